@@ -1,7 +1,9 @@
 """The public names and their modules: read by type checkers and editors, and by the package itself."""
 
 from cosserat_fenicsx import analytic as analytic
+from cosserat_fenicsx import drilling as drilling
 from cosserat_fenicsx import units as units
+from cosserat_fenicsx import well as well
 from cosserat_fenicsx.actions.centrifugal import Centrifugal as Centrifugal
 from cosserat_fenicsx.actions.fluids import AddedMass as AddedMass
 from cosserat_fenicsx.actions.fluids import Drag as Drag
@@ -15,42 +17,6 @@ from cosserat_fenicsx.actions.walls import HoleWall as HoleWall
 from cosserat_fenicsx.actions.walls import TubeRing as TubeRing
 from cosserat_fenicsx.actions.walls import TubeWall as TubeWall
 from cosserat_fenicsx.actions.walls import Wall as Wall
-from cosserat_fenicsx.drilling.bit_laws import BitOnRock as BitOnRock
-from cosserat_fenicsx.drilling.bit_laws import Cutting as Cutting
-from cosserat_fenicsx.drilling.bit_laws import Lobes as Lobes
-from cosserat_fenicsx.drilling.bit_laws import Stribeck as Stribeck
-from cosserat_fenicsx.drilling.bit_laws import Wear as Wear
-from cosserat_fenicsx.drilling.history import DrillingHistory as DrillingHistory
-from cosserat_fenicsx.drilling.linear.excitation import BitBounce as BitBounce
-from cosserat_fenicsx.drilling.linear.excitation import Campbell as Campbell
-from cosserat_fenicsx.drilling.linear.excitation import bit_bounce as bit_bounce
-from cosserat_fenicsx.drilling.linear.excitation import campbell as campbell
-from cosserat_fenicsx.drilling.linear.frequencies import SoftSpeed as SoftSpeed
-from cosserat_fenicsx.drilling.linear.frequencies import SoftTorque as SoftTorque
-from cosserat_fenicsx.drilling.linear.frequencies import natural_frequencies as natural_frequencies
-from cosserat_fenicsx.drilling.linear.limits import critical_slopes as critical_slopes
-from cosserat_fenicsx.drilling.linear.limits import limit_speed as limit_speed
-from cosserat_fenicsx.drilling.linear.limits import limit_weight as limit_weight
-from cosserat_fenicsx.drilling.linear.lumped import LumpedCutting as LumpedCutting
-from cosserat_fenicsx.drilling.linear.stability import Stability as Stability
-from cosserat_fenicsx.drilling.linear.stability import stability as stability
-from cosserat_fenicsx.drilling.mixed import BitTorque as BitTorque
-from cosserat_fenicsx.drilling.mixed import MixedScene as MixedScene
-from cosserat_fenicsx.drilling.mixed import mixed_scene as mixed_scene
-from cosserat_fenicsx.drilling.pipe_above import PipeAbove as PipeAbove
-from cosserat_fenicsx.drilling.scene import Drilling as Drilling
-from cosserat_fenicsx.drilling.scenefile import DrillingScene as DrillingScene
-from cosserat_fenicsx.drilling.segments import Discs as Discs
-from cosserat_fenicsx.drilling.simulate import simulate_drilling as simulate_drilling
-from cosserat_fenicsx.drilling.stick_slip import StickSlip as StickSlip
-from cosserat_fenicsx.drilling.top_drive import PI as PI
-from cosserat_fenicsx.drilling.top_drive import Hook as Hook
-from cosserat_fenicsx.drilling.top_drive import Matched as Matched
-from cosserat_fenicsx.drilling.top_drive import Motor as Motor
-from cosserat_fenicsx.drilling.top_drive import Stiff as Stiff
-from cosserat_fenicsx.drilling.top_drive import TopDrive as TopDrive
-from cosserat_fenicsx.drilling.wall_friction import ViscousDrag as ViscousDrag
-from cosserat_fenicsx.drilling.wall_friction import WallFriction as WallFriction
 from cosserat_fenicsx.dynamics.natural_modes import modes as modes
 from cosserat_fenicsx.dynamics.resuming import read_history as read_history
 from cosserat_fenicsx.dynamics.simulate import simulate as simulate
@@ -125,34 +91,5 @@ from cosserat_fenicsx.statics.solve import solve as solve
 from cosserat_fenicsx.storage.store import resume as resume
 from cosserat_fenicsx.studies.outcome import Study as Study
 from cosserat_fenicsx.studies.study import study as study
-from cosserat_fenicsx.well.answer import TorqueAndDrag as TorqueAndDrag
-from cosserat_fenicsx.well.calibrate import FrictionFit as FrictionFit
-from cosserat_fenicsx.well.calibrate import RigMeasurement as RigMeasurement
-from cosserat_fenicsx.well.calibrate import calibrate_friction as calibrate_friction
-from cosserat_fenicsx.well.components import Bit as Bit
-from cosserat_fenicsx.well.components import Collar as Collar
-from cosserat_fenicsx.well.components import Component as Component
-from cosserat_fenicsx.well.components import DrillPipe as DrillPipe
-from cosserat_fenicsx.well.components import DrillString as DrillString
-from cosserat_fenicsx.well.components import HeavyWeight as HeavyWeight
-from cosserat_fenicsx.well.components import Stabiliser as Stabiliser
-from cosserat_fenicsx.well.depth_sweep import DepthSweep as DepthSweep
-from cosserat_fenicsx.well.depth_sweep import depth_sweep as depth_sweep
-from cosserat_fenicsx.well.hole import Borehole as Borehole
-from cosserat_fenicsx.well.hole import HoleSection as HoleSection
-from cosserat_fenicsx.well.hole import Mud as Mud
-from cosserat_fenicsx.well.operations import BackReam as BackReam
-from cosserat_fenicsx.well.operations import Ream as Ream
-from cosserat_fenicsx.well.operations import RotaryDrilling as RotaryDrilling
-from cosserat_fenicsx.well.operations import RotateOffBottom as RotateOffBottom
-from cosserat_fenicsx.well.operations import Sliding as Sliding
-from cosserat_fenicsx.well.operations import Static as Static
-from cosserat_fenicsx.well.operations import TripIn as TripIn
-from cosserat_fenicsx.well.operations import TripOut as TripOut
-from cosserat_fenicsx.well.path import WellPath as WellPath
-from cosserat_fenicsx.well.scenefile import WellScene as WellScene
-from cosserat_fenicsx.well.torque_and_drag import torque_and_drag as torque_and_drag
 
 __version__: str
-
-def names_in(subpackage: str) -> list[str]: ...

@@ -6,7 +6,7 @@ import cosserat_fenicsx as cf
 from cosserat_fenicsx.pictures.charts import beside, draw_chart, legend
 
 #: Operations of the hook loads, their colours, and for how many depths of the bit the rod is solved.
-OPERATIONS, COLOURS, DEPTHS = (cf.TripOut(), cf.TripIn()), ("tab:blue", "tab:orange"), 9
+OPERATIONS, COLOURS, DEPTHS = (cf.well.TripOut(), cf.well.TripIn()), ("tab:blue", "tab:orange"), 9
 
 
 def stiff_and_soft(scene, drilling, file):
@@ -17,7 +17,7 @@ def stiff_and_soft(scene, drilling, file):
     """
     depths = np.linspace(scene.sweep["depths"][0], scene.hole.length, DEPTHS)
     soft, stiff = (
-        cf.depth_sweep(scene.hole, scene.string, OPERATIONS, depths, mud=scene.mud, model=model, tol=1e-3)
+        cf.well.depth_sweep(scene.hole, scene.string, OPERATIONS, depths, mud=scene.mud, model=model, tol=1e-3)
         for model in ("soft", "rod")
     )
     draw_chart(lambda: _figure(scene, drilling, depths, soft, stiff), file)
@@ -32,7 +32,7 @@ def _figure(scene, drilling, depths, soft, stiff):
         apart.plot(loads - given, depths, "o-", color=colour, fillstyle="none", label=operation.name)
     hook.set(xlabel="hook load (kN)", ylabel="measured depth, of the bit or along the string (m)")
     apart.set(xlabel="hook load of the rod less that of the soft string (kN)")
-    flexible = cf.torque_and_drag(
+    flexible = cf.well.torque_and_drag(
         scene.hole, scene.string, drilling.operation, mud=scene.mud, depth=drilling.depth, model="soft"
     )
     side.plot(

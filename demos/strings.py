@@ -26,7 +26,7 @@ def ends_at(scene, low, high):
     """The speed (rpm) between two above which the bit, from rest, no longer sticks after 170 s, to half a rpm."""
     while high - low > 0.5:
         middle = (low + high) / 2
-        history = cf.simulate_drilling(scene.with_case(middle * cf.units.rpm), 200.0, save_every=0.02)
+        history = cf.drilling.simulate_drilling(scene.with_case(middle * cf.units.rpm), 200.0, save_every=0.02)
         low, high = (middle, high) if history.stick_slip(since=170.0).sticks else (low, middle)
     return (low + high) / 2
 
@@ -66,8 +66,14 @@ def off_bottom(found, history, folder):
     passes = t[1:][(bit[1:] >= half) & (bit[:-1] < half)]
     starts = passes[np.diff(passes, prepend=0.0) > 1.0]
     yield Check("starts of the bit (s)", starts[:4], [5.40788, 10.78348, 16.60839, 22.48980], 0.02, _WAVES)
-    loads = cf.torque_and_drag(found.scene.hole.with_friction(0.195), found.scene.string, cf.RotateOffBottom(),
-                               mud=found.scene.mud, model="soft", torque_convention="johancsik")  # fmt: skip
+    loads = cf.well.torque_and_drag(
+        found.scene.hole.with_friction(0.195),
+        found.scene.string,
+        cf.well.RotateOffBottom(),
+        mud=found.scene.mud,
+        model="soft",
+        torque_convention="johancsik",
+    )
     late = history.times > 10.0
     drag = found.scene.drag.torsion * sum(p.rhoJ * p.length for p in parts) * found.scene.drive.speed
     mean = float(history.surface_torque[late].mean())
@@ -80,8 +86,13 @@ def stopped_block(found, history, folder):
     weight = sum(part.weight * part.length for part in found.scene.segments)
     t, beyond = history.times, history.hook_load - weight
     first, second = (beyond[(t > a) & (t < b)].mean() for a, b in ((0.1, 1.1), (1.19, 1.245)))
-    yield Check("hook load beyond the weight (kN)", [first / 1e3, second / 1e3], [136.846523, 326.805338], 1.5,
-                "staircase, exact")  # fmt: skip
+    yield Check(
+        "hook load beyond the weight (kN)",
+        [first / 1e3, second / 1e3],
+        [136.846523, 326.805338],
+        1.5,
+        "staircase, exact",
+    )
 
 
 def four_discs(found, history, folder):

@@ -95,7 +95,7 @@ def cable_in_conduit(folder):
     exp(mu times the angle that it turns by); its little bending stiffness changes that by about EI/(T R^2)."""
     bend, straight, mu = 1.0, 0.5, 0.3  # m, m, -
     md = np.cumsum([0.0, straight, bend * math.pi / 2, straight])
-    axis = cf.WellPath.from_survey(md, [90, 90, 90, 90], [0, 0, 90, 90])  # a horizontal one
+    axis = cf.well.WellPath.from_survey(md, [90, 90, 90, 90], [0, 0, 90, 90])  # a horizontal one
     cable, polymer = cf.Circle(0.012), cf.Material(E=2e9, nu=0.4)
     ends = [tuple(row) for row in axis.position(md)]
     curves = cf.Line(*ends[:2]), cf.Arc((straight, bend, 0.0), ends[1], math.pi / 2), cf.Line(*ends[2:])

@@ -16,7 +16,7 @@ ARM, CLEARANCE = OUTER / 2, (HOLE - OUTER) / 2
 STEEL_MASS, MUD_MASS, DRAG, EI = 149.6953, 51.8744, 283.1071, 8464506.9
 MESH = {"elements": 8, "degree": 2}
 _STEEL, _MIDDLE, _BEGIN = cf.Material(206e9, 0.2989, density=7850.0), LENGTH / 2, 0.2
-_AXIS = cf.WellPath.from_survey([0, 100], [0, 0], [0, 0])
+_AXIS = cf.well.WellPath.from_survey([0, 100], [0, 0], [0, 0])
 # The coupling above the collar: stiff in torsion, soft in bending, but so short (_BEGIN, m) that no torque buckles it.
 _SHAPE = ((0.06, 0.06), (-0.06, 0.06), (-0.06, -0.06), (0.06, -0.06))
 _COUPLING = cf.Stiffness((1e7, 1e7), 1e8, (5e2, 5e2), 1e5, mass=1.0, inertia=(1e-2, 1e-2, 2e-2), outline=_SHAPE)

@@ -21,9 +21,9 @@ def assembly(scene):
     thrust, pieces, held = scene.operations[0].weight, [], {}
     for part in scene.string.components:
         stiffness, weight = part.stiffness, weight_in_mud(part, scene.mud)
-        halves = 2 if isinstance(part, cf.Stabiliser) else 1
+        halves = 2 if isinstance(part, cf.well.Stabiliser) else 1
         for k in range(halves):
-            if k or isinstance(part, cf.Bit):
+            if k or isinstance(part, cf.well.Bit):
                 held[len(pieces)] = part.contact_radius - hole
             pieces.append((part.length and part.length / halves, stiffness.bending[0], stiffness.shear[0], weight))
     length, EI, GA, w = (np.array(x, dtype=float)[:, None] for x in zip(*pieces, strict=True))

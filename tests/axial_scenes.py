@@ -14,23 +14,25 @@ WEIGHT, MU = 222.00153767384313, 0.25  # of the pipe in mud, N/m, and its fricti
 def string(*parts, weight=0.0):
     """Parts (length, outer, inner diameter), from the top down, of one weight in mud (N/m)."""
     material = cf.Material(E=E, nu=E / 2 / G - 1, density=DENSITY)
-    return cf.DrillString(
-        [cf.Component(length, cf.Tube(outer, inner).stiffness(material), weight, outer / 2)
+    return cf.well.DrillString(
+        [cf.well.Component(length, cf.Tube(outer, inner).stiffness(material), weight, outer / 2)
          for length, outer, inner in parts], order="top down",
     )  # fmt: skip
 
 
 def hanging(hook=None, drive=None, bit=None, weight=0.0, **more):
     """Pipe and collars in a straight vertical hole without walls."""
-    return cf.Drilling(string(PIPE, COLLARS, weight=weight), drive or cf.TopDrive(0.0), bit, hook=hook, **more)
+    return cf.drilling.Drilling(
+        string(PIPE, COLLARS, weight=weight), drive or cf.drilling.TopDrive(0.0), bit, hook=hook, **more
+    )
 
 
 def in_a_well(md, inclination, hook=None, turns=0.0, **more):
     """The pipe in a well of some stations, pulled by a hook and turned (rad/s)."""
-    path = cf.WellPath.from_survey(md, inclination, np.zeros(len(md)), degrees=True)
-    hole = cf.Borehole(path, cf.HoleSection(md[-1], 0.2159, MU))
+    path = cf.well.WellPath.from_survey(md, inclination, np.zeros(len(md)), degrees=True)
+    hole = cf.well.Borehole(path, cf.well.HoleSection(md[-1], 0.2159, MU))
     pipe = string((md[-1], *PIPE[1:]), weight=WEIGHT)
-    return cf.Drilling(pipe, cf.TopDrive(turns), hole=hole, hook=hook, **more)
+    return cf.drilling.Drilling(pipe, cf.drilling.TopDrive(turns), hole=hole, hook=hook, **more)
 
 
 def column(rows, name):

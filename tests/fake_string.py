@@ -65,10 +65,14 @@ class Pendulum:
 
 
 def scene(**changed):
-    pipe = cf.DrillPipe(2000.0, size="5 in 19.50 lb/ft")
-    law = cf.Stribeck(static=6000.0, dynamic=3000.0)
-    given = {"string": cf.DrillString([pipe]), "drive": cf.TopDrive(60 * cf.units.rpm), "bit": cf.BitOnRock(law)}
-    return cf.Drilling(**{**given, **changed})
+    pipe = cf.well.DrillPipe(2000.0, size="5 in 19.50 lb/ft")
+    law = cf.drilling.Stribeck(static=6000.0, dynamic=3000.0)
+    given = {
+        "string": cf.well.DrillString([pipe]),
+        "drive": cf.drilling.TopDrive(60 * cf.units.rpm),
+        "bit": cf.drilling.BitOnRock(law),
+    }
+    return cf.drilling.Drilling(**{**given, **changed})
 
 
 def use(monkeypatch, **settings):

@@ -40,9 +40,9 @@ class Drawn(NamedTuple):
     """A well with a string, and what is done."""
 
     name: str
-    hole: cf.Borehole
-    string: cf.DrillString
-    mud: cf.Mud
+    hole: cf.well.Borehole
+    string: cf.well.DrillString
+    mud: cf.well.Mud
     depth: float
     operations: list
 
@@ -68,33 +68,44 @@ def survey(rng):
 def draw(seed):
     """The `Drawn` of a seed."""
     rng = np.random.default_rng(seed)
-    path = cf.WellPath.from_survey(*survey(rng), degrees=True)
+    path = cf.well.WellPath.from_survey(*survey(rng), degrees=True)
     name = str(rng.choice(list(PIPES)))
     outer, inner, joint, mass, least, most = PIPES[name]
     size, diameter, friction = (outer / 5) ** 2, rng.uniform(least, most) * inch, rng.uniform(0, 0.5)
-    sections = [cf.HoleSection(path.length, diameter, friction)]
+    sections = [cf.well.HoleSection(path.length, diameter, friction)]
     if rng.random() < 0.5:
-        casing = cf.HoleSection(path.length * rng.uniform(0.2, 0.8), diameter * rng.uniform(1.0, 1.3), 0.7 * friction)
+        casing = cf.well.HoleSection(
+            path.length * rng.uniform(0.2, 0.8), diameter * rng.uniform(1.0, 1.3), 0.7 * friction
+        )
         sections.insert(0, casing)
     body = min(joint * inch, 0.85 * diameter)
     tube = {"outer_diameter": body, "inner_diameter": 0.35 * body}
-    parts = [cf.Bit(diameter)] if seed % 3 == 0 else []
+    parts = [cf.well.Bit(diameter)] if seed % 3 == 0 else []
     for _ in range(int(rng.integers(0, 4)) if parts else 0):
-        parts += [cf.Stabiliser(rng.uniform(1, 2), max(body, diameter - rng.choice(UNDER)), **tube),
-                  cf.Collar(rng.uniform(2, 20), **tube)]  # fmt: skip
-    parts += [cf.Collar(rng.uniform(20, 150), **tube)] if rng.random() < 0.6 else []
-    pipe = cf.DrillPipe(outer_diameter=outer * inch, inner_diameter=inner * inch, tool_joint=joint * inch, mass=mass)
+        parts += [
+            cf.well.Stabiliser(rng.uniform(1, 2), max(body, diameter - rng.choice(UNDER)), **tube),
+            cf.well.Collar(rng.uniform(2, 20), **tube),
+        ]
+    parts += [cf.well.Collar(rng.uniform(20, 150), **tube)] if rng.random() < 0.6 else []
+    pipe = cf.well.DrillPipe(
+        outer_diameter=outer * inch, inner_diameter=inner * inch, tool_joint=joint * inch, mass=mass
+    )
     weight, torque, speed, rpm = rng.uniform(0, 100e3) * size, rng.uniform(0, 5e3) * size, *rng.uniform(0.02, 2, 2)
     known = [
-        cf.TripOut(float(rng.choice([0.0, -100e3 * size]))), cf.TripIn(), cf.RotateOffBottom(), cf.Static(),
-        cf.RotaryDrilling(weight, torque), cf.Sliding(weight, torque), cf.Ream(speed, 60 * rpm),
-        cf.BackReam(speed, 60 * rpm),
-    ]  # fmt: skip
+        cf.well.TripOut(float(rng.choice([0.0, -100e3 * size]))),
+        cf.well.TripIn(),
+        cf.well.RotateOffBottom(),
+        cf.well.Static(),
+        cf.well.RotaryDrilling(weight, torque),
+        cf.well.Sliding(weight, torque),
+        cf.well.Ream(speed, 60 * rpm),
+        cf.well.BackReam(speed, 60 * rpm),
+    ]
     operations = [known[i] for i in rng.choice(len(known), OPERATIONS, replace=False)]
     depth = path.length * (1.0 if rng.random() < 0.5 else rng.uniform(0.5, 1.0))
     told = f"{name} in{', assembly' if len(parts) > 1 else ''}, {depth:.0f} m, {len(path.md)} stations"
-    mud = cf.Mud(rng.uniform(900, 2000))
-    return Drawn(told, cf.Borehole(path, sections), cf.DrillString([*parts, pipe]), mud, depth, operations)
+    mud = cf.well.Mud(rng.uniform(900, 2000))
+    return Drawn(told, cf.well.Borehole(path, sections), cf.well.DrillString([*parts, pipe]), mud, depth, operations)
 
 
 def compare(drawn, operation):
@@ -107,7 +118,7 @@ def compare(drawn, operation):
     began = time.process_time()
     with patch.object(rod_in_hole, "solve_in_hole", wraps=rod_in_hole.solve_in_hole) as asked:
         try:
-            answer = cf.torque_and_drag(drawn.hole, drawn.string, operation, **given)
+            answer = cf.well.torque_and_drag(drawn.hole, drawn.string, operation, **given)
         except (cf.SceneError, cf.NotConverged) as refusal:
             return f"refused: {refusal}", time.process_time() - began, 0, {}
     spent = time.process_time() - began
@@ -117,11 +128,12 @@ def compare(drawn, operation):
             (place, named), found = asked.call_args, answer.solved
             count = min(FINEST, FINER * found.path.elements[0])
             true = rod_in_hole.solve_in_hole(*place, **{**named, "elements": count, "wall_stiffness": STIFF})
-            errors = {name: (error, abs(getattr(found, name) - getattr(true, name)))
-                      for name, error in found.errors.items()}  # fmt: skip
+            errors = {
+                name: (error, abs(getattr(found, name) - getattr(true, name))) for name, error in found.errors.items()
+            }
             return said, spent, found.steps, errors
         if answer.enough:
-            true = cf.torque_and_drag(drawn.hole, drawn.string, operation, **given, model="rod")
+            true = cf.well.torque_and_drag(drawn.hole, drawn.string, operation, **given, model="rod")
             told = (answer.error + answer.model_error) * np.abs(answer.tension).max() + true.solved.errors["hook_load"]
             return said, spent, 0, {"hook_load": (told, abs(answer.hook_load - true.hook_load))}
     except cf.NotConverged as unknown:

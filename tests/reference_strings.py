@@ -12,33 +12,33 @@ RPM = math.pi / 30
 
 def tubes(*sections):
     """A `DrillString` of sections from the top down: pipe, then collars."""
-    kinds = (cf.DrillPipe, cf.Collar)
+    kinds = (cf.well.DrillPipe, cf.well.Collar)
     parts = []
     for kind, s in zip(kinds, sections, strict=False):
         steel = cf.Material(E=s["E"], nu=s["E"] / (2 * s["G"]) - 1, density=s["rho"])
         parts.append(kind(s["length"], None, s["od"], s["id"], material=steel))
-    return cf.DrillString(tuple(parts), order="top down")
+    return cf.well.DrillString(tuple(parts), order="top down")
 
 
 def drive_of(name, speed=1.0):
     top = GIVEN["tops"][name]
     if top["type"] == "rigid":
-        return cf.TopDrive(speed)
+        return cf.drilling.TopDrive(speed)
     if top["type"] == "PI":
-        return cf.TopDrive(speed, top["I"], cf.PI(top["Kp"], top["Ki"]))
-    return cf.TopDrive(speed, control=cf.Matched())
+        return cf.drilling.TopDrive(speed, top["I"], cf.drilling.PI(top["Kp"], top["Ki"]))
+    return cf.drilling.TopDrive(speed, control=cf.drilling.Matched())
 
 
 def falling(rate=0.3):
     law = GIVEN["law"]
-    return cf.Stribeck(law["mu_s"], law["mu_c"], law["v_f"] / rate, radius=law["R"])
+    return cf.drilling.Stribeck(law["mu_s"], law["mu_c"], law["v_f"] / rate, radius=law["R"])
 
 
 def pipe_and_collars(top="rigid", drag=0.1, inertia=0.0, **changes):
     """Pipe and collars with a falling torque on bit of 100 kN."""
-    bit = cf.BitOnRock(falling(), weight=1e5, inertia=inertia)
+    bit = cf.drilling.BitOnRock(falling(), weight=1e5, inertia=inertia)
     given = {"string": tubes(*GIVEN["sections"]), "drive": drive_of(top), "bit": bit}
-    return cf.Drilling(**(given | {"drag": cf.ViscousDrag(drag, drag)} | changes))
+    return cf.drilling.Drilling(**(given | {"drag": cf.drilling.ViscousDrag(drag, drag)} | changes))
 
 
 def weight_of_slope(slope, speed):
@@ -51,7 +51,9 @@ def weight_of_slope(slope, speed):
 def public_discs(control, weight):
     """The four discs of Navarro-Lopez & Cortes, J. Sound Vib. 307 (2007) 152, doi:10.1016/j.jsv.2007.06.037."""
     given = GIVEN["discs"]
-    discs = cf.Discs(given["J"], given["k"], given["c"], (given["c_r"], 0, 0, given["c_b"]))
-    law = cf.Stribeck(given["mu_sb"], given["mu_cb"], given["v_f"] / given["gamma_b"], radius=given["R_b"])
-    drive = cf.TopDrive(1.0) if isinstance(control, cf.Stiff) else cf.TopDrive(control=control)
-    return cf.Drilling(discs, drive, cf.BitOnRock(law, weight=weight))
+    discs = cf.drilling.Discs(given["J"], given["k"], given["c"], (given["c_r"], 0, 0, given["c_b"]))
+    law = cf.drilling.Stribeck(given["mu_sb"], given["mu_cb"], given["v_f"] / given["gamma_b"], radius=given["R_b"])
+    drive = (
+        cf.drilling.TopDrive(1.0) if isinstance(control, cf.drilling.Stiff) else cf.drilling.TopDrive(control=control)
+    )
+    return cf.drilling.Drilling(discs, drive, cf.drilling.BitOnRock(law, weight=weight))

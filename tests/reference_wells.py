@@ -17,16 +17,16 @@ WELLS = json.loads((Path(__file__).parent / "reference" / "wells.json").read_tex
 
 def well(name):
     """The `WellPath` of a reference well."""
-    return cf.WellPath.from_survey(*np.transpose(WELLS[name]["stations_md_inc_azi"]))
+    return cf.well.WellPath.from_survey(*np.transpose(WELLS[name]["stations_md_inc_azi"]))
 
 
 def in_build_section(case):
     """The rod of `torque_and_drag` in a build section of reference/rod_in_hole.json."""
     given, alpha = case["input"], case["input"]["alpha"]
     md = np.cumsum([0, given["h"], given["R"] * math.radians(alpha), given["D"] + 50.0])
-    path = cf.WellPath.from_survey(md, [0, 0, alpha, alpha], [0, 0, 0, 0])
+    path = cf.well.WellPath.from_survey(md, [0, 0, alpha, alpha], [0, 0, 0, 0])
     stiff = cf.Stiffness((1e12, 1e12), 1e12, (given["EI"],) * 2, given["EI"])
-    string = cf.DrillString([cf.Component(None, stiff, given["w"], 0.06)])
-    operation = {1: cf.TripOut, -1: cf.TripIn, 0: cf.Static}[given["c"]](weight=-given["T0"])
-    hole = cf.Borehole(path, cf.HoleSection(path.length, 2 * (0.06 + given["r"]), given["mu"]))
-    return cf.torque_and_drag(hole, string, operation, depth=case["rod_length"], model="rod")
+    string = cf.well.DrillString([cf.well.Component(None, stiff, given["w"], 0.06)])
+    operation = {1: cf.well.TripOut, -1: cf.well.TripIn, 0: cf.well.Static}[given["c"]](weight=-given["T0"])
+    hole = cf.well.Borehole(path, cf.well.HoleSection(path.length, 2 * (0.06 + given["r"]), given["mu"]))
+    return cf.well.torque_and_drag(hole, string, operation, depth=case["rod_length"], model="rod")

@@ -15,7 +15,7 @@ from cosserat_fenicsx.scene import action
 #: d_whirl.json, without axial compression, as far as these tests need it.
 COLLAR = json.loads((Path(__file__).parent / "reference" / "whirl.json").read_text())
 LENGTH, ARM, CLEARANCE = 12.0, COLLAR["od"] / 2, COLLAR["clearance"]
-AXIS = cf.WellPath.from_survey([0, 100], [0, 0], [0, 0])
+AXIS = cf.well.WellPath.from_survey([0, 100], [0, 0], [0, 0])
 
 
 @dataclass(frozen=True)

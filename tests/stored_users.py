@@ -18,8 +18,10 @@ from cosserat_fenicsx.dynamics import resuming
 from cosserat_fenicsx.storage import files
 from cosserat_fenicsx.storage.store import Store, read
 
-HOLE = cf.Borehole(cf.WellPath.from_survey([0, 500, 1000], [0, 0, 30], [0, 0, 0]), cf.HoleSection(1000.0, 0.2159, 0.2))
-STRING = cf.DrillString([cf.DrillPipe(size="5 in 19.50 lb/ft")])
+HOLE = cf.well.Borehole(
+    cf.well.WellPath.from_survey([0, 500, 1000], [0, 0, 30], [0, 0, 0]), cf.well.HoleSection(1000.0, 0.2159, 0.2)
+)
+STRING = cf.well.DrillString([cf.well.DrillPipe(size="5 in 19.50 lb/ft")])
 
 
 def third(i):
@@ -33,10 +35,17 @@ def study(folder, upto=12):
 
 
 def sweep(folder, tol=1e-4):
-    return cf.depth_sweep(
-        HOLE, STRING, [cf.TripOut(), cf.TripIn()], [600.0, 800.0, 1000.0], mud=cf.Mud(1200.0), model="soft", tol=tol,
-        folder=folder, progress=False,
-    )  # fmt: skip
+    return cf.well.depth_sweep(
+        HOLE,
+        STRING,
+        [cf.well.TripOut(), cf.well.TripIn()],
+        [600.0, 800.0, 1000.0],
+        mud=cf.well.Mud(1200.0),
+        model="soft",
+        tol=tol,
+        folder=folder,
+        progress=False,
+    )
 
 
 def rods(folder, dt=0.05):
@@ -44,7 +53,9 @@ def rods(folder, dt=0.05):
 
 
 def string(folder, dt=0.01):
-    return cf.simulate_drilling(fake_string.scene(), 5.0, dt=dt, folder=folder, profile_every=0.5, progress=False)
+    return cf.drilling.simulate_drilling(
+        fake_string.scene(), 5.0, dt=dt, folder=folder, profile_every=0.5, progress=False
+    )
 
 
 def goes_on(folder):
@@ -75,19 +86,34 @@ class User:
 
 USERS = {
     "rods": User(
-        rods, goes_on, cf.read_history, lambda folder: rods(folder, 0.1),
+        rods,
+        goes_on,
+        cf.read_history,
+        lambda folder: rods(folder, 0.1),
         lambda x: [np.array(x._file.rows[name]).tobytes() for name in x._file.rows.dtype.names if len(x)],
-        "simulate", "motion",
+        "simulate",
+        "motion",
     ),
     "string": User(
-        string, goes_on, cf.read, lambda folder: string(folder, 0.02),
-        lambda x: [x.rows.tobytes(), x._along().tobytes()], "simulate_drilling", "motion of a drill-string",
+        string,
+        goes_on,
+        cf.read,
+        lambda folder: string(folder, 0.02),
+        lambda x: [x.rows.tobytes(), x._along().tobytes()],
+        "simulate_drilling",
+        "motion of a drill-string",
     ),
     "study": User(study, study, study, lambda folder: study(folder, 13), of_study, "study", "study"),
     "sweep": User(
-        sweep, goes_on, read, lambda folder: sweep(folder, 1e-3), of_sweep, "depth_sweep", "sweep",
+        sweep,
+        goes_on,
+        read,
+        lambda folder: sweep(folder, 1e-3),
+        of_sweep,
+        "depth_sweep",
+        "sweep",
     ),
-}  # fmt: skip
+}
 
 
 def use(monkeypatch, apart=0.0):
@@ -160,13 +186,18 @@ def mutated(folder, chance, other):
     size = chance.choice((1, 4, 40))
     noise = bytes(chance.randrange(256) for _ in range(size))
     ways = {
-        "truncated": lambda: data[:place], "overwritten": lambda: data[:place] + noise + data[place + size :],
-        "longer": lambda: data[:place] + noise + data[place:], "shorter": lambda: data[:place] + data[place + size :],
-        "twice": lambda: data * 2, "zeros": lambda: data + bytes(size), "emptied": lambda: b"",
-        "digit": lambda: data.replace(b"1", b"2", 1), "swapped": lambda: data[place:] + data[:place],
+        "truncated": lambda: data[:place],
+        "overwritten": lambda: data[:place] + noise + data[place + size :],
+        "longer": lambda: data[:place] + noise + data[place:],
+        "shorter": lambda: data[:place] + data[place + size :],
+        "twice": lambda: data * 2,
+        "zeros": lambda: data + bytes(size),
+        "emptied": lambda: b"",
+        "digit": lambda: data.replace(b"1", b"2", 1),
+        "swapped": lambda: data[place:] + data[:place],
         "of another": lambda: (other / file.name).read_bytes() if file.name in names else b"",
         "missing": None,
-    }  # fmt: skip
+    }
     names = {x.name for x in other.iterdir()} - {"stored.json"}  # with which it is that computation
     way = chance.choice(list(ways))
     file.unlink() if way == "missing" else file.write_bytes(ways[way]())

@@ -84,7 +84,7 @@ def test_drag_stops_a_rod():
 
 def test_the_mud_around_a_collar():
     steel = cf.Material(206e9, 0.3, density=7850.0)
-    line, mud = cf.Line((0, 0, 0), (0, 0, 12)), cf.Mud(1200.0, added_mass=1.7, drag=283.0)
+    line, mud = cf.Line((0, 0, 0), (0, 0, 12)), cf.well.Mud(1200.0, added_mass=1.7, drag=283.0)
     tube = cf.Rod(line, cf.Tube(0.1714, 0.0714), steel)
     mass, drag = mud.along(tube)
     assert mass.mass == pytest.approx(47.06972748986194 + 4.804714105288387, rel=1e-12) and mass.lateral
@@ -94,7 +94,7 @@ def test_the_mud_around_a_collar():
     assert ends == (5.0, 12.0) and masses == pytest.approx([mass.mass, 1.7 * 1200 * np.pi / 4 * 0.01])
     bare = cf.Rod(line, SECTION, name="bare")
     assert mud.along(bare, 0.1714, 0.0714)[0].mass == pytest.approx(mass.mass)
-    assert cf.Mud(1200.0).along(tube) == ()
+    assert cf.well.Mud(1200.0).along(tube) == ()
     with pytest.raises(cf.SceneError, match=r"Mud.along.outer = None: expected the diameter of rod 'bare'"):
         mud.along(bare)
 
@@ -102,8 +102,8 @@ def test_the_mud_around_a_collar():
 @pytest.mark.parametrize(
     "make, words",
     [
-        (lambda: cf.Mud(1200.0, added_mass=-1.0), "Mud.added_mass = -1.0: expected a coefficient, not negative"),
-        (lambda: cf.Mud(1200.0, drag=np.inf), "Mud.drag = inf"),
+        (lambda: cf.well.Mud(1200.0, added_mass=-1.0), "Mud.added_mass = -1.0: expected a coefficient, not negative"),
+        (lambda: cf.well.Mud(1200.0, drag=np.inf), "Mud.drag = inf"),
         (lambda: AddedMass(ROD, 0.0), "AddedMass.mass = 0.0: expected a positive number"),
         (lambda: AddedMass(ROD, [(1.0, 2.0), (0.5, 1.0)]), r"AddedMass.mass\[1\].to"),
         (lambda: AddedMass(ROD, [(1.0, -2.0), (None, 1.0)]), r"AddedMass.mass\[0\] = -2.0"),

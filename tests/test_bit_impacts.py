@@ -19,10 +19,10 @@ UP = LOBES * TURNS * HEIGHT  # m/s, of the rock below a bit in steady rotation, 
 
 def bouncing(stiffness=math.inf, mass=MASS, height=HEIGHT, law=None, **changed):
     """A uniform string of 2000 m: in the first 0.78 s nothing comes back from its top."""
-    string = cf.DrillString([cf.Collar(2000.0, outer_diameter=0.2, inner_diameter=0.07)])
-    bit = cf.BitOnRock(cf.Lobes(LOBES, height, law), WEIGHT, mass=mass, rock_stiffness=stiffness)
-    given = {"string": string, "drive": cf.TopDrive(TURNS), "bit": bit, "start": "steady"} | changed
-    return cf.Drilling(**given)
+    string = cf.well.DrillString([cf.well.Collar(2000.0, outer_diameter=0.2, inner_diameter=0.07)])
+    bit = cf.drilling.BitOnRock(cf.drilling.Lobes(LOBES, height, law), WEIGHT, mass=mass, rock_stiffness=stiffness)
+    given = {"string": string, "drive": cf.drilling.TopDrive(TURNS), "bit": bit, "start": "steady"} | changed
+    return cf.drilling.Drilling(**given)
 
 
 def exact(scene, until):
@@ -46,7 +46,7 @@ def test_a_weight_on_rigid_rock_is_that_of_the_wave_and_the_impulse_is_told(mass
     scene, found = bouncing(mass=mass), []
     wave = WEIGHT + scene.segments[0].axial_impedance * UP
     for dt, elements in ((4e-3, None), (2e-3, None), (1e-3, None), (5e-4, 250)):
-        history = cf.simulate_drilling(scene, 0.5, dt=dt, elements=elements)
+        history = cf.drilling.simulate_drilling(scene, 0.5, dt=dt, elements=elements)
         impulse, weight = history.impulse_on_bit, history.weight_on_bit
         assert impulse[0] == pytest.approx(mass * UP, rel=0.02, abs=1e-9) and (np.diff(impulse) >= 0).all()
         assert weight[history.times < 8.5e-3].mean() == pytest.approx(wave, rel=0.04)
@@ -67,7 +67,7 @@ def test_rock_that_gives_way_makes_a_force_that_converges(stiffness, mass):
     weight = exact(scene, 0.5)
     usual = AxialTorsional(scene).dt
     for share in (2.0, 1.0, 0.5):
-        history = cf.simulate_drilling(scene, 0.5, dt=share * usual)
+        history = cf.drilling.simulate_drilling(scene, 0.5, dt=share * usual)
         true = weight(history.mean_times)
         off.append(np.sqrt(np.mean((history.weight_on_bit - true) ** 2)) / true.max())
         assert history.weight_on_bit.min() == 0 and (history.impulse_on_bit == 0).all()
@@ -90,9 +90,9 @@ def test_steps_that_do_not_resolve_an_impact_are_told():
 def test_a_bit_that_is_set_down_on_rigid_rock_has_the_impulse_of_its_mass(mass):
     """It is lifted, then lowered with 1 m/s, at rest in itself: m v, and the force Z v of the wave that starts."""
     times = [0.0, 2.0, 4.0, 9.0, 11.0, 13.0]
-    hook = cf.Hook(speed=cf.Table(times, [(0.0,), (0.5,), (0.0,), (0.0,), (-1.0,), (-1.0,)]))
-    bit = cf.BitOnRock(cf.Stribeck(0.0, 0.0), 1e4, mass=mass)
-    scene = hanging(hook, bit=bit, weight=300.0, drag=cf.ViscousDrag(0.0, 2.0))
+    hook = cf.drilling.Hook(speed=cf.Table(times, [(0.0,), (0.5,), (0.0,), (0.0,), (-1.0,), (-1.0,)]))
+    bit = cf.drilling.BitOnRock(cf.drilling.Stribeck(0.0, 0.0), 1e4, mass=mass)
+    scene = hanging(hook, bit=bit, weight=300.0, drag=cf.drilling.ViscousDrag(0.0, 2.0))
     Z = scene.segments[-1].axial_impedance
     for dt in (4e-3, 2e-3):
         rows = AxialTorsional(scene, dt, 300).advance(round(12.3 / dt))
@@ -106,9 +106,11 @@ def test_a_bit_that_is_set_down_on_rigid_rock_has_the_impulse_of_its_mass(mass):
 
 def test_a_disc_that_bounces_has_its_whole_mass():
     """The mass of the last disc, on a spring, comes down on a rock that rises."""
-    discs = cf.Discs((1e3, 100.0), (500.0,), masses=(1e5, 2e3), axial_stiffnesses=(1e6,))
-    bit = cf.BitOnRock(cf.Lobes(LOBES, HEIGHT), 1e3, mass=500.0)
-    history = cf.simulate_drilling(cf.Drilling(discs, cf.TopDrive(TURNS), bit, start="steady"), 0.5, dt=1e-3)
+    discs = cf.drilling.Discs((1e3, 100.0), (500.0,), masses=(1e5, 2e3), axial_stiffnesses=(1e6,))
+    bit = cf.drilling.BitOnRock(cf.drilling.Lobes(LOBES, HEIGHT), 1e3, mass=500.0)
+    history = cf.drilling.simulate_drilling(
+        cf.drilling.Drilling(discs, cf.drilling.TopDrive(TURNS), bit, start="steady"), 0.5, dt=1e-3
+    )
     assert history.impulse_on_bit[0] == pytest.approx(2500.0 * UP, rel=1e-3) and history.weight_on_bit.max() < 4e4
 
 
@@ -116,7 +118,7 @@ def test_a_torque_by_the_weight_leaves_out_what_belongs_to_an_impulse():
     """Whatever the step; and what is recalled goes on to the same digits."""
     largest = []
     for dt in (2e-3, 1e-3, 5e-4):
-        scene = bouncing(law=cf.Stribeck(0.3, 0.3, radius=0.1), mass=3e3)
+        scene = bouncing(law=cf.drilling.Stribeck(0.3, 0.3, radius=0.1), mass=3e3)
         model, again = AxialTorsional(scene, dt, 300), AxialTorsional(scene, dt, 300)
         rows = model.advance(round(0.05 / dt))
         largest.append(column(rows, "torque_on_bit").max())
@@ -131,21 +133,23 @@ def test_a_torque_by_the_weight_leaves_out_what_belongs_to_an_impulse():
 def test_lobes_shake_the_weight_less_where_the_rock_gives_way(rpm, stiffness):
     """`bit_bounce` and the motion agree: D k/(D + k) of the dynamic stiffness D of the string."""
     turns = rpm * cf.units.rpm
-    bit = cf.BitOnRock(cf.Lobes(LOBES, 0.001), weight=80e3, mass=500.0, rock_stiffness=stiffness)
-    scene = hanging(cf.Hook(5e6), cf.TopDrive(turns), bit, drag=cf.ViscousDrag(0.2, 0.2), start="steady")
+    bit = cf.drilling.BitOnRock(cf.drilling.Lobes(LOBES, 0.001), weight=80e3, mass=500.0, rock_stiffness=stiffness)
+    scene = hanging(
+        cf.drilling.Hook(5e6), cf.drilling.TopDrive(turns), bit, drag=cf.drilling.ViscousDrag(0.2, 0.2), start="steady"
+    )
     model = AxialTorsional(scene, 0.002, 300)
     rows = model.advance(30000)[20000:]
     phase = LOBES * turns * (rows[:, 0] - model.dt / 2)
     parts = np.column_stack([np.sin(phase), np.cos(phase), np.ones(len(phase))])
     sine, cosine, mean = np.linalg.lstsq(parts, column(rows, "weight_on_bit"), rcond=None)[0]
-    expected = cf.bit_bounce(scene, [turns]).amplitude[0]
+    expected = cf.drilling.bit_bounce(scene, [turns]).amplitude[0]
     assert math.hypot(sine, cosine) == pytest.approx(expected, rel=4e-3) and mean == pytest.approx(80e3, rel=1e-3)
 
 
 def test_a_rock_in_other_units_is_doubted():
     """1000 kN/mm, say, as a number of 1e3 N/m."""
     with pytest.warns(cf.SceneWarning, match="BitOnRock.rock_stiffness = 1000 N/m: 60000 N press the bit by 60 m into"):
-        cf.BitOnRock(cf.Lobes(3, 8e-3), weight=6e4, rock_stiffness=1e3)
+        cf.drilling.BitOnRock(cf.drilling.Lobes(3, 8e-3), weight=6e4, rock_stiffness=1e3)
 
 
 @pytest.mark.parametrize(
@@ -153,12 +157,15 @@ def test_a_rock_in_other_units_is_doubted():
     [
         ({"weight": 1e4, "rock_stiffness": 0.0}, "BitOnRock.rock_stiffness = 0.0: expected a positive number or inf"),
         ({"rock_stiffness": 1e8}, "BitOnRock.weight = None: expected the weight on bit .* where the rock has"),
-        ({"law": cf.Cutting(0.1, 6e7, 0.6, 4), "weight": 1e4, "rock_stiffness": 1e8}, "Cutting has a depth of cut"),
+        (
+            {"law": cf.drilling.Cutting(0.1, 6e7, 0.6, 4), "weight": 1e4, "rock_stiffness": 1e8},
+            "Cutting has a depth of cut",
+        ),
     ],
 )
 def test_refusals(given, words):
     with pytest.raises(cf.SceneError, match=words):
-        cf.BitOnRock(**({"law": cf.Stribeck(1e3, 1e3)} | given))
+        cf.drilling.BitOnRock(**({"law": cf.drilling.Stribeck(1e3, 1e3)} | given))
 
 
 def test_rock_in_a_scene_file(tmp_path):
@@ -185,10 +192,10 @@ def test_rock_in_a_scene_file(tmp_path):
 def test_the_weight_of_a_hook_that_is_lowered_is_that_of_springs_in_a_row(stiffness):
     """Lines, string and rock; and in steady rotation on rock that gives way nothing changes."""
     down = cf.Table([0.0, 1.0, 2.0, 60.0], [(0.0,), (-0.01,), (0.0,), (0.0,)])
-    bit = cf.BitOnRock(cf.Stribeck(0.0, 0.0), 6e4, rock_stiffness=stiffness)
-    scene = hanging(cf.Hook(6e6, down), bit=bit, weight=300.0, drag=cf.ViscousDrag(0.0, 3.0))
-    history = cf.simulate_drilling(scene, 25.0, dt=5e-3)
+    bit = cf.drilling.BitOnRock(cf.drilling.Stribeck(0.0, 0.0), 6e4, rock_stiffness=stiffness)
+    scene = hanging(cf.drilling.Hook(6e6, down), bit=bit, weight=300.0, drag=cf.drilling.ViscousDrag(0.0, 3.0))
+    history = cf.drilling.simulate_drilling(scene, 25.0, dt=5e-3)
     give = sum(x.length / x.EA for x in scene.segments) + 1 / 6e6 + 1 / stiffness
     assert history.weight_on_bit[-1] - 6e4 == pytest.approx(0.01 / give, rel=1e-6)
-    turning = bouncing(stiffness, height=1e-12, start="steady", drag=cf.ViscousDrag(0.3, 0.3))
-    assert np.ptp(cf.simulate_drilling(turning, 1.0, dt=5e-3).weight_on_bit) < 1.0
+    turning = bouncing(stiffness, height=1e-12, start="steady", drag=cf.drilling.ViscousDrag(0.3, 0.3))
+    assert np.ptp(cf.drilling.simulate_drilling(turning, 1.0, dt=5e-3).weight_on_bit) < 1.0

@@ -12,7 +12,7 @@ from cosserat_fenicsx.drilling.elements import AxialTorsional
 
 pytestmark = [pytest.mark.serial, pytest.mark.once]
 BLADES, PSI, RATE = 4, 13.9, 0.5
-WORN = cf.Cutting(a=0.108, epsilon=60e6, zeta=0.6, blades=4, wear=cf.Wear(60e6, 0.011, 0.6))
+WORN = cf.drilling.Cutting(a=0.108, epsilon=60e6, zeta=0.6, blades=4, wear=cf.drilling.Wear(60e6, 0.011, 0.6))
 
 
 def lumped(speed, *, coupled):
@@ -20,11 +20,13 @@ def lumped(speed, *, coupled):
     one that is next to nothing, below a drive that turns it as it likes."""
     spring = {"stiffnesses": (1.0,), "dampings": (0.04,)} if coupled else {"stiffnesses": (1e6,)}
     axial = {"axial_stiffnesses": (4.0,), "axial_dampings": (0.4,)} if coupled else {"axial_stiffnesses": (1e-9,)}
-    discs = cf.Discs((1e-3, 1.0 if coupled else 1e6), masses=(1e-3, 1.0), **spring, **axial)
-    law = cf.Cutting(a=1.0, epsilon=2.0, zeta=PSI / 2, blades=BLADES)
+    discs = cf.drilling.Discs((1e-3, 1.0 if coupled else 1e6), masses=(1e-3, 1.0), **spring, **axial)
+    law = cf.drilling.Cutting(a=1.0, epsilon=2.0, zeta=PSI / 2, blades=BLADES)
     weight = law.axial_stiffness * 2 * math.pi * RATE / (BLADES * speed)
-    bit = cf.BitOnRock(law, weight=None if coupled else weight)
-    return cf.Drilling(discs, cf.TopDrive(speed), bit, hook=cf.Hook(speed=-RATE), start="steady")
+    bit = cf.drilling.BitOnRock(law, weight=None if coupled else weight)
+    return cf.drilling.Drilling(
+        discs, cf.drilling.TopDrive(speed), bit, hook=cf.drilling.Hook(speed=-RATE), start="steady"
+    )
 
 
 def pushed(scene, dt, by):
@@ -55,9 +57,11 @@ def test_a_bit_that_shakes_follows_the_delay_equation_with_order_two():
 
 
 def drilling(start="rest", weight=None, law=WORN, rpm=120.0, **more):
-    bit = cf.BitOnRock(law, weight, inertia=41.0)
-    rate = cf.Hook(speed=-1 / 120)
-    return hanging(rate, cf.TopDrive(rpm * cf.units.rpm), bit, drag=cf.ViscousDrag(0.3, 0.5), start=start, **more)
+    bit = cf.drilling.BitOnRock(law, weight, inertia=41.0)
+    rate = cf.drilling.Hook(speed=-1 / 120)
+    return hanging(
+        rate, cf.drilling.TopDrive(rpm * cf.units.rpm), bit, drag=cf.drilling.ViscousDrag(0.3, 0.5), start=start, **more
+    )
 
 
 def test_steady_drilling_is_a_solution():
@@ -67,14 +71,21 @@ def test_steady_drilling_is_a_solution():
     cut, flats = 2 * math.pi / 120 / (4 * turns), 0.108 * 0.011 * 60e6
     weight = law.axial_stiffness * cut + flats
     torque = law.torsional_stiffness * cut + 0.6 * 0.108 / 2 * flats
-    for name, value in (("weight_on_bit", weight), ("torque_on_bit", torque), ("bit_speed", turns),
-                        ("bit_velocity", 1 / 120), ("drive_speed", turns)):  # fmt: skip
+    for name, value in (
+        ("weight_on_bit", weight),
+        ("torque_on_bit", torque),
+        ("bit_speed", turns),
+        ("bit_velocity", 1 / 120),
+        ("drive_speed", turns),
+    ):
         assert np.abs(column(rows, name) / value - 1).max() < 1e-6, name
 
 
 def test_a_bit_that_is_pulled_up_steadily_is_free():
     """The rock does not pull it: no weight, no torque, and all of the string moves with the hook."""
-    scene = hanging(cf.Hook(speed=0.01), cf.TopDrive(12.0), cf.BitOnRock(WORN), start="steady")
+    scene = hanging(
+        cf.drilling.Hook(speed=0.01), cf.drilling.TopDrive(12.0), cf.drilling.BitOnRock(WORN), start="steady"
+    )
     rows = AxialTorsional(scene, 0.002).advance(200)
     assert not column(rows, "weight_on_bit").any() and not column(rows, "torque_on_bit").any()
     assert np.abs(column(rows, "bit_velocity") + 0.01).max() < 1e-9
@@ -108,7 +119,7 @@ def test_a_bit_that_cuts_from_rest_keeps_the_books(weight):
 
 def test_a_worn_bit_stands_still_until_the_weight_exceeds_that_of_its_flats():
     """It does not turn, and the hook lowers it: the flats bear all up to a l sigma."""
-    scene = hanging(cf.Hook(speed=-0.02), cf.TopDrive(0.0), cf.BitOnRock(WORN))
+    scene = hanging(cf.drilling.Hook(speed=-0.02), cf.drilling.TopDrive(0.0), cf.drilling.BitOnRock(WORN))
     rows = AxialTorsional(scene, 0.005).advance(4000)
     weight, deep = column(rows, "weight_on_bit"), column(rows, "bit_advance")
     limit = 0.108 * 0.011 * 60e6
@@ -121,8 +132,10 @@ def test_a_worn_bit_stands_still_until_the_weight_exceeds_that_of_its_flats():
 def test_lobes_shake_the_weight_on_bit_as_the_impedance_says(rpm, amplitude):
     """Three lobes of 2 mm: forced vibration, as long as the bit stays on the rock."""
     turns = rpm * cf.units.rpm
-    bit = cf.BitOnRock(cf.Lobes(3, 0.002), weight=80e3)
-    scene = hanging(cf.Hook(5e6), cf.TopDrive(turns), bit, drag=cf.ViscousDrag(0.2, 0.2), start="steady")
+    bit = cf.drilling.BitOnRock(cf.drilling.Lobes(3, 0.002), weight=80e3)
+    scene = hanging(
+        cf.drilling.Hook(5e6), cf.drilling.TopDrive(turns), bit, drag=cf.drilling.ViscousDrag(0.2, 0.2), start="steady"
+    )
     model = AxialTorsional(scene, 0.002, 300)
     rows = model.advance(40000)[30000:]
     phase = 3 * turns * (rows[:, 0] - model.dt / 2)
@@ -133,9 +146,11 @@ def test_lobes_shake_the_weight_on_bit_as_the_impedance_says(rpm, amplitude):
 
 def test_a_bit_on_high_lobes_leaves_the_rock_and_is_not_pulled():
     scene = hanging(
-        cf.Hook(stiffness=5e6), cf.TopDrive(140 * cf.units.rpm), cf.BitOnRock(cf.Lobes(3, 0.005), weight=40e3),
-        drag=cf.ViscousDrag(0.2, 0.2),
-    )  # fmt: skip
+        cf.drilling.Hook(stiffness=5e6),
+        cf.drilling.TopDrive(140 * cf.units.rpm),
+        cf.drilling.BitOnRock(cf.drilling.Lobes(3, 0.005), weight=40e3),
+        drag=cf.drilling.ViscousDrag(0.2, 0.2),
+    )
     rows = AxialTorsional(scene, 0.004).advance(5000)
     weight, up = column(rows, "weight_on_bit"), -column(rows, "bit_advance")
     assert weight.min() == 0.0 and weight.max() > 80e3 and up.max() > 0.006
@@ -143,7 +158,7 @@ def test_a_bit_on_high_lobes_leaves_the_rock_and_is_not_pulled():
 
 
 def test_what_is_recalled_goes_on_to_the_same_digits():
-    for scene in (drilling(weight=100e3), drilling(law=cf.Lobes(3, 0.002), weight=80e3)):
+    for scene in (drilling(weight=100e3), drilling(law=cf.drilling.Lobes(3, 0.002), weight=80e3)):
         model, again = AxialTorsional(scene, 0.004, 60), AxialTorsional(scene, 0.004, 60)
         model.advance(700)
         again.recall(model.memory())
@@ -154,14 +169,25 @@ def test_what_is_recalled_goes_on_to_the_same_digits():
     ("scene", "message"),
     [
         (lambda: AxialTorsional(drilling(), axial=False), "torsion alone"),
-        (lambda: AxialTorsional(drilling("steady", 80e3, cf.Stribeck(4e3, 3e3, 1.0))), "does not give way"),
+        (lambda: AxialTorsional(drilling("steady", 80e3, cf.drilling.Stribeck(4e3, 3e3, 1.0))), "does not give way"),
         (lambda: drilling("turning"), "Drilling.start.*'rest' or 'steady'"),
-        (lambda: AxialTorsional(cf.Drilling(drilling().string, cf.TopDrive(control=cf.Motor(5e3)), start="steady")),
-         "Drilling.start.*PI"),
-        (lambda: cf.Discs((1.0, 1.0), (1.0,), axial_stiffnesses=(1.0,)), "axial_stiffnesses.*without masses"),
-        (lambda: cf.Drilling(cf.Discs((1.0, 1.0), (1.0,)), cf.TopDrive(1.0), hook=cf.Hook()), "turn alone"),
+        (
+            lambda: AxialTorsional(
+                cf.drilling.Drilling(
+                    drilling().string, cf.drilling.TopDrive(control=cf.drilling.Motor(5e3)), start="steady"
+                )
+            ),
+            "Drilling.start.*PI",
+        ),
+        (lambda: cf.drilling.Discs((1.0, 1.0), (1.0,), axial_stiffnesses=(1.0,)), "axial_stiffnesses.*without masses"),
+        (
+            lambda: cf.drilling.Drilling(
+                cf.drilling.Discs((1.0, 1.0), (1.0,)), cf.drilling.TopDrive(1.0), hook=cf.drilling.Hook()
+            ),
+            "turn alone",
+        ),
     ],
-)  # fmt: skip
+)
 def test_refusals(scene, message):
     with pytest.raises(cf.SceneError, match=message):
         scene()

@@ -70,7 +70,7 @@ class FullWeight(cf.LineAction):
 def half_wave():
     """A rod of half a wave on the low side of a horizontal hole, its ends on the line where it lies, and its load."""
     length, low = math.pi / K, R + W / KP
-    path = cf.WellPath.from_survey([0, length + 20], [90, 90], [0, 0])
+    path = cf.well.WellPath.from_survey([0, length + 20], [90, 90], [0, 0])
     pipe = cf.Stiffness((math.inf, math.inf), math.inf, (EI, EI), 1e6)
     rod = cf.Rod(cf.Line((10, 0, low), (10 + length, 0, low)), pipe)
     wall = TubeWall(rod, path, radius=0.0635 + R, contact_radius=0.0635, stiffness=KP, begins=10.0)
@@ -114,7 +114,7 @@ def test_the_snake_begins_at_its_load_and_has_its_amplitude():
 
 @pytest.mark.parametrize("share, stable", [(0.9, True), (1.1, False)])
 def test_a_long_string_on_the_low_side_says_that_it_would_snake(share, stable):
-    path = cf.WellPath.from_survey([0, 300], [90, 90], [0, 0])
+    path = cf.well.WellPath.from_survey([0, 300], [90, 90], [0, 0])
     pipe = cf.Stiffness((1.35e8, 1.35e8), 7e8, (EI, EI), 1e6)
     given = {"radius": 0.0635 + R, "rings": [(200.0, 0.0, 0.1)], "bottom_tension": -share * F_SNAKE}
     answer = solve_in_hole(path, [200.0], pipe, W, 0.0635, elements=512, **given)
@@ -127,7 +127,7 @@ def test_the_helix_of_a_thrust(name):
     """A weightless rod with finite EA and GA in a frictionless cylinder: a Cosserat helix in the middle."""
     case = json.loads((Path(__file__).parent / "reference" / "rod_in_hole.json").read_text(encoding="utf-8"))[name]
     length, radius = 250.0, case["r"]
-    path = cf.WellPath.from_survey([0, length + 10], [0, 0], [0, 0])
+    path = cf.well.WellPath.from_survey([0, length + 10], [0, 0], [0, 0])
     pipe = cf.Stiffness((case["GA"],) * 2, case["EA"], (case["EI"],) * 2, case["EI"])
     answer = solve_in_hole(
         path, [length], pipe, 1e-6, 0.05, radius=0.05 + radius, rings=[(length, 0.0, 0.05)],
@@ -146,7 +146,7 @@ def test_a_string_that_is_pressed_on_its_bit_is_a_helix():
     """In a vertical hole, hung from a clamp: it is as slender a helix everywhere as its compression F there asks for,
     with sqrt(F/(2 EI)) rad per m and r F^2/(4 EI) of the wall, and it is stable, unlike the straight string."""
     length, thrust = 500.0, 150e3
-    path = cf.WellPath.from_survey([0, length + 10], [0, 0], [0, 0])
+    path = cf.well.WellPath.from_survey([0, length + 10], [0, 0], [0, 0])
     pipe = cf.Stiffness((1.35e8, 1.35e8), 7e8, (EI, EI), 1e6)
     given = {"radius": 0.0635 + R, "rings": [(length, 0.0, 0.1)], "bottom_tension": -thrust}
     straight = solve_in_hole(path, [length], pipe, W, 0.0635, elements=256, **given)
@@ -164,12 +164,12 @@ def test_a_string_that_is_pressed_on_its_bit_is_a_helix():
     assert np.ptp(s) - np.ptp(z) == pytest.approx(trapezoid((R**2 * F / (4 * EI))[wound], s), rel=1e-3)
 
 
-@pytest.mark.parametrize(("inclination", "operation"), [(45, cf.Static(250e3)), (60, cf.Sliding(240e3))])
+@pytest.mark.parametrize(("inclination", "operation"), [(45, cf.well.Static(250e3)), (60, cf.well.Sliding(240e3))])
 def test_a_string_in_a_plane_hole_leaves_the_plane_where_it_would_buckle(inclination, operation):
     """Straight, and beyond the load of a snake: in the plane Newton's method keeps the symmetry."""
-    path = cf.WellPath.from_survey([0, 300, 650], [inclination] * 3, [0, 0, 0])
-    hole = cf.Borehole(path, cf.HoleSection(650.0, 0.2159, 0.2))
-    string = cf.DrillString([cf.DrillPipe(size="5 in 19.50 lb/ft")])
-    found = cf.torque_and_drag(hole, string, operation, mud=cf.Mud(1200.0), depth=600.0, model="rod")
+    path = cf.well.WellPath.from_survey([0, 300, 650], [inclination] * 3, [0, 0, 0])
+    hole = cf.well.Borehole(path, cf.well.HoleSection(650.0, 0.2159, 0.2))
+    string = cf.well.DrillString([cf.well.DrillPipe(size="5 in 19.50 lb/ft")])
+    found = cf.well.torque_and_drag(hole, string, operation, mud=cf.well.Mud(1200.0), depth=600.0, model="rod")
     assert found.solved.negative_modes == 0 and found.enough and any("begun as a helix" in line for line in found.why)
     assert np.abs(found.offset[:, 1]).max() > 0.01

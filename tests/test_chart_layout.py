@@ -62,7 +62,10 @@ def check_all(*plots, units=True):
 
 def test_strings_in_motion(monkeypatch):
     use(monkeypatch)
-    history, long = cf.simulate_drilling(scene(), 30.0), cf.simulate_drilling(scene(), 1000.0, profile_every=10.0)
+    history, long = (
+        cf.drilling.simulate_drilling(scene(), 30.0),
+        cf.drilling.simulate_drilling(scene(), 1000.0, profile_every=10.0),
+    )
     check_all(history.plot, history.plot_map, history.plot_phase, history.plot_energy, long.plot, long.plot_map)
     assert history.plot(units="field").axes[1].get_ylabel() == "torque (ft-lbf)"
     torque = history.plot(units={"moment": "N m"}).axes[1].lines[0].get_ydata()
@@ -74,13 +77,13 @@ def test_strings_in_motion(monkeypatch):
 
 def test_stability_of_strings():
     plain, speeds = pipe_and_collars("SoftSpeed"), np.linspace(4.0, 16.0, 7)
-    rock = cf.BitOnRock(cf.Lobes(3, 0.002), weight=8e4)
-    lobes = pipe_and_collars(bit=rock, hook=cf.Hook(1.0))
+    rock = cf.drilling.BitOnRock(cf.drilling.Lobes(3, 0.002), weight=8e4)
+    lobes = pipe_and_collars(bit=rock, hook=cf.drilling.Hook(1.0))
     check_all(
-        cf.stability(plain, speeds, [3e4, 8e4], up_to=1.0).plot,
-        cf.stability(plain, speeds, up_to=1.0).plot,
-        cf.campbell(lobes, 20.0, up_to=2.0).plot,
-        cf.bit_bounce(lobes, speeds).plot,
+        cf.drilling.stability(plain, speeds, [3e4, 8e4], up_to=1.0).plot,
+        cf.drilling.stability(plain, speeds, up_to=1.0).plot,
+        cf.drilling.campbell(lobes, 20.0, up_to=2.0).plot,
+        cf.drilling.bit_bounce(lobes, speeds).plot,
     )
 
 
@@ -96,7 +99,7 @@ def test_sections_in_holes(collar):  # noqa: F811
 
 @pytest.mark.slow
 def test_strings_in_wells():
-    sliding = cf.torque_and_drag(wells.HOLE, wells.STRING, cf.Sliding(1e5), mud=wells.MUD, model="buckled")
-    fit = cf.calibrate_friction(wells.HOLE.with_friction(0.0), wells.STRING, wells.measured(1.0), mud=wells.MUD)
+    sliding = cf.well.torque_and_drag(wells.HOLE, wells.STRING, cf.well.Sliding(1e5), mud=wells.MUD, model="buckled")
+    fit = cf.well.calibrate_friction(wells.HOLE.with_friction(0.0), wells.STRING, wells.measured(1.0), mud=wells.MUD)
     check_all(sliding.plot, lambda **look: sliding.plot(between=(2300, 2500), **look), wells.sweep().plot, fit.plot)
     assert sliding.plot(units="field").axes[1].get_xlabel() == "tension (klbf)"

@@ -14,7 +14,7 @@ pytestmark = [pytest.mark.serial, pytest.mark.once]
 @pytest.fixture
 def history(monkeypatch):
     use(monkeypatch)
-    return cf.simulate_drilling(scene(), 30.0)
+    return cf.drilling.simulate_drilling(scene(), 30.0)
 
 
 def curve(panel, label):
@@ -53,13 +53,15 @@ def test_what_is_grey_is_told_and_the_drive_is_named(history):
     legend = [text.get_text() for text in history.plot().axes[0].get_legend().get_texts()]
     assert "bit at rest" in legend
     string, rpm = history.scene.string, cf.units.rpm
-    history.scene = scene(drive=cf.TopDrive(60 * rpm, inertia=2900.0, control=cf.SoftSpeed(string, 2900.0)))
+    history.scene = scene(
+        drive=cf.drilling.TopDrive(60 * rpm, inertia=2900.0, control=cf.drilling.SoftSpeed(string, 2900.0))
+    )
     assert "PI (Kp = 4 impedances) drive at 60 rpm" in history.plot()._suptitle.get_text()
 
 
 def test_long_runs_show_bands_between_extremes(monkeypatch):
     use(monkeypatch)
-    history = cf.simulate_drilling(scene(), 1000.0, dt=0.02, profile_every=10.0)
+    history = cf.drilling.simulate_drilling(scene(), 1000.0, dt=0.02, profile_every=10.0)
     speeds = history.plot().axes[0]
     assert not speeds.lines and len(speeds.collections) == 2
     tops = [shape.get_paths()[0].vertices[:, 1].max() for shape in speeds.collections]

@@ -17,15 +17,20 @@ DURATION = 60.0
 def scene_of(kind):
     """With a controller, with places that stick, and with axial motion; or discs."""
     if kind == "discs":
-        law, drive = cf.Stribeck(11e3, 6e3, 2.0), cf.TopDrive(6.0, 930.0, cf.PI(2000.0, 900.0))
-        return cf.Drilling(cf.Discs((10.0, 2782.0, 750.0), (698.0, 1080.0)), drive, cf.BitOnRock(law))
-    path = cf.WellPath.from_survey([0, 500, 1100, 2000], [0, 0, 60, 60], [0, 0, 0, 0])
-    hole = cf.Borehole(path, cf.HoleSection(2000.0, 0.2159, 0.25))
-    string = cf.DrillString([cf.Collar(150.0, "NC46-65"), cf.DrillPipe(size="5 in 19.50 lb/ft")])
-    friction = cf.WallFriction(0.3, 0.2, 1.0, of_rotation=True)
-    drive = cf.TopDrive(4.0, 2900.0, cf.SoftSpeed(string, 2900.0, depth=2000.0))
-    hook = cf.Hook(speed=cf.Sine((0.1,), 0.2)) if kind == "axial and torsional" else None
-    return cf.Drilling(string, drive, None, hole, hook, cf.Mud(1200.0), friction)
+        law, drive = (
+            cf.drilling.Stribeck(11e3, 6e3, 2.0),
+            cf.drilling.TopDrive(6.0, 930.0, cf.drilling.PI(2000.0, 900.0)),
+        )
+        return cf.drilling.Drilling(
+            cf.drilling.Discs((10.0, 2782.0, 750.0), (698.0, 1080.0)), drive, cf.drilling.BitOnRock(law)
+        )
+    path = cf.well.WellPath.from_survey([0, 500, 1100, 2000], [0, 0, 60, 60], [0, 0, 0, 0])
+    hole = cf.well.Borehole(path, cf.well.HoleSection(2000.0, 0.2159, 0.25))
+    string = cf.well.DrillString([cf.well.Collar(150.0, "NC46-65"), cf.well.DrillPipe(size="5 in 19.50 lb/ft")])
+    friction = cf.drilling.WallFriction(0.3, 0.2, 1.0, of_rotation=True)
+    drive = cf.drilling.TopDrive(4.0, 2900.0, cf.drilling.SoftSpeed(string, 2900.0, depth=2000.0))
+    hook = cf.drilling.Hook(speed=cf.Sine((0.1,), 0.2)) if kind == "axial and torsional" else None
+    return cf.drilling.Drilling(string, drive, None, hole, hook, cf.well.Mud(1200.0), friction)
 
 
 def run_in(folder, kind):
@@ -33,7 +38,7 @@ def run_in(folder, kind):
     from cosserat_fenicsx.storage.store import Store
 
     Store.APART, Store.SELDOM = 0.0, 0
-    cf.simulate_drilling(scene_of(kind), DURATION, folder=folder)
+    cf.drilling.simulate_drilling(scene_of(kind), DURATION, folder=folder)
 
 
 @pytest.mark.parametrize("kind", ["torsion", "axial and torsional", "discs"])
@@ -48,7 +53,7 @@ def test_kill_9(kind, tmp_path):
         time.sleep(0.001)
     process.kill()
     process.wait()
-    whole = cf.simulate_drilling(scene_of(kind), DURATION)
+    whole = cf.drilling.simulate_drilling(scene_of(kind), DURATION)
     assert 0 < len(cf.read(place)) < len(whole)
     again = cf.resume(place)
     assert np.array_equal(again.rows, whole.rows, equal_nan=True) and again.counts == whole.counts

@@ -13,9 +13,9 @@ pytestmark = pytest.mark.ranks
 def test_ranks_share_a_folder(tmp_path_all, monkeypatch):
     monkeypatch.setattr(Store, "APART", 0.0)
     monkeypatch.setattr(Store, "SELDOM", 0)
-    given = scene(bit=cf.BitOnRock(cf.Stribeck(6e3, 4e3, 3.0), inertia=50.0))
-    history = cf.simulate_drilling(given, 10.0, folder=tmp_path_all / "one", profile_every=1.0)
-    alone = cf.simulate_drilling(given, 15.0, profile_every=1.0)
+    given = scene(bit=cf.drilling.BitOnRock(cf.drilling.Stribeck(6e3, 4e3, 3.0), inertia=50.0))
+    history = cf.drilling.simulate_drilling(given, 10.0, folder=tmp_path_all / "one", profile_every=1.0)
+    alone = cf.drilling.simulate_drilling(given, 15.0, profile_every=1.0)
     assert np.array_equal(history.rows, alone.rows[: len(history)], equal_nan=True)
     again = cf.resume(tmp_path_all / "one", duration=15.0)
     assert np.array_equal(again.rows, alone.rows, equal_nan=True) and np.array_equal(again.speed, alone.speed)

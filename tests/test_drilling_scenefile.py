@@ -76,10 +76,10 @@ def test_what_a_file_says(tmp_path):
     assert found.title == "Drilling in an inclined hole" and found.settings == {"duration": 60.0, "dt": 0.01}
     assert scene.drive.speed == cf.Ramp((60 * rpm,), 1.0, 10.0)
     assert scene.drive.control.Kp == pytest.approx(4 * scene.segments[0].torsional_impedance)
-    assert scene.bit == cf.BitOnRock(cf.Stribeck(6e3, 4e3, 30 * rpm), 80e3, 50.0)
+    assert scene.bit == cf.drilling.BitOnRock(cf.drilling.Stribeck(6e3, 4e3, 30 * rpm), 80e3, 50.0)
     assert scene.hook.stiffness == 5e6 and scene.hook.speed(5.0) == pytest.approx((10 / 3600,))
-    assert scene.friction == cf.WallFriction(0.3, 0.2, 10 * rpm, of_rotation=True)
-    assert scene.drag == cf.ViscousDrag(0.1, 0.2) and scene.mud.density == pytest.approx(1198.264273)
+    assert scene.friction == cf.drilling.WallFriction(0.3, 0.2, 10 * rpm, of_rotation=True)
+    assert scene.drag == cf.drilling.ViscousDrag(0.1, 0.2) and scene.mud.density == pytest.approx(1198.264273)
     assert scene.bit_depth == 2500.0 and scene.hole.sections[0].diameter == pytest.approx(0.31115)
     assert found.speeds == pytest.approx([40 * rpm, 80 * rpm, 120 * rpm, 160 * rpm]) and found.weights == (20e3, 60e3)
 
@@ -87,7 +87,9 @@ def test_what_a_file_says(tmp_path):
 def test_discs(tmp_path):
     drive = "[drive]\ncontrol = { type = 'Motor', torque = 8e3 }"
     scene = read(tmp_path, f"[discs]\ninertias = [930.0, 2782.0]\nstiffnesses = [700.0]\n{drive}").scene
-    assert scene.string == cf.Discs((930.0, 2782.0), (700.0,)) and scene.drive == cf.TopDrive(control=cf.Motor(8e3))
+    assert scene.string == cf.drilling.Discs((930.0, 2782.0), (700.0,)) and scene.drive == cf.drilling.TopDrive(
+        control=cf.drilling.Motor(8e3)
+    )
 
 
 LAW = "law = { type = 'Cutting', a = '0.108 m', epsilon = '60 MPa', zeta = 0.6, blades = 4, wear = { stress = '60 MPa', length = 0.011, friction = 0.6 } }"  # noqa: E501
@@ -95,9 +97,11 @@ LAW = "law = { type = 'Cutting', a = '0.108 m', epsilon = '60 MPa', zeta = 0.6, 
 
 def test_laws_inside_laws(tmp_path):
     law = read(tmp_path, re.sub("law = .*", LAW, FILE)).scene.bit.law
-    assert law == cf.Cutting(0.108, 60e6, 0.6, 4, cf.Wear(60e6, 0.011, 0.6))
+    assert law == cf.drilling.Cutting(0.108, 60e6, 0.6, 4, cf.drilling.Wear(60e6, 0.011, 0.6))
     lobes = "law = { type = 'Lobes', count = 3, amplitude = '2 mm', law = { static = 4e3, dynamic = 4e3 } }"
-    assert read(tmp_path, re.sub("law = .*", lobes, FILE)).scene.bit.law == cf.Lobes(3, 2e-3, cf.Stribeck(4e3, 4e3))
+    assert read(tmp_path, re.sub("law = .*", lobes, FILE)).scene.bit.law == cf.drilling.Lobes(
+        3, 2e-3, cf.drilling.Stribeck(4e3, 4e3)
+    )
 
 
 @pytest.mark.parametrize(
@@ -159,8 +163,19 @@ def test_the_command_line(tmp_path, capsys, monkeypatch):
 def test_the_reference_has_every_key_and_unit():
     page = (ROOT / "docs" / "drilling_files.md").read_text(encoding="utf-8")
     told = set(re.findall(r"`([^`]+)`", re.sub(r"```.*?```", "", page, flags=re.S)))
-    named = {name: cls for name, cls in (members(BitLaw) | members(DriveControl)).items() if name in cf.__all__}
-    classes = (cf.TopDrive, *named.values(), cf.BitOnRock, cf.Wear, cf.Hook, cf.WallFriction, cf.ViscousDrag, cf.Discs)
+    named = {
+        name: cls for name, cls in (members(BitLaw) | members(DriveControl)).items() if name in cf.drilling.__all__
+    }
+    classes = (
+        cf.drilling.TopDrive,
+        *named.values(),
+        cf.drilling.BitOnRock,
+        cf.drilling.Wear,
+        cf.drilling.Hook,
+        cf.drilling.WallFriction,
+        cf.drilling.ViscousDrag,
+        cf.drilling.Discs,
+    )
     assert named.keys() <= told
     arguments = {name for cls in classes for name in inspect.signature(cls).parameters}
     keys = {key for cls in (SimulateDrilling, StabilityMap) for key in arguments_of(cls)}

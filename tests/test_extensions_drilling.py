@@ -1,6 +1,5 @@
 """Laws and drives of drill-strings that are defined outside the package, each in one file of tests/extensions."""
 
-
 import subprocess
 import sys
 from dataclasses import dataclass, replace
@@ -17,17 +16,19 @@ from cosserat_fenicsx.drilling import BitLaw, FrictionLaw, SampledControl
 
 pytestmark = pytest.mark.serial
 TORSION, BOTH = "torsion", "axial and torsional"
-COLLAR = cf.Collar(length=100.0, outer_diameter=0.165, inner_diameter=0.057)
-PIPE = cf.DrillPipe(length=900.0, outer_diameter=0.127, inner_diameter=0.1086)
-STRING = cf.DrillString((COLLAR, PIPE))
-PATH = cf.WellPath.from_survey([0, 200, 600, 1000], [0, 0, 40, 40], [0, 0, 0, 0], degrees=True)
-HOLE = cf.Borehole(PATH, (cf.HoleSection(1000.0, 0.25, friction=0.3),))
+COLLAR = cf.well.Collar(length=100.0, outer_diameter=0.165, inner_diameter=0.057)
+PIPE = cf.well.DrillPipe(length=900.0, outer_diameter=0.127, inner_diameter=0.1086)
+STRING = cf.well.DrillString((COLLAR, PIPE))
+PATH = cf.well.WellPath.from_survey([0, 200, 600, 1000], [0, 0, 40, 40], [0, 0, 0, 0], degrees=True)
+HOLE = cf.well.Borehole(PATH, (cf.well.HoleSection(1000.0, 0.25, friction=0.3),))
 
 
-def scene(law=None, *, weight=50e3, control=cf.Stiff(), inertia=0.0, **more):
-    bit = None if law is None else cf.BitOnRock(law, weight=weight, inertia=20.0, mass=200.0)
-    more |= {"mud": cf.Mud(1200.0)} if "hole" in more else {}
-    return cf.Drilling(STRING, cf.TopDrive(6.0, inertia, control), bit, drag=cf.ViscousDrag(0.2, 0.2), **more)
+def scene(law=None, *, weight=50e3, control=cf.drilling.Stiff(), inertia=0.0, **more):
+    bit = None if law is None else cf.drilling.BitOnRock(law, weight=weight, inertia=20.0, mass=200.0)
+    more |= {"mud": cf.well.Mud(1200.0)} if "hole" in more else {}
+    return cf.drilling.Drilling(
+        STRING, cf.drilling.TopDrive(6.0, inertia, control), bit, drag=cf.drilling.ViscousDrag(0.2, 0.2), **more
+    )
 
 
 def same(one, other, rtol):
@@ -62,7 +63,11 @@ class _Wall(FrictionLaw):
         return self.law.coefficient(slip)
 
 
-BIT_LAWS = [cf.Stribeck(6e3, 4e3, 2.0), cf.Stribeck(1.0, 0.7, 2.0, radius=0.1), cf.Stribeck(6e3, 4e3)]
+BIT_LAWS = [
+    cf.drilling.Stribeck(6e3, 4e3, 2.0),
+    cf.drilling.Stribeck(1.0, 0.7, 2.0, radius=0.1),
+    cf.drilling.Stribeck(6e3, 4e3),
+]
 
 
 @pytest.mark.parametrize("law", BIT_LAWS)
@@ -70,23 +75,27 @@ BIT_LAWS = [cf.Stribeck(6e3, 4e3, 2.0), cf.Stribeck(1.0, 0.7, 2.0, radius=0.1), 
 def test_a_bit_law_as_a_function(law, model):
     """It sticks, slips and follows the weight on bit as the law in closed form."""
     options = {"model": model, "progress": False} | ({"elements": 60} if model == BOTH else {})
-    moves = {"hook": cf.Hook(stiffness=5e6, speed=-1e-3)} if model == BOTH else {}
-    expected, found = (cf.simulate_drilling(scene(x, **moves), 6.0, **options) for x in (law, _Falling(law)))
+    moves = {"hook": cf.drilling.Hook(stiffness=5e6, speed=-1e-3)} if model == BOTH else {}
+    expected, found = (cf.drilling.simulate_drilling(scene(x, **moves), 6.0, **options) for x in (law, _Falling(law)))
     assert expected.bit_speed.max() > 6.0 and (expected.bit_speed[10:] == 0).any()
     same(found, expected, 1e-6)
 
 
 def test_a_bit_law_as_a_function_starts_steadily_and_is_linearised():
-    law, stiff = cf.Stribeck(1.0, 0.7, 2.0, radius=0.1), scene(_Falling(cf.Stribeck(1.0, 0.7, 2.0, radius=0.1)))
+    law, stiff = (
+        cf.drilling.Stribeck(1.0, 0.7, 2.0, radius=0.1),
+        scene(_Falling(cf.drilling.Stribeck(1.0, 0.7, 2.0, radius=0.1))),
+    )
     for model in (TORSION, BOTH):
-        history = cf.simulate_drilling(replace(stiff, start="steady"), 0.5, model=model, progress=False)
+        history = cf.drilling.simulate_drilling(replace(stiff, start="steady"), 0.5, model=model, progress=False)
         assert history.torque_on_bit == pytest.approx(law.torque(6.0, 50e3), rel=1e-3)
         assert np.ptp(history.bit_speed) < 0.01
     speeds, weights = [2.0, 6.0], [30e3, 60e3]
-    expected, found = (cf.stability(x, speeds, weights, up_to=2.0) for x in (scene(law), stiff))
+    expected, found = (cf.drilling.stability(x, speeds, weights, up_to=2.0) for x in (scene(law), stiff))
     np.testing.assert_allclose(found.roots, expected.roots, rtol=1e-6)
     expected, found = (
-        (cf.limit_speed(x, up_to=2.0), cf.limit_weight(x, 3.0, up_to=2.0)) for x in (scene(law), stiff)
+        (cf.drilling.limit_speed(x, up_to=2.0), cf.drilling.limit_weight(x, 3.0, up_to=2.0))
+        for x in (scene(law), stiff)
     )
     assert found == pytest.approx(expected, rel=1e-5)
 
@@ -96,8 +105,8 @@ def test_karnopp(model):
     """With a narrow band it is the law that drops at once; with a wide one the bit needs more to leave it."""
     options = {"model": model, "progress": False} | ({"elements": 60} if model == BOTH else {})
     histories = {
-        law: cf.simulate_drilling(scene(law), 8.0, **options)
-        for law in (cf.Stribeck(6e3, 4e3), Karnopp(6e3, 4e3, 1e-5), Karnopp("6 kN m", "4 kN m", 0.5))
+        law: cf.drilling.simulate_drilling(scene(law), 8.0, **options)
+        for law in (cf.drilling.Stribeck(6e3, 4e3), Karnopp(6e3, 4e3, 1e-5), Karnopp("6 kN m", "4 kN m", 0.5))
     }
     expected, narrow, wide = histories.values()
     np.testing.assert_allclose(narrow.bit_angle, expected.bit_angle, atol=0.1)
@@ -109,14 +118,15 @@ def test_karnopp(model):
 
 def test_wall_friction_as_a_function():
     """Against rotation alone, and against axial and rotary slip together."""
-    law = cf.WallFriction(0.3, 0.2, 0.05)
-    turned = cf.WallFriction(1.0, 0.6, 1.0, of_rotation=True, of_hole=True)
+    law = cf.drilling.WallFriction(0.3, 0.2, 0.05)
+    turned = cf.drilling.WallFriction(1.0, 0.6, 1.0, of_rotation=True, of_hole=True)
     for ours, given in ((law, {}), (turned, {"of_rotation": True, "of_hole": True})):
         for model in (TORSION, BOTH):
             options = {"model": model, "dt": 0.01, "progress": False}
-            more = {"hole": HOLE, "hook": cf.Hook(speed=-0.05) if model == BOTH else None}
+            more = {"hole": HOLE, "hook": cf.drilling.Hook(speed=-0.05) if model == BOTH else None}
             expected, found = (
-                cf.simulate_drilling(scene(friction=x, **more), 4.0, **options) for x in (ours, _Wall(ours, **given))
+                cf.drilling.simulate_drilling(scene(friction=x, **more), 4.0, **options)
+                for x in (ours, _Wall(ours, **given))
             )
             assert np.abs(expected.lost_at_wall[-1]) > 1e3
             same(found, expected, 1e-5)
@@ -128,11 +138,12 @@ def test_stribeck_curve(model):
     curve = StribeckCurve(0.3, 0.2, "0.1 m/s", viscous=0.1)
     options = {"model": model, "dt": 0.01, "progress": False}
     film, bare = (
-        cf.simulate_drilling(scene(friction=x, hole=HOLE), 8.0, **options) for x in (curve, replace(curve, viscous=0.0))
+        cf.drilling.simulate_drilling(scene(friction=x, hole=HOLE), 8.0, **options)
+        for x in (curve, replace(curve, viscous=0.0))
     )
     assert film.surface_torque[-200:].mean() > 1.02 * bare.surface_torque[-200:].mean()
     assert abs(film.balance[-1]) < 1e-3 * film.work_of_drive[-1]
-    steady = cf.simulate_drilling(replace(scene(friction=curve, hole=HOLE), start="steady"), 1.0, **options)
+    steady = cf.drilling.simulate_drilling(replace(scene(friction=curve, hole=HOLE), start="steady"), 1.0, **options)
     assert np.ptp(steady.surface_torque) < 1e-2 * steady.surface_torque.mean()
 
 
@@ -141,14 +152,14 @@ def test_a_control_called_once_a_sample(model, tmp_path):
     """With short samples it is the PI control; a motion that is resumed has the same digits."""
     options = {"model": model, "dt": 2e-3, "progress": False}
     gains = {"Kp": 2000.0, "Ki": 1000.0}
-    law = cf.Stribeck(3e3, 2e3, 2.0)
+    law = cf.drilling.Stribeck(3e3, 2e3, 2.0)
     ours = scene(law, control=LimitedSpeed(**gains, most=1e5, sample=2e-3), inertia=2000.0)
-    theirs = scene(law, control=cf.PI(**gains), inertia=2000.0)
-    whole, expected = (cf.simulate_drilling(x, 6.0, **options) for x in (ours, theirs))
+    theirs = scene(law, control=cf.drilling.PI(**gains), inertia=2000.0)
+    whole, expected = (cf.drilling.simulate_drilling(x, 6.0, **options) for x in (ours, theirs))
     assert np.abs(whole.drive_speed - expected.drive_speed).max() < 0.05
     limited = replace(ours, drive=replace(ours.drive, control=replace(ours.drive.control, most=1500.0)))
-    assert cf.simulate_drilling(limited, 6.0, **options).surface_torque.max() < expected.surface_torque.max()
-    cf.simulate_drilling(ours, 2.503, folder=tmp_path / "run", **options)
+    assert cf.drilling.simulate_drilling(limited, 6.0, **options).surface_torque.max() < expected.surface_torque.max()
+    cf.drilling.simulate_drilling(ours, 2.503, folder=tmp_path / "run", **options)
     resumed = cf.resume(tmp_path / "run", ours, duration=6.0, progress=False)
     np.testing.assert_array_equal(resumed.rows, whole.rows)
 
@@ -214,23 +225,23 @@ def test_all_three_in_a_scene_file_stored_and_resumed(tmp_path):
 def test_a_control_called_once_a_sample_in_the_linear_theory():
     """It stands for its gains, where it has some."""
     control = LimitedSpeed(2000.0, 1000.0, most=1e5)
-    law = cf.Stribeck(6e3, 4e3, 2.0)
-    ours, theirs = (scene(law, control=x, inertia=2000.0) for x in (control, cf.PI(2000.0, 1000.0)))
-    np.testing.assert_allclose(*(cf.stability(x, [6.0], up_to=1.0).roots for x in (ours, theirs)))
+    law = cf.drilling.Stribeck(6e3, 4e3, 2.0)
+    ours, theirs = (scene(law, control=x, inertia=2000.0) for x in (control, cf.drilling.PI(2000.0, 1000.0)))
+    np.testing.assert_allclose(*(cf.drilling.stability(x, [6.0], up_to=1.0).roots for x in (ours, theirs)))
 
     @dataclass(frozen=True)
     class Blind(SampledControl):
         def torque(self, state, now):
             return 1e3, state
 
-    blind = cf.TopDrive(6.0, 2000.0, Blind())
+    blind = cf.drilling.TopDrive(6.0, 2000.0, Blind())
     with pytest.raises(cf.SceneError, match="acts in simulate_drilling, unless Blind has gains"):
-        cf.stability(replace(ours, drive=blind), [6.0])
+        cf.drilling.stability(replace(ours, drive=blind), [6.0])
     rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, 1.0)), COLLAR.stiffness)
     with pytest.raises(cf.SceneError, match="acts in simulate_drilling"):
-        cf.PipeAbove(rod.start, PIPE, blind)
+        cf.drilling.PipeAbove(rod.start, PIPE, blind)
     with pytest.raises(cf.SceneError, match="'rest' with this drive"):
-        cf.simulate_drilling(replace(ours, start="steady"), 1.0)
+        cf.drilling.simulate_drilling(replace(ours, start="steady"), 1.0)
 
 
 @pytest.mark.parametrize(
@@ -246,9 +257,9 @@ def test_laws_that_fail_are_refused_in_words(torque, words):
     Law = dataclass(frozen=True)(type("_Law", (BitLaw,), {"torque": lambda self, *given: torque(*given)}))
     for model in (TORSION, BOTH):
         with pytest.raises(cf.SceneError, match=words):
-            cf.simulate_drilling(scene(Law()), 1.0, model=model)
+            cf.drilling.simulate_drilling(scene(Law()), 1.0, model=model)
     with pytest.raises(cf.SceneError, match="expected a WallFriction, of which the rod's wall"):
-        cf.mixed_scene(scene(friction=StribeckCurve(0.3, 0.2, 0.1), hole=HOLE), 900.0)
+        cf.drilling.mixed_scene(scene(friction=StribeckCurve(0.3, 0.2, 0.1), hole=HOLE), 900.0)
 
 
 def test_a_law_with_an_array():
@@ -262,8 +273,8 @@ def test_a_law_with_an_array():
         def torque(self, speed, weight):
             return np.interp(speed, *self.values)
 
-    law, same_law = Table(np.array([[0.0, 2.0, 50.0], [6e3, 4e3, 4e3]])), cf.Stribeck(6e3, 4e3)
-    history = cf.simulate_drilling(scene(law), 6.0, progress=False)
+    law, same_law = Table(np.array([[0.0, 2.0, 50.0], [6e3, 4e3, 4e3]])), cf.drilling.Stribeck(6e3, 4e3)
+    history = cf.drilling.simulate_drilling(scene(law), 6.0, progress=False)
     assert history.torque_on_bit.max() == pytest.approx(same_law.static, rel=1e-3) and history.bit_speed.max() > 6.0
 
 
@@ -276,7 +287,9 @@ def test_a_law_that_fails_during_the_motion():
             return 4e3 if weight == 50e3 else 1 / 0
 
     with pytest.raises(cf.SceneError, match="Fails.torque raised ZeroDivisionError"):
-        cf.simulate_drilling(scene(Fails(), hook=cf.Hook(5e6, -1e-3)), 2.0, model=BOTH, progress=False)
+        cf.drilling.simulate_drilling(
+            scene(Fails(), hook=cf.drilling.Hook(5e6, -1e-3)), 2.0, model=BOTH, progress=False
+        )
 
 
 def test_controls_that_fail_are_refused_in_words():
@@ -286,6 +299,6 @@ def test_controls_that_fail_are_refused_in_words():
             return 1e3, (now.time,)
 
     with pytest.raises(cf.SceneError, match=r"Changing.torque = .*expected a state of 0 numbers at t = 0 s"):
-        cf.simulate_drilling(scene(control=Changing(), inertia=2000.0), 1.0)
+        cf.drilling.simulate_drilling(scene(control=Changing(), inertia=2000.0), 1.0)
     with pytest.raises(cf.SceneError, match="expected that of the drive .* for a sampled control"):
         scene(control=Changing())

@@ -1,6 +1,5 @@
 """The forms: Taylor test of every tangent, balance under rigid motions, and the second variation."""
 
-
 import dense
 import numpy as np
 import pytest

@@ -51,6 +51,7 @@ SHARED = {
     "errors",
     "interrupts",
     "kinds",
+    "names",
     "new_files",
     "numerics",
     "parts",

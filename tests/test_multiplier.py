@@ -1,6 +1,5 @@
 """The multiplier formulation with every support, joint and load; its moments, stability and mesh refinement."""
 
-
 import dense
 import numpy as np
 import pytest

@@ -14,9 +14,11 @@ from cosserat_fenicsx.quantities import Units
 from cosserat_fenicsx.results.screen import LINES, WIDTH
 
 pytestmark = pytest.mark.serial
-WELL = cf.WellPath.from_survey([0, 500, 1500, 2500], [0, 0, 60, 85], [0, 0, 0, 0])
-HOLE = cf.Borehole(WELL, [cf.HoleSection(2500.0, 0.2159, 0.25)])
-STRING = cf.DrillString([cf.Bit(0.2159), cf.Collar(90.0, "NC46-65"), cf.DrillPipe(size="5 in 19.50 lb/ft")])
+WELL = cf.well.WellPath.from_survey([0, 500, 1500, 2500], [0, 0, 60, 85], [0, 0, 0, 0])
+HOLE = cf.well.Borehole(WELL, [cf.well.HoleSection(2500.0, 0.2159, 0.25)])
+STRING = cf.well.DrillString(
+    [cf.well.Bit(0.2159), cf.well.Collar(90.0, "NC46-65"), cf.well.DrillPipe(size="5 in 19.50 lb/ft")]
+)
 
 
 def path():
@@ -31,12 +33,14 @@ def history():
 
 
 def sweep():
-    operations = [cf.TripOut(), cf.TripIn(), cf.RotateOffBottom()]
-    return cf.depth_sweep(HOLE, STRING, operations, np.linspace(500, 2500, 20), mud=cf.Mud(1200.0), model="soft")
+    operations = [cf.well.TripOut(), cf.well.TripIn(), cf.well.RotateOffBottom()]
+    return cf.well.depth_sweep(
+        HOLE, STRING, operations, np.linspace(500, 2500, 20), mud=cf.well.Mud(1200.0), model="soft"
+    )
 
 
 def answer():
-    return cf.torque_and_drag(HOLE, STRING, cf.TripOut(), mud=cf.Mud(1200.0), model="soft")
+    return cf.well.torque_and_drag(HOLE, STRING, cf.well.TripOut(), mud=cf.well.Mud(1200.0), model="soft")
 
 
 #: A result of each class; and the name and the unit of one of its quantities, in field units too.
@@ -47,9 +51,19 @@ RESULTS = {
     "Buckling": (lambda: cf.buckling(column()[1], 2), "critical_load_factor", "1", "1"),
     "TorqueAndDrag": (answer, "tension", "N", "klbf"),
     "DepthSweep": (sweep, "depth", "m", "ft"),
-    "DrillingHistory": (lambda: cf.simulate_drilling(pipe_and_collars("PI_stiff"), 5.0), "bit_speed", "rad/s", "rpm"),
-    "Stability": (lambda: cf.stability(pipe_and_collars("PI_stiff"), [9.0], up_to=2.0), "growth", "1/s", "1/s"),
-    "Campbell": (lambda: cf.campbell(pipe_and_collars(), 20.0, up_to=4.0), "critical_speed", "rad/s", "rpm"),
+    "DrillingHistory": (
+        lambda: cf.drilling.simulate_drilling(pipe_and_collars("PI_stiff"), 5.0),
+        "bit_speed",
+        "rad/s",
+        "rpm",
+    ),
+    "Stability": (
+        lambda: cf.drilling.stability(pipe_and_collars("PI_stiff"), [9.0], up_to=2.0),
+        "growth",
+        "1/s",
+        "1/s",
+    ),
+    "Campbell": (lambda: cf.drilling.campbell(pipe_and_collars(), 20.0, up_to=4.0), "critical_speed", "rad/s", "rpm"),
     "Study": (lambda: cf.study(lambda force: {"work": 2.0 * force}, {"force": range(60)}), "work", "1", "1"),
 }
 

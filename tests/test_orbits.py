@@ -93,7 +93,7 @@ def test_a_rolling_collar(collar):
 
 def test_seen_from_the_high_side():
     """In a hole that leads east and up, south is to the right."""
-    path = cf.WellPath.from_survey([0, 20], [100, 100], [90, 90])
+    path = cf.well.WellPath.from_survey([0, 20], [100, 100], [90, 90])
     rod = cf.Rod(cf.Line(path.position(5.0), path.position(6.0)), cf.Circle(0.17), cf.Material(206e9, density=7850.0))
     wall = HoleWall(rod, path, 0.108, 0.085, begins=5.0)
     up = np.array([0, np.cos(np.radians(100)), -np.sin(np.radians(100))])

@@ -51,7 +51,7 @@ def test_classes_register_themselves():
     known = members(BitLaw)
     assert list(known)[:3] == ["Stribeck", "Cutting", "Lobes"] and known["TwoTorques"] is TwoTorques
     assert "_Hidden" not in known and "BitLaw" not in known
-    assert cf.BitOnRock(TwoTorques("1 kN m")).law == TwoTorques(1e3, 1.0)
+    assert cf.drilling.BitOnRock(TwoTorques("1 kN m")).law == TwoTorques(1e3, 1.0)
 
     @dataclass(frozen=True)
     class Local(BitLaw):
@@ -120,7 +120,7 @@ def test_values_in_their_normal_form(given, normal):
         ({"point": ["1 s", 0, 0]}, r"Everything.point\[0\] = '1 s': s is a unit of time, expected one of length"),
         ({"turning": (1.0,)}, r"Everything.turning = \(1.0,\): expected a finite number \(rad/s\)"),
         ({"turning": {}}, r"Everything.turning = {}: expected .* or a function of time that gives one"),
-        ({"law": cf.Hook()}, r"expected Stribeck\(...\), Cutting\(...\), Lobes\(...\).* or .*\(...\)"),
+        ({"law": cf.drilling.Hook()}, r"expected Stribeck\(...\), Cutting\(...\), Lobes\(...\).* or .*\(...\)"),
         ({"lengths": [1, -1]}, r"Everything.lengths\[1\] = -1: expected a positive number \(m\)"),
         ({"lengths": 1}, r"Everything.lengths = 1: expected a list, each a positive number \(m\)"),
         ({"stiff": math.nan}, r"Everything.stiff = nan: expected a positive number or infinity \(N/m\)"),
@@ -132,13 +132,15 @@ def test_values_that_are_refused(given, words):
 
 
 def test_text_with_units_is_accepted_in_python_as_in_files():
-    assert cf.TopDrive("60 rpm", "2900 kg m^2").speed == pytest.approx(2 * math.pi)
-    assert cf.BitOnRock(cf.Stribeck("6 kN m", "4 kft-lbf", "30 rpm"), "20 klbf").weight == 20 * units.kip
-    assert cf.Hook("5 MN/m", "10 m/h") == cf.Hook(5e6, 10 / 3600)
-    assert cf.WallFriction(0.3, 0.2, "10 rpm", of_rotation=True).speed == 10 * units.rpm
-    assert cf.WallFriction(0.3, 0.2, "10 ft/min").speed == pytest.approx(0.0508)
+    assert cf.drilling.TopDrive("60 rpm", "2900 kg m^2").speed == pytest.approx(2 * math.pi)
+    assert (
+        cf.drilling.BitOnRock(cf.drilling.Stribeck("6 kN m", "4 kft-lbf", "30 rpm"), "20 klbf").weight == 20 * units.kip
+    )
+    assert cf.drilling.Hook("5 MN/m", "10 m/h") == cf.drilling.Hook(5e6, 10 / 3600)
+    assert cf.drilling.WallFriction(0.3, 0.2, "10 rpm", of_rotation=True).speed == 10 * units.rpm
+    assert cf.drilling.WallFriction(0.3, 0.2, "10 ft/min").speed == pytest.approx(0.0508)
     with pytest.raises(cf.SceneError, match="WallFriction.speed = '10 rpm': rpm is a unit of rotation"):
-        cf.WallFriction(0.3, 0.2, "10 rpm")
+        cf.drilling.WallFriction(0.3, 0.2, "10 rpm")
 
 
 def test_dimensions():

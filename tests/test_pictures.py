@@ -171,7 +171,7 @@ def test_an_arrow_points_where_the_force_does():
 def test_tubes_are_drawn_around_their_rods():
     """With their true clearance, 0.05 m, around rods that are drawn thicker; not where displacements are magnified."""
     rod = cf.Rod(cf.Line((0.5, 0, 0), (3.5, 0, 0)), cf.Circle(0.02), STEEL, name="r")
-    axis = cf.WellPath.from_survey([0, 4], [90, 90], [0, 0])
+    axis = cf.well.WellPath.from_survey([0, 4], [90, 90], [0, 0])
     walls = [cf.TubeWall(rod, axis, 0.06, 0.01, begins=0.5), cf.TubeRing(rod.at(1.5), axis, 0.02, 0.03, begins=0.5)]
     scene = cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Force(rod.end, (0, 0, 1.0)), *walls])
     path = cf.solve(scene, [1.0], elements=2)

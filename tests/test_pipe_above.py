@@ -12,7 +12,7 @@ from cosserat_fenicsx.drilling.pipe_above import DelayLines, TopEnd
 pytestmark = pytest.mark.serial
 G, E, DENSITY = 79.3e9, 206e9, 7850.0
 STEEL = cf.Material(E=E, nu=E / (2 * G) - 1, density=DENSITY)
-PIPE = cf.DrillPipe(length=3000.0, outer_diameter=0.127, inner_diameter=0.10861, material=STEEL)
+PIPE = cf.well.DrillPipe(length=3000.0, outer_diameter=0.127, inner_diameter=0.10861, material=STEEL)
 COLLARS = {"outer_diameter": 0.1651, "inner_diameter": 0.05715, "material": STEEL}
 Z_PIPE, Z_COLLARS, SPEED = 296.3752962822167, 1793.8208301221391, 3178.350331229312
 # natural frequencies of the reference numbers for drill-strings: a_stability and c_axial, Hz
@@ -26,7 +26,7 @@ def collars(drive=None, *loads, pipe=PIPE, damping=0.0, **more):
     damping = cf.Damping(drag=damping) if damping else None
     rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, -200)), cf.Tube(0.1651, 0.05715), STEEL, name="collars", damping=damping)
     held = [cf.Roller(end, across) for end in (rod.start, rod.end) for across in ((1, 0, 0), (0, 1, 0))]
-    above = cf.PipeAbove(rod.start, pipe, drive or cf.TopDrive(0.0), **more)
+    above = cf.drilling.PipeAbove(rod.start, pipe, drive or cf.drilling.TopDrive(0.0), **more)
     return rod, cf.Scene([rod], held, [above, *(load(rod) for load in loads)])
 
 
@@ -135,7 +135,7 @@ def test_the_answer_to_a_torque_at_the_bit_is_that_of_the_whole_string(scheme):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("hook", "frequencies"), [(cf.Hook(5e6), ON_HOOK), (None, UNDER_RIGID_HOOK)])
+@pytest.mark.parametrize(("hook", "frequencies"), [(cf.drilling.Hook(5e6), ON_HOOK), (None, UNDER_RIGID_HOOK)])
 def test_axial_natural_frequencies_are_those_of_the_reference(hook, frequencies):
     blow = pulse((0, 0, -2e4), 0.15)
     rod, scene = collars(None, lambda rod: cf.Force(rod.end, blow), hook=hook)
@@ -155,7 +155,7 @@ def test_torsional_natural_frequencies_are_those_of_the_reference():
 
 def test_a_matched_drive_reflects_nothing():
     """The rod moves as on a dashpot of the pipe's impedance."""
-    rod, scene = collars(cf.TopDrive(0.0, control=cf.Matched()), torque())
+    rod, scene = collars(cf.drilling.TopDrive(0.0, control=cf.drilling.Matched()), torque())
     dashpot = cf.Scene([rod], [cf.Pin(rod.start), *scene.supports[2:]],
                        [cf.Dashpot(rod.start, rotational=Z_PIPE), torque()(rod)])  # fmt: skip
     speed, other = (bit_speed(motion(x, 4.0, 0.01), rod) for x in (scene, dashpot))
@@ -165,11 +165,13 @@ def test_a_matched_drive_reflects_nothing():
 @pytest.mark.parametrize("drag", [0.0, 0.2])
 def test_a_controlled_drive_turns_the_rod_as_it_turns_the_string(drag):
     """Against the waves of the whole string, whose speeds are means over two of its steps."""
-    drive = cf.TopDrive(lambda t: 5 * (1 - math.cos(math.pi * min(t, 2) / 2)), 2000.0, cf.PI(800.0, 200.0))
-    mud = {"drag": cf.ViscousDrag(drag)} if drag else {}
+    drive = cf.drilling.TopDrive(
+        lambda t: 5 * (1 - math.cos(math.pi * min(t, 2) / 2)), 2000.0, cf.drilling.PI(800.0, 200.0)
+    )
+    mud = {"drag": cf.drilling.ViscousDrag(drag)} if drag else {}
     rod, scene = collars(drive, damping=drag, **mud)
-    string = cf.DrillString((cf.Collar(200.0, **COLLARS), PIPE))
-    whole = cf.simulate_drilling(cf.Drilling(string, drive, **mud), 8.0, dt=0.0005, model="torsion")
+    string = cf.well.DrillString((cf.well.Collar(200.0, **COLLARS), PIPE))
+    whole = cf.drilling.simulate_drilling(cf.drilling.Drilling(string, drive, **mud), 8.0, dt=0.0005, model="torsion")
     history = motion(scene, 8.0, 0.005)
     expected = np.interp(history.times, whole.times - (whole.times[1] - whole.times[0]) / 2, whole.bit_speed)
     np.testing.assert_allclose(bit_speed(history, rod), expected, atol=2e-4 * expected.max())
@@ -178,16 +180,16 @@ def test_a_controlled_drive_turns_the_rod_as_it_turns_the_string(drag):
 @pytest.mark.parametrize(("scheme", "allowed"), [("momentum", 1e-5), ("energy", 1e-9), ("generalised-alpha", 2e-3)])
 def test_energy_balance_with_all_that_the_pipe_does(scheme, allowed):
     """Off the vertical, under a torque and a force; the first scheme keeps energy to second order alone."""
-    drive = cf.TopDrive(lambda t: 3 * math.sin(t) ** 2, 2000.0, cf.PI(800.0, 200.0))
+    drive = cf.drilling.TopDrive(lambda t: 3 * math.sin(t) ** 2, 2000.0, cf.drilling.PI(800.0, 200.0))
     blow = pulse((2e3, 0, -2e4), 0.5)
-    rod, scene = collars(drive, torque(), lambda rod: cf.Force(rod.at(100.0), blow), hook=cf.Hook(5e6))
+    rod, scene = collars(drive, torque(), lambda rod: cf.Force(rod.at(100.0), blow), hook=cf.drilling.Hook(5e6))
     assert imbalance(motion(scene, 3.0, 0.005, scheme=scheme)) < allowed
 
 
 def test_from_hanging_at_rest_the_hook_lifts_it():
     """By as much as the hook moved, one travel time before, on the mean."""
     weight = 200.0 * STEEL.density * math.pi / 4 * (0.1651**2 - 0.05715**2) * 9.80665
-    lift = cf.Hook(speed=lambda t: 0.25 * (1 - math.cos(math.pi * min(t, 1))))
+    lift = cf.drilling.Hook(speed=lambda t: 0.25 * (1 - math.cos(math.pi * min(t, 1))))
     rod, scene = collars(None, lambda rod: cf.Weight((0, 0, -9.80665)), hook=lift, tension=weight)
     history = motion(scene, 40.0, 0.02, start=1.0)
     up = history.displacement(rod.start)[:, 2]
@@ -206,8 +208,8 @@ def test_adaptive_steps_that_are_taken_back_do_not_count():
 
 @pytest.mark.parametrize("steps", [{"dt": 0.02}, {"tol": 1e-3}])
 def test_resume_gives_identical_digits(steps, tmp_path, monkeypatch):
-    drive = cf.TopDrive(3.0, 2000.0, cf.PI(800.0, 200.0))
-    rod, scene = collars(drive, torque(), hook=cf.Hook(5e6))
+    drive = cf.drilling.TopDrive(3.0, 2000.0, cf.drilling.PI(800.0, 200.0))
+    rod, scene = collars(drive, torque(), hook=cf.drilling.Hook(5e6))
     whole = cf.simulate(scene, 4.0, elements=2, degree=2, **steps)
     stop_at(monkeypatch, 90, 0.0)
     with pytest.raises(Exception, match="^$"):
@@ -220,7 +222,7 @@ def test_resume_gives_identical_digits(steps, tmp_path, monkeypatch):
 
 def test_steps_longer_than_half_a_travel_time_are_halved():
     """A pipe of 100 m: 20 ms up in torsion, 12 axially."""
-    short = cf.DrillPipe(length=100.0, outer_diameter=0.127, inner_diameter=0.10861, material=STEEL)
+    short = cf.well.DrillPipe(length=100.0, outer_diameter=0.127, inner_diameter=0.10861, material=STEEL)
     rod, scene = collars(None, torque(), pipe=short)
     longest = 100 * math.sqrt(DENSITY / E) / 2
     history = motion(scene, 0.4, 0.016, save_every=0.4)
@@ -229,19 +231,19 @@ def test_steps_longer_than_half_a_travel_time_are_halved():
 
 def test_refusals():
     rod, scene = collars()
-    drive, steel = cf.TopDrive(1.0), {"outer_diameter": 0.127, "inner_diameter": 0.10861}
+    drive, steel = cf.drilling.TopDrive(1.0), {"outer_diameter": 0.127, "inner_diameter": 0.10861}
     for arguments, words in (
         ((rod.at(100.0), PIPE, drive), "station = .*an end of the rod"),
         ((rod.start, (), drive), "pipe = .*at least one part"),
         ((rod.start, "pipe", drive), "pipe = .*parts of the pipe"),
-        ((rod.start, cf.DrillPipe(**steel), drive), "length = None: expected a positive number"),
+        ((rod.start, cf.well.DrillPipe(**steel), drive), "length = None: expected a positive number"),
         ((rod.start, PIPE, 1.0), "drive = 1.0: expected a TopDrive"),
         ((rod.start, PIPE, drive, 5e6), "hook = .*a Hook"),
         ((rod.start, PIPE, drive, None, math.inf), "tension = inf: expected a finite number"),
         ((rod.start, PIPE, drive, None, 0.0, 0.3), "drag = 0.3: expected a ViscousDrag"),
     ):
         with pytest.raises(cf.SceneError, match=words):
-            cf.PipeAbove(*arguments)
+            cf.drilling.PipeAbove(*arguments)
     with pytest.raises(cf.SceneError, match="triple-jump"):
         cf.simulate(scene, 1.0, dt=0.01, scheme="triple-jump")
     with pytest.raises(cf.SceneError, match="modes: PipeAbove at collars.start"):

@@ -24,11 +24,13 @@ ranks.PATIENCE = 0.5
 rank, wait = MPI.COMM_WORLD.rank, MPI.COMM_WORLD.barrier
 """
 SWEEP = """
-pipe, path = cf.DrillPipe(size="5 in 19.50 lb/ft"), cf.WellPath.from_survey([0, 500, 1000], [0, 0, 30], [0, 0, 0])
-given = cf.Borehole(path, cf.HoleSection(1000.0, 0.2, 0.2)), cf.DrillString([pipe]), cf.TripOut(), [1000.0]
+pipe = cf.well.DrillPipe(size="5 in 19.50 lb/ft")
+path = cf.well.WellPath.from_survey([0, 500, 1000], [0, 0, 30], [0, 0, 0])
+hole = cf.well.Borehole(path, cf.well.HoleSection(1000.0, 0.2, 0.2))
+given = hole, cf.well.DrillString([pipe]), cf.well.TripOut(), [1000.0]
 if rank == 1:
     raise ValueError("one rank")
-cf.depth_sweep(*given, mud=cf.Mud(1200.0), model="soft", folder="sweep")
+cf.well.depth_sweep(*given, mud=cf.well.Mud(1200.0), model="soft", folder="sweep")
 """
 SOLVE = """
 rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, 1)), cf.Circle(0.1), cf.Material(E=1e9, nu=0.3), name="rod")
@@ -45,9 +47,14 @@ def run(program, folder, size=2):
     clean = {name: value for name, value in os.environ.items() if not name.startswith(("OMPI_COMM", "PMIX", "ORTE"))}
     began = time.monotonic()
     done = subprocess.run(
-        ["mpirun", "--oversubscribe", "-n", str(size), sys.executable, "-c", BEGIN + program], check=False,
-        capture_output=True, encoding="utf-8", cwd=folder, timeout=60, env={**clean, "PYTHONPATH": str(ROOT)},
-    )  # fmt: skip
+        ["mpirun", "--oversubscribe", "-n", str(size), sys.executable, "-c", BEGIN + program],
+        check=False,
+        capture_output=True,
+        encoding="utf-8",
+        cwd=folder,
+        timeout=60,
+        env={**clean, "PYTHONPATH": str(ROOT)},
+    )
     return done, time.monotonic() - began
 
 
@@ -90,8 +97,14 @@ def test_one_process_is_not_watched():
     code = "import sys, cosserat_fenicsx; print(sys.excepthook is sys.__excepthook__, 'mpi4py' in sys.modules)"
     clean = {name: value for name, value in os.environ.items() if name not in ranks.SIZES}
     for more, said in [({}, "True False"), *(({name: "2"}, "False False") for name in ranks.SIZES)]:
-        done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, encoding="utf-8", cwd=ROOT,
-                              env={**clean, **more})  # fmt: skip
+        done = subprocess.run(
+            [sys.executable, "-c", code],
+            check=True,
+            capture_output=True,
+            encoding="utf-8",
+            cwd=ROOT,
+            env={**clean, **more},
+        )
         assert done.stdout.strip() == said, more
 
 

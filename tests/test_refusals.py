@@ -58,25 +58,46 @@ def written(folder, survey=STATIONS, more="", weight=241.0, on_bit=0.0):
 
 
 SURVEYS = {
-    "not of one column each": ('survey = "s.csv"\ncolumns = ["MD", ["Inc"], "Azi"]', "MD,Inc,Azi\n0,0,0\n1000,0,0\n",
-                               r"inc = \['Inc'\]: expected the name of a column"),
-    "a column twice": ('survey = "s.csv"', "MD,MD,Inc,Azi\n0,0,0,0\n1000,2000,10,0\n",
-                       "columns 1 and 2 are both named 'md'"),
-    "a column in two units": ('survey = "s.csv"', "MD (m),MD (ft),Inc,Azi\n0,0,0,0\n1000,3281,10,0\n",
-                              r"both named 'md' \(MD \(m\), MD \(ft\)\): expected one, or that columns"),
-    "two usual names": ('survey = "s.csv"', "Depth MD,Measured Depth,Inc,Azi\n0,0,0,0\n1,2,3,4\n",
-                        "no column 'md' in Depth MD, Measured Depth"),
-    "one column for two": ('survey = "s.csv"\ncolumns = ["MD", "Inc", "Inc"]', "MD,Inc,Azi\n0,0,0\n1000,0,0\n",
-                           "expected three columns, each of another name"),
-    "a long field": ('survey = "s.csv"', "MD,Inc,Azi," + "x" * 200_000 + "\n0,0,0,\n",
-                     "line 1 is no row of a .csv file"),
-    "a number of Python's": ('survey = "s.csv"', "MD,Inc,Azi\n0,0,0\n10_00,10,0\n",
-                             "line 3, '10_00,10,0': expected num"),
+    "not of one column each": (
+        'survey = "s.csv"\ncolumns = ["MD", ["Inc"], "Azi"]',
+        "MD,Inc,Azi\n0,0,0\n1000,0,0\n",
+        r"inc = \['Inc'\]: expected the name of a column",
+    ),
+    "a column twice": (
+        'survey = "s.csv"',
+        "MD,MD,Inc,Azi\n0,0,0,0\n1000,2000,10,0\n",
+        "columns 1 and 2 are both named 'md'",
+    ),
+    "a column in two units": (
+        'survey = "s.csv"',
+        "MD (m),MD (ft),Inc,Azi\n0,0,0,0\n1000,3281,10,0\n",
+        r"both named 'md' \(MD \(m\), MD \(ft\)\): expected one, or that columns",
+    ),
+    "two usual names": (
+        'survey = "s.csv"',
+        "Depth MD,Measured Depth,Inc,Azi\n0,0,0,0\n1,2,3,4\n",
+        "no column 'md' in Depth MD, Measured Depth",
+    ),
+    "one column for two": (
+        'survey = "s.csv"\ncolumns = ["MD", "Inc", "Inc"]',
+        "MD,Inc,Azi\n0,0,0\n1000,0,0\n",
+        "expected three columns, each of another name",
+    ),
+    "a long field": (
+        'survey = "s.csv"',
+        "MD,Inc,Azi," + "x" * 200_000 + "\n0,0,0,\n",
+        "line 1 is no row of a .csv file",
+    ),
+    "a number of Python's": (
+        'survey = "s.csv"',
+        "MD,Inc,Azi\n0,0,0\n10_00,10,0\n",
+        "line 3, '10_00,10,0': expected num",
+    ),
     "an endless device": ('survey = "/dev/zero"', "", "/dev/zero: no plain file: expected a survey as .csv"),
     "a folder": ('survey = "."', "", "Is a directory"),
     "a null character": (r'survey = "s\u0000.csv"', "", "cannot be read .*null"),
     "a workbook": ('survey = "s.xlsx"', "", "s.xlsx: a workbook or another archive: .* save the sheet as .csv"),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("case", SURVEYS)
@@ -92,14 +113,14 @@ def test_surveys(case, tmp_path):
 def test_a_unit_says_which_of_two_columns(tmp_path):
     (tmp_path / "s.csv").write_text("MD (m),MD (ft),Inc,Azi\n0,0,0,0\n1000,3281,10,0\n", encoding="utf-8")
     for name, length in (("md (m)", 1000.0), ("MD  (FT)", 3281 * 0.3048)):
-        assert cf.WellPath.from_csv(tmp_path / "s.csv", md=name).length == pytest.approx(length)
+        assert cf.well.WellPath.from_csv(tmp_path / "s.csv", md=name).length == pytest.approx(length)
 
 
 def test_files_of_bounded_size(tmp_path, monkeypatch):
     (tmp_path / "s.csv").write_text("MD,Inc,Azi\n" + "0,0,0\n" * 100, encoding="utf-8")
     monkeypatch.setattr(checks, "MOST_TEXT", 500)
     with pytest.raises(cf.SceneError, match=r"s.csv: larger than .* MiB: expected a survey"):
-        cf.WellPath.from_csv(tmp_path / "s.csv")
+        cf.well.WellPath.from_csv(tmp_path / "s.csv")
 
 
 def test_other_files_are_plain_ones_too(tmp_path):
@@ -159,7 +180,7 @@ def test_numbers_beyond_sense():
         cf.Stiffness((1.0, 1.0), 1e200, (1.0, 1.0), 1.0)
     cf.Stiffness((float("inf"),) * 2, float("inf"), (1e30, 1e30), 1e30)  # rods may be in units of their own
     with pytest.raises(cf.SceneError, match=r"TopDrive.inertia = 1000000000000.0: .*, of at most 1e\+10 kg m\^2"):
-        cf.TopDrive(6.0, 1e12, cf.PI(1.0, 1.0))
+        cf.drilling.TopDrive(6.0, 1e12, cf.drilling.PI(1.0, 1.0))
 
 
 def test_a_step_longer_than_all_parts(tmp_path, capsys):
@@ -169,8 +190,8 @@ def test_a_step_longer_than_all_parts(tmp_path, capsys):
     assert main(["run", str(file)]) == 2
     assert "expected a step of at most 0.0531 s" in capsys.readouterr().err
     scene = cf.read(file).scene
-    slow = cf.Drilling(scene.string, cf.TopDrive(1.0))
-    coarse, fine = (cf.simulate_drilling(slow, 2.0, dt=dt, progress=False) for dt in (1.0, 1e-3))
+    slow = cf.drilling.Drilling(scene.string, cf.drilling.TopDrive(1.0))
+    coarse, fine = (cf.drilling.simulate_drilling(slow, 2.0, dt=dt, progress=False) for dt in (1.0, 1e-3))
     assert coarse.dt < 0.1 and coarse.bit_speed[-1] == pytest.approx(fine.bit_speed[-1], abs=0.5)
 
 
@@ -180,12 +201,14 @@ def test_a_step_longer_than_all_parts(tmp_path, capsys):
         (lambda: cf.Circle(radius=0.1), "Circle has no argument 'radius': did you mean 'diameter'"),
         (lambda: cf.solve(None, load_factor=[1.0]), "solve has no argument 'load_factor': did you mean 'load_factors'"),
         (lambda: cf.Material(E=1.0, rho=3.0), "Material has no argument 'rho': did you mean 'density'"),
-        (lambda: cf.TripOut(wieght=3.0), "TripOut has no argument 'wieght': did you mean 'weight'"),
-        (lambda: cf.Circle(),
-         r"Circle: missing a required argument: 'diameter': expected Circle\(diameter, shear_factor=...\)"),
+        (lambda: cf.well.TripOut(wieght=3.0), "TripOut has no argument 'wieght': did you mean 'weight'"),
+        (
+            lambda: cf.Circle(),
+            r"Circle: missing a required argument: 'diameter': expected Circle\(diameter, shear_factor=...\)",
+        ),
         (lambda: cf.Circle(1.0, 2.0, 3.0), "Circle: too many positional arguments: expected"),
     ],
-)  # fmt: skip
+)
 def test_arguments_that_there_are_not(call, words):
     with pytest.raises(TypeError, match=words):
         call()
@@ -208,8 +231,12 @@ def test_public_functions_are_those_of_their_modules():
 
 
 def test_warnings_are_of_the_line_that_calls():
-    for call in (lambda: cf.HoleSection(10.0, 20.0, 0.1), lambda: cf.Mud(1.2), lambda: cf.TripOut(weight=3.0),
-                 lambda: cf.Ream(0.1, 5.0)):  # fmt: skip
+    for call in (
+        lambda: cf.well.HoleSection(10.0, 20.0, 0.1),
+        lambda: cf.well.Mud(1.2),
+        lambda: cf.well.TripOut(weight=3.0),
+        lambda: cf.well.Ream(0.1, 5.0),
+    ):
         with pytest.warns(cf.SceneWarning) as told:
             call()
         assert [warning.filename for warning in told] == [__file__]
@@ -219,8 +246,10 @@ def test_warnings_are_of_the_line_that_calls():
 def test_damaged_files_of_strings(seed):
     """Scene files of wells and of strings in motion: explained, or refused in words."""
     tables = {file: tomllib.loads(file.read_text(encoding="utf-8")) for file in sorted(DEMOS.glob("**/*.toml"))}
-    kinds = [(explain_drilling, {file: x for file, x in tables.items() if "drive" in x}),
-             (explain_well, {file: x for file, x in tables.items() if "well" in x and "drive" not in x})]  # fmt: skip
+    kinds = [
+        (explain_drilling, {file: x for file, x in tables.items() if "drive" in x}),
+        (explain_well, {file: x for file, x in tables.items() if "well" in x and "drive" not in x}),
+    ]
     chance, refused = random.Random(seed), 0
     commands = parser(dict.fromkeys(("run", "resume", "buckling", "modes", "explain", "schema"), main))
     for _ in range(60):

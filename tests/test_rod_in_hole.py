@@ -38,7 +38,7 @@ def built(case, **options):
     """A string in a vertical line, an arc and a straight line, see the reference."""
     given, alpha = case["input"], math.radians(case["input"]["alpha"])
     md = np.cumsum([0, given["h"], given["R"] * alpha, given["D"] + 50.0])
-    path = cf.WellPath.from_survey(md, np.degrees([0, 0, alpha, alpha]), [0, 0, 0, 0])
+    path = cf.well.WellPath.from_survey(md, np.degrees([0, 0, alpha, alpha]), [0, 0, 0, 0])
     return solve_in_hole(
         path, [case["rod_length"]], rigid(given["EI"]), given["w"], 0.06, radius=0.06 + given["r"],
         friction=given["mu"], slip=(float(given["c"]), 0.0), bottom_tension=given["T0"], hinge=(0, 1, 0), has_arm=False,
@@ -81,7 +81,7 @@ def test_a_frictionless_string_hangs_by_its_tension_and_its_depth():
 @pytest.mark.parametrize("case", KNOWN["bottom-hole assembly"][1:3], ids=["bit", "stabiliser"])
 def test_an_assembly_touches_the_low_side_at_its_tangency(case):
     exact, inc, length = case["exact_kirchhoff"], case["inclination_deg"], 60.0
-    path = cf.WellPath.from_survey([0, length + 20], [inc, inc], [0, 0])
+    path = cf.well.WellPath.from_survey([0, length + 20], [inc, inc], [0, 0])
     rings = [(length, 0.0, 0.1)]
     if "stabiliser_at_arc_length" in case:
         rings.append((length - case["stabiliser_at_arc_length"], case["stabiliser_offset_low_side"], 0.1))
@@ -108,7 +108,7 @@ def test_a_string_slips_round_an_arc(case):
     straight, clear, own = max(12 * math.sqrt(EI / T), 0.6 * R * angle), 1e-3 * R, 0.01 * R
     clear *= 10 if case["EI"] == 0.01 else 1
     md = np.cumsum([0.0, straight, (R + clear) * angle, straight])
-    path = cf.WellPath.from_survey([*md[:3], md[3] + R], np.degrees([0, 0, angle, angle]), [0] * 4)
+    path = cf.well.WellPath.from_survey([*md[:3], md[3] + R], np.degrees([0, 0, angle, angle]), [0] * 4)
     answer = solve_in_hole(
         path, [md[3]], rigid(EI), 1e-9 * T / R, own, friction=mu, slip=(1.0, 0.0), bottom_tension=T, has_arm=False,
         radius=[(md[1], own + 0.3 * R), (md[2], own + clear), (md[3] + R, own + 0.3 * R)],
@@ -122,7 +122,7 @@ def test_a_string_slips_round_an_arc(case):
 
 def test_the_pressure_of_a_turning_string_is_smaller_than_its_weight():
     """Friction carries a part of it: |q|/sqrt(1 + mu^2), and the torque is that pressure times mu and the radius."""
-    path, mu = cf.WellPath.from_survey([0, 500], [60, 60], [30, 30]), 0.4
+    path, mu = cf.well.WellPath.from_survey([0, 500], [60, 60], [30, 30]), 0.4
     answer = solve_in_hole(path, [400], PIPE, 241.13, 0.0635, radius=0.108, friction=mu, slip=(0.0, 1.0))
     inside = (answer.s > 100) & (answer.s < 300)
     pressure = 241.13 * math.sin(math.radians(60)) / math.hypot(1, mu)
@@ -143,7 +143,7 @@ FOUND = {("P", "out"): 907306.0, ("P", "in"): 379920.4, ("P", "turning"): 598622
 @pytest.mark.parametrize("name, way", FOUND)
 def test_whole_wells(name, way):
     stations = np.transpose(WELLS[name]["stations_md_inc_azi"])
-    path = cf.WellPath.from_survey(*stations)
+    path = cf.well.WellPath.from_survey(*stations)
     given = {"radius": 0.0635 + 0.04445, "friction": 0.25, "slip": SLIP[way]}
     answer = solve_in_hole(path, [path.length], PIPE, 241.13, 0.0635, **given)
     assert answer.hook_load == pytest.approx(FOUND[name, way], rel=2e-5)  # friction's arm along the pipe: -1.5e-5
@@ -154,7 +154,7 @@ def test_whole_wells(name, way):
 
 def test_slender_strings_are_solved():
     """Beside the wall their pivots are zero to rounding; with less bending stiffness the hook load tends to a limit."""
-    path = cf.WellPath.from_survey([0, 100, 300, 500], [0, 0, 40, 40], [20] * 4)
+    path = cf.well.WellPath.from_survey([0, 100, 300, 500], [0, 0, 40, 40], [20] * 4)
     given = {"radius": 0.108, "friction": 0.25, "slip": SLIP["out"], "elements": 256}
     stiffer, soft = (solve_in_hole(path, [500.0], rigid(EI), 241.13, 0.0635, **given).hook_load for EI in (1e3, 100.0))
     assert soft == pytest.approx(stiffer, rel=1e-6)
@@ -162,7 +162,7 @@ def test_slender_strings_are_solved():
 
 def test_drilling_with_weight_on_a_centred_bit():
     """The soft string's hook load and torque are 661 189 N and 9548 N m; the clearance takes 3.4 % of the torque."""
-    path = cf.WellPath.from_survey(*np.transpose(WELLS["F-12"]["stations_md_inc_azi"]))
+    path = cf.well.WellPath.from_survey(*np.transpose(WELLS["F-12"]["stations_md_inc_azi"]))
     answer = solve_in_hole(
         path, [path.length], PIPE, 241.13, 0.0635, radius=0.0635 + 0.04445, friction=0.25, slip=SLIP["turning"],
         bottom_tension=-8e4, bottom_torque=5e3, rings=[(path.length, 0.0, 0.1)],
@@ -174,7 +174,7 @@ def test_drilling_with_weight_on_a_centred_bit():
 
 
 def test_two_sections_two_frictions_and_rings():
-    path = cf.WellPath.from_survey(*np.transpose(WELLS["P"]["stations_md_inc_azi"]))
+    path = cf.well.WellPath.from_survey(*np.transpose(WELLS["P"]["stations_md_inc_azi"]))
     collar = cf.Stiffness((1e9, 1e9), 5e9, (2e7, 2e7), 1.5e7)
     hole = {"radius": [(2500.0, 0.1112), (4700.0, 0.108)], "friction": [(2500.0, 0.2), (4700.0, 0.3)]}
     answer = solve_in_hole(
@@ -187,7 +187,7 @@ def test_two_sections_two_frictions_and_rings():
 
 
 def test_a_string_on_the_axis_has_no_twist_and_no_jump_of_its_quaternion():
-    path = cf.WellPath.from_survey([0, 100, 400, 700], [0, 30, 170, 20], [0, 0, 90, 300])
+    path = cf.well.WellPath.from_survey([0, 100, 400, 700], [0, 30, 170, 20], [0, 0, 90, 300])
     rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, 700)), PIPE)
     s = np.linspace(0, 700, 5001)
     r, q = np.split(on_axis(rod, path, s), [3], axis=1)
@@ -211,7 +211,7 @@ def test_a_string_on_the_axis_has_no_twist_and_no_jump_of_its_quaternion():
     ({"bottom_tension": math.nan}, "bottom_tension"),
 ])  # fmt: skip
 def test_refusals(arguments, word):
-    path = cf.WellPath.from_survey([0, 500], [60, 60], [30, 30])
+    path = cf.well.WellPath.from_survey([0, 500], [60, 60], [30, 30])
     given = {"lengths": [400], "stiffness": PIPE, "weight": 241.13, "contact_radius": 0.0635, "radius": 0.108}
     with pytest.raises(cf.SceneError, match=word.replace("(", r"\(")):
         solve_in_hole(path, **{**given, **arguments})
@@ -220,7 +220,7 @@ def test_refusals(arguments, word):
 @pytest.mark.slow
 def test_what_walls_tell_of_their_work_is_true():
     rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, 10)), PIPE)
-    wall = TubeWall(rod, cf.WellPath.from_survey([0, 20], [0, 0], [0, 0]), 0.1, 0.05)
+    wall = TubeWall(rod, cf.well.WellPath.from_survey([0, 20], [0, 0], [0, 0]), 0.1, 0.05)
     assert found_traits(wall, [rod]) == traits_of(wall, [rod])
 
 
@@ -228,13 +228,17 @@ def test_walls_refuse_what_has_no_axis():
     rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, 10)), PIPE)
     with pytest.raises(cf.SceneError, match="the axis of the tube"):
         TubeWall(rod, "straight", 0.1, 0.05)
-    path = cf.WellPath.from_survey([0, 20], [0, 0], [0, 0])
+    path = cf.well.WellPath.from_survey([0, 20], [0, 0], [0, 0])
     with pytest.raises(cf.SceneError, match="contact_radius"):
         TubeRing(rod.end, path, 0.01, 0.0)
 
 
 def test_a_string_of_several_rods_is_the_same():
-    path, length, weight = cf.WellPath.from_survey([0, 60, 140, 260], [20, 20, 60, 60], [0, 0, 40, 40]), 200.0, 241.13
+    path, length, weight = (
+        cf.well.WellPath.from_survey([0, 60, 140, 260], [20, 20, 60, 60], [0, 0, 40, 40]),
+        200.0,
+        241.13,
+    )
     pipe = cf.Stiffness((1.35e8, 1.35e8), math.inf, (1228200.0, 1228200.0), 1.2282e10)
     start, down, lines = path.position(0.0), path.tangent(0.0), []
     for ends in ([0.0, length], [0.0, 75.0, length]):
@@ -265,7 +269,7 @@ def test_a_string_of_several_rods_is_the_same():
 def test_side_force_and_moment_on_a_coarse_mesh():
     """They are near to those of a fine mesh, which the wall's forces at the nodes are not, and the estimates are above
     their errors."""
-    path = cf.WellPath.from_survey([0, 300, 900, 1500], [0, 0, 40, 40], [20, 20, 20, 20])
+    path = cf.well.WellPath.from_survey([0, 300, 900, 1500], [0, 0, 40, 40], [20, 20, 20, 20])
     given = path, [1500], PIPE, 241.13, 0.0635
     coarse, fine = (solve_in_hole(*given, radius=0.108, friction=0.25, slip=(1.0, 0.0), wall_stiffness=1e9, elements=n)
                     for n in (64, 512))  # fmt: skip

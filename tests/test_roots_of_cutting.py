@@ -13,13 +13,13 @@ A, EPSILON, ZETA, BLADES, WEIGHT = 0.108, 60e6, 0.6, 4, 5e4
 
 
 @pytest.mark.parametrize(("length", "speed", "up_to"), [(50.0, 3.0, 30.0), (300.0, 1.0, 10.0), (2000.0, 0.2, 1.0)])
-@pytest.mark.parametrize("hook", [cf.Hook(), None], ids=["held", "load stays"])
+@pytest.mark.parametrize("hook", [cf.drilling.Hook(), None], ids=["held", "load stays"])
 def test_short_strings_and_slow_rotation(length, speed, up_to, hook):
     """Every root fulfils (s Za + ka E)(s Zt - kt rho E) + ka kt rho E^2 = 0 with Z coth(s L/c) of a uniform string;
     with Z tanh(s L/c) along the axis where the load of the hook stays the same."""
-    bit = cf.BitOnRock(cf.Cutting(A, EPSILON, ZETA, BLADES), weight=WEIGHT, inertia=1.0, mass=10.0)
-    scene = cf.Drilling(string((length, 0.127, 0.1)), cf.TopDrive(1.0), bit, hook=hook)
-    roots = cf.stability(scene, [speed], up_to=up_to).roots[0, 0]
+    bit = cf.drilling.BitOnRock(cf.drilling.Cutting(A, EPSILON, ZETA, BLADES), weight=WEIGHT, inertia=1.0, mass=10.0)
+    scene = cf.drilling.Drilling(string((length, 0.127, 0.1)), cf.drilling.TopDrive(1.0), bit, hook=hook)
+    roots = cf.drilling.stability(scene, [speed], up_to=up_to).roots[0, 0]
     (part,) = scene.segments
     ka, kt = BLADES * ZETA * EPSILON * A, BLADES * EPSILON * A**2 / 2
     rho, tau = WEIGHT / ka * BLADES / (2 * np.pi), 2 * np.pi / (BLADES * speed)

@@ -245,7 +245,7 @@ def test_materials_of_a_scene_file_have_names(tmp_path):
 @pytest.mark.slow
 def test_a_cable_that_is_pulled_through_a_conduit():
     """The force at its end by the friction and the stiffness of the wall, whose axis turns with the position."""
-    axis = cf.WellPath.from_survey([0, np.pi / 2], [90, 90], [0, 90])
+    axis = cf.well.WellPath.from_survey([0, np.pi / 2], [90, 90], [0, 90])
 
     def scene(stiffness=1e6, friction=0.3):
         material = cf.Material(E=2e9, nu=0.4)

@@ -18,8 +18,10 @@ pytestmark = [pytest.mark.serial, pytest.mark.once]
 @pytest.mark.parametrize("case", [x for x in GIVEN["natural_Hz"] if x != "hook"])
 def test_reference_frequencies(case):
     expected = GIVEN["natural_Hz"][case]
-    hook = cf.Hook(GIVEN["natural_Hz"]["hook"]) if "hook" in case else None
-    found = cf.natural_frequencies(pipe_and_collars(hook=hook), len(expected), case.split()[-1], case.split()[0])
+    hook = cf.drilling.Hook(GIVEN["natural_Hz"]["hook"]) if "hook" in case else None
+    found = cf.drilling.natural_frequencies(
+        pipe_and_collars(hook=hook), len(expected), case.split()[-1], case.split()[0]
+    )
     assert found == pytest.approx(expected, rel=1e-12)
 
 
@@ -27,7 +29,9 @@ def test_a_pipe_with_an_inertia_at_its_end():
     """w tan(w L/c) = Z/J between k pi and (k + 1/2) pi, by itself."""
     pipe = replace(pipe_and_collars(), string=tubes(GIVEN["sections"][0]))
     part, inertia = pipe.segments[0], 40.0
-    found = cf.natural_frequencies(replace(pipe, bit=cf.BitOnRock(cf.Stribeck(0, 0), inertia=inertia)), 5)
+    found = cf.drilling.natural_frequencies(
+        replace(pipe, bit=cf.drilling.BitOnRock(cf.drilling.Stribeck(0, 0), inertia=inertia)), 5
+    )
     time, Z = part.length / part.torsional_speed, part.torsional_impedance
     for k in range(5):
         exact = brentq(lambda x: x / time * math.sin(x) * inertia - Z * math.cos(x), k * math.pi, (k + 0.5) * math.pi)
@@ -42,18 +46,22 @@ def many_parts(count, drive):
     parts = []
     for length, EA, GJ, mass in zip(lengths, axial, torsional, masses, strict=True):
         stiff = cf.Stiffness((1e9, 1e9), EA, (1e6, 1e6), GJ, mass=mass, inertia=(mass / 1e3, mass / 1e3, mass / 5e2))
-        parts.append(cf.Component(float(length), stiff, 100.0, 0.08))
-    bit = cf.BitOnRock(cf.Stribeck(0, 0), inertia=30.0, mass=500.0)
-    return cf.Drilling(cf.DrillString(tuple(parts)), drive, bit, hook=cf.Hook(4e6))
+        parts.append(cf.well.Component(float(length), stiff, 100.0, 0.08))
+    bit = cf.drilling.BitOnRock(cf.drilling.Stribeck(0, 0), inertia=30.0, mass=500.0)
+    return cf.drilling.Drilling(cf.well.DrillString(tuple(parts)), drive, bit, hook=cf.drilling.Hook(4e6))
 
 
-@pytest.mark.parametrize("drive", [cf.TopDrive(1.0), cf.TopDrive(None, 2000.0, cf.Motor(1.0))], ids=["held", "free"])
+@pytest.mark.parametrize(
+    "drive",
+    [cf.drilling.TopDrive(1.0), cf.drilling.TopDrive(None, 2000.0, cf.drilling.Motor(1.0))],
+    ids=["held", "free"],
+)
 @pytest.mark.parametrize("kind", ["torsion", "axial"])
 @pytest.mark.parametrize("bit", ["free", "fixed"])
 def test_no_frequency_is_missed(drive, kind, bit):
     """Forty parts: as many frequencies as the winding number of another function says, and the same ones."""
     scene = many_parts(40, drive)
-    w = 2 * math.pi * cf.natural_frequencies(scene, 40, bit, kind)
+    w = 2 * math.pi * cf.drilling.natural_frequencies(scene, 40, bit, kind)
     assert (np.diff(w) > 0).all()
     guide = torsional(scene) if kind == "torsion" else axial(scene)
     columns = slice(1, None, 2) if bit == "free" else slice(0, None, 2)
@@ -64,12 +72,17 @@ def test_no_frequency_is_missed(drive, kind, bit):
 
 
 def test_discs_and_what_turns_as_a_whole():
-    held, free = public_discs(cf.Stiff(), 1e4), public_discs(cf.Motor(1.0), 1e4)
-    assert [len(cf.natural_frequencies(x, 9, bit)) for x in (held, free) for bit in ("free", "fixed")] == [3, 2, 3, 3]
-    undamped = replace(held, string=cf.Discs(held.string.inertias, held.string.stiffnesses))
+    held, free = public_discs(cf.drilling.Stiff(), 1e4), public_discs(cf.drilling.Motor(1.0), 1e4)
+    assert [len(cf.drilling.natural_frequencies(x, 9, bit)) for x in (held, free) for bit in ("free", "fixed")] == [
+        3,
+        2,
+        3,
+        3,
+    ]
+    undamped = replace(held, string=cf.drilling.Discs(held.string.inertias, held.string.stiffnesses))
     guide = torsional(undamped)
     roots, _ = all_roots(lambda s: guide.bit(s)[1::2], Box(-1, 1, 1e-3, 9.0), 1.0)
-    assert roots.imag / (2 * math.pi) == pytest.approx(cf.natural_frequencies(held, 9), rel=1e-12)
+    assert roots.imag / (2 * math.pi) == pytest.approx(cf.drilling.natural_frequencies(held, 9), rel=1e-12)
 
 
 def test_nothing_overflows():
@@ -125,27 +138,27 @@ def test_multiple_roots(roots):
 
 def test_gains_of_tuned_drives():
     scene = pipe_and_collars("PI_stiff")
-    for choose, name in ((cf.SoftSpeed, "SoftSpeed"), (cf.SoftTorque, "tuned")):
-        expected = cf.PI(GIVEN["tops"][name]["Kp"], GIVEN["tops"][name]["Ki"])
+    for choose, name in ((cf.drilling.SoftSpeed, "SoftSpeed"), (cf.drilling.SoftTorque, "tuned")):
+        expected = cf.drilling.PI(GIVEN["tops"][name]["Kp"], GIVEN["tops"][name]["Ki"])
         for string in (scene.string, scene):
             found = choose(string, 2900.0)
             assert (found.Kp, found.Ki) == pytest.approx((expected.Kp, expected.Ki), rel=1e-12)
     pipe = scene.string.components[-1]
     part = scene.segments[0]
-    found = cf.SoftTorque(pipe, 2000.0)
+    found = cf.drilling.SoftTorque(pipe, 2000.0)
     assert found.Ki == pytest.approx(2000 * (math.pi / 2 * part.torsional_speed / part.length) ** 2, rel=1e-12)
-    assert cf.SoftTorque(cf.DrillString((replace(pipe, length=None),)), 2000.0, depth=3000.0) == found
+    assert cf.drilling.SoftTorque(cf.well.DrillString((replace(pipe, length=None),)), 2000.0, depth=3000.0) == found
     with pytest.raises(cf.SceneError, match="inertia = 0"):
-        cf.SoftSpeed(pipe, 0)
+        cf.drilling.SoftSpeed(pipe, 0)
     with pytest.raises(cf.SceneError, match="discs have no impedance"):
-        cf.SoftSpeed(public_discs(cf.Stiff(), 1e4), 2900.0)
+        cf.drilling.SoftSpeed(public_discs(cf.drilling.Stiff(), 1e4), 2900.0)
 
 
 def test_critical_speeds_of_a_pipe(tmp_path):
     """A free end in torsion, (k + 1/2)/2 c/L; a fixed one in axial motion, k c/(2 L)."""
-    bit = cf.BitOnRock(cf.Lobes(3, 0.002), weight=8e4)
+    bit = cf.drilling.BitOnRock(cf.drilling.Lobes(3, 0.002), weight=8e4)
     scene = replace(pipe_and_collars(), string=tubes(GIVEN["sections"][0]), bit=bit)
-    part, answer = scene.segments[0], cf.campbell(scene, 20.0, up_to=4.0)
+    part, answer = scene.segments[0], cf.drilling.campbell(scene, 20.0, up_to=4.0)
     found = answer.critical_speeds()
     w = np.arange(1, 40) * math.pi * part.axial_speed / part.length
     for name, times in answer.excitations.items():
@@ -164,6 +177,6 @@ def test_critical_speeds_of_a_pipe(tmp_path):
 )
 def test_refusals(arguments, words):
     with pytest.raises(cf.SceneError, match=words):
-        cf.natural_frequencies(pipe_and_collars(), *arguments)
+        cf.drilling.natural_frequencies(pipe_and_collars(), *arguments)
     with pytest.raises(cf.SceneError, match="discs turn alone"):
-        cf.natural_frequencies(public_discs(cf.Stiff(), 1e4), 1, kind="axial")
+        cf.drilling.natural_frequencies(public_discs(cf.drilling.Stiff(), 1e4), 1, kind="axial")

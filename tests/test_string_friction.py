@@ -25,7 +25,7 @@ def steady(model, seconds, last=5.0):
 @pytest.mark.parametrize(("speed", "load"), [(0.3, 209829.94485859264), (-0.3, 123172.36165217214)])
 def test_pulled_and_turned_at_once(speed, load):
     """Friction mu w sin(inc) against the slip (V, r Om)."""
-    model = AxialTorsional(in_a_well(*STRAIGHT, cf.Hook(speed=speed), 2 * np.pi), 0.0025, 100)
+    model = AxialTorsional(in_a_well(*STRAIGHT, cf.drilling.Hook(speed=speed), 2 * np.pi), 0.0025, 100)
     rows = steady(model, 40)
     assert column(rows, "hook_load") == pytest.approx(load, rel=1e-6)
     assert column(rows, "surface_torque") == pytest.approx(3659.170460933915, rel=1e-6)
@@ -36,13 +36,18 @@ def test_one_way_of_slip_alone():
     """Without a slip across it, friction does not calm what still swings: drag does, and adds what is known."""
     hanging_load, rate, rho_a, rho_j = 166501.15325538238, 0.5, 26.713757953594364, 0.0932481524676923
     rows = steady(
-        AxialTorsional(in_a_well(*STRAIGHT, cf.Hook(speed=0.3), drag=cf.ViscousDrag(axial=rate)), 0.0025, 100), 60
+        AxialTorsional(
+            in_a_well(*STRAIGHT, cf.drilling.Hook(speed=0.3), drag=cf.drilling.ViscousDrag(axial=rate)), 0.0025, 100
+        ),
+        60,
     )
     told = hanging_load + MU * ACROSS * 1500 + rate * rho_a * 0.3 * 1500
     load = column(rows, "hook_load")
     assert load.mean() == pytest.approx(told, rel=1e-6) and np.abs(load - told).max() < 1e-4 * told
     assert np.all(column(rows, "surface_torque") == 0)
-    rows = steady(AxialTorsional(in_a_well(*STRAIGHT, turns=2 * np.pi, drag=cf.ViscousDrag(rate)), 0.0025, 100), 60)
+    rows = steady(
+        AxialTorsional(in_a_well(*STRAIGHT, turns=2 * np.pi, drag=cf.drilling.ViscousDrag(rate)), 0.0025, 100), 60
+    )
     told = MU * ACROSS * 0.0635 * 1500 + rate * rho_j * 2 * np.pi * 1500
     assert column(rows, "surface_torque").mean() == pytest.approx(told, rel=1e-6)
     assert column(rows, "hook_load") == pytest.approx(hanging_load, rel=1e-9)
@@ -52,7 +57,7 @@ def test_through_a_build_section():
     """The soft string of an independent computation; of the second order in the mesh."""
     arc, errors = 314.15926535897927, []
     for elements in (60, 120):
-        scene = in_a_well([0.0, arc, arc + 1500], [0.0, 60.0, 60.0], cf.Hook(speed=0.3), 2 * np.pi)
+        scene = in_a_well([0.0, arc, arc + 1500], [0.0, 60.0, 60.0], cf.drilling.Hook(speed=0.3), 2 * np.pi)
         rows = steady(AxialTorsional(scene, 0.01, elements), 60)
         load, torque = (column(rows, name).mean() for name in ("hook_load", "surface_torque"))
         errors.append((load / 301989.3437927205 - 1, torque / 6571.193644923769 - 1))
@@ -63,7 +68,7 @@ def test_through_a_build_section():
 def test_pulled_from_rest():
     """Behind the front the pipe moves with V - f x/(2 Z), and the hook bears Z V + f c t/2 more."""
     V, f, Z, dt = 0.3, MU * ACROSS, IMPEDANCE[0], 0.00047
-    model = AxialTorsional(in_a_well(*STRAIGHT, cf.Hook(speed=V)), dt, 600)
+    model = AxialTorsional(in_a_well(*STRAIGHT, cf.drilling.Hook(speed=V)), dt, 600)
     start = model.profile()[PROFILE.index("tension"), 0]
     rows = model.advance(round(0.2 / dt))
     t, more = rows[:, 0] - dt / 2, column(rows, "hook_load") - start
@@ -80,7 +85,7 @@ def test_pulled_from_rest():
 @pytest.mark.parametrize("axial", [False, True])
 def test_a_front_of_torsion_stops_by_itself(axial):
     m, Om, Z, dt = 3.52427441057226, 2 * np.pi, 296.3752962822167, 0.0003
-    model = AxialTorsional(lying(cf.TopDrive(Om)), dt, 3000, axial=axial)
+    model = AxialTorsional(lying(cf.drilling.TopDrive(Om)), dt, 3000, axial=axial)
     rows = model.advance(round(0.332 / dt))
     t, x = rows[:, 0] - dt / 2, model.depths
     assert x[model.profile()[PROFILE.index("angle")] > 1e-9].max() == pytest.approx(1056.7740703874679, rel=5e-3)
@@ -90,7 +95,7 @@ def test_a_front_of_torsion_stops_by_itself(axial):
 
 
 def test_a_lying_pipe_until_its_end_moves():
-    rows = AxialTorsional(lying(cf.TopDrive(2 * np.pi)), 0.003).advance(3000)
+    rows = AxialTorsional(lying(cf.drilling.TopDrive(2 * np.pi)), 0.003).advance(3000)
     t, om = rows[:, 0], column(rows, "bit_speed")
     assert t[om != 0][0] == pytest.approx(2.725, rel=2e-3)
     assert column(rows, "surface_torque").max() == pytest.approx(12432.4, rel=1e-3)
@@ -111,7 +116,7 @@ class Slowly:
 def test_a_pipe_turned_slowly_and_back():
     """M = sqrt(2 GJ m phi); back by dphi to l2 = sqrt(GJ dphi/m), and M = m l1 - 2 m l2."""
     m = 3.52427441057226
-    model = AxialTorsional(lying(cf.TopDrive(Slowly(120.0))), 0.01, 250, axial=False)
+    model = AxialTorsional(lying(cf.drilling.TopDrive(Slowly(120.0))), 0.01, 250, axial=False)
     rows = model.advance(12000)
     x, angle = model.depths, model.profile()[0]
     slope, end = np.polyfit(x[x < 1700], np.sqrt(angle[x < 1700]), 1)
@@ -157,9 +162,13 @@ def test_two_methods_agree_on_torsion_in_a_curved_well():
 
 def test_the_tension_at_rest_is_that_of_the_soft_string():
     scene = in_a_well([0.0, 400.0, 900.0, 1800.0], [0.0, 0.0, 50.0, 80.0])
-    scene = cf.Drilling(scene.string, scene.drive, cf.BitOnRock(cf.Stribeck(0.0, 0.0), 40e3), scene.hole)
+    scene = cf.drilling.Drilling(
+        scene.string, scene.drive, cf.drilling.BitOnRock(cf.drilling.Stribeck(0.0, 0.0), 40e3), scene.hole
+    )
     model = AxialTorsional(scene, 0.01, 150)
-    answer = cf.torque_and_drag(scene.hole.with_friction(0.0), scene.string, cf.RotaryDrilling(40e3, 0.0), model="soft")
+    answer = cf.well.torque_and_drag(
+        scene.hole.with_friction(0.0), scene.string, cf.well.RotaryDrilling(40e3, 0.0), model="soft"
+    )
     hook = answer.hook_load if not callable(answer.hook_load) else answer.hook_load()
     row = model.advance(1)
     assert column(row, "hook_load")[0] == pytest.approx(hook, rel=1e-9)
@@ -169,8 +178,10 @@ def test_the_tension_at_rest_is_that_of_the_soft_string():
 def test_a_bit_that_is_lifted_off_the_rock():
     """The weight on bit falls by the stiffness of the string times the way of the hook, down to nothing; the torque
     of a law with a radius falls with it."""
-    bit = cf.BitOnRock(cf.Stribeck(0.5, 0.5, radius=0.1), 80e3, inertia=50.0)
-    scene = hanging(cf.Hook(speed=0.005), cf.TopDrive(3.0), bit, 250.0, drag=cf.ViscousDrag(0.5, 0.5))
+    bit = cf.drilling.BitOnRock(cf.drilling.Stribeck(0.5, 0.5, radius=0.1), 80e3, inertia=50.0)
+    scene = hanging(
+        cf.drilling.Hook(speed=0.005), cf.drilling.TopDrive(3.0), bit, 250.0, drag=cf.drilling.ViscousDrag(0.5, 0.5)
+    )
     model = AxialTorsional(scene, 0.01, 100)
     rows = model.advance(10000)
     weight, torque = column(rows, "weight_on_bit"), column(rows, "torque_on_bit")
@@ -185,14 +196,21 @@ def test_a_bit_that_is_lifted_off_the_rock():
 
 def test_falling_friction_of_a_long_string_needs_no_half_steps():
     """Where nothing moves along the axis, and where all does."""
-    path = cf.WellPath.from_survey([0, 1000, 1500, 5000], [0, 0, 60, 60], np.zeros(4), degrees=True)
+    path = cf.well.WellPath.from_survey([0, 1000, 1500, 5000], [0, 0, 60, 60], np.zeros(4), degrees=True)
     parts = part_of(4800.0, 0.127, 0.10861, weight=220.0), part_of(200.0, 0.1651, 0.05715, weight=1200.0)
-    pipe, hole = cf.DrillString(parts, order="top down"), cf.Borehole(path, cf.HoleSection(5000, 0.2159, 0.3))
-    for hook in (None, cf.Hook(5e6, 0.3)):
-        scene = cf.Drilling(
-            pipe, cf.TopDrive(8.0, 2900.0, cf.PI(1e4, 1e4)), hook=hook, hole=hole,
-            friction=cf.WallFriction(1.0, 0.7, 1.0, of_rotation=True, of_hole=True), drag=cf.ViscousDrag(0.1, 0.1),
-        )  # fmt: skip
+    pipe, hole = (
+        cf.well.DrillString(parts, order="top down"),
+        cf.well.Borehole(path, cf.well.HoleSection(5000, 0.2159, 0.3)),
+    )
+    for hook in (None, cf.drilling.Hook(5e6, 0.3)):
+        scene = cf.drilling.Drilling(
+            pipe,
+            cf.drilling.TopDrive(8.0, 2900.0, cf.drilling.PI(1e4, 1e4)),
+            hook=hook,
+            hole=hole,
+            friction=cf.drilling.WallFriction(1.0, 0.7, 1.0, of_rotation=True, of_hole=True),
+            drag=cf.drilling.ViscousDrag(0.1, 0.1),
+        )
         model = AxialTorsional(scene, 0.01, 250)
         rows = model.advance(3000)
         assert model.counts["halved"] == 0 and model.counts["iterations"] < 4 * 3000 and unbalanced(rows) < 1e-11

@@ -20,7 +20,7 @@ BAND = 60 / (2 * math.pi)  # Hz, of the reference
 def test_reference_roots(case):
     speed = 6.0
     weight = weight_of_slope(case["kappa"], speed)
-    answer = cf.stability(pipe_and_collars(case["top"], case["drag_rate"]), [speed], [weight], up_to=BAND)
+    answer = cf.drilling.stability(pipe_and_collars(case["top"], case["drag_rate"]), [speed], [weight], up_to=BAND)
     found = answer.roots[0, 0]
     for re, im in case["s"]:
         assert np.nanmin(np.abs(found - complex(re, im))) < 1e-12 * abs(complex(re, im))
@@ -29,7 +29,7 @@ def test_reference_roots(case):
 @pytest.mark.parametrize("case", GIVEN["limits"], ids=lambda x: f"{x['top']} {x['drag_rate']:g} {x['Jb']:g}")
 def test_reference_limits(case):
     scene = pipe_and_collars(case["top"], case["drag_rate"], case["Jb"])
-    w, kappa = cf.critical_slopes(scene, BAND)
+    w, kappa = cf.drilling.critical_slopes(scene, BAND)
     for frequency, slope in case["crossings"]:
         k = int(np.abs(w - frequency).argmin())
         assert w[k] == pytest.approx(frequency, rel=1e-10) and kappa[k] == pytest.approx(slope, rel=1e-10)
@@ -40,42 +40,44 @@ def test_reference_limits(case):
     assert kappa[k] == pytest.approx(case["kappa_mode1"], rel=1e-10)
     if kappa.argmax() != 0 or moving[0]:
         weights = case["WOB_N_at_rpm_band"]
-        assert cf.limit_weight(scene, 90 * RPM, up_to=BAND) == pytest.approx(weights["90"], rel=1e-10)
-        assert cf.limit_speed(scene, weights["180"], up_to=BAND) == pytest.approx(180 * RPM, rel=1e-9)
+        assert cf.drilling.limit_weight(scene, 90 * RPM, up_to=BAND) == pytest.approx(weights["90"], rel=1e-10)
+        assert cf.drilling.limit_speed(scene, weights["180"], up_to=BAND) == pytest.approx(180 * RPM, rel=1e-9)
 
 
 def test_a_string_without_losses():
     """Any falling torque makes it grow; none leaves it as it is."""
     scene = pipe_and_collars(drag=0.0)
-    assert math.isinf(cf.limit_speed(scene)) and cf.limit_weight(scene, 6.0) == 0.0
-    assert cf.limit_speed(scene, up_to=0.05) == 0.0 and math.isinf(cf.limit_weight(scene, 6.0, up_to=0.05))  # no mode
-    assert cf.stability(scene, [6.0], [1e3], modes=6).unstable_modes.tolist() == [[6]]
-    free = cf.stability(replace(scene, bit=None), [6.0], modes=6)
+    assert math.isinf(cf.drilling.limit_speed(scene)) and cf.drilling.limit_weight(scene, 6.0) == 0.0
+    assert cf.drilling.limit_speed(scene, up_to=0.05) == 0.0 and math.isinf(
+        cf.drilling.limit_weight(scene, 6.0, up_to=0.05)
+    )  # no mode
+    assert cf.drilling.stability(scene, [6.0], [1e3], modes=6).unstable_modes.tolist() == [[6]]
+    free = cf.drilling.stability(replace(scene, bit=None), [6.0], modes=6)
     assert free.unstable_modes.tolist() == [[0]] and (free.growth == 0).all()
-    assert free.frequency[0, 0] == pytest.approx(cf.natural_frequencies(scene, 6), rel=1e-12)
+    assert free.frequency[0, 0] == pytest.approx(cf.drilling.natural_frequencies(scene, 6), rel=1e-12)
 
 
 def test_a_matched_drive_gives_way_at_its_impedance():
     Z = pipe_and_collars().segments[0].torsional_impedance
-    w, kappa = cf.critical_slopes(pipe_and_collars("matched", 0.0, 50.0), BAND)
+    w, kappa = cf.drilling.critical_slopes(pipe_and_collars("matched", 0.0, 50.0), BAND)
     assert w[0] == 0.0 and kappa[0] == pytest.approx(-Z, rel=1e-12)
     speed = 6.0
     weights = [weight_of_slope(factor * kappa[0], speed) for factor in (0.99, 1.01)]
-    answer = cf.stability(pipe_and_collars("matched", 0.0, 50.0), [speed], weights, up_to=BAND)
+    answer = cf.drilling.stability(pipe_and_collars("matched", 0.0, 50.0), [speed], weights, up_to=BAND)
     assert answer.unstable_modes.tolist() == [[0, 1]]
     assert answer.frequency[0, 1, answer.unstable(0, 1)[0]] == 0.0
 
 
 def test_a_drive_calms_the_first_mode_and_leaves_the_collars():
     """At 92 rpm and 100 kN: stiff, the modes of 0.19 and 8 Hz grow; SoftSpeed calms the first one alone."""
-    answer = cf.stability(pipe_and_collars("PI_stiff"), [92 * RPM], up_to=BAND)
+    answer = cf.drilling.stability(pipe_and_collars("PI_stiff"), [92 * RPM], up_to=BAND)
     grow = answer.unstable(0)
     first, collars = (min(grow, key=lambda k: abs(answer.frequency[0, 0, k] - f)) for f in (0.19, 8.14))
     drives = answer.with_drives(0)
     assert set(drives) == {"stiff", "SoftTorque", "SoftSpeed", "matched"}
     assert drives["SoftSpeed"][first] < 0 < drives["stiff"][first]
     assert drives["SoftSpeed"][collars] == pytest.approx(answer.growth[0, 0, collars], rel=0.01)
-    alone = cf.stability(pipe_and_collars("SoftSpeed"), [92 * RPM], up_to=BAND)
+    alone = cf.drilling.stability(pipe_and_collars("SoftSpeed"), [92 * RPM], up_to=BAND)
     assert drives["SoftSpeed"][first] == pytest.approx(alone.growth[0, 0, :2].max(), rel=1e-12)
     text = answer.details()
     assert "SoftSpeed calms 0.191" in text and "densest in the collar" in answer.shape(collars).where
@@ -88,19 +90,23 @@ def test_a_tuned_drive_is_one_drive_whoever_tells_of_it():
     string, case = tubes(*GIVEN["sections"]), ([60 * RPM], [8e4])
 
     def told(control, **given):
-        return cf.stability(pipe_and_collars(drive=cf.TopDrive(1.0, 2900.0, control), inertia=50.0), *case, up_to=BAND)
+        return cf.drilling.stability(
+            pipe_and_collars(drive=cf.drilling.TopDrive(1.0, 2900.0, control), inertia=50.0), *case, up_to=BAND
+        )
 
-    soft, torque = (choose(string, 2900.0) for choose in (cf.SoftSpeed, cf.SoftTorque))
-    assert (soft.rule, torque.rule) == ("SoftSpeed", "SoftTorque") and cf.PI(soft.Kp, soft.Ki) == soft
+    soft, torque = (choose(string, 2900.0) for choose in (cf.drilling.SoftSpeed, cf.drilling.SoftTorque))
+    assert (soft.rule, torque.rule) == ("SoftSpeed", "SoftTorque") and cf.drilling.PI(soft.Kp, soft.Ki) == soft
     own = told(soft)
-    assert cf.SoftSpeed(own.scene, 2900.0) == soft
-    heard = cf.SoftSpeed(string, 2900.0, bit_inertia=50.0)
-    assert heard.Ki == pytest.approx(2900.0 * (2 * math.pi * cf.natural_frequencies(own.scene, 1)[0]) ** 2, rel=1e-12)
+    assert cf.drilling.SoftSpeed(own.scene, 2900.0) == soft
+    heard = cf.drilling.SoftSpeed(string, 2900.0, bit_inertia=50.0)
+    assert heard.Ki == pytest.approx(
+        2900.0 * (2 * math.pi * cf.drilling.natural_frequencies(own.scene, 1)[0]) ** 2, rel=1e-12
+    )
     columns, k = own.with_drives(0), own.unstable(0)[0]
     assert (columns["SoftSpeed"] == own.growth[0, 0]).all()
     text = own.details()
     assert "SoftSpeed (own)" in text and "of the scene, SoftSpeed." in " ".join(text.split())
-    for other in (told(torque), told(cf.PI(38e3, 1e5))):
+    for other in (told(torque), told(cf.drilling.PI(38e3, 1e5))):
         near = int(np.abs(other.frequency[0, 0] - own.frequency[0, 0, k]).argmin())
         assert other.with_drives(0)["SoftSpeed"][near] == pytest.approx(own.growth[0, 0, k], rel=1e-9)
         if other.scene.drive.control == torque:
@@ -110,9 +116,9 @@ def test_a_tuned_drive_is_one_drive_whoever_tells_of_it():
 def test_every_case_of_a_map_has_all_its_modes():
     """The same roots as one by one, and each mode in its own column: its growth falls with the speed."""
     scene, speeds, weights = pipe_and_collars("SoftSpeed", inertia=20.0), np.linspace(3, 14, 6), [2e4, 6e4, 1.2e5]
-    answer = cf.stability(scene, speeds, weights, up_to=BAND)
+    answer = cf.drilling.stability(scene, speeds, weights, up_to=BAND)
     for i, j in ((0, 0), (0, 2), (3, 1), (5, 2)):
-        alone = cf.stability(scene, speeds[i : i + 1], weights[j : j + 1], up_to=BAND).roots.ravel()
+        alone = cf.drilling.stability(scene, speeds[i : i + 1], weights[j : j + 1], up_to=BAND).roots.ravel()
         here = answer.roots[i, j][np.isfinite(answer.roots[i, j])]
         assert len(here) == np.isfinite(alone).sum()
         assert np.abs(np.sort_complex(here) - np.sort_complex(alone)).max() < 1e-11
@@ -125,14 +131,16 @@ def test_every_case_of_a_map_has_all_its_modes():
 
 def cutting(rpm=60.0):
     given, p = GIVEN["cutting"], GIVEN["cutting"]["parameters"]
-    law = cf.Cutting(p["a"], p["eps"], p["zeta"], p["n"])
-    drag, hook = cf.ViscousDrag(p["dt_"], p["da"]), cf.Hook(speed=-p["V"])
-    return cf.Drilling(tubes(given["section"]), cf.TopDrive(rpm * RPM), cf.BitOnRock(law), hook=hook, drag=drag)
+    law = cf.drilling.Cutting(p["a"], p["eps"], p["zeta"], p["n"])
+    drag, hook = cf.drilling.ViscousDrag(p["dt_"], p["da"]), cf.drilling.Hook(speed=-p["V"])
+    return cf.drilling.Drilling(
+        tubes(given["section"]), cf.drilling.TopDrive(rpm * RPM), cf.drilling.BitOnRock(law), hook=hook, drag=drag
+    )
 
 
 def test_counts_of_a_string_whose_bit_cuts():
     rows = GIVEN["cutting"]["rows"]
-    answer = cf.stability(cutting(), [row["rpm"] * RPM for row in rows], up_to=BAND)
+    answer = cf.drilling.stability(cutting(), [row["rpm"] * RPM for row in rows], up_to=BAND)
     within = (answer.growth > 1e-3) & (answer.growth < 6) & (answer.roots.imag > 1e-3) & (answer.roots.imag < 60)
     assert within.sum(axis=2).ravel().tolist() == [row["unstable_roots_in_box"] for row in rows]
     for i, row in enumerate(rows):
@@ -144,7 +152,7 @@ def test_counts_of_a_string_whose_bit_cuts():
 def test_the_shape_of_a_coupled_mode():
     """Both equations of motion of the bit, with the depth of cut d = E (v - rho om)/s."""
     speed, law, rate = 100 * RPM, cutting().bit.law, GIVEN["cutting"]["parameters"]["V"]
-    answer = cf.stability(cutting(), [speed], up_to=BAND)
+    answer = cf.drilling.stability(cutting(), [speed], up_to=BAND)
     for k in (*answer.unstable(0), 3, 8):
         shape = answer.shape(k, 0)
         s, om, v = shape.root, shape.rotation[-1], shape.velocity[-1]
@@ -160,20 +168,20 @@ def test_the_weight_sets_the_rate_of_penetration():
     scene, speed = cutting(), 100 * RPM
     law = scene.bit.law
     depth = 2 * math.pi * GIVEN["cutting"]["parameters"]["V"] / (law.blades * speed)
-    by_rate = cf.stability(scene, [speed], up_to=2.0)
-    worn = replace(law, wear=cf.Wear(60e6, 0.011, 0.6))
+    by_rate = cf.drilling.stability(scene, [speed], up_to=2.0)
+    worn = replace(law, wear=cf.drilling.Wear(60e6, 0.011, 0.6))
     for changed, flats in ((law, 0.0), (worn, 0.108 * 0.011 * 60e6)):
-        string = replace(scene, bit=cf.BitOnRock(changed))
-        found = cf.stability(string, [speed], [law.axial_stiffness * depth + flats], up_to=2.0)
+        string = replace(scene, bit=cf.drilling.BitOnRock(changed))
+        found = cf.drilling.stability(string, [speed], [law.axial_stiffness * depth + flats], up_to=2.0)
         assert np.abs(found.roots - by_rate.roots).max() < 1e-10
     with pytest.raises(cf.SceneError, match="more than the wear flats carry"):
-        cf.stability(replace(scene, bit=cf.BitOnRock(worn)), [speed], [7e4])
+        cf.drilling.stability(replace(scene, bit=cf.drilling.BitOnRock(worn)), [speed], [7e4])
 
 
 def test_the_lumped_bit_that_cuts():
     given = GIVEN["lumped"]
     p = given["parameters"]
-    free = cf.LumpedCutting(p["psi"], p["n"], p["v0"])
+    free = cf.drilling.LumpedCutting(p["psi"], p["n"], p["v0"])
     damped = replace(free, axial_frequency=p["omega_a"], axial_damping=p["zeta_a"], torsional_damping=p["zeta_t"])
     for model, rows in ((damped, given["damped"]), (free, given["free"])):
         for row in rows:
@@ -183,39 +191,39 @@ def test_the_lumped_bit_that_cuts():
             assert (found.real > 0).sum() == sum(s.real > 0 for s in listed)
     assert damped.limits(2.0, 12.0) == pytest.approx([given["limit"]], abs=1e-10)
     exact = 2 * math.sqrt(2 * p["psi"] / p["n"])
-    assert cf.LumpedCutting(p["psi"], p["n"]).limits(3.0, 12.0) == pytest.approx([exact], rel=1e-10)
+    assert cf.drilling.LumpedCutting(p["psi"], p["n"]).limits(3.0, 12.0) == pytest.approx([exact], rel=1e-10)
     assert exact == pytest.approx(given["axial_only"], rel=1e-12)
 
 
 @pytest.mark.parametrize("row", GIVEN["discs"]["critical"], ids=lambda row: f"{row['WOB'] / 1e3:g} kN")
 def test_critical_speeds_of_discs(row):
-    pairs = {"omega_constant_torque": cf.Motor(8138.0), "omega_imposed_top_speed": cf.Stiff()}
+    pairs = {"omega_constant_torque": cf.drilling.Motor(8138.0), "omega_imposed_top_speed": cf.drilling.Stiff()}
     for name, control in pairs.items():
-        assert cf.limit_speed(public_discs(control, row["WOB"])) == pytest.approx(row[name], rel=1e-8)
+        assert cf.drilling.limit_speed(public_discs(control, row["WOB"])) == pytest.approx(row[name], rel=1e-8)
         above, below = row[name] * 1.001, row[name] * 0.999
-        answer = cf.stability(public_discs(control, row["WOB"]), [below, above])
+        answer = cf.drilling.stability(public_discs(control, row["WOB"]), [below, above])
         assert (answer.unstable_modes.ravel() > 0).tolist() == [True, False]
 
 
 def test_bit_bounce(tmp_path):
     given = GIVEN["bit_bounce"]
-    bit = cf.BitOnRock(cf.Lobes(given["lobes"], given["amplitude"]), weight=given["static_WOB"])
-    scene = pipe_and_collars(drag=given["drag_rate"], bit=bit, hook=cf.Hook(GIVEN["natural_Hz"]["hook"]))
+    bit = cf.drilling.BitOnRock(cf.drilling.Lobes(given["lobes"], given["amplitude"]), weight=given["static_WOB"])
+    scene = pipe_and_collars(drag=given["drag_rate"], bit=bit, hook=cf.drilling.Hook(GIVEN["natural_Hz"]["hook"]))
     rpm = np.array([float(x) for x in given["dynamic_WOB_amplitude"]])
-    answer = cf.bit_bounce(scene, rpm * RPM)
+    answer = cf.drilling.bit_bounce(scene, rpm * RPM)
     assert answer.amplitude == pytest.approx(list(given["dynamic_WOB_amplitude"].values()), rel=1e-10)
     assert answer.lifts_off.tolist() == list(given["lifts_off"].values())
-    limits = cf.bit_bounce(scene, np.arange(40, 200, 0.25) * RPM).limits() / RPM
+    limits = cf.drilling.bit_bounce(scene, np.arange(40, 200, 0.25) * RPM).limits() / RPM
     assert limits == pytest.approx(given["lift_off_limits_rpm"], abs=0.006)  # the reference's grid is 0.005 rpm
     answer.plot(tmp_path / "bounce.png")
     with pytest.raises(cf.SceneError, match="Lobes"):
-        cf.bit_bounce(pipe_and_collars(), [1.0])
+        cf.drilling.bit_bounce(pipe_and_collars(), [1.0])
 
 
 def test_the_shape_of_a_mode():
     """In one pipe below a stiff drive: sinh(g x)/sinh(g L) with g = s/c, and half a wave more from mode to mode."""
     scene = replace(pipe_and_collars(drag=0.0), string=tubes(GIVEN["sections"][0]))
-    part, answer = scene.segments[0], cf.stability(scene, [14.0], modes=4)
+    part, answer = scene.segments[0], cf.drilling.stability(scene, [14.0], modes=4)
     assert answer.roots.shape == (1, 1, 4)
     for k in range(4):
         shape = answer.shape(k)
@@ -227,8 +235,8 @@ def test_the_shape_of_a_mode():
 
 def test_pictures(tmp_path):
     scene = pipe_and_collars("SoftSpeed")
-    cf.stability(scene, [4.0, 8.0, 12.0], [3e4, 8e4], up_to=1.0).plot(tmp_path / "map.png")
-    cf.stability(scene, [4.0, 8.0, 12.0], up_to=1.0).plot(tmp_path / "speeds.png", mode=0)
+    cf.drilling.stability(scene, [4.0, 8.0, 12.0], [3e4, 8e4], up_to=1.0).plot(tmp_path / "map.png")
+    cf.drilling.stability(scene, [4.0, 8.0, 12.0], up_to=1.0).plot(tmp_path / "speeds.png", mode=0)
     assert all((tmp_path / name).stat().st_size > 10_000 for name in ("map.png", "speeds.png"))
 
 
@@ -239,24 +247,27 @@ def test_a_torque_that_falls_too_fast():
     with pytest.raises(cf.SceneError, match=r"falls by 1973\.\d* N m .* impedance .* 1793\.\d* N m s/rad"):
         check_bit(scene.with_case(weight=steep))
     check_bit(scene.with_case(weight=steep / 1.2))
-    check_bit(replace(scene, bit=cf.BitOnRock(falling(), weight=steep, inertia=5.0)))
+    check_bit(replace(scene, bit=cf.drilling.BitOnRock(falling(), weight=steep, inertia=5.0)))
     with pytest.raises(cf.SceneError, match="at 0.1 rad/s under"):
-        cf.stability(scene, [0.1], [1.1 * steep])
+        cf.drilling.stability(scene, [0.1], [1.1 * steep])
 
 
 @pytest.mark.parametrize(
     ("call", "words"),
     [
-        (lambda: cf.stability(pipe_and_collars(), [0.0]), "speeds = \\[0.0\\]: expected positive"),
-        (lambda: cf.stability(pipe_and_collars(), [1.0], [-1.0]), "weights = -1.0: expected a positive"),
-        (lambda: cf.stability(pipe_and_collars(bit=None), [1.0], [1e4]), "expected a BitOnRock"),
-        (lambda: cf.stability(pipe_and_collars(), [1.0], modes=0), "modes = 0"),
-        (lambda: cf.stability(replace(cutting(), hook=None), [1.0]), "or a Hook whose speed"),
-        (lambda: cf.limit_weight(cutting(), 1.0), "a Stribeck law and a radius"),
-        (lambda: cf.stability(pipe_and_collars(), [5.0], up_to=1.0).shape(99), "a number from 0 to"),
-        (lambda: cf.PI(1.0, 1.0, rule="SoftSped"), "PI.rule = 'SoftSped': expected 'SoftTorque' or 'SoftSpeed'"),
-        (lambda: cf.SoftSpeed(tubes(*GIVEN["sections"]), 2900.0, bit_inertia=-1), "bit_inertia = -1"),
-        (lambda: cf.LumpedCutting(13.9, 4).limits(3.0, 2.0), "more than low"),
+        (lambda: cf.drilling.stability(pipe_and_collars(), [0.0]), "speeds = \\[0.0\\]: expected positive"),
+        (lambda: cf.drilling.stability(pipe_and_collars(), [1.0], [-1.0]), "weights = -1.0: expected a positive"),
+        (lambda: cf.drilling.stability(pipe_and_collars(bit=None), [1.0], [1e4]), "expected a BitOnRock"),
+        (lambda: cf.drilling.stability(pipe_and_collars(), [1.0], modes=0), "modes = 0"),
+        (lambda: cf.drilling.stability(replace(cutting(), hook=None), [1.0]), "or a Hook whose speed"),
+        (lambda: cf.drilling.limit_weight(cutting(), 1.0), "a Stribeck law and a radius"),
+        (lambda: cf.drilling.stability(pipe_and_collars(), [5.0], up_to=1.0).shape(99), "a number from 0 to"),
+        (
+            lambda: cf.drilling.PI(1.0, 1.0, rule="SoftSped"),
+            "PI.rule = 'SoftSped': expected 'SoftTorque' or 'SoftSpeed'",
+        ),
+        (lambda: cf.drilling.SoftSpeed(tubes(*GIVEN["sections"]), 2900.0, bit_inertia=-1), "bit_inertia = -1"),
+        (lambda: cf.drilling.LumpedCutting(13.9, 4).limits(3.0, 2.0), "more than low"),
     ],
 )
 def test_refusals(call, words):
@@ -265,15 +276,15 @@ def test_refusals(call, words):
 
 
 def test_limit_speed_of_a_bit_that_cuts():
-    scene = replace(cutting(), drag=cf.ViscousDrag(0.8, 0.8))
-    limit = cf.limit_speed(scene, up_to=2.0, between=(2.0, 40.0), points=12)
-    grow = cf.stability(scene, [0.999 * limit, 1.001 * limit], up_to=2.0).unstable_modes.ravel()
+    scene = replace(cutting(), drag=cf.drilling.ViscousDrag(0.8, 0.8))
+    limit = cf.drilling.limit_speed(scene, up_to=2.0, between=(2.0, 40.0), points=12)
+    grow = cf.drilling.stability(scene, [0.999 * limit, 1.001 * limit], up_to=2.0).unstable_modes.ravel()
     assert grow[0] > 0 == grow[1]
-    assert math.isinf(cf.limit_speed(scene, up_to=2.0, between=(2.0, 0.9 * limit), points=3))
+    assert math.isinf(cf.drilling.limit_speed(scene, up_to=2.0, between=(2.0, 0.9 * limit), points=3))
 
 
 def test_other_drives():
-    answer = cf.stability(pipe_and_collars(), [6.0], up_to=1.0)
+    answer = cf.drilling.stability(pipe_and_collars(), [6.0], up_to=1.0)
     assert set(answer.with_drives(0)) == {"matched"}  # no inertia to tune
     own = answer.with_drives(0, 0, {"own": drive_of("rigid")})["own"]
     assert own == pytest.approx(answer.growth[0, 0], rel=1e-12)
@@ -282,14 +293,18 @@ def test_other_drives():
 def test_speeds_in_revolutions_a_minute_are_doubted():
     """120 typed for 120 * units.rpm would be 1146 rev/min."""
     with pytest.warns(cf.SceneWarning, match=r"TopDrive.speed = 120 rad/s are 1146 rev/min.*120 \* units.rpm"):
-        fast = cf.TopDrive(120)
+        fast = cf.drilling.TopDrive(120)
     assert fast.speed == 120
     for function in (cf.Ramp((120.0,), 1.0, 5.0), lambda t: 120.0):
         with pytest.warns(cf.SceneWarning, match=r"TopDrive.speed = 120 rad/s are 1146 rev/min"):
-            cf.TopDrive(function)
+            cf.drilling.TopDrive(function)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        drive = cf.TopDrive(250 * cf.units.rpm)
-        scene = cf.Drilling(cf.Discs((930.0, 2782.0), (700.0,)), drive, cf.BitOnRock(cf.Stribeck(8000.0, 5000.0)))
+        drive = cf.drilling.TopDrive(250 * cf.units.rpm)
+        scene = cf.drilling.Drilling(
+            cf.drilling.Discs((930.0, 2782.0), (700.0,)),
+            drive,
+            cf.drilling.BitOnRock(cf.drilling.Stribeck(8000.0, 5000.0)),
+        )
     with pytest.warns(cf.SceneWarning, match="stability.speeds = 180 rad/s"):
-        cf.stability(scene, [90.0, 180.0], None)
+        cf.drilling.stability(scene, [90.0, 180.0], None)

@@ -26,7 +26,7 @@ def test_natural_frequencies_of_a_hanging_string(stiffness):
     """Those of the midpoint rule with the model's matrices, whose shares of mass make up for its error in time."""
     errors = []
     for dt, elements in ((0.004, 120), (0.002, 240)):
-        chain = AxialTorsional(hanging(cf.Hook(stiffness)), dt, elements)._chain
+        chain = AxialTorsional(hanging(cf.drilling.Hook(stiffness)), dt, elements)._chain
         spring, free = chain.spring[:, 0], int(np.isinf(stiffness))
         K = np.diag(np.append(spring, 0) + np.append(0, spring)) - np.diag(spring, 1) - np.diag(spring, -1)
         M = np.diag(chain.mass[:, 0]) + np.diag(chain.mass_off[:, 0], 1) + np.diag(chain.mass_off[:, 0], -1)
@@ -41,12 +41,12 @@ def test_a_block_that_stops():
     """As a block that starts, turned round: Z v, with collars more from 2 L/c on; with a hook that yields,
     Z v (1 - exp(-k t/Z)) first, and later what characteristics give."""
     dt = 0.001
-    rows = AxialTorsional(hanging(cf.Hook(speed=1.0)), dt, 500).advance(1249)
+    rows = AxialTorsional(hanging(cf.drilling.Hook(speed=1.0)), dt, 500).advance(1249)
     t, force = rows[:, 0], column(rows, "hook_load")
     first, second = (t > 0.02) & (t < 1.15), t > 2 * 3000 / SPEED + 0.008
     assert force[first] == pytest.approx(IMPEDANCE[0], rel=2e-3)
     assert force[second].mean() == pytest.approx(326805.3383015774, rel=4e-3)
-    rows = AxialTorsional(hanging(cf.Hook(5e6, 1.0)), dt, 500).advance(5000)
+    rows = AxialTorsional(hanging(cf.drilling.Hook(5e6, 1.0)), dt, 500).advance(5000)
     t, force = rows[:, 0] - dt / 2, column(rows, "hook_load")
     first = t < 1.1
     told = IMPEDANCE[0] * (1 - np.exp(-5e6 * t[first] / IMPEDANCE[0]))
@@ -79,15 +79,20 @@ def test_a_soft_drive_calms_it(axial):
 
 @pytest.mark.parametrize(
     ("weight", "torque", "releases", "peak"),
-    [(97347.0, 10e3, (167.50634780, 175.81200608, 184.11850238), 6.694376635),
-     (53018.0, 6e3, (175.02624880, 181.82270104, 188.61915386), 5.092853190)],
-)  # fmt: skip
+    [
+        (97347.0, 10e3, (167.50634780, 175.81200608, 184.11850238), 6.694376635),
+        (53018.0, 6e3, (175.02624880, 181.82270104, 188.61915386), 5.092853190),
+    ],
+)
 def test_four_discs(weight, torque, releases, peak):
     """E. M. Navarro-Lopez & D. Cortes, J. Sound Vib. 307 (2007) 152, doi:10.1016/j.jsv.2007.06.037: limit cycles."""
-    discs = cf.Discs((930.0, 2782.25, 750.0, 471.9698), (698.063, 1080.0, 907.48), (139.6126, 190.0, 181.49),
-                     (0.0, 0.0, 0.0, 50.0))  # fmt: skip
-    bit = cf.BitOnRock(cf.Stribeck(0.8, 0.5, 1 / 0.9, radius=0.155575), weight)
-    model = AxialTorsional(cf.Drilling(discs, cf.TopDrive(control=cf.Motor(torque, 425.0)), bit), 0.0025)
+    discs = cf.drilling.Discs(
+        (930.0, 2782.25, 750.0, 471.9698), (698.063, 1080.0, 907.48), (139.6126, 190.0, 181.49), (0.0, 0.0, 0.0, 50.0)
+    )
+    bit = cf.drilling.BitOnRock(cf.drilling.Stribeck(0.8, 0.5, 1 / 0.9, radius=0.155575), weight)
+    model = AxialTorsional(
+        cf.drilling.Drilling(discs, cf.drilling.TopDrive(control=cf.drilling.Motor(torque, 425.0)), bit), 0.0025
+    )
     rows = model.advance(80000)
     t, om = rows[:, 0], column(rows, "bit_speed")
     starts = t[:-1][(om[1:] > 0) & (om[:-1] == 0) & (t[:-1] > releases[0] - 1)]
@@ -99,13 +104,17 @@ def test_four_discs(weight, torque, releases, peak):
 def test_discs_at_the_speed_where_their_steady_motion_becomes_unstable():
     """2.7652598516 rad/s under 97 347 N, for a constant torque of the motor."""
     W, R, grows = 97347.0, 0.155575, []
-    discs = cf.Discs((930.0, 2782.25, 750.0, 471.9698), (698.063, 1080.0, 907.48), (139.6126, 190.0, 181.49),
-                     (0.0, 0.0, 0.0, 50.0))  # fmt: skip
-    bit = cf.BitOnRock(cf.Stribeck(0.8, 0.5, 1 / 0.9, radius=R), W)
+    discs = cf.drilling.Discs(
+        (930.0, 2782.25, 750.0, 471.9698), (698.063, 1080.0, 907.48), (139.6126, 190.0, 181.49), (0.0, 0.0, 0.0, 50.0)
+    )
+    bit = cf.drilling.BitOnRock(cf.drilling.Stribeck(0.8, 0.5, 1 / 0.9, radius=R), W)
     for speed in (2.7652598516 * 0.995, 2.7652598516 * 1.005):
         on_bit = W * R * (0.5 + 0.3 * np.exp(-0.9 * speed))
         model = AxialTorsional(
-            cf.Drilling(discs, cf.TopDrive(control=cf.Motor(on_bit + 475 * speed, 425.0)), bit), 0.01
+            cf.drilling.Drilling(
+                discs, cf.drilling.TopDrive(control=cf.drilling.Motor(on_bit + 475 * speed, 425.0)), bit
+            ),
+            0.01,
         )
         x, v = model._kept["x"], model._kept["v"]
         moments = on_bit + 50 * speed
@@ -123,7 +132,7 @@ def test_a_signal_that_jumps_ends_steps():
         return 1.0 if t < 0.0137 else 3.0
 
     asked.jumps = (0.0137,)
-    scene = cf.Drilling(string(PIPE), cf.TopDrive(asked))
+    scene = cf.drilling.Drilling(string(PIPE), cf.drilling.TopDrive(asked))
     rows = AxialTorsional(scene, 0.01, 20, axial=False).advance(20)
     assert column(rows, "drive_angle")[-1] == pytest.approx(0.0137 + 3 * (0.2 - 0.0137), rel=1e-12)
     assert unbalanced(rows) < 1e-12
@@ -150,17 +159,29 @@ class Swallow:
 
 
 def test_other_laws_of_the_bit_plug_in_as_end_conditions():
-    scene = cf.Drilling(string(PIPE), cf.TopDrive(1.0), cf.BitOnRock(cf.Cutting(0.1, 60e6, 0.6, 4)),
-                        hook=cf.Hook(speed=-0.1))  # fmt: skip
-    lobes = cf.Drilling(scene.string, scene.drive, cf.BitOnRock(cf.Lobes(3, 0.002, LAW), 80e3, inertia=50.0))
+    scene = cf.drilling.Drilling(
+        string(PIPE),
+        cf.drilling.TopDrive(1.0),
+        cf.drilling.BitOnRock(cf.drilling.Cutting(0.1, 60e6, 0.6, 4)),
+        hook=cf.drilling.Hook(speed=-0.1),
+    )
+    lobes = cf.drilling.Drilling(
+        scene.string, scene.drive, cf.drilling.BitOnRock(cf.drilling.Lobes(3, 0.002, LAW), 80e3, inertia=50.0)
+    )
     assert column(AxialTorsional(lobes, 0.01, 50, axial=False).advance(100), "torque_on_bit").max() > 0
     Z = IMPEDANCE[0], 296.3752962822167
     end = Swallow(*Z)
     model = AxialTorsional(scene, 0.004, 200, end=end)
     rows = model.advance(1000)
     late = rows[rows[:, 0] > 3]
-    for name, value in (("bit_velocity", 0.1), ("bit_speed", 1.0), ("weight_on_bit", 0.1 * Z[0]),
-                        ("torque_on_bit", Z[1]), ("surface_torque", Z[1]), ("hook_load", -0.1 * Z[0])):  # fmt: skip
+    for name, value in (
+        ("bit_velocity", 0.1),
+        ("bit_speed", 1.0),
+        ("weight_on_bit", 0.1 * Z[0]),
+        ("torque_on_bit", Z[1]),
+        ("surface_torque", Z[1]),
+        ("hook_load", -0.1 * Z[0]),
+    ):
         assert column(late, name) == pytest.approx(value, rel=5e-3)
     assert end.steps == 1000 and unbalanced(rows) < 1e-12
     kept = model.memory()
@@ -170,8 +191,14 @@ def test_other_laws_of_the_bit_plug_in_as_end_conditions():
 
 
 def test_the_same_digits_after_recall():
-    bit = cf.BitOnRock(cf.Stribeck(0.6, 0.3, 3.0, radius=0.1), 80e3, inertia=50.0, mass=300.0)
-    scene = hanging(cf.Hook(5e6, -0.001), cf.TopDrive(6.0, **SOFT), bit, 300.0, drag=cf.ViscousDrag(0.2, 0.1))
+    bit = cf.drilling.BitOnRock(cf.drilling.Stribeck(0.6, 0.3, 3.0, radius=0.1), 80e3, inertia=50.0, mass=300.0)
+    scene = hanging(
+        cf.drilling.Hook(5e6, -0.001),
+        cf.drilling.TopDrive(6.0, **SOFT),
+        bit,
+        300.0,
+        drag=cf.drilling.ViscousDrag(0.2, 0.1),
+    )
     first, second = (AxialTorsional(scene, 0.01, 100) for _ in range(2))
     rows, profiles = first.advance(3000), first.profile()
     second.advance(1234)
@@ -189,7 +216,7 @@ def test_a_step_that_fails_returns_what_was_done():
         def begin(self, model, h):
             return EndForce(np.zeros(2), self.tangent * (np.nan if model.time > 0.095 else 1.0))
 
-    scene = cf.Drilling(string(PIPE), cf.TopDrive(1.0), cf.BitOnRock(LAW, inertia=50.0))
+    scene = cf.drilling.Drilling(string(PIPE), cf.drilling.TopDrive(1.0), cf.drilling.BitOnRock(LAW, inertia=50.0))
     model = AxialTorsional(scene, 0.01, 50, end=Broken(1.0, 1.0))
     with pytest.raises(cf.NotConverged, match="t = 0.1 s does not converge") as told:
         model.advance(20)
@@ -197,24 +224,32 @@ def test_a_step_that_fails_returns_what_was_done():
 
 
 def test_what_is_refused():
-    steep = cf.Drilling(string(PIPE), cf.TopDrive(1.0), cf.BitOnRock(cf.Stribeck(6000.0, 4000.0, 3.0)))
+    steep = cf.drilling.Drilling(
+        string(PIPE), cf.drilling.TopDrive(1.0), cf.drilling.BitOnRock(cf.drilling.Stribeck(6000.0, 4000.0, 3.0))
+    )
     with pytest.raises(cf.SceneError, match="law.*666.667 N m per rad/s.*impedance.*296.375"):
         AxialTorsional(steep)
-    hard = cf.Drilling(string(PIPE), cf.TopDrive(1.0), cf.BitOnRock(cf.Stribeck(6000.0, 4000.0, 0.1), inertia=20.0))
+    hard = cf.drilling.Drilling(
+        string(PIPE),
+        cf.drilling.TopDrive(1.0),
+        cf.drilling.BitOnRock(cf.drilling.Stribeck(6000.0, 4000.0, 0.1), inertia=20.0),
+    )
     with pytest.raises(cf.SceneError, match=r"dt = 0.01 s: expected at most about 0.00\d+ s"):
         AxialTorsional(hard, 0.01, 50)
     assert AxialTorsional(hard, elements=50).dt < 0.005
     for arguments, told in (({"dt": 0.0}, "dt"), ({"elements": 1}, "elements"), ({"elements": 20.5}, "elements")):
         with pytest.raises(cf.SceneError, match=told):
             AxialTorsional(hard, **arguments)
-    discs = cf.Discs((100.0, 100.0), (500.0,))
+    discs = cf.drilling.Discs((100.0, 100.0), (500.0,))
     with pytest.raises(cf.SceneError, match="impedance"):
-        AxialTorsional(cf.Drilling(discs, cf.TopDrive(1.0, control=cf.Matched())))
+        AxialTorsional(cf.drilling.Drilling(discs, cf.drilling.TopDrive(1.0, control=cf.drilling.Matched())))
 
 
 def test_torsion_alone_does_not_feel_the_hook():
     """Nor does a drive without inertia, whose node the hook would hold."""
-    drive = cf.TopDrive(3.0, control=cf.Matched())
-    rows = [AxialTorsional(hanging(hook, drive), 0.005, 100, axial=False).advance(300)
-            for hook in (None, cf.Hook(5e6, 0.5))]  # fmt: skip
+    drive = cf.drilling.TopDrive(3.0, control=cf.drilling.Matched())
+    rows = [
+        AxialTorsional(hanging(hook, drive), 0.005, 100, axial=False).advance(300)
+        for hook in (None, cf.drilling.Hook(5e6, 0.5))
+    ]
     np.testing.assert_array_equal(*rows)

@@ -31,11 +31,11 @@ def tip(eta, elements):
 
 
 def hook_load(depth, friction, model):
-    path = cf.WellPath.from_survey([0, 600, 1200, 2500], [0, 0, 50, 50], [0, 0, 120, 120])
-    hole = cf.Borehole(path, cf.HoleSection(2500.0, 0.2159, friction))
-    string = cf.DrillString([cf.DrillPipe(size="5 in 19.50 lb/ft")])
-    answer = cf.torque_and_drag(
-        hole, string, cf.RotateOffBottom(), mud=cf.Mud(1200.0), depth=depth, model=model, tol=1e-2
+    path = cf.well.WellPath.from_survey([0, 600, 1200, 2500], [0, 0, 50, 50], [0, 0, 120, 120])
+    hole = cf.well.Borehole(path, cf.well.HoleSection(2500.0, 0.2159, friction))
+    string = cf.well.DrillString([cf.well.DrillPipe(size="5 in 19.50 lb/ft")])
+    answer = cf.well.torque_and_drag(
+        hole, string, cf.well.RotateOffBottom(), mud=cf.well.Mud(1200.0), depth=depth, model=model, tol=1e-2
     )
     return {"hook load": answer.hook_load, "torque": answer.surface_torque, "model": answer.model}
 

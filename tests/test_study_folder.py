@@ -13,7 +13,7 @@ from mpi4py import MPI
 import cosserat_fenicsx as cf
 
 ROOT = Path(__file__).parent.parent
-LIMIT, CALLS, STOPS, COUNT, MUD = 3, [], [], 0, cf.Mud(1200.0)
+LIMIT, CALLS, STOPS, COUNT, MUD = 3, [], [], 0, cf.well.Mud(1200.0)
 CASES = {"i": range(12)}
 PROGRAM = """
 import sys, time
@@ -143,9 +143,7 @@ def test_another_study_is_refused(tmp_path_all, monkeypatch):
     COMM.barrier()
 
     def refused(task, cases, words):
-        with pytest.raises(
-            cf.SceneError, match=rf"it holds another study, expected the same call, .*: {words}"
-        ):
+        with pytest.raises(cf.SceneError, match=rf"it holds another study, expected the same call, .*: {words}"):
             cf.study(task, cases, folder=tmp_path_all)
 
     refused(fourth, CASES, "task: function is '.*fourth', where the study has '.*third'")
@@ -181,7 +179,7 @@ def test_what_a_task_uses_is_compared(tmp_path_all, monkeypatch):
     cf.study(pressure, {"depth": [1.0]}, folder=tmp_path_all)
     COMM.barrier()
     here = sys.modules[__name__]
-    for name, other in (("MUD", cf.Mud(1300.0)), ("heaviness", lambda: 9.80665 * MUD.density)):
+    for name, other in (("MUD", cf.well.Mud(1300.0)), ("heaviness", lambda: 9.80665 * MUD.density)):
         with monkeypatch.context() as changed, pytest.raises(cf.SceneError, match="or something that it uses"):
             changed.setattr(here, name, other)
             cf.study(pressure, {"depth": [1.0]}, folder=tmp_path_all)
@@ -206,11 +204,11 @@ def test_parts_of_scenes_are_compared(tmp_path_all):
     def weight(mud, operation):
         return mud.density
 
-    cases = {"mud": [cf.Mud(1200.0), cf.Mud(1300.0)], "operation": [cf.TripIn()]}
+    cases = {"mud": [cf.well.Mud(1200.0), cf.well.Mud(1300.0)], "operation": [cf.well.TripIn()]}
     assert cf.study(weight, cases, folder=tmp_path_all).results == [1200.0, 1300.0]
     COMM.barrier()
     with pytest.raises(cf.SceneError, match=r"cases\[1\]\['mud'\].density is 1400"):
-        cf.study(weight, {**cases, "mud": [cf.Mud(1200.0), cf.Mud(1400.0)]}, folder=tmp_path_all)
+        cf.study(weight, {**cases, "mud": [cf.well.Mud(1200.0), cf.well.Mud(1400.0)]}, folder=tmp_path_all)
 
 
 @pytest.mark.ranks

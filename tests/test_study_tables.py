@@ -40,7 +40,7 @@ def test_xarray_over_the_grid(found):
 
 def test_xarray_over_cases_one_by_one():
     pytest.importorskip("xarray")
-    operations = [cf.TripOut(), cf.TripIn()]
+    operations = [cf.well.TripOut(), cf.well.TripIn()]
     found = cf.study(lambda how, s=0.0: s + 1, [{"how": operations[0]}, {"how": operations[1], "s": 2.0}])
     data = found.to_xarray()
     assert data["result"].dims == ("case",) and data["result"].values.tolist() == [1.0, 3.0]

@@ -7,18 +7,24 @@ import pytest
 import cosserat_fenicsx as cf
 
 pytestmark = pytest.mark.serial
-PATH = cf.WellPath.from_survey([0, 500, 1000], [0, 0, 30], [0, 0, 0])
-PIPE = cf.DrillPipe(size="5 in 19.50 lb/ft")
+PATH = cf.well.WellPath.from_survey([0, 500, 1000], [0, 0, 30], [0, 0, 0])
+PIPE = cf.well.DrillPipe(size="5 in 19.50 lb/ft")
 DEPTHS = [600.0, 800.0, 1000.0]
 
 
 def hole(**given):
-    return cf.Borehole(PATH, cf.HoleSection(1000.0, 0.2159, 0.2), **given)
+    return cf.well.Borehole(PATH, cf.well.HoleSection(1000.0, 0.2159, 0.2), **given)
 
 
 def sweep(file, **given):
-    given = {"hole": hole(), "string": cf.DrillString([PIPE]), "mud": cf.Mud(1200.0), "model": "soft", **given}
-    return cf.depth_sweep(operations=[cf.TripOut()], depths=DEPTHS, folder=file, progress=False, **given)
+    given = {
+        "hole": hole(),
+        "string": cf.well.DrillString([PIPE]),
+        "mud": cf.well.Mud(1200.0),
+        "model": "soft",
+        **given,
+    }
+    return cf.well.depth_sweep(operations=[cf.well.TripOut()], depths=DEPTHS, folder=file, progress=False, **given)
 
 
 def test_every_part_of_the_hole_is_compared(tmp_path):
@@ -28,9 +34,11 @@ def test_every_part_of_the_hole_is_compared(tmp_path):
     with pytest.raises(cf.SceneError, match=r"another folder: hole.wall_stiffness is 1.*, where the sweep has 1000"):
         sweep(file, hole=hole(wall_stiffness=1e5))
     for name, other in {
-        "string": cf.DrillString([cf.Collar(50.0, "NC46-65"), PIPE]), "mud": cf.Mud(1201.0), "friction": [0.3],
+        "string": cf.well.DrillString([cf.well.Collar(50.0, "NC46-65"), PIPE]),
+        "mud": cf.well.Mud(1201.0),
+        "friction": [0.3],
         "torque_convention": "fixed",
-    }.items():  # fmt: skip
+    }.items():
         given = {"hole": hole(wall_stiffness=1e10), name: other}
         with pytest.raises(cf.SceneError, match="holds another sweep|torque_convention") as refusal:
             sweep(file, **given)
@@ -39,14 +47,14 @@ def test_every_part_of_the_hole_is_compared(tmp_path):
 
 
 @dataclass(frozen=True)
-class Own(cf.Component):
+class Own(cf.well.Component):
     """A component of the user's own, with a field that the package does not know."""
 
     maker: str = ""
 
 
 def test_components_of_the_users_own_are_compared_by_all_their_fields(tmp_path):
-    strings = [cf.DrillString([Own(None, None, 200.0, 0.0635, maker=maker)]) for maker in ("one", "other")]
+    strings = [cf.well.DrillString([Own(None, None, 200.0, 0.0635, maker=maker)]) for maker in ("one", "other")]
     sweep(tmp_path / "sweep", string=strings[0], mud=None)
     with pytest.raises(cf.SceneError, match="string.components.*maker is 'other', where the sweep has 'one'"):
         sweep(tmp_path / "sweep", string=strings[1], mud=None)

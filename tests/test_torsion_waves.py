@@ -30,18 +30,80 @@ pytestmark = [pytest.mark.serial, pytest.mark.once]
 PIPE_IMPEDANCE = 296.3752962822167
 ANGLE, STICKING = PROFILE.index("angle"), PROFILE.index("sticking")
 #: Of the lower end off bottom after 1, 2, ... 60 s, rad, by exact waves in cells of 2.5 m with friction at their ends.
-REFERENCE_ANGLES = np.array([
-    0, 0, 0, 0, 0, 3.68, 13.43, 21.7, 22.21, 22.21, 23.07, 31.58, 42.44, 45.47, 45.47, 45.47, 47.85, 58.92,
-    69.09, 69.97, 69.97, 69.97, 73.46, 84.49, 94.16, 94.72, 94.72, 95.48, 101.21, 112.04, 117.52, 117.76,
-    117.76, 120.61, 130.02, 138.9, 140.11, 140.11, 140.17, 146.76, 158.51, 164.38, 164.38, 164.38, 165, 173.2,
-    184.83, 188.79, 188.8, 188.8, 191.51, 200.94, 209.99, 212.14, 212.14, 212.15, 217.9, 228.75, 235.39, 235.71,
-])  # fmt: skip
+REFERENCE_ANGLES = np.array(
+    [
+        0,
+        0,
+        0,
+        0,
+        0,
+        3.68,
+        13.43,
+        21.7,
+        22.21,
+        22.21,
+        23.07,
+        31.58,
+        42.44,
+        45.47,
+        45.47,
+        45.47,
+        47.85,
+        58.92,
+        69.09,
+        69.97,
+        69.97,
+        69.97,
+        73.46,
+        84.49,
+        94.16,
+        94.72,
+        94.72,
+        95.48,
+        101.21,
+        112.04,
+        117.52,
+        117.76,
+        117.76,
+        120.61,
+        130.02,
+        138.9,
+        140.11,
+        140.11,
+        140.17,
+        146.76,
+        158.51,
+        164.38,
+        164.38,
+        164.38,
+        165,
+        173.2,
+        184.83,
+        188.79,
+        188.8,
+        188.8,
+        191.51,
+        200.94,
+        209.99,
+        212.14,
+        212.14,
+        212.15,
+        217.9,
+        228.75,
+        235.39,
+        235.71,
+    ]
+)
 
 
 @pytest.mark.parametrize(("speed", "dt"), [(np.pi, 20 / SPEED), (2 * np.pi, 7.3 / SPEED)])
 def test_the_staircase_of_a_torque_that_drops_at_once(speed, dt):
     """Bit without inertia, stiff drive: each 2L/c the wave 2 Z Om is added, and a bit that slips takes all but T_d."""
-    scene = cf.Drilling(string_of((2000.0, *PIPE[1:])), cf.TopDrive(speed), cf.BitOnRock(cf.Stribeck(8000.0, 5000.0)))
+    scene = cf.drilling.Drilling(
+        string_of((2000.0, *PIPE[1:])),
+        cf.drilling.TopDrive(speed),
+        cf.drilling.BitOnRock(cf.drilling.Stribeck(8000.0, 5000.0)),
+    )
     model = TorsionWaves(scene, dt)
     travel, Z = 2000 / SPEED, PIPE_IMPEDANCE
     t, rows = run(model, 40 * travel)
@@ -105,7 +167,7 @@ def test_speed_above_which_the_bit_never_sticks(drive, sticks, turns):
 def test_a_front_in_a_lying_pipe():
     """Speed Om - m x/(2 Z) behind the front, which stops by itself where that is zero."""
     m, Om = 3.52427441057226, 2 * np.pi
-    model = TorsionWaves(lying(cf.TopDrive(Om)), 2 / SPEED)
+    model = TorsionWaves(lying(cf.drilling.TopDrive(Om)), 2 / SPEED)
     model.advance(round(0.2 / model.dt))
     x, (speed, torque) = model.depths, model.profile()[1:3]
     behind = (x > 4) & (x < 0.19 * SPEED)
@@ -116,7 +178,7 @@ def test_a_front_in_a_lying_pipe():
     profile = model.profile()
     assert x[profile[ANGLE] > 0].max() == pytest.approx(1056.7740703874679, rel=5e-3)
     assert profile[STICKING, x > 1060].all() and not profile[STICKING, x < 1000].any()
-    t, rows = run(TorsionWaves(lying(cf.TopDrive(Om)), 10 / SPEED), 9)
+    t, rows = run(TorsionWaves(lying(cf.drilling.TopDrive(Om)), 10 / SPEED), 9)
     assert t[np.flatnonzero(rows[:, COLUMN["bit_angle"]])[0]] == pytest.approx(2.725, rel=2e-3)
     assert rows[:, COLUMN["surface_torque"]].max() == pytest.approx(12432.4, rel=1e-3)
     assert rows[:, COLUMN["bit_speed"]].max() == pytest.approx(12.565, rel=2e-3)
@@ -138,7 +200,7 @@ class Turn:
 def test_a_pipe_turned_slowly_and_back():
     """The parabola of a string on its wall: l = sqrt(2 GJ phi/m), M = m l; back by dphi to sqrt(GJ dphi/m)."""
     m, GJ = 3.52427441057226, 941984.5211067691
-    model = TorsionWaves(lying(cf.TopDrive(Turn(2 * np.pi, np.pi / 2, 60.0))), 4 / SPEED)
+    model = TorsionWaves(lying(cf.drilling.TopDrive(Turn(2 * np.pi, np.pi / 2, 60.0))), 4 / SPEED)
     _, rows = run(model, 60)
     x, angle = model.depths, model.profile()[ANGLE]
     slope, end = np.polyfit(x[x < 1700], np.sqrt(angle[x < 1700]), 1)
@@ -214,7 +276,7 @@ def test_a_wave_goes_through_parts_of_any_length():
     the end turns as the drive was asked to turn a travel time before."""
     lengths, speeds = np.array([700.3, 0.2, 1001.7, 13.1, 303.13]), np.array([3100.0, 2000.0, 2900.0, 3300.0, 3000.0])
     parts = [
-        cf.Component(
+        cf.well.Component(
             length, cf.Stiffness((1e9, 1e9), 1e9, (1e6, 1e6), 300 * c, 20.0, inertia=(0.1, 0.1, 300 / c)), 1, 0.1
         )
         for length, c in zip(lengths, speeds, strict=True)
@@ -226,8 +288,13 @@ def test_a_wave_goes_through_parts_of_any_length():
 
     errors = []
     for dt in (0.02, 0.01):
-        model = TorsionWaves(cf.Drilling(cf.DrillString(parts, order="top down"),
-                                         cf.TopDrive(asked, control=cf.Matched(300.0))), dt)  # fmt: skip
+        model = TorsionWaves(
+            cf.drilling.Drilling(
+                cf.well.DrillString(parts, order="top down"),
+                cf.drilling.TopDrive(asked, control=cf.drilling.Matched(300.0)),
+            ),
+            dt,
+        )
         t, rows = run(model, 5)
         s = np.maximum(t - travel, 0)
         errors.append(np.abs(rows[:, COLUMN["bit_angle"]] - (s - np.sin(4 * s) / 4)).max())
@@ -238,22 +305,28 @@ def test_a_wave_goes_through_parts_of_any_length():
 
 def test_cells_keep_travel_time_inertia_and_compliance():
     parts = [(2513.0, *PIPE[1:]), (0.3, 0.2, 0.05), (111.7, 0.1651, 0.05715), (18.0, 0.127, 0.1), (3.1, 0.2, 0.1)]
-    segments = cf.Drilling(string_of(*parts), cf.TopDrive(1.0)).segments
+    segments = cf.drilling.Drilling(string_of(*parts), cf.drilling.TopDrive(1.0)).segments
     found = cells_of(segments, 10 / SPEED)
     assert found.dt <= 10 / SPEED and found.joined == 2 and found.depths[-1] == pytest.approx(2646.1)
     assert (found.impedance * found.time).sum() == pytest.approx(sum(x.rhoJ * x.length for x in segments), rel=1e-12)
     assert (found.time / found.impedance).sum() == pytest.approx(sum(x.length / x.GJ for x in segments), rel=1e-12)
     times = found.time / found.dt
     assert np.all((np.abs(times - 1) < 1e-9) | ((times >= 1.5 - 1e-9) & (times < 2.5)))
-    whole = cells_of(cf.Drilling(string_of(PIPE, (200.0, 0.1651, 0.05715)), cf.TopDrive(1.0)).segments, 10.5 / SPEED)
+    whole = cells_of(
+        cf.drilling.Drilling(string_of(PIPE, (200.0, 0.1651, 0.05715)), cf.drilling.TopDrive(1.0)).segments,
+        10.5 / SPEED,
+    )
     assert len(whole.time) == 320 and whole.unfit < 1e-9
 
 
 def test_drag_is_of_the_second_order():
     angles = []
     for cells in (40, 80, 160):
-        scene = cf.Drilling(string_of(PIPE), cf.TopDrive(lambda t: 1 - np.cos(3 * t), 2900.0, cf.PI(2e3, 5e3)),
-                            drag=cf.ViscousDrag(1.0))  # fmt: skip
+        scene = cf.drilling.Drilling(
+            string_of(PIPE),
+            cf.drilling.TopDrive(lambda t: 1 - np.cos(3 * t), 2900.0, cf.drilling.PI(2e3, 5e3)),
+            drag=cf.drilling.ViscousDrag(1.0),
+        )
         angles.append(run(TorsionWaves(scene, elements=cells), 160 * 3000 / SPEED / 40)[1][-1, COLUMN["bit_angle"]])
     assert 3.7 < (angles[0] - angles[1]) / (angles[1] - angles[2]) < 4.3
 
@@ -261,8 +334,11 @@ def test_drag_is_of_the_second_order():
 def test_a_motor_and_a_wave_of_the_drag():
     """The steady speed of a given torque: over the drags of its bearings and of the mud."""
     drag = 5.0 * DENSITY * 1.1878745537285865e-05 * 3000
-    scene = cf.Drilling(string_of(PIPE), cf.TopDrive(inertia=1000.0, control=cf.Motor(3000.0, 100.0)),
-                        drag=cf.ViscousDrag(5.0))  # fmt: skip
+    scene = cf.drilling.Drilling(
+        string_of(PIPE),
+        cf.drilling.TopDrive(inertia=1000.0, control=cf.drilling.Motor(3000.0, 100.0)),
+        drag=cf.drilling.ViscousDrag(5.0),
+    )
     _, rows = run(TorsionWaves(scene), 200)
     for name in ("drive_speed", "bit_speed"):
         assert rows[-1, COLUMN[name]] == pytest.approx(3000 / (100 + drag), rel=1e-6)
@@ -272,8 +348,8 @@ def test_a_motor_and_a_wave_of_the_drag():
 
 def test_the_same_digits_after_recall():
     scene, wall_force = off_bottom()
-    drive = cf.TopDrive(Turn(30.0, 5.0, 7.03), 2900.0, cf.PI(38e3, 100e3))
-    scene = replace(scene, drive=drive, bit=cf.BitOnRock(LAW, inertia=50.0))
+    drive = cf.drilling.TopDrive(Turn(30.0, 5.0, 7.03), 2900.0, cf.drilling.PI(38e3, 100e3))
+    scene = replace(scene, drive=drive, bit=cf.drilling.BitOnRock(LAW, inertia=50.0))
     first, second = (TorsionWaves(scene, 0.0071, normal_force=wall_force) for _ in range(2))
     assert np.any(first.cells.turn)
     first.advance(700)
@@ -285,12 +361,16 @@ def test_the_same_digits_after_recall():
 
 def test_wall_force_of_the_soft_string():
     """The kinetic torque is that of torque and drag where the string rotates off bottom."""
-    path = cf.WellPath.from_survey([0, 400, 900, 1300, 2200], [0, 0, 40, 70, 70], [20, 20, 20, 80, 80], degrees=True)
-    hole = cf.Borehole(path, [cf.HoleSection(1000, 0.25, 0.2), cf.HoleSection(2200, 0.2159, 0.3)])
-    string = cf.DrillString([part(200.0, 0.1651, 0.05715, weight=1000.0), part(None, *PIPE[1:], weight=250.0)])
-    told = cf.torque_and_drag(hole, string, cf.RotateOffBottom(), model="soft", torque_convention="johancsik", tol=1e-6)
-    friction = cf.WallFriction(1.5, 1.0, 0.1, of_hole=True)
-    model = TorsionWaves(cf.Drilling(string, cf.TopDrive(1.0), hole=hole, friction=friction))
+    path = cf.well.WellPath.from_survey(
+        [0, 400, 900, 1300, 2200], [0, 0, 40, 70, 70], [20, 20, 20, 80, 80], degrees=True
+    )
+    hole = cf.well.Borehole(path, [cf.well.HoleSection(1000, 0.25, 0.2), cf.well.HoleSection(2200, 0.2159, 0.3)])
+    string = cf.well.DrillString([part(200.0, 0.1651, 0.05715, weight=1000.0), part(None, *PIPE[1:], weight=250.0)])
+    told = cf.well.torque_and_drag(
+        hole, string, cf.well.RotateOffBottom(), model="soft", torque_convention="johancsik", tol=1e-6
+    )
+    friction = cf.drilling.WallFriction(1.5, 1.0, 0.1, of_hole=True)
+    model = TorsionWaves(cf.drilling.Drilling(string, cf.drilling.TopDrive(1.0), hole=hole, friction=friction))
     assert model._slide.sum() == pytest.approx(told.surface_torque, rel=1e-5)
     assert model._hold.sum() == pytest.approx(1.5 * told.surface_torque, rel=1e-5)
     assert model._decay[-1] == pytest.approx(0.1 / (0.1651 / 2))
@@ -298,30 +378,36 @@ def test_wall_force_of_the_soft_string():
 
 
 def test_what_is_told_and_refused():
-    steep = cf.WallFriction(0.5, 0.1, 0.02, of_rotation=True)
+    steep = cf.drilling.WallFriction(0.5, 0.1, 0.02, of_rotation=True)
     scene, wall_force = off_bottom()
     model = TorsionWaves(replace(scene, friction=steep), 20 / SPEED, normal_force=wall_force)
     assert model.dt < 5 / SPEED and any("would have several answers" in line for line in model.why)
-    sudden = cf.WallFriction(0.5, 0.1, 1e-9, of_rotation=True)
+    sudden = cf.drilling.WallFriction(0.5, 0.1, 1e-9, of_rotation=True)
     with pytest.raises(cf.SceneError, match="Drilling.friction = .*decays more slowly"):
         TorsionWaves(replace(scene, friction=sudden))
-    light = cf.BitOnRock(cf.Stribeck(6000.0, 2000.0, 1e-3), inertia=0.01)
+    light = cf.drilling.BitOnRock(cf.drilling.Stribeck(6000.0, 2000.0, 1e-3), inertia=0.01)
     with pytest.raises(cf.SceneError, match="BitOnRock.law = .*a larger inertia of the bit than 0.01"):
         TorsionWaves(replace(stick_slip(), bit=light))
-    law = cf.Stribeck(6000.0, 2000.0, 1.0)
+    law = cf.drilling.Stribeck(6000.0, 2000.0, 1.0)
     with pytest.raises(cf.SceneError, match="impedance of the string at the bit is 1793.82"):
-        TorsionWaves(cf.Drilling(string_of(PIPE, (200.0, 0.1651, 0.05715)), cf.TopDrive(1.0), cf.BitOnRock(law)))
+        TorsionWaves(
+            cf.drilling.Drilling(
+                string_of(PIPE, (200.0, 0.1651, 0.05715)), cf.drilling.TopDrive(1.0), cf.drilling.BitOnRock(law)
+            )
+        )
     with pytest.raises(cf.SceneError, match="expected a DrillString; discs have no waves"):
-        TorsionWaves(cf.Drilling(cf.Discs((1.0, 1.0), (1.0,)), cf.TopDrive(1.0)))
+        TorsionWaves(cf.drilling.Drilling(cf.drilling.Discs((1.0, 1.0), (1.0,)), cf.drilling.TopDrive(1.0)))
     with pytest.raises(cf.SceneError, match="TorsionWaves.scene.bit.law = .*knows no depth of cut"):
-        cutting = cf.BitOnRock(cf.Cutting(0.1, 60e6, 0.6, 4))
-        TorsionWaves(cf.Drilling(string_of(PIPE), cf.TopDrive(1.0), cutting))
+        cutting = cf.drilling.BitOnRock(cf.drilling.Cutting(0.1, 60e6, 0.6, 4))
+        TorsionWaves(cf.drilling.Drilling(string_of(PIPE), cf.drilling.TopDrive(1.0), cutting))
     for dt, words in ((-1, "a positive number"), (1e-9, "at least 1e-05 of the travel time")):
         with pytest.raises(cf.SceneError, match=f"TorsionWaves.dt = {dt}: expected {words}"):
             TorsionWaves(scene, dt)
 
 
 def test_lobes_give_their_torque_alone():
-    lobes = replace(stick_slip(), bit=cf.BitOnRock(cf.Lobes(3, 2e-3, law=LAW), weight=80e3, inertia=50.0))
+    lobes = replace(
+        stick_slip(), bit=cf.drilling.BitOnRock(cf.drilling.Lobes(3, 2e-3, law=LAW), weight=80e3, inertia=50.0)
+    )
     lobed, plain = (TorsionWaves(scene, 40 / SPEED).advance(500) for scene in (lobes, stick_slip()))
     np.testing.assert_array_equal(lobed, plain)

@@ -12,9 +12,17 @@ pytestmark = pytest.mark.serial
 HERE = Path(__file__).parent
 
 
-@pytest.mark.parametrize("name", [name for name in cf.__all__ if inspect.isfunction(getattr(cf, name))])
-def test_functions_are_annotated(name):
-    signature = inspect.signature(getattr(cf, name))
+FUNCTIONS = [
+    found
+    for module in (cf, cf.well, cf.drilling)
+    for name in module.__all__
+    if inspect.isfunction(found := getattr(module, name))
+]
+
+
+@pytest.mark.parametrize("function", FUNCTIONS, ids=lambda function: function.__name__)
+def test_functions_are_annotated(function):
+    signature = inspect.signature(function)
     for parameter in (*signature.parameters.values(),):
         assert parameter.annotation is not inspect.Parameter.empty, parameter
     assert signature.return_annotation is not inspect.Signature.empty

@@ -18,8 +18,8 @@ SCHEMES = ("momentum", "energy", "generalised-alpha")
 STEEL = cf.Material(E=206e9, nu=0.3, density=7850.0)
 #: radius of the rod, clearance in the hole, m; measured depth of its start, m; gravity, m/s^2
 A, C, BEGIN, G = 0.085, 0.02, 5.0, 9.81
-VERTICAL = cf.WellPath.from_survey([0, 20], [0, 0], [0, 0])
-HORIZONTAL = cf.WellPath.from_survey([0, 20], [90, 90], [0, 0])
+VERTICAL = cf.well.WellPath.from_survey([0, 20], [0, 0], [0, 0])
+HORIZONTAL = cf.well.WellPath.from_survey([0, 20], [90, 90], [0, 0])
 SMALL = {"elements": 2, "degree": 2}
 
 
@@ -266,7 +266,7 @@ def test_friction_is_weaker_in_slip():
 
 def test_joined_rods_are_one():
     """A pipe that falls, slides and stops, with two contacts at each joint, and another wall at one of its nodes."""
-    path, axis = cf.WellPath.from_survey([0, 400], [90, 90], [0, 0]), np.array([1.0, 0, 0])
+    path, axis = cf.well.WellPath.from_survey([0, 400], [90, 90], [0, 0]), np.array([1.0, 0, 0])
     found = []
     for parts in (1, 3):
         ends = path.position(100) + 0.03 * np.array([0, 0, 1]) + np.outer(np.linspace(0, 60, parts + 1), axis)
@@ -286,7 +286,7 @@ def test_joined_rods_are_one():
 
 def test_a_pipe_at_rest_stays_there():
     """On the low side, from its equilibrium, in steps in which waves pass five nodes: no step is halved."""
-    path = cf.WellPath.from_survey([0, 400], [90, 90], [0, 0])
+    path = cf.well.WellPath.from_survey([0, 400], [90, 90], [0, 0])
     start = path.position(100) + np.array([0, 0, 0.0499])
     rod = cf.Rod(cf.Line(start, start + (30, 0, 0)), cf.Tube(0.127, 0.1), STEEL, name="pipe")
     sizes = {"path": path, "radius": 0.1135, "contact_radius": 0.0635, "stiffness": 1e6, "begins": 100}

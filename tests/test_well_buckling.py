@@ -16,17 +16,17 @@ LOCK_UP, CRITICAL = WELLS["lock-up"], WELLS["critical"]
 
 def string(case):
     stiff = cf.Stiffness((1e9, 1e9), 7e8, (case["EI"],) * 2, 9.4e5)
-    return cf.DrillString([cf.Component(None, stiff, case["w"], 0.05)])
+    return cf.well.DrillString([cf.well.Component(None, stiff, case["w"], 0.05)])
 
 
 def straight(case, length, inclination=90.0):
-    path = cf.WellPath.from_survey([0, length], [inclination] * 2, [0, 0])
-    return cf.Borehole(path, [cf.HoleSection(length, 2 * (0.05 + case["r"]), case["mu"])])
+    path = cf.well.WellPath.from_survey([0, length], [inclination] * 2, [0, 0])
+    return cf.well.Borehole(path, [cf.well.HoleSection(length, 2 * (0.05 + case["r"]), case["mu"])])
 
 
-def pushed(case, length, weight, inclination=90.0, operation=cf.Sliding, **settings):
+def pushed(case, length, weight, inclination=90.0, operation=cf.well.Sliding, **settings):
     hole = straight(case, length, inclination)
-    return cf.torque_and_drag(hole, string(case), operation(weight), **{"tol": 1e-6, **settings})
+    return cf.well.torque_and_drag(hole, string(case), operation(weight), **{"tol": 1e-6, **settings})
 
 
 def test_critical_loads():
@@ -58,16 +58,19 @@ def test_the_loads_of_a_helix_in_a_vertical_hole():
 
 def test_critical_loads_along_a_string():
     case = {"EI": 1228200.0, "w": 241.13, "r": 0.04445, "mu": 0.2}
-    path = cf.WellPath.from_survey([0, 300, 300 + 300 * math.pi / 4, 1000], [0, 0, 45, 45], [0, 0, 70, 70])
-    hole = cf.Borehole(path, [cf.HoleSection(1000, 0.18890, 0.2)])
-    answer = cf.torque_and_drag(hole, string(case), cf.TripIn(), model="soft")
+    path = cf.well.WellPath.from_survey([0, 300, 300 + 300 * math.pi / 4, 1000], [0, 0, 45, 45], [0, 0, 70, 70])
+    hole = cf.well.Borehole(path, [cf.well.HoleSection(1000, 0.18890, 0.2)])
+    answer = cf.well.torque_and_drag(hole, string(case), cf.well.TripIn(), model="soft")
     inclined, bent = answer.md > 600, (answer.md > 301) & (answer.md < 300 + 300 * math.pi / 4 - 1e-6)
     assert answer.critical_load("Dawson-Paslay")[inclined] == pytest.approx(137276.68, rel=1e-7)
     assert answer.critical_load("He-Kyllingstad")[inclined] == pytest.approx(137276.68, rel=1e-7)
     assert (answer.critical_load("He-Kyllingstad")[bent] > 2 * answer.critical_load("Dawson-Paslay")[bent]).all()
     assert answer.critical_load("Lubinski") == pytest.approx(criteria.lubinski(case["EI"], case["w"]))
-    assert np.isnan(cf.torque_and_drag(hole, cf.DrillString([cf.Component(None, None, 241.13, 0.06)]), cf.TripIn())
-                    .critical_load("Wu")).all()  # fmt: skip
+    assert np.isnan(
+        cf.well.torque_and_drag(
+            hole, cf.well.DrillString([cf.well.Component(None, None, 241.13, 0.06)]), cf.well.TripIn()
+        ).critical_load("Wu")
+    ).all()
 
 
 @pytest.mark.parametrize("name", ["wicks_steel", "wicks_composite", "drill_pipe_F_bit_50kN"])
@@ -92,12 +95,15 @@ def test_lock_up(name):
 @pytest.mark.parametrize("tol", [1e-2, 1e-9])
 def test_errors_from_below_are_multiplied_by_helices(tol):
     """Just short of lock-up, with a bend at the bottom that the soft string solves to no more than its tolerance."""
-    path = cf.WellPath.from_survey([0, 800, 1500, 2500, 3200, 4200, 5200], [5, 60, 30, 90, 80, 95, 90],
-                                   [0, 0, 0, 0, 3, 2, 0])  # fmt: skip
-    pipe = cf.Component(None, cf.Stiffness((1e9, 1e9), 2.6e9, (2063790.0,) * 2, 1.59e6), 315.0, 0.064)
-    hole = cf.Borehole(path, [cf.HoleSection(5200, 0.21, 0.341)])
-    one, best = (cf.torque_and_drag(hole, cf.DrillString([pipe]), cf.Sliding(5e4), model="buckled", tol=asked)
-                 for asked in (tol, 1e-10))  # fmt: skip
+    path = cf.well.WellPath.from_survey(
+        [0, 800, 1500, 2500, 3200, 4200, 5200], [5, 60, 30, 90, 80, 95, 90], [0, 0, 0, 0, 3, 2, 0]
+    )
+    pipe = cf.well.Component(None, cf.Stiffness((1e9, 1e9), 2.6e9, (2063790.0,) * 2, 1.59e6), 315.0, 0.064)
+    hole = cf.well.Borehole(path, [cf.well.HoleSection(5200, 0.21, 0.341)])
+    one, best = (
+        cf.well.torque_and_drag(hole, cf.well.DrillString([pipe]), cf.well.Sliding(5e4), model="buckled", tol=asked)
+        for asked in (tol, 1e-10)
+    )
     assert one.error <= tol and abs(one.hook_load - best.hook_load) <= one.solved.error + best.solved.error
 
 
@@ -113,11 +119,11 @@ def test_helices_in_straight_holes():
 
 def test_a_rotating_helix_has_no_axial_friction_but_torque():
     case = {"EI": 1228200.0, "w": 241.13, "r": 0.04445, "mu": 0.25}
-    answer = pushed(case, 500.0, 400e3, operation=lambda weight: cf.RotaryDrilling(weight, 0.0))
+    answer = pushed(case, 500.0, 400e3, operation=lambda weight: cf.well.RotaryDrilling(weight, 0.0))
     assert answer.hook_load == pytest.approx(-400e3, rel=1e-12)
     N = (241.13 + 0.04445 * 400e3**2 / (4 * 1228200.0)) / math.sqrt(1 + 0.25**2)
     assert answer.surface_torque == pytest.approx(0.25 * 0.05 * N * 500, rel=1e-9)
-    soft = pushed(case, 500.0, 400e3, model="soft", operation=lambda weight: cf.RotaryDrilling(weight, 0.0))
+    soft = pushed(case, 500.0, 400e3, model="soft", operation=lambda weight: cf.well.RotaryDrilling(weight, 0.0))
     assert soft.surface_torque < answer.surface_torque / 3
 
 
@@ -133,10 +139,10 @@ def test_auto_takes_the_first_rung_without_helices():
 
 def test_buckled_stretches_are_told_apart():
     """A string that is a helix above and below a bend, whose wall force holds it straight."""
-    path = cf.WellPath.from_survey([0, 1500, 1800, 3300], [90, 90, 30, 30], [0, 0, 0, 0])
-    hole = cf.Borehole(path, [cf.HoleSection(3300, 0.21, 0.0)])
-    pipe = cf.Component(None, cf.Stiffness((1e9, 1e9), 2.6e9, (2063790.0, 2063790.0), 1.59e6), 1.0, 0.064)
-    answer = cf.torque_and_drag(hole, cf.DrillString([pipe]), cf.Sliding(60e3), model="auto")
+    path = cf.well.WellPath.from_survey([0, 1500, 1800, 3300], [90, 90, 30, 30], [0, 0, 0, 0])
+    hole = cf.well.Borehole(path, [cf.well.HoleSection(3300, 0.21, 0.0)])
+    pipe = cf.well.Component(None, cf.Stiffness((1e9, 1e9), 2.6e9, (2063790.0, 2063790.0), 1.59e6), 1.0, 0.064)
+    answer = cf.well.torque_and_drag(hole, cf.well.DrillString([pipe]), cf.well.Sliding(60e3), model="auto")
     states = answer.buckling[(answer.md > 1600) & (answer.md < 1700)]
     assert (states == 0).all() and answer.buckling[0] == answer.buckling[-1] == 2
     assert "helical buckling at md = 0 to 1500, 1800 to 3300 m" in str(answer)

@@ -53,14 +53,14 @@ def test_a_build_section_through_the_public_face(case):
 @pytest.mark.parametrize("case", KNOWN["bottom-hole assembly"][:2], ids=["free", "thrust"])
 def test_an_assembly_through_the_public_face(case):
     exact, length, r = case["exact_kirchhoff"], 60.0, 0.1
-    path = cf.WellPath.from_survey([0, length + 20], [case["inclination_deg"]] * 2, [0, 0])
+    path = cf.well.WellPath.from_survey([0, length + 20], [case["inclination_deg"]] * 2, [0, 0])
     wide = 2 * (r + case["clearance"])
     stiff = cf.Stiffness((1e12,) * 2, 1e12, (case["EI"],) * 2, case["EI"])
-    bit = cf.Bit(wide, length=1e-3, body_diameter=2 * r, mass=case["w"] / 9.81)
-    string = cf.DrillString([bit, cf.Component(None, stiff, case["w"], r)])
-    found = cf.torque_and_drag(
-        cf.Borehole(path, cf.HoleSection(length + 20, wide, 0.0)), string, cf.Static(weight=case["WOB"]),
-        mud=cf.Mud(1e-3), depth=length, model="rod",
+    bit = cf.well.Bit(wide, length=1e-3, body_diameter=2 * r, mass=case["w"] / 9.81)
+    string = cf.well.DrillString([bit, cf.well.Component(None, stiff, case["w"], r)])
+    found = cf.well.torque_and_drag(
+        cf.well.Borehole(path, cf.well.HoleSection(length + 20, wide, 0.0)), string, cf.well.Static(weight=case["WOB"]),
+        mud=cf.well.Mud(1e-3), depth=length, model="rod",
     )  # fmt: skip
     *_, tangency, at_bit = points_of(found)
     assert length - tangency[0] == pytest.approx(exact["arc_length_to_tangency"], abs=1e-3)
@@ -77,7 +77,7 @@ SLICK = (1.7e7, 2050.0, 0.0508, 17.919140838675947, 1639.0117496314479)
 def test_a_force_behind_which_the_string_rises(tol):
     """In a stiff wall the contact splits behind it: the force is not that of the first part alone, 8 % more."""
     EI, weight, clearance, at, force = SLICK
-    length, path = 120.0, cf.WellPath.from_survey([0, 140], np.radians([3.0, 3.0]), [0, 0], degrees=False)
+    length, path = 120.0, cf.well.WellPath.from_survey([0, 140], np.radians([3.0, 3.0]), [0, 0], degrees=False)
     solved = solve_in_hole(
         path, [length], cf.Stiffness((1e12,) * 2, 1e12, (EI, EI), EI), weight, 0.1, radius=0.1 + clearance,
         bottom_tension=-250e3, rings=[(length, 0.0, 0.1)], tol=tol,
@@ -96,7 +96,7 @@ STABILISED = ((29.0, 0.003), (11.0, 0.003), (2.0, 0.0016)), (3536.43, 4185.51)
 def test_forces_of_rings_next_to_each_other():
     """No wall is between them whose softness would count: the next wall is 18 m away."""
     (rings, forces), (EI, weight, clearance, *_) = STABILISED, SLICK
-    length, path = 120.0, cf.WellPath.from_survey([0, 140], [88.0, 88.0], [0, 0])
+    length, path = 120.0, cf.well.WellPath.from_survey([0, 140], [88.0, 88.0], [0, 0])
     solved = solve_in_hole(
         path, [length], cf.Stiffness((1e12,) * 2, 1e12, (EI, EI), EI), weight, 0.1, radius=0.1 + clearance,
         bottom_tension=-250e3, rings=[*((length - d, room, 0.1) for d, room in rings), (length, 0.0, 0.1)],
@@ -111,7 +111,7 @@ def test_a_smaller_tol_makes_forces_at_points_more_accurate(case):
     """The wall is made stiffer, and the contact splits behind the forces."""
     given, alpha = case["input"], math.radians(case["input"]["alpha"])
     md = np.cumsum([0, given["h"], given["R"] * alpha, given["D"] + 50.0])
-    path = cf.WellPath.from_survey(md, np.degrees([0, 0, alpha, alpha]), [0, 0, 0, 0])
+    path = cf.well.WellPath.from_survey(md, np.degrees([0, 0, alpha, alpha]), [0, 0, 0, 0])
     solved = solve_in_hole(
         path, [case["rod_length"]], cf.Stiffness((1e12,) * 2, 1e12, (given["EI"],) * 2, given["EI"]), given["w"], 0.06,
         radius=0.06 + given["r"], friction=given["mu"], slip=(float(given["c"]), 0.0), bottom_tension=given["T0"],
@@ -135,7 +135,7 @@ def test_errors_of_forces_at_points_are_with_the_contacts():
 def test_a_force_near_the_end_of_its_contact_says_so():
     """The part that is left behind it is shorter than what its peak and the rise behind it need."""
     EI, weight, clearance, _, force = SLICK
-    length, path = 60.0, cf.WellPath.from_survey([0, 140], np.radians([3.0, 3.0]), [0, 0], degrees=False)
+    length, path = 60.0, cf.well.WellPath.from_survey([0, 140], np.radians([3.0, 3.0]), [0, 0], degrees=False)
     solved = solve_in_hole(
         path, [length], cf.Stiffness((1e12,) * 2, 1e12, (EI, EI), EI), weight, 0.1, radius=0.1 + clearance,
         bottom_tension=-250e3, rings=[(length, 0.0, 0.1)],
@@ -196,11 +196,11 @@ def test_a_force_that_is_small_beside_the_pressure():
 
 def test_forces_that_the_mesh_does_not_resolve_are_told():
     """Those of a mesh that is fine enough for a rough hook load."""
-    path = cf.WellPath.from_survey([0, 400, 1000, 2000], [0, 0, 60, 60], [0, 0, 40, 40])
+    path = cf.well.WellPath.from_survey([0, 400, 1000, 2000], [0, 0, 60, 60], [0, 0, 40, 40])
     stiff = cf.Stiffness((1.35e8,) * 2, 7e8, (1228200.0,) * 2, 9.4e5)
-    string = cf.DrillString([cf.Component(None, stiff, 241.13, 0.0635)])
-    found = cf.torque_and_drag(
-        cf.Borehole(path, cf.HoleSection(2000, 0.216, 0.25)), string, cf.TripIn(), model="rod", tol=5e-2
+    string = cf.well.DrillString([cf.well.Component(None, stiff, 241.13, 0.0635)])
+    found = cf.well.torque_and_drag(
+        cf.well.Borehole(path, cf.well.HoleSection(2000, 0.216, 0.25)), string, cf.well.TripIn(), model="rod", tol=5e-2
     )
     rough = found.solved.rough
     assert rough and "are ROUGH" in found.details() and is_balanced(found)
@@ -231,11 +231,13 @@ def test_resultants_of_any_pressure_add_up():
 
 def test_torque_does_not_alternate_at_the_edge_of_a_collar():
     """The wall's force is concentrated there: torque falls by its friction, and all the way down."""
-    path = cf.WellPath.from_survey([0, 100, 300, 500], [0, 0, 40, 40], [20, 20, 20, 20])
-    string = cf.DrillString(
-        [cf.Collar(60, outer_diameter=0.2, inner_diameter=0.07), cf.DrillPipe(size="5 in 19.50 lb/ft")]
+    path = cf.well.WellPath.from_survey([0, 100, 300, 500], [0, 0, 40, 40], [20, 20, 20, 20])
+    string = cf.well.DrillString(
+        [cf.well.Collar(60, outer_diameter=0.2, inner_diameter=0.07), cf.well.DrillPipe(size="5 in 19.50 lb/ft")]
     )
-    where = cf.Borehole(path, cf.HoleSection(500.0, 0.2159, 0.25))
-    found = cf.torque_and_drag(where, string, cf.RotateOffBottom(), mud=cf.Mud(1200.0), model="rod", tol=1e-5)
+    where = cf.well.Borehole(path, cf.well.HoleSection(500.0, 0.2159, 0.25))
+    found = cf.well.torque_and_drag(
+        where, string, cf.well.RotateOffBottom(), mud=cf.well.Mud(1200.0), model="rod", tol=1e-5
+    )
     assert np.diff(found.torque).max() < 5e-3 * found.surface_torque
     assert found.torque[0] == pytest.approx(found.surface_torque, rel=1e-9)

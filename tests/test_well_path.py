@@ -14,7 +14,7 @@ pytestmark = [pytest.mark.serial, pytest.mark.once]
 
 def arc(angle, radius, azimuth=30.0):
     """A vertical line of 100 m, then a planar arc from vertical."""
-    return cf.WellPath.from_survey([0, 100, 100 + radius * math.radians(angle)], [0, 0, angle], [0, 200, azimuth])
+    return cf.well.WellPath.from_survey([0, 100, 100 + radius * math.radians(angle)], [0, 0, angle], [0, 200, azimuth])
 
 
 @pytest.mark.parametrize("angle", [1e-4, 3.0, 40.0, 90.0, 150.0, 179.0])
@@ -63,8 +63,8 @@ def test_tangent_and_curvature_are_derivatives():
 def test_azimuth_does_not_enter_by_itself():
     """Through north, by turns, and at vertical stations; down and up again beyond 90 degrees."""
     md, inc = [0, 100, 200, 300, 400], [0, 20, 30, 110, 60]
-    one = cf.WellPath.from_survey(md, inc, [0, 350, 10, 5, 300])
-    two = cf.WellPath.from_survey(md, inc, [77, -10, -350, 5, -60])
+    one = cf.well.WellPath.from_survey(md, inc, [0, 350, 10, 5, 300])
+    two = cf.well.WellPath.from_survey(md, inc, [77, -10, -350, 5, -60])
     at = np.linspace(0, 400, 33)
     assert np.abs(one.position(at) - two.position(at)).max() < 1e-12 * 400
     assert np.linalg.norm(one.tangent(at), axis=1) == pytest.approx(1, abs=1e-14)
@@ -89,7 +89,7 @@ def test_the_closest_point(name):
 
 def test_the_closest_point_of_a_wide_arc_far_away():
     """Half a turn, seen from a point nearer to its end than to its start, behind both."""
-    well = cf.WellPath.from_survey([0, 100 * math.pi * 0.9], [0, 162], [0, 0])
+    well = cf.well.WellPath.from_survey([0, 100 * math.pi * 0.9], [0, 162], [0, 0])
     md = np.linspace(0, well.length, 100001)
     for point in ([-20.0, 0.0, -50.0], [205.0, 3.0, 10.0], [150.0, 0.0, -90.0], [90.0, 0.0, 1.0]):
         best = md[np.argmin(np.linalg.norm(well.position(md) - point, axis=1))]
@@ -106,11 +106,11 @@ def test_a_survey_from_a_file(tmp_path):
         ("depth_ft;tilt;Azimuth", {"md": "Depth", "inc": "tilt"}),
     ):
         file.write_text(heading + stations, encoding="utf-8")
-        well = cf.WellPath.from_csv(file, **given)
+        well = cf.well.WellPath.from_csv(file, **given)
         assert well.md.tolist() == pytest.approx([0, 304.8, 609.6]), heading
         assert np.degrees([well.inclination[2], well.azimuth[2]]) == pytest.approx([30, 45]), heading
     file.write_text("MD (m),Inc (rad),Azi\n0,0,0\n900,0.3,0.2\n", encoding="utf-8")
-    assert cf.WellPath.from_csv(file).inclination[1] == 0.3
+    assert cf.well.WellPath.from_csv(file).inclination[1] == 0.3
 
 
 @pytest.mark.parametrize(
@@ -131,7 +131,7 @@ def test_a_survey_from_a_file(tmp_path):
 def test_files_that_are_refused(text, given, words, tmp_path):
     (tmp_path / "survey.csv").write_text(text, encoding="utf-8")
     with pytest.raises(cf.SceneError, match=words):
-        cf.WellPath.from_csv(tmp_path / "survey.csv", **given)
+        cf.well.WellPath.from_csv(tmp_path / "survey.csv", **given)
 
 
 @pytest.mark.parametrize(
@@ -153,11 +153,11 @@ def test_files_that_are_refused(text, given, words, tmp_path):
 )
 def test_surveys_that_are_refused(md, inc, azi, degrees, words):
     with pytest.raises(cf.SceneError, match=words):
-        cf.WellPath.from_survey(md, inc, azi, degrees)
+        cf.well.WellPath.from_survey(md, inc, azi, degrees)
 
 
 def test_degrees_that_look_like_radians_are_taken_where_said():
     with pytest.warns(cf.SceneWarning, match="look like radians"):
-        well = cf.WellPath.from_survey([0, 100, 200], [0, 0.5, 1.2], [0, 1, 5.5], degrees=True)
+        well = cf.well.WellPath.from_survey([0, 100, 200], [0, 0.5, 1.2], [0, 1, 5.5], degrees=True)
     assert well.inclination[2] == pytest.approx(math.radians(1.2))
-    assert cf.WellPath.from_survey([0, 100], [0, 0], [0, 3]).dogleg[0] == 0  # a vertical well has nothing to doubt
+    assert cf.well.WellPath.from_survey([0, 100], [0, 0], [0, 3]).dogleg[0] == 0  # a vertical well has nothing to doubt

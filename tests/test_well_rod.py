@@ -18,40 +18,56 @@ from cosserat_fenicsx.well.rod.rod_answer import _found
 KNOWN = json.loads((Path(__file__).parent / "reference" / "rod_in_hole.json").read_text(encoding="utf-8"))
 EI = 1228200.0
 STIFF = cf.Stiffness((1.35359e8, 1.35359e8), 7.03868e8, (EI, EI), 9.4e5)
-STRING = cf.DrillString([cf.Component(None, STIFF, 241.13, 0.0635, name="pipe")])
-MUD = cf.Mud(1200.0)
+STRING = cf.well.DrillString([cf.well.Component(None, STIFF, 241.13, 0.0635, name="pipe")])
+MUD = cf.well.Mud(1200.0)
 
 
 def hole(path, clearance=0.04445, mu=0.25, **settings):
-    return cf.Borehole(path, cf.HoleSection(path.length, 2 * (0.0635 + clearance), mu), **settings)
+    return cf.well.Borehole(path, cf.well.HoleSection(path.length, 2 * (0.0635 + clearance), mu), **settings)
 
 
 def build():
     """Vertical, a build to 40 degrees, straight."""
-    return cf.WellPath.from_survey([0, 100, 300, 500], [0, 0, 40, 40], [20, 20, 20, 20])
+    return cf.well.WellPath.from_survey([0, 100, 300, 500], [0, 0, 40, 40], [20, 20, 20, 20])
 
 
 @pytest.fixture(scope="module")
 def out():
-    return cf.torque_and_drag(hole(build()), STRING, cf.TripOut(weight=-50e3), tol=1e-4)
+    return cf.well.torque_and_drag(hole(build()), STRING, cf.well.TripOut(weight=-50e3), tol=1e-4)
 
 
 def test_auto_goes_on_to_the_rod_and_says_why(out):
     assert out.model == "rod" and out.enough and out.error <= 1e-4 and math.isnan(out.model_error)
-    soft = cf.torque_and_drag(hole(build()), STRING, cf.TripOut(weight=-50e3), model="soft")
+    soft = cf.well.torque_and_drag(hole(build()), STRING, cf.well.TripOut(weight=-50e3), model="soft")
     apart = out.hook_load - soft.hook_load
     assert out.differences["soft"] == pytest.approx((apart, 0.0), abs=50) and out.differences["soft"][0] == apart
     assert abs(apart) <= soft.model_error * soft.tension.max() < 8 * abs(apart)
     told = "; ".join(out.why)
     assert "clearance" in told and f"{apart:+.4g} N" in told and "error in the hook load exceeds tol = 0.0001" in told
     assert "NOT ENOUGH" not in out.details() and "exact rod in contact" in out.details()
-    assert not soft.enough and cf.torque_and_drag(hole(build()), STRING, cf.TripOut(-50e3), tol=0.05).model == "soft"
+    assert (
+        not soft.enough
+        and cf.well.torque_and_drag(hole(build()), STRING, cf.well.TripOut(-50e3), tol=0.05).model == "soft"
+    )
 
 
 def test_what_the_answer_of_the_rod_tells(out):
     n = len(out.md)
-    for name in ("tension", "torque", "side_force", "bending_moment", "standoff", "clearance", "buckling", "helical",
-                 "contact_side", "inclination", "component", "true_tension", "von_mises"):  # fmt: skip
+    for name in (
+        "tension",
+        "torque",
+        "side_force",
+        "bending_moment",
+        "standoff",
+        "clearance",
+        "buckling",
+        "helical",
+        "contact_side",
+        "inclination",
+        "component",
+        "true_tension",
+        "von_mises",
+    ):
         assert getattr(out, name).shape == (n,), name
     assert out.position.shape == out.offset.shape == (n, 3)
     assert out.tension[[0, -1]] == pytest.approx([out.hook_load, 50e3], rel=1e-6)
@@ -66,20 +82,23 @@ def test_what_the_answer_of_the_rod_tells(out):
     assert {name for *_, name in out.contacts} == {"high", "low"} and min(sides.values()) > 1e3
     points = [md for md, end, *_ in out.contacts if md == end]
     assert len(points) >= 2 and f"{len(points)} forces of the wall at points" in out.details()
-    assert out.stretch == pytest.approx(((out.tension[1:] + out.tension[:-1]) / 2 * np.diff(out.md)).sum() / 7.03868e8,
-                                        rel=1e-3)  # fmt: skip
+    assert out.stretch == pytest.approx(
+        ((out.tension[1:] + out.tension[:-1]) / 2 * np.diff(out.md)).sum() / 7.03868e8, rel=1e-3
+    )
     assert np.isfinite(out.critical_load("He-Kyllingstad")).any() and math.isnan(out.neutral_point)
 
 
 def test_the_difference_is_one_of_clearance():
     """What a string misses that leaves one wall for the other grows like the root of the clearance, T sqrt(4 r/R)."""
-    wide, narrow = (cf.torque_and_drag(hole(well("P"), r), STRING, cf.TripOut(), model="rod").differences["soft"]
-                    for r in (0.04, 0.01))  # fmt: skip
+    wide, narrow = (
+        cf.well.torque_and_drag(hole(well("P"), r), STRING, cf.well.TripOut(), model="rod").differences["soft"]
+        for r in (0.04, 0.01)
+    )
     assert wide[0] / narrow[0] == pytest.approx(2, rel=0.1)
 
 
 def test_a_rotating_string_climbs_and_has_torque():
-    found = cf.torque_and_drag(hole(build(), 0.01), STRING, cf.RotateOffBottom(weight=-50e3), model="rod")
+    found = cf.well.torque_and_drag(hole(build(), 0.01), STRING, cf.well.RotateOffBottom(weight=-50e3), model="rod")
     hook, torque = found.differences["soft"]
     assert abs(hook) < 1e-4 * found.hook_load and -0.05 * found.surface_torque < torque < 0
     assert found.torque[0] == pytest.approx(found.surface_torque, rel=1e-6) and found.twist > 0
@@ -98,8 +117,8 @@ def test_a_build_section_against_its_strong_form(case):
 @pytest.mark.slow
 def test_a_string_that_would_buckle_is_not_enough():
     """In a vertical hole it stays straight on the axis, far beyond the load at which it buckles."""
-    path = cf.WellPath.from_survey([0, 600], [0, 0], [0, 0])
-    found = cf.torque_and_drag(hole(path), STRING, cf.RotaryDrilling(12e3, 2e3), model="rod")
+    path = cf.well.WellPath.from_survey([0, 600], [0, 0], [0, 0])
+    found = cf.well.torque_and_drag(hole(path), STRING, cf.well.RotaryDrilling(12e3, 2e3), model="rod")
     assert found.error < 1e-9 and found.solved.negative_modes > 0
     assert not found.enough and found.model_error > 0 and "NOT STABLE without friction" in str(found)
 
@@ -129,11 +148,13 @@ def test_of_several_equilibria_the_stable_one_is_taken(monkeypatch):
 
 def test_a_rigid_wall_is_approached_as_closely_as_the_accuracy_needs(tmp_path_all):
     """Beside a stabiliser with little clearance a wall of 1e8 N/m^2 is too soft for a hook load to 1e-4."""
-    sections = cf.HoleSection(500.0, 0.2159, 0.25)
-    near_gauge = cf.Stabiliser(1.5, 0.2143, 0.165, 0.07)
-    string = cf.DrillString([cf.Bit(0.2159), near_gauge, cf.Collar(60, "NC46-65"), STRING.components[-1]])
+    sections = cf.well.HoleSection(500.0, 0.2159, 0.25)
+    near_gauge = cf.well.Stabiliser(1.5, 0.2143, 0.165, 0.07)
+    string = cf.well.DrillString(
+        [cf.well.Bit(0.2159), near_gauge, cf.well.Collar(60, "NC46-65"), STRING.components[-1]]
+    )
     given = {"depth": 400.0, "model": "rod"}
-    rigid = cf.torque_and_drag(cf.Borehole(build(), sections), string, cf.TripOut(), mud=MUD, **given)
+    rigid = cf.well.torque_and_drag(cf.well.Borehole(build(), sections), string, cf.well.TripOut(), mud=MUD, **given)
     assert rigid.enough and rigid.solved.wall_stiffness >= 1e9
     # at its blades and at the bit the clearance is theirs
     for s, clearance, contact in zip((398.95, 400.0), (0.0008, 0.0), rigid.contacts[-2:], strict=True):
@@ -154,7 +175,9 @@ def test_a_rigid_wall_is_approached_as_closely_as_the_accuracy_needs(tmp_path_al
     rows = (tmp_path_all / "out_contacts.csv").read_text(encoding="utf-8").splitlines()
     assert rows[-1].endswith(",bit") and float(rows[-1].split(",")[2]) == pytest.approx(rigid.contacts[-1].force)
     with pytest.raises(cf.NotConverged, match="stiffer wall") as refused:
-        cf.torque_and_drag(cf.Borehole(build(), sections, wall_stiffness=1e8), string, cf.TripOut(), mud=MUD, **given)
+        cf.well.torque_and_drag(
+            cf.well.Borehole(build(), sections, wall_stiffness=1e8), string, cf.well.TripOut(), mud=MUD, **given
+        )
     soft = refused.value.answer
     assert soft.wall_stiffness == 1e8 and soft.of_stiffness > 1e-4
     for name in ("hook_load", "wall_force"):
@@ -164,20 +187,24 @@ def test_a_rigid_wall_is_approached_as_closely_as_the_accuracy_needs(tmp_path_al
 
 def test_many_pieces_are_solved_on_two_meshes():
     """A string of more components than the first mesh has elements: as of one component."""
-    joints = cf.DrillString([*(replace(STRING.components[-1], length=1.0) for _ in range(300)), STRING.components[-1]])
-    whole, cut = (cf.torque_and_drag(hole(build()), x, cf.TripOut(-50e3), model="rod") for x in (STRING, joints))
+    joints = cf.well.DrillString(
+        [*(replace(STRING.components[-1], length=1.0) for _ in range(300)), STRING.components[-1]]
+    )
+    whole, cut = (
+        cf.well.torque_and_drag(hole(build()), x, cf.well.TripOut(-50e3), model="rod") for x in (STRING, joints)
+    )
     assert abs(whole.hook_load - cut.hook_load) < cut.error * cut.hook_load < 1e-4 * cut.hook_load
     assert cut.solved.path.elements[0] > 512
 
 
 def test_the_survey_below_the_string_changes_nothing():
     md, inc = [0, 100, 300, 500], [10, 10, 60, 60]
-    sections = [cf.HoleSection(250.0, 0.25, 0.2), cf.HoleSection(400.0, 0.2, 0.4)]
+    sections = [cf.well.HoleSection(250.0, 0.25, 0.2), cf.well.HoleSection(400.0, 0.2, 0.4)]
     loads = []
     for more in (1.0, 10_000.0):
-        path = cf.WellPath.from_survey([*md, 500 + more], [*inc, 60], [0] * 5)
-        where = cf.Borehole(path, [*sections, cf.HoleSection(path.length, 0.22, 0.3)])
-        loads.append(cf.torque_and_drag(where, STRING, cf.TripOut(), depth=500.0, model="rod").hook_load)
+        path = cf.well.WellPath.from_survey([*md, 500 + more], [*inc, 60], [0] * 5)
+        where = cf.well.Borehole(path, [*sections, cf.well.HoleSection(path.length, 0.22, 0.3)])
+        loads.append(cf.well.torque_and_drag(where, STRING, cf.well.TripOut(), depth=500.0, model="rod").hook_load)
     assert loads[0] == pytest.approx(loads[1], rel=1e-9)
 
 
@@ -217,14 +244,25 @@ def test_what_is_handed_on(monkeypatch):
 
     monkeypatch.setattr(rod_in_hole, "solve_in_hole", asked)
     path = build()
-    sections = [cf.HoleSection(200, 0.25, 0.2), cf.HoleSection(450, 0.2159, 0.3), cf.HoleSection(500, 0.15, 0.4)]
-    stabiliser = cf.Stabiliser(2.0, 0.21, 0.16, 0.07)
-    string = cf.DrillString(
-        [cf.Bit(0.2159), stabiliser, cf.Collar(50, "NC46-65"), cf.DrillPipe(size="5 in 19.50 lb/ft")]
+    sections = [
+        cf.well.HoleSection(200, 0.25, 0.2),
+        cf.well.HoleSection(450, 0.2159, 0.3),
+        cf.well.HoleSection(500, 0.15, 0.4),
+    ]
+    stabiliser = cf.well.Stabiliser(2.0, 0.21, 0.16, 0.07)
+    string = cf.well.DrillString(
+        [cf.well.Bit(0.2159), stabiliser, cf.well.Collar(50, "NC46-65"), cf.well.DrillPipe(size="5 in 19.50 lb/ft")]
     )
     with pytest.raises(Asked) as found:
-        cf.torque_and_drag(cf.Borehole(path, sections, wall_stiffness=3e8), string, cf.Ream(0.2, 60, 30e3, 2e3),
-                           mud=MUD, depth=400.0, model="rod", tol=1e-3)  # fmt: skip
+        cf.well.torque_and_drag(
+            cf.well.Borehole(path, sections, wall_stiffness=3e8),
+            string,
+            cf.well.Ream(0.2, 60, 30e3, 2e3),
+            mud=MUD,
+            depth=400.0,
+            model="rod",
+            tol=1e-3,
+        )
     (axis, lengths, stiffness, weight, radius), named = found.value.args
     assert axis is path and lengths == pytest.approx([347.7, 50, 2, 0.3]) and len(stiffness) == 4 and min(weight) > 0
     assert radius[-2:] == [0.08, 0.35 * 0.2159]
@@ -238,16 +276,18 @@ def test_what_is_handed_on(monkeypatch):
 
 def test_what_cannot_be_a_rod(monkeypatch):
     path = build()
-    soft = cf.DrillString([cf.Component(None, None, 241.13, 0.0635)])
+    soft = cf.well.DrillString([cf.well.Component(None, None, 241.13, 0.0635)])
     tight = hole(path, 0.0)
-    for where, string, words in ((hole(path), soft, "stiffness = None: expected a Stiffness"),
-                                 (tight, STRING, "pipe: its body is 0.127 m wide in a hole of 0.127 m")):  # fmt: skip
+    for where, string, words in (
+        (hole(path), soft, "stiffness = None: expected a Stiffness"),
+        (tight, STRING, "pipe: its body is 0.127 m wide in a hole of 0.127 m"),
+    ):
         with pytest.raises(cf.SceneError, match=words):
-            cf.torque_and_drag(where, string, cf.TripOut(), model="rod")
+            cf.well.torque_and_drag(where, string, cf.well.TripOut(), model="rod")
     settings = {"model": "rod", "torque_convention": "johancsik"}
     with pytest.raises(cf.SceneError, match="torque_convention = 'johancsik': expected 'coulomb'"):
-        cf.torque_and_drag(hole(path), STRING, cf.RotateOffBottom(), **settings)
-    instead = cf.torque_and_drag(hole(path), soft, cf.TripOut())
+        cf.well.torque_and_drag(hole(path), STRING, cf.well.RotateOffBottom(), **settings)
+    instead = cf.well.torque_and_drag(hole(path), soft, cf.well.TripOut())
     assert instead.model == "soft" and not instead.enough
     assert any("the exact rod in contact was tried, and not solved: component: stiffness" in x for x in instead.why)
 
@@ -255,13 +295,13 @@ def test_what_cannot_be_a_rod(monkeypatch):
         raise cf.NotConverged("the contact alternates")
 
     monkeypatch.setattr(rod_in_hole, "solve_in_hole", fails)
-    instead = cf.torque_and_drag(hole(path), STRING, cf.TripOut())
+    instead = cf.well.torque_and_drag(hole(path), STRING, cf.well.TripOut())
     assert not instead.enough and "not solved: the contact alternates" in str(instead)
     with pytest.raises(cf.NotConverged, match="alternates$"):
-        cf.torque_and_drag(hole(path), STRING, cf.TripOut(), model="rod")
-    flat = cf.WellPath.from_survey([0, 20000], [90, 90], [0, 0])
+        cf.well.torque_and_drag(hole(path), STRING, cf.well.TripOut(), model="rod")
+    flat = cf.well.WellPath.from_survey([0, 20000], [90, 90], [0, 0])
     with pytest.raises(cf.NotConverged, match=r"alternates; WITH THE WALL FORCE OF A HELIX IT LOCKS UP: .* md = "):
-        cf.torque_and_drag(hole(flat), STRING, cf.TripIn(), model="rod")
+        cf.well.torque_and_drag(hole(flat), STRING, cf.well.TripIn(), model="rod")
 
 
 def test_the_chart_shows_side_force_without_peaks_and_forces_at_points_with_numbers(out):
@@ -291,24 +331,30 @@ def test_the_chart_shows_side_force_without_peaks_and_forces_at_points_with_numb
 #: Hook loads of another program (a prototype, elements of 2 m), N, with friction on the centreline: that its arm along
 #: the pipe changes them by up to 41 N was found with this package.
 FOUND = [
-    ("P", cf.TripOut(), 907306.0), ("P", cf.TripIn(), 379920.4), ("P", cf.RotateOffBottom(), 598622.0),
-    ("F-12", cf.TripOut(), 938745.5), ("F-12", cf.TripIn(), 595230.4), ("ISCWSA 2", cf.TripOut(), 1091313.3),
-]  # fmt: skip
+    ("P", cf.well.TripOut(), 907306.0),
+    ("P", cf.well.TripIn(), 379920.4),
+    ("P", cf.well.RotateOffBottom(), 598622.0),
+    ("F-12", cf.well.TripOut(), 938745.5),
+    ("F-12", cf.well.TripIn(), 595230.4),
+    ("ISCWSA 2", cf.well.TripOut(), 1091313.3),
+]
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("name", "operation", "load"), FOUND)
 def test_whole_wells(name, operation, load):
-    found = cf.torque_and_drag(hole(well(name)), STRING, operation)
+    found = cf.well.torque_and_drag(hole(well(name)), STRING, operation)
     assert found.model == "rod" and found.enough and found.hook_load == pytest.approx(load, rel=5e-5)
     assert not any("MORE" in line for line in found.why)  # the soft string's estimate covers the difference
 
 
 def test_a_string_in_a_vertical_hole_is_a_helix_and_not_straight():
-    path = cf.WellPath.from_survey([0, 310], [0, 0], [0, 0])
-    string = cf.DrillString([cf.Bit(0.2159), cf.DrillPipe(size="5 in 19.50 lb/ft")])
+    path = cf.well.WellPath.from_survey([0, 310], [0, 0], [0, 0])
+    string = cf.well.DrillString([cf.well.Bit(0.2159), cf.well.DrillPipe(size="5 in 19.50 lb/ft")])
     given = {"mud": MUD, "depth": 300.0, "model": "rod", "tol": 1e-3}
-    answer = cf.torque_and_drag(cf.Borehole(path, cf.HoleSection(310, 0.2159, 0.0)), string, cf.Static(75e3), **given)
+    answer = cf.well.torque_and_drag(
+        cf.well.Borehole(path, cf.well.HoleSection(310, 0.2159, 0.0)), string, cf.well.Static(75e3), **given
+    )
     assert "begun as a helix: from the axis an equilibrium was found that would buckle" in "\n".join(answer.why)
     assert answer.solved.negative_modes == 0 and 0 < answer.neutral_point < 40
     wound = (answer.md > 100) & (answer.md < 240)
@@ -322,9 +368,11 @@ def test_a_string_in_a_vertical_hole_is_a_helix_and_not_straight():
 def test_a_helix_has_the_hand_that_torque_favours(torque):
     """Closed forms of a long helix with small slopes: 0.6423 rad/m and 1611 N/m, of the other hand 0.6278 and 1516."""
     EI = 3.1e5
-    string = cf.DrillString([cf.Component(None, cf.Stiffness((5.6e7,) * 2, 2.9e8, (EI, EI), EI), 1.0, 0.05)])
-    where = cf.Borehole(cf.WellPath.from_survey([0, 130], [0, 0], [0, 0]), cf.HoleSection(130.0, 2 * 0.081, 0.0))
-    answer = cf.torque_and_drag(where, string, cf.Static(250e3, torque), depth=120.0, model="rod")
+    string = cf.well.DrillString([cf.well.Component(None, cf.Stiffness((5.6e7,) * 2, 2.9e8, (EI, EI), EI), 1.0, 0.05)])
+    where = cf.well.Borehole(
+        cf.well.WellPath.from_survey([0, 130], [0, 0], [0, 0]), cf.well.HoleSection(130.0, 2 * 0.081, 0.0)
+    )
+    answer = cf.well.torque_and_drag(where, string, cf.well.Static(250e3, torque), depth=120.0, model="rod")
     inside = (answer.md > 50) & (answer.md < 70)
     rate = np.polyfit(answer.solved.s[inside], np.unwrap(answer.solved.side[inside]), 1)[0]
     assert rate * torque < 0 and abs(rate) == pytest.approx(0.6423, rel=0.02)
@@ -336,7 +384,7 @@ def test_a_helix_has_the_hand_that_torque_favours(torque):
 
 def test_a_torque_of_a_string_that_does_not_turn_is_not_more_than_was_estimated(out):
     """A helix and the side of the contact make a few N m; the estimates are about the hook load alone."""
-    soft = cf.torque_and_drag(hole(build()), STRING, cf.TripIn(), model="soft")
+    soft = cf.well.torque_and_drag(hole(build()), STRING, cf.well.TripIn(), model="soft")
     assert not out.solved.string.turns
     assert not any("MORE" in line for line in _found(soft, out.solved, {"soft": (0.0, 21.0)}))
     assert any("MORE" in line for line in _found(soft, out.solved, {"soft": (1e6, 0.0)}))
@@ -350,11 +398,11 @@ def test_an_unknown_number_of_negative_modes_is_not_enough(out):
 
 def test_a_string_that_stays_straight_where_there_is_a_helix_is_not_enough():
     """In a vertical hole with friction: what the helix rubs is the error of the model."""
-    path = cf.WellPath.from_survey([0, 400], [0, 0], [0, 0])
+    path = cf.well.WellPath.from_survey([0, 400], [0, 0], [0, 0])
     given = {"depth": 400.0, "tol": 1e-3}
-    lean, operation = hole(path, mu=0.3), cf.Sliding(90e3)
-    answer = cf.torque_and_drag(lean, STRING, operation, model="rod", **given)
-    buckled = cf.torque_and_drag(lean, STRING, operation, model="buckled", **given)
+    lean, operation = hole(path, mu=0.3), cf.well.Sliding(90e3)
+    answer = cf.well.torque_and_drag(lean, STRING, operation, model="rod", **given)
+    buckled = cf.well.torque_and_drag(lean, STRING, operation, model="buckled", **given)
     assert answer.solved.negative_modes > 10 and answer.hook_load == pytest.approx(400 * 241.13 - 90e3, rel=1e-6)
     apart = buckled.hook_load - answer.hook_load
     assert abs(apart) > 100 and not answer.enough

@@ -51,11 +51,11 @@ def test_the_assembly_by_its_strong_form(demos_on_the_path):
 def test_what_a_file_says():
     scene = cf.read(VOLVE)
     assert scene.hole.path.length == 3438 and len(scene.hole.path.md) == 74
-    assert scene.hole.sections[1] == cf.HoleSection(3438.0, 8.5 * cf.units.inch, 0.30, "open hole")
-    assert scene.mud == cf.Mud(10.2 * cf.units.ppg)
-    assert scene.string.components[1] == cf.Collar(90.0, "NC46-65") and len(scene.sweep["depths"]) == 20
+    assert scene.hole.sections[1] == cf.well.HoleSection(3438.0, 8.5 * cf.units.inch, 0.30, "open hole")
+    assert scene.mud == cf.well.Mud(10.2 * cf.units.ppg)
+    assert scene.string.components[1] == cf.well.Collar(90.0, "NC46-65") and len(scene.sweep["depths"]) == 20
     assert scene.operations[2].torque == pytest.approx(3500 * cf.units.ft_lbf) and scene.operations[2].weight == 80e3
-    by_hand = cf.torque_and_drag(scene.hole, scene.string, cf.TripOut(), mud=scene.mud, **scene.settings)
+    by_hand = cf.well.torque_and_drag(scene.hole, scene.string, cf.well.TripOut(), mud=scene.mud, **scene.settings)
     assert scene.run()[0].hook_load == by_hand.hook_load
 
 
@@ -179,8 +179,10 @@ def test_the_reference_has_every_key_unit_and_size():
     classes = [cls for family in (StringPart, Operation) for cls in members(family).values()]
     classes = [cls for cls in classes if cls.__module__.startswith("cosserat_fenicsx.")]
     assert {cls.__name__ for cls in classes} <= told
-    arguments = {name for cls in (*classes, cf.Mud, cf.HoleSection) for name in inspect.signature(cls).parameters}
-    holes = {key for make in cf.Borehole.constructors() for key in arguments_of(make)} - {"path"}
+    arguments = {
+        name for cls in (*classes, cf.well.Mud, cf.well.HoleSection) for name in inspect.signature(cls).parameters
+    }
+    holes = {key for make in cf.well.Borehole.constructors() for key in arguments_of(make)} - {"path"}
     keys = holes | {key for cls in (DepthSweepSettings, TorqueAndDragSettings) for key in arguments_of(cls)}
     keys |= {f"[{key}]" for key in arguments_of(WellScene)} - {"[title]", "[operations]"}
     names = ("length", "force", "moment", "density", "mass per length", "force per length", "speed", "rotation")

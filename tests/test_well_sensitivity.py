@@ -11,8 +11,8 @@ from cosserat_fenicsx.numerics import PLACES, derivative
 
 pytestmark = [pytest.mark.serial, pytest.mark.once]
 PATH = well("P")
-COLLAR = cf.Collar(200.0, outer_diameter=0.165, inner_diameter=0.07)
-PIPE = cf.DrillPipe(outer_diameter=0.127, inner_diameter=0.1086)
+COLLAR = cf.well.Collar(200.0, outer_diameter=0.165, inner_diameter=0.07)
+PIPE = cf.well.DrillPipe(outer_diameter=0.127, inner_diameter=0.1086)
 #: names of parameters, the argument of `answer` and its value
 NAMES = {
     "hole.sections[0].friction": ("cased", 0.2),
@@ -24,17 +24,26 @@ NAMES = {
 
 
 def answer(operation, convention, *, cased=0.2, open=0.32, density=1200.0, weight=5e4, torque=3e3, tol=1e-11):
-    hole = cf.Borehole(PATH, [cf.HoleSection(2000, 0.22, cased), cf.HoleSection(PATH.length, 0.2159, open)])
-    return cf.torque_and_drag(hole, cf.DrillString([COLLAR, PIPE]), operation(weight=weight, torque=torque),
-                              mud=cf.Mud(density), model="soft", tol=tol, torque_convention=convention)  # fmt: skip
+    hole = cf.well.Borehole(
+        PATH, [cf.well.HoleSection(2000, 0.22, cased), cf.well.HoleSection(PATH.length, 0.2159, open)]
+    )
+    return cf.well.torque_and_drag(
+        hole,
+        cf.well.DrillString([COLLAR, PIPE]),
+        operation(weight=weight, torque=torque),
+        mud=cf.well.Mud(density),
+        model="soft",
+        tol=tol,
+        torque_convention=convention,
+    )
 
 
 def capstan(pull=900e3, mu=0.3, weight=0.0):
     """A string without weight on a quarter circle."""
-    path = cf.WellPath.from_survey([0, 200 * math.pi], [0, 90], [350, 350])
-    hole = cf.Borehole(path, [cf.HoleSection(path.length, 0.2159, mu)])
-    string = cf.DrillString([cf.Component(weight=weight, contact_radius=0.0635)])
-    return cf.torque_and_drag(hole, string, cf.TripOut(weight=-pull), model="soft", tol=1e-11)
+    path = cf.well.WellPath.from_survey([0, 200 * math.pi], [0, 90], [350, 350])
+    hole = cf.well.Borehole(path, [cf.well.HoleSection(path.length, 0.2159, mu)])
+    string = cf.well.DrillString([cf.well.Component(weight=weight, contact_radius=0.0635)])
+    return cf.well.torque_and_drag(hole, string, cf.well.TripOut(weight=-pull), model="soft", tol=1e-11)
 
 
 def test_capstan():
@@ -49,7 +58,7 @@ def test_capstan():
 
 
 @pytest.mark.parametrize("convention", ["coulomb", "johancsik"])
-@pytest.mark.parametrize("operation", [cf.TripOut, cf.TripIn, cf.RotaryDrilling])
+@pytest.mark.parametrize("operation", [cf.well.TripOut, cf.well.TripIn, cf.well.RotaryDrilling])
 def test_a_well_as_by_differences_of_answers(operation, convention):
     here = answer(operation, convention)
     for query in ("hook_load", "surface_torque"):
@@ -66,7 +75,7 @@ def test_a_well_as_by_differences_of_answers(operation, convention):
 
 
 def test_weights_of_components_add_up():
-    found = answer(cf.TripOut, "coulomb").sensitivity(
+    found = answer(cf.well.TripOut, "coulomb").sensitivity(
         ["weight", "string.components[0].weight", "string.components[1].weight"]
     )
     all_of_it, *parts = found.values()
@@ -76,16 +85,18 @@ def test_weights_of_components_add_up():
 def test_uncertainty_of_a_hook_load_with_a_fit():
     """The coefficients of a fit, with their correlation, tell how uncertain a hook load is: as readings of exactly
     this load would."""
-    hole = cf.Borehole(PATH, [cf.HoleSection(2000, 0.22, 0.2), cf.HoleSection(PATH.length, 0.2159, 0.32)])
-    string, rng, measurements = cf.DrillString([COLLAR, PIPE]), np.random.default_rng(5), []
+    hole = cf.well.Borehole(
+        PATH, [cf.well.HoleSection(2000, 0.22, 0.2), cf.well.HoleSection(PATH.length, 0.2159, 0.32)]
+    )
+    string, rng, measurements = cf.well.DrillString([COLLAR, PIPE]), np.random.default_rng(5), []
     for depth in (1500.0, 2500.0, 3500.0, 4500.0):
-        for operation in (cf.TripOut(), cf.TripIn()):
-            exact = cf.torque_and_drag(hole, string, operation, mud=cf.Mud(1200.0), depth=depth, model="soft")
-            measurements.append(cf.RigMeasurement(depth, operation, exact.hook_load + 5e3 * rng.normal()))
-    fit = cf.calibrate_friction(hole, string, measurements, mud=cf.Mud(1200.0))
+        for operation in (cf.well.TripOut(), cf.well.TripIn()):
+            exact = cf.well.torque_and_drag(hole, string, operation, mud=cf.well.Mud(1200.0), depth=depth, model="soft")
+            measurements.append(cf.well.RigMeasurement(depth, operation, exact.hook_load + 5e3 * rng.normal()))
+    fit = cf.well.calibrate_friction(hole, string, measurements, mud=cf.well.Mud(1200.0))
     half = np.diff(fit.interval)[:, 0] / 2
     assert half / fit.standard_error == pytest.approx([half[0] / fit.standard_error[0]] * 2)  # Student's quantile
-    here = cf.torque_and_drag(fit.hole, string, cf.TripOut(), mud=cf.Mud(1200.0), model="soft")
+    here = cf.well.torque_and_drag(fit.hole, string, cf.well.TripOut(), mud=cf.well.Mud(1200.0), model="soft")
     names = ["hole.sections[0].friction", "hole.sections[1].friction"]
     given = dict(zip(names, fit.standard_error, strict=True))
     found = here.uncertainty(given, correlation=fit.correlation)
@@ -112,9 +123,10 @@ def test_refusals_in_words():
             here.sensitivity([name])
     with pytest.raises(cf.SceneError, match="did you mean 'hook_load'"):
         here.sensitivity(["friction"], "hook")
-    hole = cf.Borehole(PATH, [cf.HoleSection(PATH.length, 0.2159, 0.25)])
-    buckled = cf.torque_and_drag(hole, cf.DrillString([COLLAR, PIPE]), cf.Sliding(90e3), mud=cf.Mud(1200.0),
-                                 model="buckled")  # fmt: skip
+    hole = cf.well.Borehole(PATH, [cf.well.HoleSection(PATH.length, 0.2159, 0.25)])
+    buckled = cf.well.torque_and_drag(
+        hole, cf.well.DrillString([COLLAR, PIPE]), cf.well.Sliding(90e3), mud=cf.well.Mud(1200.0), model="buckled"
+    )
     assert buckled.solved.helical.any()
     with pytest.raises(cf.SceneError, match="a string with a helix .model = 'buckled'.*model='soft'"):
         buckled.sensitivity(["friction"])

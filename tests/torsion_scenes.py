@@ -9,45 +9,51 @@ from cosserat_fenicsx.drilling.protocol import LEDGER, SERIES
 COLUMN = {name: 1 + i for i, name in enumerate((*SERIES, *LEDGER))}
 G, DENSITY, SPEED = 79.3e9, 7850.0, 3178.350331229312
 PIPE, COLLARS = (3000.0, 0.127, 0.10861), (200.0, 0.1651, 0.05715)
-LAW = cf.Stribeck(6000.0, 4000.0, 3.0)
-SOFT = {"inertia": 2900.0, "control": cf.PI(1185.5011851288668, 4224.336965928753)}
+LAW = cf.drilling.Stribeck(6000.0, 4000.0, 3.0)
+SOFT = {"inertia": 2900.0, "control": cf.drilling.PI(1185.5011851288668, 4224.336965928753)}
 
 
 def part(length, outer, inner, G=G, weight=100.0):
     material = cf.Material(E=2.5 * G, nu=0.25, density=DENSITY)
-    return cf.Component(length, cf.Tube(outer, inner).stiffness(material), weight, outer / 2)
+    return cf.well.Component(length, cf.Tube(outer, inner).stiffness(material), weight, outer / 2)
 
 
 def string(*parts):
-    return cf.DrillString(tuple(part(*x) for x in parts), order="top down")
+    return cf.well.DrillString(tuple(part(*x) for x in parts), order="top down")
 
 
 def stick_slip(speed=2 * np.pi, *, drag=0.3, of_bit=50.0, **drive):
     """Pipe and collars with a bit."""
-    return cf.Drilling(string(PIPE, COLLARS), cf.TopDrive(speed, **drive), cf.BitOnRock(LAW, inertia=of_bit),
-                       drag=cf.ViscousDrag(drag))  # fmt: skip
+    return cf.drilling.Drilling(
+        string(PIPE, COLLARS),
+        cf.drilling.TopDrive(speed, **drive),
+        cf.drilling.BitOnRock(LAW, inertia=of_bit),
+        drag=cf.drilling.ViscousDrag(drag),
+    )
 
 
 def lying(drive, length=3000.0):
     """A horizontal pipe whose friction holds 3.52427441057226 N m a metre."""
-    path = cf.WellPath.from_survey([0, length], [90, 90], [0, 0], degrees=True)
-    pipe = cf.DrillString((part(length, *PIPE[1:], weight=222.00153767384313),))
-    return cf.Drilling(pipe, drive, hole=cf.Borehole(path, cf.HoleSection(length, 0.2159, 0.25)))
+    path = cf.well.WellPath.from_survey([0, length], [90, 90], [0, 0], degrees=True)
+    pipe = cf.well.DrillString((part(length, *PIPE[1:], weight=222.00153767384313),))
+    return cf.drilling.Drilling(pipe, drive, hole=cf.well.Borehole(path, cf.well.HoleSection(length, 0.2159, 0.25)))
 
 
 def off_bottom():
     """The inclined well, and the wall force of its string where its tension is left out: w sin(inclination)."""
     stations, G = np.array([0.0, 500.0, *np.arange(520.0, 1601.0, 20.0), 2500.0]), 61e9
     inclination = np.interp(stations, [500.0, 1600.0], [0.0, 60.0])
-    path = cf.WellPath.from_survey(stations, inclination, 0 * stations, degrees=True)
+    path = cf.well.WellPath.from_survey(stations, inclination, 0 * stations, degrees=True)
     parts = (2270.0, 0.146529, 0.123024), (230.0, 0.187, 0.095)
     weights = [DENSITY * np.pi / 4 * (outer**2 - inner**2) * 9.81 for _, outer, inner in parts]
-    laid = cf.DrillString([part(*x, G, w) for x, w in zip(parts, weights, strict=True)], order="top down")
-    scene = cf.Drilling(
-        laid, cf.TopDrive(40 * cf.units.rpm, 2900.0, cf.PI(38e3, 100e3)),
-        hole=cf.Borehole(path, cf.HoleSection(2500.0, 0.2159, 0.3)),
-        friction=cf.WallFriction(0.3, 0.195, 1.0, of_rotation=True), drag=cf.ViscousDrag(0.1),
-    )  # fmt: skip
+    laid = cf.well.DrillString([part(*x, G, w) for x, w in zip(parts, weights, strict=True)], order="top down")
+    scene = cf.drilling.Drilling(
+        laid,
+        cf.drilling.TopDrive(40 * cf.units.rpm, 2900.0, cf.drilling.PI(38e3, 100e3)),
+        hole=cf.well.Borehole(path, cf.well.HoleSection(2500.0, 0.2159, 0.3)),
+        friction=cf.drilling.WallFriction(0.3, 0.195, 1.0, of_rotation=True),
+        drag=cf.drilling.ViscousDrag(0.1),
+    )
 
     def wall_force(md):
         return np.where(md < 2270, *weights) * np.sin(np.interp(md, [500.0, 1600.0], [0.0, np.pi / 3]))

@@ -12,7 +12,7 @@ from cosserat_fenicsx.drilling.wall_friction import law_of
 from cosserat_fenicsx.errors import NotConverged, SceneError, SceneWarning, nearest
 from cosserat_fenicsx.well import criteria
 from cosserat_fenicsx.well.operations import RotaryDrilling, RotateOffBottom, TripIn, TripOut
-from cosserat_fenicsx.well.torque_and_drag import torque_and_drag
+from cosserat_fenicsx.well.solve import torque_and_drag
 
 TORSION, BOTH = "torsion", "axial and torsional"
 MODELS = ("auto", TORSION, BOTH)

@@ -1,6 +1,5 @@
 """`DrillingHistory`: a drill-string in motion over time."""
 
-
 from typing import Any
 
 import numpy as np

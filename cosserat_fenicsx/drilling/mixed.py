@@ -222,5 +222,3 @@ def _check_law(owner, field, law):
     if law.lifts:
         refuse(owner, field, law, f"a Stribeck or another law of the torque over the speed: {law.lifts}, and the rod's "
                "end knows no depth of cut")  # fmt: skip
-
-

@@ -91,9 +91,7 @@ def simulate_drilling(
         history.folder = store.place
     TimeLoop(running, history, store, **apart, turn=_turn_to_watch(scene)).until(duration, progress)
     if check:
-        history.errors = step_errors(
-            running.dt, partial(with_step, scene, name, running), history.rows, duration / 2
-        )
+        history.errors = step_errors(running.dt, partial(with_step, scene, name, running), history.rows, duration / 2)
     return history
 
 

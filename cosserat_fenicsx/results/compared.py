@@ -209,6 +209,7 @@ def words_of(name):
 def _norms(values):
     return np.linalg.norm(np.reshape(values, (len(values), -1)), axis=1)
 
+
 # Differences of positions and of rotations up to this are rounding alone, in units of the scales' length and rad.
 ROUNDING = 1e-14
 # Sizes, in the scales' units, below which a quantity is taken to vanish; and the least moment over n times the length.

@@ -143,7 +143,6 @@ class Buckling(Shapes):
         )
 
 
-
 # Largest number of things that are left out to name in a sentence.
 _NAMED = 6
 
@@ -175,8 +174,9 @@ class Modes(Shapes):
         Quantity("frequency", unit="Hz", axes=("mode",), getter="frequencies", digits=7),
         Quantity("period", unit="s", axes=("mode",), getter="periods", digits=5),
         Quantity("growth", unit="1/s", axes=("mode",), digits=4),
-        Quantity("error", "estimated relative error of the squared frequency", axes=("mode",), digits=2,
-                 short="est. error"),
+        Quantity(
+            "error", "estimated relative error of the squared frequency", axes=("mode",), digits=2, short="est. error"
+        ),
         Quantity("squares", "squared angular frequency", "rad^2/s^2", axes=("mode",)),
     )
     _caption = (

@@ -591,4 +591,3 @@ def _axis_and_arm(curve):
     if not radius > 1e-12 * np.abs([curve.start, curve.centre]).max():
         refuse(curve, "start", curve.start, f"a point off the axis through centre = {curve.centre}")
     return axis, across / radius, radius
-

@@ -1,6 +1,5 @@
 """A `History` whose states are stored in a file, written as they are saved and read on demand."""
 
-
 import numpy as np
 
 from cosserat_fenicsx.errors import SceneError

@@ -18,7 +18,7 @@ from cosserat_fenicsx.results.result import Result, by_name
 from cosserat_fenicsx.well.components import DrillString
 from cosserat_fenicsx.well.hole import Borehole, Mud
 from cosserat_fenicsx.well.operations import Operation
-from cosserat_fenicsx.well.torque_and_drag import BUCKLED, SOFT, torque_and_drag
+from cosserat_fenicsx.well.solve import BUCKLED, SOFT, torque_and_drag
 
 
 @dataclass(frozen=True)

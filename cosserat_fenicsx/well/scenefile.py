@@ -49,12 +49,12 @@ from cosserat_fenicsx.checks import File
 from cosserat_fenicsx.parts import Depth, Number, Part, Values, positive
 from cosserat_fenicsx.well.answer import TorqueAndDrag
 from cosserat_fenicsx.well.components import DrillString
-from cosserat_fenicsx.well.depth_sweep import DepthSweep, depth_sweep
 from cosserat_fenicsx.well.hole import Borehole, Mud
 from cosserat_fenicsx.well.operations import Operation
 from cosserat_fenicsx.well.pieces import pieces_of
 from cosserat_fenicsx.well.rod.rod_answer import check_rod
-from cosserat_fenicsx.well.torque_and_drag import CONVENTIONS, ROD, check_settings, torque_and_drag
+from cosserat_fenicsx.well.solve import CONVENTIONS, ROD, check_settings, torque_and_drag
+from cosserat_fenicsx.well.sweep import DepthSweep, depth_sweep
 
 
 @dataclass(frozen=True)

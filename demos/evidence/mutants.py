@@ -216,7 +216,7 @@ def tests_for(mutant, lines, seconds):
 
 
 def verdict(mutant, root, tests, limit=LIMIT):
-    """"killed", "survived" or "not run" of a mutant against tests, in a copy of the checkout."""
+    """ "killed", "survived" or "not run" of a mutant against tests, in a copy of the checkout."""
     if not tests:
         return "not run"
     with tempfile.TemporaryDirectory() as place:

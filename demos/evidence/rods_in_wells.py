@@ -29,16 +29,16 @@ STIFFNESS = cf.Stiffness((1.35359e8, 1.35359e8), 7.03868e8, (1228200.0, 1228200.
 ON_BIT, TORQUE, SPEED, RPM = 50e3, 3e3, 0.2, 60.0  # N, N m, m/s, 1/min
 #: (operation, whether the bit is centred)
 CASES = (
-    (cf.TripOut(), False),
-    (cf.TripIn(), False),
-    (cf.RotateOffBottom(), False),
-    (cf.Ream(SPEED, RPM), False),
-    (cf.BackReam(SPEED, RPM), False),
-    (cf.Static(), False),
-    (cf.Sliding(ON_BIT), False),
-    (cf.RotaryDrilling(ON_BIT, TORQUE), False),
-    (cf.Sliding(ON_BIT), True),
-    (cf.RotaryDrilling(ON_BIT, TORQUE), True),
+    (cf.well.TripOut(), False),
+    (cf.well.TripIn(), False),
+    (cf.well.RotateOffBottom(), False),
+    (cf.well.Ream(SPEED, RPM), False),
+    (cf.well.BackReam(SPEED, RPM), False),
+    (cf.well.Static(), False),
+    (cf.well.Sliding(ON_BIT), False),
+    (cf.well.RotaryDrilling(ON_BIT, TORQUE), False),
+    (cf.well.Sliding(ON_BIT), True),
+    (cf.well.RotaryDrilling(ON_BIT, TORQUE), True),
 )
 FINE, STIFF, LENGTH = 8192, 1e10, 2.0  # elements and N/m^2, of what counts as true; m, of an element
 BEFORE = 4  # elements over those of the mesh before, where their number is asked for
@@ -52,8 +52,8 @@ UNKNOWNS, BAND = 7, 27  # of a node; on each side of the diagonal, P3
 def well(name):
     """The `Borehole` of a reference well."""
     stations = json.loads(SURVEYS.read_text(encoding="utf-8"))[name]["stations_md_inc_azi"]
-    path = cf.WellPath.from_survey(*np.transpose(stations))
-    return cf.Borehole(path, cf.HoleSection(path.length, 2 * (RADIUS + CLEARANCE), FRICTION))
+    path = cf.well.WellPath.from_survey(*np.transpose(stations))
+    return cf.well.Borehole(path, cf.well.HoleSection(path.length, 2 * (RADIUS + CLEARANCE), FRICTION))
 
 
 def solved(hole, operation, centred, elements=None, **settings):
@@ -108,9 +108,9 @@ def measure(hole, operation, centred, runs, fine):
 
 def broomstick(hole, operation, depths):
     """Processor time, s, of a sweep over so many depths of the bit, and the largest estimated error in it."""
-    pipe = cf.DrillString([cf.Component(None, STIFFNESS, WEIGHT, RADIUS, name="pipe")])
+    pipe = cf.well.DrillString([cf.well.Component(None, STIFFNESS, WEIGHT, RADIUS, name="pipe")])
     where = np.linspace(SHALLOWEST, 1.0, depths) * hole.length
-    sweep, seconds = timed(lambda: cf.depth_sweep(hole, pipe, operation, where, model="rod", progress=False))
+    sweep, seconds = timed(lambda: cf.well.depth_sweep(hole, pipe, operation, where, model="rod", progress=False))
     return seconds, float(sweep.values["error"].max())
 
 

@@ -128,8 +128,10 @@ def main(runs=9, out="out", scenes=SCENES):
             for model, unknowns, seconds, ratio, error, estimate in rows:
                 told = f"{estimate:.0e}" if np.isfinite(estimate) else "-"
                 most = ASKED.get(draw.__name__) if model == "auto" else None
-                scene, verdict = draw.__name__.replace("_", " "), judged(ratio, most) if most else (
-                    f"{share(ratio)} | - | -")
+                scene, verdict = (
+                    draw.__name__.replace("_", " "),
+                    judged(ratio, most) if most else (f"{share(ratio)} | - | -"),
+                )
                 cells.append((scene, name, model, unknowns, f"{error:.0e}", told, f"{1e3 * seconds:.2f}", verdict))
     heads = f"scene | mesh | model | unknowns | error of the tip | estimate | ms | over spatial | {HEADS}"
     print(write("rungs", [f"{compat.version()}, {platform.machine()}.", "", *table(heads, cells)], out))

@@ -35,12 +35,12 @@ SAMPLES, LIMIT = 25, 60.0  # of a row; s, of a request
 
 def ours(path, tol):
     """(error, s) of this package: the largest relative error of both hook loads, the processor time of one."""
-    hole = cf.Borehole(path, cf.HoleSection(path.length, 0.2159, FRICTION))
-    string = cf.DrillString([cf.Component(weight=WEIGHT, contact_radius=RADIUS)])
+    hole = cf.well.Borehole(path, cf.well.HoleSection(path.length, 0.2159, FRICTION))
+    string = cf.well.DrillString([cf.well.Component(weight=WEIGHT, contact_radius=RADIUS)])
     loads, seconds = [], []
-    for operation in (cf.TripOut(), cf.TripIn()):
+    for operation in (cf.well.TripOut(), cf.well.TripIn()):
         for _ in range(SAMPLES):
-            answer, spent = timed(lambda op=operation: cf.torque_and_drag(hole, string, op, model="soft", tol=tol))
+            answer, spent = timed(lambda op=operation: cf.well.torque_and_drag(hole, string, op, model="soft", tol=tol))
             seconds.append(spent)
         loads.append(answer.hook_load)
     return loads, statistics.median(seconds)

@@ -39,12 +39,16 @@ def scene():
     """The string."""
     material = cf.Material(E=206e9, nu=206e9 / 2 / 79.3e9 - 1, density=7850.0)
     parts = [
-        cf.Component(length, cf.Tube(outer, inner).stiffness(material), weight=1.0, contact_radius=outer / 2)
+        cf.well.Component(length, cf.Tube(outer, inner).stiffness(material), weight=1.0, contact_radius=outer / 2)
         for length, outer, inner in ((3000.0, 0.127, 0.10861), (200.0, 0.1651, 0.05715))
     ]
-    bit = cf.BitOnRock(cf.Stribeck(6000.0, 4000.0, 3.0), inertia=50.0)
-    return cf.Drilling(cf.DrillString(parts, order="top down"), cf.TopDrive(60 * cf.units.rpm), bit,
-                       drag=cf.ViscousDrag(0.3))  # fmt: skip
+    bit = cf.drilling.BitOnRock(cf.drilling.Stribeck(6000.0, 4000.0, 3.0), inertia=50.0)
+    return cf.drilling.Drilling(
+        cf.well.DrillString(parts, order="top down"),
+        cf.drilling.TopDrive(60 * cf.units.rpm),
+        bit,
+        drag=cf.drilling.ViscousDrag(0.3),
+    )
 
 
 def solved(drilling, method, cells):
@@ -85,10 +89,16 @@ def measure(cases, samples):
 def lines(rows):
     """Markdown: errors and times."""
     heads = "method | cells | error of the period | error of the bit's largest speed | processor time (ms)"
-    told = [(method, cells, f"{off['period']:.1e}", f"{off['peak']:.1e}", f"{1e3 * seconds:.1f}")
-            for method, cells, off, seconds in rows]  # fmt: skip
-    return [*table(heads, told), "", f"{in_words()}. The truth is known to {KNOWN['period']:.0e} (period) and "
-            f"{KNOWN['peak']:.1e} (speed); smaller errors are chance."]  # fmt: skip
+    told = [
+        (method, cells, f"{off['period']:.1e}", f"{off['peak']:.1e}", f"{1e3 * seconds:.1f}")
+        for method, cells, off, seconds in rows
+    ]
+    return [
+        *table(heads, told),
+        "",
+        f"{in_words()}. The truth is known to {KNOWN['period']:.0e} (period) and "
+        f"{KNOWN['peak']:.1e} (speed); smaller errors are chance.",
+    ]
 
 
 def chart(rows):
@@ -98,16 +108,25 @@ def chart(rows):
     titles = {"period": "period of stick-slip", "peak": "largest speed of the bit"}
     for panel, (name, title) in zip(figure.subplots(1, 2), titles.items(), strict=True):
         panel.axhspan(KNOWN[name] / 100, KNOWN[name], color="0.9", zorder=0)
-        panel.text(0.99, KNOWN[name] * 0.9, "not known better ", transform=panel.get_yaxis_transform(), fontsize=SMALL,
-                   color="0.4", ha="right", va="top")  # fmt: skip
+        panel.text(
+            0.99,
+            KNOWN[name] * 0.9,
+            "not known better ",
+            transform=panel.get_yaxis_transform(),
+            fontsize=SMALL,
+            color="0.4",
+            ha="right",
+            va="top",
+        )
         for method, colour in colours.items():
             here = [(cells, off[name], seconds) for by, cells, off, seconds in rows if by == method]
             cells, off, seconds = zip(*here, strict=True)
             shown = np.maximum(off, KNOWN[name] / 5)
             panel.loglog(1e3 * np.array(seconds), shown, "o-", color=colour, label=method)
             for x, y, n in zip(seconds, shown, cells, strict=True):
-                panel.annotate(f"{n}", (1e3 * x, y), xytext=(4, 4), textcoords="offset points", fontsize=SMALL,
-                               color=colour)  # fmt: skip
+                panel.annotate(
+                    f"{n}", (1e3 * x, y), xytext=(4, 4), textcoords="offset points", fontsize=SMALL, color=colour
+                )
         panel.set(xlabel="processor time of 120 s of motion (ms), one thread", ylim=(KNOWN[name] / 8, 5e-3))
         panel.set_ylabel(f"relative error, {title}")
         panel.margins(x=0.12)

@@ -29,7 +29,7 @@ from cosserat_fenicsx.well.components import DrillString
 from cosserat_fenicsx.well.hole import Borehole, Mud
 from cosserat_fenicsx.well.operations import Operation
 from cosserat_fenicsx.well.pieces import pieces_of
-from cosserat_fenicsx.well.torque_and_drag import AUTO, BUCKLED, ROD, SOFT, torque_and_drag
+from cosserat_fenicsx.well.solve import AUTO, BUCKLED, ROD, SOFT, torque_and_drag
 
 #: Numbers that are kept of an answer; `locked` is where the string locks up, m, or NaN; `model` the index of its model.
 KEPT = ("hook_load", "surface_torque", "error", "model_error", "locked", "model")

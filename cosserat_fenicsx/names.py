@@ -1,0 +1,36 @@
+"""Public names of a package, said once in its stub `__init__.pyi`, whose modules are imported at their first use."""
+
+import importlib
+from os import path
+
+
+def public(package, file):
+    """What a package's `__init__.py` needs.
+
+    Args:
+        package, file: its __name__ and __file__.
+
+    Returns:
+        (__getattr__, __dir__, __all__): the names are those of the lines "from module import name as name" of the stub.
+    """
+    with open(path.join(path.dirname(file), "__init__.pyi"), encoding="utf-8") as stub:
+        lines = [line.split() for line in stub if line.startswith("from ")]
+    homes = {line[3]: line[1] for line in lines}
+
+    def get(name):
+        if name not in homes:
+            raise AttributeError(f"module '{package}' has no attribute '{name}'")
+        if homes[name] == package:  # a public module
+            return importlib.import_module(f"{package}.{name}")
+        from cosserat_fenicsx.checks import in_words
+
+        home = importlib.import_module(homes[name])
+        value = in_words(getattr(home, name))
+        setattr(importlib.import_module(package), name, value)
+        setattr(home, name, value)  # the same object, as pickle expects
+        return value
+
+    def known():
+        return sorted({*homes, "__doc__", "__file__", "__name__", "__path__"})
+
+    return get, known, sorted(homes)

@@ -1,0 +1,29 @@
+"""The public names of this package and their modules, see the stub of `cosserat_fenicsx`."""
+
+from cosserat_fenicsx.well.answer import TorqueAndDrag as TorqueAndDrag
+from cosserat_fenicsx.well.calibrate import FrictionFit as FrictionFit
+from cosserat_fenicsx.well.calibrate import RigMeasurement as RigMeasurement
+from cosserat_fenicsx.well.calibrate import calibrate_friction as calibrate_friction
+from cosserat_fenicsx.well.components import Bit as Bit
+from cosserat_fenicsx.well.components import Collar as Collar
+from cosserat_fenicsx.well.components import Component as Component
+from cosserat_fenicsx.well.components import DrillPipe as DrillPipe
+from cosserat_fenicsx.well.components import DrillString as DrillString
+from cosserat_fenicsx.well.components import HeavyWeight as HeavyWeight
+from cosserat_fenicsx.well.components import Stabiliser as Stabiliser
+from cosserat_fenicsx.well.hole import Borehole as Borehole
+from cosserat_fenicsx.well.hole import HoleSection as HoleSection
+from cosserat_fenicsx.well.hole import Mud as Mud
+from cosserat_fenicsx.well.operations import BackReam as BackReam
+from cosserat_fenicsx.well.operations import Ream as Ream
+from cosserat_fenicsx.well.operations import RotaryDrilling as RotaryDrilling
+from cosserat_fenicsx.well.operations import RotateOffBottom as RotateOffBottom
+from cosserat_fenicsx.well.operations import Sliding as Sliding
+from cosserat_fenicsx.well.operations import Static as Static
+from cosserat_fenicsx.well.operations import TripIn as TripIn
+from cosserat_fenicsx.well.operations import TripOut as TripOut
+from cosserat_fenicsx.well.path import WellPath as WellPath
+from cosserat_fenicsx.well.scenefile import WellScene as WellScene
+from cosserat_fenicsx.well.solve import torque_and_drag as torque_and_drag
+from cosserat_fenicsx.well.sweep import DepthSweep as DepthSweep
+from cosserat_fenicsx.well.sweep import depth_sweep as depth_sweep
