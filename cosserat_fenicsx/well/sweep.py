@@ -35,7 +35,7 @@ from cosserat_fenicsx.well.solve import AUTO, BUCKLED, ROD, SOFT, torque_and_dra
 KEPT = ("hook_load", "surface_torque", "error", "model_error", "locked", "model")
 _MODELS = (SOFT, BUCKLED, ROD)
 KIND = Kind(
-    what="sweep", home="well.depth_sweep", call="depth_sweep", again="the same call of depth_sweep goes on from there",
+    what="sweep", home="well.sweep", call="depth_sweep", again="the same call of depth_sweep goes on from there",
     differs="it holds another sweep, expected the same call, or another folder",
 )  # fmt: skip
 #: Arguments that are parts; the others are plain, but for the operations.
