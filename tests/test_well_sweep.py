@@ -9,7 +9,7 @@ import pytest
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.quantities import Units
-from cosserat_fenicsx.well import depth_sweep as module
+from cosserat_fenicsx.well import sweep as module
 from cosserat_fenicsx.well.rod import rod_in_hole
 
 pytestmark = pytest.mark.serial
