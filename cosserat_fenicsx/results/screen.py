@@ -18,7 +18,7 @@ _FRAME, _FEWEST = 6, 4
 # Most significant digits in the short table.
 _DIGITS = 5
 # Numbers below this times the largest of their column are rounding.
-_ROUNDING = 1e-12
+_ROUNDING = 1e-9
 
 
 def rows_of(count, most):
@@ -42,11 +42,12 @@ def table(given, units, rows, title=None, caption=None, which=None):
         values = np.asarray(values)
         numbers = values.dtype.kind in "fiu"
         unit, size = units.on_screen(quantity, values[which] if numbers else ())
-        least = quantity.noise
-        if values.dtype.kind == "f":
-            least = max(least, _ROUNDING * float(np.nanmax(np.abs(values), initial=0.0)))
+        digits = quantity.digits if rows > SHORT else min(quantity.digits, _DIGITS)
+        if values.dtype.kind == "f":  # in the short table, numbers with a unit end where those of their column do
+            small = 10.0**-digits if rows <= SHORT and unit not in ("", "1") else _ROUNDING
+            least = max(quantity.noise, small * float(np.nanmax(np.abs(values), initial=0.0)))
             values = np.where(np.abs(values) <= least, 0.0, values) / size
-        parts, digits = values.reshape(count, -1).T, quantity.digits if rows > SHORT else min(quantity.digits, _DIGITS)
+        parts = values.reshape(count, -1).T
         for part, column in zip(quantity.parts or [""], parts, strict=True):
             label = dataclasses.replace(quantity, label=f"{quantity.short or f'{quantity.label} '}{part}".strip())
             found.add_column(label.heading(unit), justify="right" if numbers else "left", overflow="fold",
