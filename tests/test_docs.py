@@ -67,7 +67,8 @@ def test_every_public_name_is_in_the_reference():
 
 
 @pytest.mark.parametrize(
-    ("page", "program"), [x for x in blocks("python") if re.search(r"import cosserat_fenicsx|from cosserat_fenicsx import", x[1])]
+    ("page", "program"),
+    [x for x in blocks("python") if re.search(r"import cosserat_fenicsx|from cosserat_fenicsx import", x[1])],
 )
 def test_programs_run(page, program, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
