@@ -24,7 +24,7 @@ solve, files = cf.solve, set()
 
 def look(frame, event, argument):
     file = frame.f_code.co_filename
-    if event == "call" and file.startswith({str(ROOT)!r}):
+    if event == "call" and file.startswith({str(ROOT / "cosserat_fenicsx")!r}):
         while frame and frame.f_code.co_name != "<module>":
             frame = frame.f_back
         if frame.f_code is here:  # not what an import runs

@@ -202,6 +202,8 @@ def _put(value, keys, leaf):
 
 def _made(item, changes):
     """A dataclass of the package, made anew with other fields."""
+    if isinstance(item, Station):
+        return dataclasses.replace(item, **changes)
     given = item.arguments()  # in the order of the fields, whose names may differ
     names = dict(zip([x.name for x in dataclasses.fields(item) if x.init], given, strict=True))
     return type(item)(**given | {names[field]: value for field, value in changes.items()})
