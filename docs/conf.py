@@ -5,11 +5,16 @@ from pathlib import Path
 
 sys.path.append(str(Path(__file__).parent))
 
+import defaults
 import scene_keys
 
 import cosserat_fenicsx
 
-scene_keys.write(Path(__file__).parent / "api")
+for module in (defaults, scene_keys):  # pages that follow from the code
+    file, text = Path(__file__).parent / "api" / f"{module.__name__}.md", module.page()
+    file.parent.mkdir(exist_ok=True)
+    if not file.exists() or file.read_text(encoding="utf-8") != text:
+        file.write_text(text, encoding="utf-8")
 project, copyright = "cosserat_fenicsx", "MIT licence"
 version = release = cosserat_fenicsx.__version__
 html_title = f"cosserat_fenicsx {release}"

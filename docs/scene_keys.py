@@ -1,8 +1,7 @@
-"""Writes api/scene_keys.md: every key of a scene file, from the classes that files are read as."""
+"""The page api/scene_keys.md: every key of a scene file, from the classes that files are read as."""
 
 import inspect
 import re
-from pathlib import Path
 
 from cosserat_fenicsx.dimensions import DIMENSIONS
 from cosserat_fenicsx.files.read import kinds
@@ -76,12 +75,3 @@ def page():
     for name, dimension in DIMENSIONS.items():
         lines.append(f"| {name} | {dimension.si} | {', '.join(f'`{unit}`' for unit in dimension.units)} |")
     return "\n".join(lines) + "\n"
-
-
-def write(folder):
-    """Write the page into a folder, a Path, where it is another than before."""
-    file = Path(folder) / "scene_keys.md"
-    file.parent.mkdir(exist_ok=True)
-    text = page()
-    if not file.exists() or file.read_text(encoding="utf-8") != text:
-        file.write_text(text, encoding="utf-8")
