@@ -226,6 +226,39 @@ def test_memory_and_refreshed_data_in_motion(scheme):
     assert history.displacement(FREE.end)[-1, 2] == pytest.approx(np.sin(1.4) / 2, rel=3e-5)
 
 
+@dataclass(frozen=True)
+class LateDamper(cf.PointAction):
+    """A force against the velocity at the end of the step before, which is its memory."""
+
+    station: object
+    damping: float
+
+    scaled = False
+    memory = (action.vector((0.0, 0, 0), "m/s"),)
+
+    def data(self, rod, s):
+        return (action.scalar(self.damping, "N s/m"),)
+
+    @staticmethod
+    def work(point, test, damping, before):
+        return -damping * ufl.dot(before, test.phi_r)
+
+    @staticmethod
+    def evolve(point, damping, before):
+        return [point.r_t]
+
+
+@pytest.mark.serial
+@pytest.mark.parametrize("scheme", ["momentum", "energy", "generalised-alpha"])
+def test_a_memory_of_velocities(scheme):
+    """A mass of 1 kg with v' = -c v: it comes to (1 - exp(-c))/c after 1 s, up to the delay of one step."""
+    c, dt = 2.0, 0.001
+    pushed = [cf.InitialVelocity(FREE, linear=(1.0, 0, 0))]
+    scene = cf.Scene([FREE], [], [LateDamper(FREE.at(0.5), c)], velocities=pushed)
+    history = cf.simulate(scene, 1.0, scheme=scheme, dt=dt, elements=1, degree=2)
+    assert history.displacement(FREE.at(0.5))[-1, 0] == pytest.approx((1 - np.exp(-c)) / c, abs=2 * c * dt)
+
+
 def test_motions_without_a_place_for_memory():
     scene = cf.Scene([FREE], [], [Slider(FREE.end, 100.0, 1.0)])
     with pytest.raises(cf.SceneError, match="steps back in time: expected actions without memory"):
