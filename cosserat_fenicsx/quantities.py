@@ -12,7 +12,8 @@ import numpy as np
 from cosserat_fenicsx.dimensions import DIMENSIONS
 from cosserat_fenicsx.errors import SceneError, nearest
 
-#: Units with the prefixes that people write, by SI units: on the screen the largest one that gives a number above 1.
+#: Units with the prefixes that people write, by SI units: on the screen the largest one that gives a number above 1, or
+#: above 10 for mega: a hook load of 1122 kN is not written as 1.122 MN.
 _PREFIXED = {
     "N": {"N": 1.0, "kN": 1e3, "MN": 1e6},
     "N m": {"N m": 1.0, "kN m": 1e3, "MN m": 1e6},
@@ -140,7 +141,8 @@ class Units:
         largest = float(values[np.isfinite(values)].max(initial=0.0))
         if unit not in _PREFIXED or largest == 0 or (unit == "m" and largest >= _SHORT):
             return unit, 1.0
-        suits = [(name, size) for name, size in _PREFIXED[unit].items() if size <= largest]
+        least = {"MN": 1e7, "MN m": 1e7, "MN/m": 1e7}
+        suits = [(name, size) for name, size in _PREFIXED[unit].items() if least.get(name, size) <= largest]
         return suits[-1] if suits else next(iter(_PREFIXED[unit].items()))
 
 

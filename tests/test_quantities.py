@@ -48,7 +48,7 @@ def test_other_units_are_refused(chosen, words):
 
 def test_prefixes_on_the_screen():
     """Those that people write: kN m, and never mN m."""
-    sizes = {0.0: "N", 0.3: "N", 999.0: "N", 2e3: "kN", 3.2e6: "MN", np.nan: "N"}
+    sizes = {0.0: "N", 0.3: "N", 999.0: "N", 2e3: "kN", 3.2e6: "kN", 3.2e7: "MN", np.nan: "N"}
     assert {size: Units().on_screen(LOAD, [size])[0] for size in sizes} == sizes
     length = Quantity("x", unit="m")
     assert [Units().on_screen(length, [x])[0] for x in (2e-3, 0.5, 5e3)] == ["mm", "m", "m"]
