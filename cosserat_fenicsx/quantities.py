@@ -93,6 +93,19 @@ class Quantity:
                         strict=True))  # fmt: skip
 
 
+class Quantities(dict[str, Quantity]):
+    """{name: `Quantity`}; printed a line each: the name, its heading, its axes, and the frame of its components."""
+
+    def __repr__(self):
+        rows = [(x.name, x.heading(), ", ".join(x.axes) or "one number", x.frame) for x in self.values()]
+        widths = [max(map(len, column), default=0) for column in zip(*rows, strict=True)]
+        lines = ["  ".join(text.ljust(width) for text, width in zip(row, widths, strict=True)) for row in rows]
+        return "\n".join(line.rstrip() for line in lines)
+
+    def __or__(self, other):
+        return Quantities({**self, **other})
+
+
 class Units:
     """The units that quantities are shown in: those of the result ("SI"), of the oil field, or chosen ones.
 

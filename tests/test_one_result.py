@@ -87,6 +87,8 @@ def test_quantities_and_units(found):
     quantity = result.quantities[name]
     assert quantity.unit == unit and Units("field").of(quantity)[0] == field and len(quantity.axes) == 1
     assert all(x.name == key and isinstance(x.axes, tuple) for key, x in result.quantities.items())
+    listed = repr(result.quantities).splitlines()
+    assert [line.split()[0] for line in listed] == list(result.quantities) and quantity.heading() in "".join(listed)
     factor = Units("field").of(quantity)[1]
     np.testing.assert_allclose(result.value(name, "field") * factor, result.value(name), rtol=1e-14)
 

@@ -12,7 +12,7 @@ import numpy as np
 from cosserat_fenicsx.checks import File
 from cosserat_fenicsx.errors import InstallationError, SceneError
 from cosserat_fenicsx.new_files import replaced
-from cosserat_fenicsx.quantities import Quantity, Units
+from cosserat_fenicsx.quantities import Quantities, Quantity, Units
 from cosserat_fenicsx.ranks import on_first, world
 from cosserat_fenicsx.results import screen
 from cosserat_fenicsx.scene.rod import Rod, RodOrName
@@ -75,9 +75,9 @@ class Result:
     @property
     def quantities(self) -> dict[str, Quantity]:
         """{name: `Quantity`}: label, unit, frame and axes of all that the result holds."""
-        found: dict[str, Quantity] = {}
+        found = Quantities()
         for kind in reversed(type(self).__mro__):
-            found |= vars(kind).get("_quantities", {})
+            found.update(vars(kind).get("_quantities", {}))
         return found
 
     def value(self, name: str, units: str | Mapping = "SI") -> Any:

@@ -7,7 +7,7 @@ import numpy as np
 
 from cosserat_fenicsx.checks import File
 from cosserat_fenicsx.errors import SceneError
-from cosserat_fenicsx.quantities import Quantity
+from cosserat_fenicsx.quantities import Quantities, Quantity
 from cosserat_fenicsx.results.export import saved
 from cosserat_fenicsx.results.result import Result
 
@@ -28,7 +28,7 @@ class StoredResult(Result):
     @property
     def quantities(self) -> dict[str, Quantity]:
         """See `Result`."""
-        found = {}
+        found = Quantities()
         for said in self._head["quantities"]:
             said = {name: tuple(x) if isinstance(x, list) else x for name, x in said.items()}
             found[said["name"]] = Quantity(**said, getter=lambda result, name=said["name"]: result._stored[name])
