@@ -192,8 +192,7 @@ def run(demo, out=None, *, quick=False, film=False):
     history = cf.simulate(scene, **{**settings, **(DEMOS[demo] if quick else {})})
     check, shapes, curve = demo(history)
     if out is not None:
-        if MPI.COMM_WORLD.rank == 0:
-            draw(history, Path(out) / f"{name}.png", shapes, curve)
+        draw(history, Path(out) / f"{name}.png", shapes, curve)
         if film:
             history.animate(Path(out) / f"{name}.gif")
     return history, check
