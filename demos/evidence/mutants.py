@@ -140,10 +140,14 @@ def _nodes(tree):
 
 
 def tracked(root):
-    """The files of a checkout that belong to it, present in the folder."""
-    listed = subprocess.run(["git", "ls-files", "-co", "--exclude-standard"], cwd=root, capture_output=True, text=True,
-                            check=True).stdout.splitlines()  # fmt: skip
-    return [name for name in listed if (root / name).exists()]
+    """The files of a checkout, without what is built in it: names from its root."""
+    built = {".git", ".venv", "out", "build", "dist", "__pycache__", "api", ".pytest_cache", ".ruff_cache"}
+    found = []
+    for folder, folders, files in os.walk(root):
+        folders[:] = [name for name in folders if name not in built and not name.endswith(".egg-info")]
+        links = [name for name in folders if (Path(folder) / name).is_symlink()]
+        found += [str((Path(folder) / name).relative_to(root)) for name in (*files, *links)]
+    return sorted(found)
 
 
 def copied(root, place):
