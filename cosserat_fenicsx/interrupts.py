@@ -27,6 +27,7 @@ def listen():
     if signal.getsignal(signal.SIGINT) is _ask:
         return
     os.environ["PETSC_OPTIONS"] = f"{os.environ.get('PETSC_OPTIONS', '')} -no_signal_handler"
+    os.environ.setdefault("UCX_DEBUG_SIGNO", "0")  # MPI's library takes SIGHUP when it is loaded
     for number in _SIGNALS:
         if number != signal.SIGHUP or signal.getsignal(number) is not signal.SIG_IGN:  # nohup ignores SIGHUP
             signal.signal(number, _ask)

@@ -16,11 +16,10 @@ from pathlib import Path
 
 import cffi
 import numpy as np
-from petsc4py import PETSc
 
 from cosserat_fenicsx import code_cache, compat
 from cosserat_fenicsx.code_cache import instructions
-from cosserat_fenicsx.compat import compiling
+from cosserat_fenicsx.compat import PETSc, compiling
 
 SOURCES = tuple(Path(__file__).with_name(name) for name in ("chain.c", "newton.c", "sweep.c", "contact.c"))
 # What -ffast-math would add hides numbers that are not finite, and changes sums. Python's own -fwrapv slows loops down.
