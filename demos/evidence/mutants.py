@@ -5,10 +5,10 @@
     python demos/evidence/mutants.py --quick         one error in a copy of a small file, against its own tests
 
 An error (a "mutant") swaps an arithmetic operator or a comparison, changes a sign or a constant, or leaves out a
-statement. It is killed when a test fails that passes without it, or when the tests do not end. Each mutant lives in a
-copy of the checkout, and only the tests that run its line are started, the quickest first: which these are is measured
-once, with coverage (`pip install pytest-cov`). Lines of C are charged to the tests that run the Python beside them. A
-run that was broken off goes on where it was: outcomes are kept in out/mutants.jsonl, by seed and state of the code.
+statement. It is killed when a test fails that passes without it, or when the tests take five times as long as they
+should. Each mutant lives in a copy of the checkout, and only the tests that run its line are started, the quickest
+first: which these are is measured once, with coverage (`pip install pytest-cov`). A line that only runs while its file
+is imported is charged to all tests of the file, lines of C to the tests that run the Python beside them. A run that was broken off goes on where it was: outcomes are kept in out/mutants.jsonl, by seed and state of the code.
 """
 
 import argparse
@@ -51,8 +51,8 @@ IN_C = {
     "constant": [(r"(?<![\w.])([2-9]|\d+\.\d+)(?![\w.])", r"(\1 * 1.5)")],
     "statement": [(r"^\s+[\w\->\[\].*]+ [-+*/]?= [^;{]*;$", "    ;")],
 }  # fmt: skip
-#: The most that the tests of one mutant may take (s).
-LIMIT = 900
+#: The tests of a mutant may take this many times what they take without it, and as many seconds more.
+TIMES, SECONDS = 5, 60
 
 
 @dataclass(frozen=True)
@@ -215,12 +215,17 @@ def tests_for(mutant, lines, seconds):
         found = {test for name, by_line in lines.items() if str(Path(name).parent) == beside
                  for tests in by_line.values() for test in tests}  # fmt: skip
     else:
-        found = set(lines.get(mutant.file, {}).get(str(mutant.line), ()))
+        by_line = lines.get(mutant.file, {})
+        # A statement of several lines may be charged to its first ones.
+        line = max((int(x) for x in by_line if int(x) <= mutant.line), default=0)
+        found = set(by_line.get(str(line), ()))
+        if not found:
+            found = {test for tests in by_line.values() for test in tests}
     return sorted(found, key=lambda test: seconds.get(test, 0.0))
 
 
-def verdict(mutant, root, tests, limit=LIMIT):
-    """ "killed", "survived" or "not run" of a mutant against tests, in a copy of the checkout."""
+def verdict(mutant, root, tests, seconds=0.0):
+    """ "killed", "survived" or "not run" of a mutant against tests that take `seconds`, in a copy of the checkout."""
     if not tests:
         return "not run"
     with tempfile.TemporaryDirectory() as place:
@@ -234,7 +239,7 @@ def verdict(mutant, root, tests, limit=LIMIT):
         options = ["-q", "-x", "-p", "no:cacheprovider"]
         code = f"import json, sys, pytest; sys.exit(pytest.main([*{options}, *json.load(open('asked.json'))]))"
         try:
-            done = subprocess.run([sys.executable, "-c", code], cwd=copy, env=surroundings(copy), timeout=limit,
+            done = subprocess.run([sys.executable, "-c", code], cwd=copy, env=surroundings(copy), timeout=TIMES * seconds + SECONDS,
                                   stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)  # fmt: skip
         except subprocess.TimeoutExpired:
             return "killed"
@@ -267,7 +272,10 @@ def main(count=120, seed=0, root=ROOT, out=Path("out"), workers=2):
     mutants = chosen(root, count, seed)
     left = [x for x in mutants if x not in known]
     with concurrent.futures.ThreadPoolExecutor(workers) as pool, file.open("a", encoding="utf-8") as stream:
-        running = {pool.submit(verdict, x, root, tests_for(x, lines, seconds)): x for x in left}
+        running = {}
+        for x in left:
+            tests = tests_for(x, lines, seconds)
+            running[pool.submit(verdict, x, root, tests, sum(seconds.get(test, 0.0) for test in tests))] = x
         try:
             for done in track(concurrent.futures.as_completed(running), "mutants", total=len(left)):
                 x = running[done]
