@@ -6,9 +6,10 @@
 
 An error (a "mutant") swaps an arithmetic operator or a comparison, changes a sign or a constant, or leaves out a
 statement. It is killed when a test fails that passes without it, or when the tests take five times as long as they
-should. Each mutant lives in a copy of the checkout, and only the tests that run its line are started, the quickest
-first: which these are is measured once, with coverage (`pip install pytest-cov`). A line that only runs while its file
-is imported is charged to all tests of the file, lines of C to the tests that run the Python beside them. A run that was broken off goes on where it was: outcomes are kept in out/mutants.jsonl, by seed and state of the code.
+should. Each mutant lives in a copy of the checkout; the tests that run its line are started first, then those that run
+another line of its file, and for forms and C all: which these are is measured once, with coverage (`pip install
+pytest-cov`). A run that was broken off goes on where it was: outcomes are kept in out/mutants.jsonl, by seed and state
+of the code.
 """
 
 import argparse
@@ -209,19 +210,22 @@ def tests_of_lines(root, out):
 
 
 def tests_for(mutant, lines, seconds):
-    """The tests that run the line of a mutant, the quickest first."""
-    if mutant.file.endswith(".c"):
-        beside = str(Path(mutant.file).parent)
-        found = {test for name, by_line in lines.items() if str(Path(name).parent) == beside
-                 for tests in by_line.values() for test in tests}  # fmt: skip
-    else:
-        by_line = lines.get(mutant.file, {})
-        # A statement of several lines may be charged to its first ones.
-        line = max((int(x) for x in by_line if int(x) <= mutant.line), default=0)
-        found = set(by_line.get(str(line), ()))
-        if not found:
-            found = {test for tests in by_line.values() for test in tests}
-    return sorted(found, key=lambda test: seconds.get(test, 0.0))
+    """The tests that run the line of a mutant, the quickest first, then the others that may notice it.
+
+    A function that keeps what it has made runs its lines in one test only: the others are the tests that run any line of
+    the file, and for forms and C, which are compiled and kept, all tests.
+    """
+    by_line = lines.get(mutant.file, {})
+    # A statement of several lines may be charged to its first ones.
+    line = max((int(x) for x in by_line if int(x) <= mutant.line), default=0)
+    of_line = set(by_line.get(str(line), ()))
+    of_file = {test for tests in by_line.values() for test in tests} - of_line
+    others = set(seconds) - of_line - of_file if mutant.part in ("forms", "C") else set()
+
+    def ordered(tests):
+        return sorted(tests, key=lambda test: seconds.get(test, 0.0))
+
+    return [*ordered(of_line), *ordered(of_file), *ordered(others)]
 
 
 def verdict(mutant, root, tests, seconds=0.0):
