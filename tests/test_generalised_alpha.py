@@ -10,7 +10,7 @@ from test_action_protocol import FREE, Lookup
 from test_schemes import smooth
 
 import cosserat_fenicsx as cf
-from cosserat_fenicsx.dynamics.stepper import OneStep
+from cosserat_fenicsx.dynamics.stepper import Stepper
 
 pytestmark = pytest.mark.serial
 SCHEME = "generalised-alpha"
@@ -186,7 +186,7 @@ def test_a_step_by_half_a_turn_is_none(monkeypatch, scheme):
     """-q also satisfies |q| = 1: where Newton's method converges to it, the step counts as failed."""
     rod = cf.Rod(cf.Line((0, 0, 0), (2, 0, 0)), STIFF)
     scene = cf.Scene([rod], [cf.Clamp(rod.start)], velocities=[cf.InitialVelocity(rod, angular=lambda s: (0, s, 0))])
-    predicted, flips = OneStep._predicted, []
+    predicted, flips = Stepper._predicted, []
 
     def flipped(stepper, h):
         guesses = predicted(stepper, h)
@@ -198,7 +198,7 @@ def test_a_step_by_half_a_turn_is_none(monkeypatch, scheme):
         return guesses
 
     plain = cf.simulate(scene, 0.1, dt=0.01, elements=2, degree=2, model="spatial", scheme=scheme)
-    monkeypatch.setattr(OneStep, "_predicted", flipped)
+    monkeypatch.setattr(Stepper, "_predicted", flipped)
     halved = cf.simulate(scene, 0.1, dt=0.01, elements=2, degree=2, model="spatial", scheme=scheme)
     assert flips and halved.steps[-1] == 11
     np.testing.assert_allclose(halved.rotation(rod.end)[-1], plain.rotation(rod.end)[-1], atol=1e-3)

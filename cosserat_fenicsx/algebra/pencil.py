@@ -73,9 +73,10 @@ class Pencil:
                 bounds = self._rounding(vectors[:, :count])
                 rounding = 10 * bounds.max()
                 beyond = top + max(_TOGETHER * abs(top), rounding)
-                asked = self._below(beyond) - np.count_nonzero(values < beyond)
-                if asked <= 0:
+                missing = self._below(beyond) - np.count_nonzero(values < beyond)
+                if missing <= 0:
                     return values[:count], self._unknowns(vectors[:, :count]), _TYPICAL * bounds
+                asked = min(missing, count)  # the others may be as many as there are nodes, and need not be found
                 shift = self._missing_next_to(values, beyond, rounding)
             else:
                 asked = count - len(values)

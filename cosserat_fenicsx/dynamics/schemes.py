@@ -7,11 +7,11 @@ import numpy as np
 from cosserat_fenicsx.algebra.equations import MATRICES, RESIDUAL
 from cosserat_fenicsx.algebra.newton import Solved
 from cosserat_fenicsx.dynamics.step_problem import MovingTies, StepProblem
-from cosserat_fenicsx.dynamics.stepper import OneStep
+from cosserat_fenicsx.dynamics.stepper import Stepper
 from cosserat_fenicsx.errors import SceneError
 
 
-class Momentum(OneStep):
+class Momentum(Stepper):
     """The default scheme: averaged stress, exact balances of linear and of angular momentum (forms/inertia.py)."""
 
     forms, problem_class = "momentum", StepProblem
@@ -102,7 +102,7 @@ def _turning_of(R):
     return change / 4
 
 
-class Energy(OneStep):
+class Energy(Stepper):
     """The scheme with exact energy and linear momentum; angular momentum to second order (forms/energy.py).
 
     The test functions of the form are variations of (r, q). At every node the variation of q is that by a small
@@ -118,7 +118,7 @@ class Energy(OneStep):
 _GAMMA = 1 / (2 - 2 ** (1 / 3))
 
 
-class TripleJump:
+class TripleJump(Momentum):
     """Fourth order by three steps of the default scheme, one of them back in time.
 
     A symmetric scheme of order 2 gains two orders by steps gamma h, (1 - 2 gamma) h, gamma h with gamma = 1/(2 -
@@ -127,14 +127,7 @@ class TripleJump:
     evaluated up to about a third of a step before its start and after its end.
     """
 
-    order, adapts, rho_inf, kinks_persist = 4, False, None, True
-    forms, problem_class, impulse_error = Momentum.forms, Momentum.problem_class, Momentum.impulse_error
-
-    def __init__(self, problem):
-        self.problem, self._inner = problem, Momentum(problem)
-
-    work = property(lambda self: self._inner.work)
-    dissipated = property(lambda self: self._inner.dissipated)
+    order, adapts = 4, False
 
     def begin(self):
         """See `Stepper`.
@@ -156,39 +149,19 @@ class TripleJump:
                 "scheme = 'triple-jump' steps back in time, and needs smooth motions: expected no walls such as a "
                 "HoleWall, or another scheme"
             )
-        self._inner.begin()
-
-    def jump(self):
-        """See `Stepper`."""
-        self._inner.jump()
-
-    def drive(self, t):
-        """See `Stepper`."""
-        self._inner.drive(t)
-
-    def kink(self):
-        """See `Stepper`."""
-        self._inner.kink()
+        super().begin()
 
     def step(self, t, h):
         """See `Stepper`."""
-        inner, iterations = self._inner, 0
+        iterations = 0
         for done, share in enumerate((_GAMMA, 1 - 2 * _GAMMA, _GAMMA)):
-            solved = inner.step(t, share * h)
+            solved = super().step(t, share * h)
             t, iterations = t + share * h, iterations + solved.iterations
             if not solved.converged:
                 for _ in range(done):
-                    inner.undo()
+                    self.undo()
                 return Solved(False, iterations, solved.reason)
         return Solved(True, iterations, "converged")
-
-    def memory(self):
-        """See `Stepper`."""
-        return self._inner.memory()
-
-    def recall(self, memory):
-        """See `Stepper`."""
-        self._inner.recall(memory)
 
 
 # Loads at the end of a step are evaluated this share of the step earlier, i.e. before a jump at its end.
@@ -319,7 +292,7 @@ class CollocationProblem(StepProblem):
         self.ties.shift(4 * values[1] - values[2] - 2 * values[0])
 
 
-class GeneralisedAlpha(OneStep):
+class GeneralisedAlpha(Stepper):
     """Dissipation of unresolved modes: the generalised-alpha scheme, order 2, on the rotation group.
 
     Eq. (1) holds at the end of every step; velocities and positions are integrated by an auxiliary acceleration b
@@ -412,5 +385,5 @@ class GeneralisedAlpha(OneStep):
         self._accelerations_known, self.rho_inf = memory["accelerations_known"], memory["rho_inf"]
 
 
-#: Steppers by the names of `simulate`; each follows `Stepper`.
+#: Steppers by the names of `simulate`.
 SCHEMES = {"momentum": Momentum, "energy": Energy, "generalised-alpha": GeneralisedAlpha, "triple-jump": TripleJump}

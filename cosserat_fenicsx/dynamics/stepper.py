@@ -1,11 +1,10 @@
-"""What a scheme in time offers, the base of the implicit one-step schemes of order 2 (velocities by the trapezoidal
-rule, whatever the forms conserve), and Newton's method for a step.
+"""Base of the implicit one-step schemes (velocities by the trapezoidal rule, whatever the forms conserve), and Newton's
+method for a step.
 """
 
 import math
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Protocol
 
 import numpy as np
 
@@ -14,85 +13,30 @@ from cosserat_fenicsx.algebra.newton import WORDS, Solved
 from cosserat_fenicsx.dynamics.start import drive
 
 
-class Stepper(Protocol):
-    """A scheme with the `StepProblem` that it solves; made once for a signature, used for every scene of it.
-
-    Attributes:
-        order: of the global error in the step h.
-        forms: the name of the discretisation that its models must have; problem_class: the class of its `StepProblem`.
-        kinks_persist: whether velocities alternate from step to step without decay after a kink of a prescribed motion.
-        adapts: whether it has `error` and `undo`.
-        rho_inf: spectral radius at infinite frequency where that can be set, else None.
-        impulse_error: error of a load's impulse over steps h, divided by h^2 times the change of the load's rate.
-        work, dissipated: work of loads and supports, and energy dissipated by damping, since `begin`; dimensionless.
-    """
-
-    order: int
-    kinks_persist: bool
-    adapts: bool
-    rho_inf: float | None
-    impulse_error: float
-    forms: str
-    problem_class: type
-    work: float
-    dissipated: float
-
-    def begin(self):
-        """Start a motion from the current state of the problem's model."""
-
-    def jump(self):
-        """Accelerations or velocities jump at the current time: earlier states can no longer be extrapolated."""
-
-    def drive(self, t):
-        """See `start.drive`, t in s; the change of kinetic energy counts as work of the supports."""
-
-    def kink(self):
-        """The slope of a load jumps at the current time, not its value: the rate of the acceleration jumps."""
-
-    def step(self, t, h):
-        """Step from the time t to t + h, s.
-
-        Returns:
-            `Solved`. Where it has converged, the problem's x and the model's state and velocity are those of t + h;
-            otherwise they are as they were at t.
-        """
-
-    def error(self, early=False):
-        """Estimated local error of the last step, of positions (over the unit of length) and rotations (rad over 10).
-
-        None where too few steps have been made since the start or a jump. With `early` few steps suffice; fast waves,
-        which they do not average out, then count too.
-        """
-
-    def prediction_error(self):
-        """Difference between the end of the last step and the predictor, in the norm of `error`."""
-
-    def undo(self):
-        """Return to the state before the last step."""
-
-    def memory(self):
-        """All data, besides the scene and the time, that later steps depend on: arrays, numbers, and dicts of them.
-
-        It includes the problem's own (`StepProblem.memory`): a motion continued from it has the same digits.
-        """
-
-    def recall(self, memory):
-        """Restore what `memory` returned, after `begin`, on the same scene."""
-
-
 # The error estimate takes four states, so many steps apart: this averages out unresolved, small vibrations.
 _STRIDE = 8
 #: Weight of rotations (rad) in error norms, relative to positions over the unit of length.
 ROTATION_WEIGHT = 0.1
 
 
-class OneStep:
-    """See `Stepper`."""
+class Stepper:
+    """A scheme with the `StepProblem` that it solves; made once for a signature, used for every scene of it.
 
-    order, adapts, rho_inf, kinks_persist = 2, True, None, True
-    impulse_error = 1 / 24  # loads are evaluated at mid-step
-    #: local error over that of the trapezoidal rule, as measured
-    error_ratio = 1.0
+    Attributes:
+        order: of the global error in the step h.
+        forms: the name of the discretisation that its models must have; problem_class: the class of its `StepProblem`.
+        kinks_persist: whether velocities alternate from step to step without decay after a kink of a prescribed motion.
+        adapts: whether `error` holds, so that steps can be chosen by it.
+        rho_inf: spectral radius at infinite frequency where that can be set, else None.
+        impulse_error: error of a load's impulse over steps h, divided by h^2 times the change of the load's rate; here
+            loads are evaluated at mid-step.
+        error_ratio: local error over that of the trapezoidal rule, as measured.
+        work, dissipated: work of loads and supports, and energy dissipated by damping, since `begin`; dimensionless.
+    """
+
+    forms: str
+    problem_class: type
+    order, adapts, rho_inf, kinks_persist, impulse_error, error_ratio = 2, True, None, True, 1 / 24, 1.0
 
     def __init__(self, problem):
         self.problem, self._newton = problem, StepNewton(problem)
@@ -102,7 +46,7 @@ class OneStep:
         self._rates = (*model.rate_arrays, *model.actions.memory)
 
     def begin(self):
-        """See `Stepper`."""
+        """Start a motion from the current state of the problem's model."""
         self._h = None
         self._newton.forget()
         self.work = self.dissipated = 0.0
@@ -110,22 +54,28 @@ class OneStep:
         self.jump()
 
     def jump(self):
-        """See `Stepper`."""
+        """Accelerations or velocities jump at the current time: earlier states can no longer be extrapolated."""
         self._guesses = None  # those of the last step, where they are known
         self._past = []  # of the last steps: (h, state, rates, (work, dissipated)) at their starts
 
     def drive(self, t):
-        """See `Stepper`."""
+        """See `start.drive`, t in s; the change of kinetic energy counts as work of the supports."""
         kinetic, _ = self.problem.energies()
         self._guesses = None
         drive(self.problem.model, t)
         self.work += self.problem.energies()[0] - kinetic
 
     def kink(self):
-        """See `Stepper`: a one-step scheme takes earlier states for its predictor alone."""
+        """The slope of a load jumps at the current time, not its value: the rate of the acceleration jumps; nothing to
+        do where earlier states serve the predictor alone."""
 
     def step(self, t, h):
-        """See `Stepper`."""
+        """Step from the time t to t + h, s.
+
+        Returns:
+            `Solved`. Where it has converged, the problem's x and the model's state and velocity are those of t + h;
+            otherwise they are as they were at t.
+        """
         problem, delays = self.problem, self.problem.model.delays
         if h > delays.longest:
             return Solved(False, 0, f"it is longer than the {delays.longest:.3g} s that an action allows")
@@ -170,9 +120,11 @@ class OneStep:
         return guesses[order]
 
     def error(self, early=False):
-        """See `Stepper`: h^3/12 times the third derivative of the cubic through four states, the last one the current.
+        """Estimated local error of the last step, of positions (over the unit of length) and rotations (rad over 10).
 
-        Only positions count: differences of velocities are dominated by fast waves, which are small and not resolved.
+        h^3/12 times the third derivative of the cubic through four states, the last one the current; None where too few
+        steps have been made since the start or a jump. With `early` few steps suffice; fast waves, which they do not
+        average out, then count too. Differences of velocities are left out, which such waves dominate.
         """
         stride = min(_STRIDE, len(self._past) // 3) if early else _STRIDE
         past = self._past[-3 * stride :]
@@ -186,11 +138,11 @@ class OneStep:
         return self.error_ratio * 0.5 * steps[-1] ** 3 * self.problem.model.largest_of(third, ROTATION_WEIGHT)
 
     def prediction_error(self):
-        """See `Stepper`."""
+        """Difference between the end of the last step and the predictor, in the norm of `error`."""
         return self.problem.model.largest_of(self._state - self._predictor, ROTATION_WEIGHT)
 
     def undo(self):
-        """See `Stepper`."""
+        """Return to the state before the last step."""
         _, state, rates, (self.work, self.dissipated) = self._past.pop()
         self._guesses = None
         self._state[:] = state
@@ -200,7 +152,10 @@ class OneStep:
         self.problem.begin_again()
 
     def memory(self):
-        """See `Stepper`."""
+        """All data, besides the scene and the time, that later steps depend on: arrays, numbers, and dicts of them.
+
+        It includes the problem's own (`StepProblem.memory`): a motion continued from it has the same digits.
+        """
         past = self._past
         return {
             "h": np.nan if self._h is None else self._h,
@@ -218,7 +173,7 @@ class OneStep:
         }
 
     def recall(self, memory):
-        """See `Stepper`."""
+        """Restore what `memory` returned, after `begin`, on the same scene."""
         self._h = None if np.isnan(memory["h"]) else memory["h"]
         self.work, self.dissipated = memory["books"].tolist()
         for i, rate in enumerate(self._rates):
