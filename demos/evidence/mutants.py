@@ -212,8 +212,8 @@ def tests_of_lines(root, out):
 def tests_for(mutant, lines, seconds):
     """The tests that run the line of a mutant, the quickest first, then the others that may notice it.
 
-    A function that keeps what it has made runs its lines in one test only: the others are the tests that run any line of
-    the file, and for forms and C, which are compiled and kept, all tests.
+    A function that keeps what it has made runs its lines in one test only: the others are the tests that run any line
+    of the file, and for forms and C, which are compiled and kept, all tests.
     """
     by_line = lines.get(mutant.file, {})
     # A statement of several lines may be charged to its first ones.
@@ -243,8 +243,10 @@ def verdict(mutant, root, tests, seconds=0.0):
         options = ["-q", "-x", "-p", "no:cacheprovider"]
         code = f"import json, sys, pytest; sys.exit(pytest.main([*{options}, *json.load(open('asked.json'))]))"
         try:
-            done = subprocess.run([sys.executable, "-c", code], cwd=copy, env=surroundings(copy), timeout=TIMES * seconds + SECONDS,
-                                  stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)  # fmt: skip
+            done = subprocess.run(
+                [sys.executable, "-c", code], cwd=copy, env=surroundings(copy), timeout=TIMES * seconds + SECONDS,
+                stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+            )  # fmt: skip
         except subprocess.TimeoutExpired:
             return "killed"
         return "survived" if done.returncode == 0 else "killed"
