@@ -22,6 +22,7 @@ it is a member under its own name, in scene files, in stored data and in the ref
 
 import dataclasses
 import importlib
+import inspect
 import numbers
 import typing
 from collections.abc import Callable
@@ -50,7 +51,21 @@ from cosserat_fenicsx.kinds import misplaced as misplaced
 from cosserat_fenicsx.kinds import spoken as spoken
 
 
-class Part:
+class _Readable(type):
+    """Lets `help` and `dir` show what a class is for, and not what `dataclass` adds to it."""
+
+    def __dir__(cls):
+        return [name for name in super().__dir__() if not name.startswith("__") or name in ("__call__", "__doc__")]
+
+    @property
+    def __signature__(cls):
+        """The arguments and their defaults; the docstring has their units."""
+        own = inspect.signature(cls.__init__)
+        arguments = [x.replace(annotation=x.empty) for name, x in own.parameters.items() if name != "self"]
+        return own.replace(parameters=arguments, return_annotation=own.empty)
+
+
+class Part(metaclass=_Readable):
     """Base of the parts of scenes, see the head of the module.
 
     Class arguments:

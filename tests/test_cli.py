@@ -107,6 +107,13 @@ def test_explain():
     assert "168 unknowns" in cosserat("explain", DEMO, "--model", "spatial").stdout
 
 
+def test_a_reader_that_has_enough_is_no_error():
+    first = [sys.executable, "-m", "cosserat_fenicsx", "schema"]
+    with subprocess.Popen(first, stdout=subprocess.PIPE, stderr=subprocess.PIPE, cwd=ROOT) as process:
+        process.stdout.close()
+        assert (process.wait(60), process.stderr.read()) == (0, b"")
+
+
 def test_explained_size_is_the_solved_size():
     from cosserat_fenicsx import solve
 

@@ -1,6 +1,7 @@
 """Parts of scenes: what fields take follows from annotations, and classes register themselves."""
 
 import math
+import pydoc
 from dataclasses import dataclass, replace
 from typing import Annotated, Literal
 
@@ -45,6 +46,12 @@ class Everything(Part):
     lengths: tuple[parts.Length, ...] = ()
     stiff: parts.Stiffness = math.inf
     anything: object = None
+
+
+def test_help_shows_the_part_and_not_its_dataclass():
+    text = pydoc.render_doc(cf.Spring, renderer=pydoc.plaintext)
+    assert "Spring(station, stiffness=0.0, rotational=0.0, direction=None)" in text and "rotational: c, N m/rad" in text
+    assert "__" not in text and "typing" not in text
 
 
 def test_classes_register_themselves():

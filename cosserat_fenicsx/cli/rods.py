@@ -11,7 +11,6 @@ from cosserat_fenicsx.cli.say import (
     NOT_CONVERGED,
     Files,
     ended,
-    first_rank,
     in_words,
     keep_inputs,
     say,
@@ -159,7 +158,7 @@ def deliver(computed, options, moving, tables=None):
     path, trouble, code = ended(lambda: together(computed))
     if path is not None and len(path):
         station = options.station
-        _report(path, station)
+        say(path.details(station=station), file=sys.stdout)
         if out is not None:
             film = options.animate if code != INTERRUPTED else None  # a film would take long after an interruption
             if code == INTERRUPTED:
@@ -219,12 +218,6 @@ def _check_film(options, moving):
     if Path(options.animate).name != options.animate:
         raise SceneError(f"--animate {options.animate}: expected a name without folders; it is written to -o DIR")
     check_name(options.animate)
-
-
-def _report(path, station):
-    text = path.details(station=station)
-    if first_rank():
-        print(text, flush=True)  # before the messages on stderr that follow
 
 
 def _write(path, out, station, *, picture, stops, magnify, shown, film, speed, color):

@@ -34,7 +34,11 @@ def first_rank():
 
 def say(text, file=None):
     if first_rank():
-        print(text, file=file or sys.stderr, flush=True)
+        stream = file or sys.stderr
+        try:
+            print(text, file=stream, flush=True)
+        except BrokenPipeError:  # the reader, such as `head`, has enough: files are still written
+            os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
 
 
 @contextmanager
