@@ -26,7 +26,7 @@ def ends_at(scene, low, high):
     """The speed (rpm) between two above which the bit, from rest, no longer sticks after 170 s, to half a rpm."""
     while high - low > 0.5:
         middle = (low + high) / 2
-        history = cf.drilling.simulate_drilling(scene.with_case(middle * cf.units.rpm), 200.0, save_every=0.02)
+        history = cf.drilling.simulate(scene.with_case(middle * cf.units.rpm), 200.0, save_every=0.02)
         low, high = (middle, high) if history.stick_slip(since=170.0).sticks else (low, middle)
     return (low + high) / 2
 

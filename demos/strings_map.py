@@ -30,7 +30,7 @@ RPM = 30 / np.pi
 def drilled(speed, weight):
     """Severity, period and share of time at rest of the bit in the last quarter, from rest at a speed (rad/s) and a
     weight on bit (N)."""
-    history = cf.drilling.simulate_drilling(FOUND.scene.with_case(speed, weight), FOUND.settings["duration"])
+    history = cf.drilling.simulate(FOUND.scene.with_case(speed, weight), FOUND.settings["duration"])
     cycle = history.stick_slip(since=0.75 * FOUND.settings["duration"])
     return {"severity": cycle.severity, "period": cycle.period, "stuck": cycle.stuck}
 

@@ -76,12 +76,12 @@ def scene(**changed):
 
 
 def use(monkeypatch, **settings):
-    """Let `simulate_drilling` take the pendulum; `settings`: its attributes."""
-    from cosserat_fenicsx.drilling import simulate
+    """Let `simulate` take the pendulum; `settings`: its attributes."""
+    from cosserat_fenicsx.drilling import motion
 
     def made(scene, name, dt, elements):
         model = Pendulum(scene, dt, elements)
         vars(model).update(settings)
         return model
 
-    monkeypatch.setattr(simulate, "model_of", made)
+    monkeypatch.setattr(motion, "model_of", made)

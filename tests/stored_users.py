@@ -53,7 +53,7 @@ def rods(folder, dt=0.05):
 
 
 def string(folder, dt=0.01):
-    return cf.drilling.simulate_drilling(
+    return cf.drilling.simulate(
         fake_string.scene(), 5.0, dt=dt, folder=folder, profile_every=0.5, progress=False
     )
 
@@ -100,7 +100,7 @@ USERS = {
         cf.read,
         lambda folder: string(folder, 0.02),
         lambda x: [x.rows.tobytes(), x._along().tobytes()],
-        "simulate_drilling",
+        "drilling.simulate",
         "motion of a drill-string",
     ),
     "study": User(study, study, study, lambda folder: study(folder, 13), of_study, "study", "study"),

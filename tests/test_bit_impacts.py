@@ -46,7 +46,7 @@ def test_a_weight_on_rigid_rock_is_that_of_the_wave_and_the_impulse_is_told(mass
     scene, found = bouncing(mass=mass), []
     wave = WEIGHT + scene.segments[0].axial_impedance * UP
     for dt, elements in ((4e-3, None), (2e-3, None), (1e-3, None), (5e-4, 250)):
-        history = cf.drilling.simulate_drilling(scene, 0.5, dt=dt, elements=elements)
+        history = cf.drilling.simulate(scene, 0.5, dt=dt, elements=elements)
         impulse, weight = history.impulse_on_bit, history.weight_on_bit
         assert impulse[0] == pytest.approx(mass * UP, rel=0.02, abs=1e-9) and (np.diff(impulse) >= 0).all()
         assert weight[history.times < 8.5e-3].mean() == pytest.approx(wave, rel=0.04)
@@ -67,7 +67,7 @@ def test_rock_that_gives_way_makes_a_force_that_converges(stiffness, mass):
     weight = exact(scene, 0.5)
     usual = AxialTorsional(scene).dt
     for share in (2.0, 1.0, 0.5):
-        history = cf.drilling.simulate_drilling(scene, 0.5, dt=share * usual)
+        history = cf.drilling.simulate(scene, 0.5, dt=share * usual)
         true = weight(history.mean_times)
         off.append(np.sqrt(np.mean((history.weight_on_bit - true) ** 2)) / true.max())
         assert history.weight_on_bit.min() == 0 and (history.impulse_on_bit == 0).all()
@@ -108,7 +108,7 @@ def test_a_disc_that_bounces_has_its_whole_mass():
     """The mass of the last disc, on a spring, comes down on a rock that rises."""
     discs = cf.drilling.Discs((1e3, 100.0), (500.0,), masses=(1e5, 2e3), axial_stiffnesses=(1e6,))
     bit = cf.drilling.BitOnRock(cf.drilling.Lobes(LOBES, HEIGHT), 1e3, mass=500.0)
-    history = cf.drilling.simulate_drilling(
+    history = cf.drilling.simulate(
         cf.drilling.Drilling(discs, cf.drilling.TopDrive(TURNS), bit, start="steady"), 0.5, dt=1e-3
     )
     assert history.impulse_on_bit[0] == pytest.approx(2500.0 * UP, rel=1e-3) and history.weight_on_bit.max() < 4e4
@@ -194,8 +194,8 @@ def test_the_weight_of_a_hook_that_is_lowered_is_that_of_springs_in_a_row(stiffn
     down = cf.Table([0.0, 1.0, 2.0, 60.0], [(0.0,), (-0.01,), (0.0,), (0.0,)])
     bit = cf.drilling.BitOnRock(cf.drilling.Stribeck(0.0, 0.0), 6e4, rock_stiffness=stiffness)
     scene = hanging(cf.drilling.Hook(6e6, down), bit=bit, weight=300.0, drag=cf.drilling.ViscousDrag(0.0, 3.0))
-    history = cf.drilling.simulate_drilling(scene, 25.0, dt=5e-3)
+    history = cf.drilling.simulate(scene, 25.0, dt=5e-3)
     give = sum(x.length / x.EA for x in scene.segments) + 1 / 6e6 + 1 / stiffness
     assert history.weight_on_bit[-1] - 6e4 == pytest.approx(0.01 / give, rel=1e-6)
     turning = bouncing(stiffness, height=1e-12, start="steady", drag=cf.drilling.ViscousDrag(0.3, 0.3))
-    assert np.ptp(cf.drilling.simulate_drilling(turning, 1.0, dt=5e-3).weight_on_bit) < 1.0
+    assert np.ptp(cf.drilling.simulate(turning, 1.0, dt=5e-3).weight_on_bit) < 1.0

@@ -14,7 +14,7 @@ pytestmark = [pytest.mark.serial, pytest.mark.once]
 @pytest.fixture
 def history(monkeypatch):
     use(monkeypatch)
-    return cf.drilling.simulate_drilling(scene(), 30.0)
+    return cf.drilling.simulate(scene(), 30.0)
 
 
 def curve(panel, label):
@@ -61,7 +61,7 @@ def test_what_is_grey_is_told_and_the_drive_is_named(history):
 
 def test_long_runs_show_bands_between_extremes(monkeypatch):
     use(monkeypatch)
-    history = cf.drilling.simulate_drilling(scene(), 1000.0, dt=0.02, profile_every=10.0)
+    history = cf.drilling.simulate(scene(), 1000.0, dt=0.02, profile_every=10.0)
     speeds = history.plot().axes[0]
     assert not speeds.lines and len(speeds.collections) == 2
     tops = [shape.get_paths()[0].vertices[:, 1].max() for shape in speeds.collections]

@@ -103,8 +103,8 @@ def test_buckling_in_the_hole_is_told():
 def test_every_model_moves_and_goes_on(changed, settings, tmp_path):
     """A longer motion of two parts has the digits of one; halving the step is reflected in the errors."""
     given = scene(**changed)
-    whole = cf.drilling.simulate_drilling(given, 6.0, check=True, **settings)
-    cf.drilling.simulate_drilling(given, 3.0, folder=tmp_path / "part", profile_every=6.0 / 400, **settings)
+    whole = cf.drilling.simulate(given, 6.0, check=True, **settings)
+    cf.drilling.simulate(given, 3.0, folder=tmp_path / "part", profile_every=6.0 / 400, **settings)
     again = cf.resume(tmp_path / "part", duration=6.0)
     assert np.array_equal(again.rows, whole.rows, equal_nan=True) and np.isfinite(whole.errors.peak)
     assert np.array_equal(again.angle, whole.angle) and again.sticking.shape == again.speed.shape
@@ -117,7 +117,7 @@ def test_rotation_alone_moves_nothing_along_the_axis():
     given = scene(
         string=string, bit=bit(), hole=hole(BENT), mud=MUD, drive=cf.drilling.TopDrive(cf.Ramp((6.0,), end=2.0))
     )
-    found, both = (cf.drilling.simulate_drilling(given, 30.0, model=name) for name in ("auto", BOTH))
+    found, both = (cf.drilling.simulate(given, 30.0, model=name) for name in ("auto", BOTH))
     assert found.model == TORSION and both.model == BOTH
     assert (both.weight_on_bit == 80e3).all() and not both.bit_advance.any()
     assert found.surface_torque[-1] == pytest.approx(both.surface_torque[-1], rel=1e-2)
@@ -126,11 +126,11 @@ def test_rotation_alone_moves_nothing_along_the_axis():
 
 def test_elements_and_steps():
     drilled = scene(bit=cf.drilling.BitOnRock(cf.drilling.Stribeck(6e3, 4e3, 3.0), inertia=50.0))
-    assert len(cf.drilling.simulate_drilling(drilled, 1.0, elements=80).depths) == 81
+    assert len(cf.drilling.simulate(drilled, 1.0, elements=80).depths) == 81
     with pytest.raises(cf.SceneError, match="elements = 80: expected None beside dt: waves of torsion"):
-        cf.drilling.simulate_drilling(drilled, 1.0, elements=80, dt=0.01)
+        cf.drilling.simulate(drilled, 1.0, elements=80, dt=0.01)
     with pytest.raises(cf.SceneError, match="elements = 8: expected None for Discs"):
-        cf.drilling.simulate_drilling(scene(string=cf.drilling.Discs((9.0, 2.0), (7.0,)), bit=None), 1.0, elements=8)
+        cf.drilling.simulate(scene(string=cf.drilling.Discs((9.0, 2.0), (7.0,)), bit=None), 1.0, elements=8)
 
 
 def test_more_weight_on_bit_than_the_string_has_along_the_hole_is_told():

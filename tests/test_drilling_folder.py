@@ -20,8 +20,8 @@ def bytes_of(folder):
 
 def test_a_motion_goes_on_for_longer(tmp_path, monkeypatch):
     use(monkeypatch)
-    cf.drilling.simulate_drilling(scene(), 40.0, folder=tmp_path / "whole", profile_every=0.5)
-    cf.drilling.simulate_drilling(scene(), 25.0, folder=tmp_path / "part", profile_every=0.5)
+    cf.drilling.simulate(scene(), 40.0, folder=tmp_path / "whole", profile_every=0.5)
+    cf.drilling.simulate(scene(), 25.0, folder=tmp_path / "part", profile_every=0.5)
     assert len(cf.resume(tmp_path / "part", duration=40.0)) == 4000
     assert bytes_of(tmp_path / "part") == bytes_of(tmp_path / "whole")
     assert len(cf.resume(tmp_path / "part")) == 4000  # complete
@@ -31,9 +31,9 @@ def test_a_motion_goes_on_for_longer(tmp_path, monkeypatch):
 
 def test_folders_that_are_refused(tmp_path, monkeypatch):
     use(monkeypatch)
-    cf.drilling.simulate_drilling(scene(), 1.0, folder=tmp_path / "one")
+    cf.drilling.simulate(scene(), 1.0, folder=tmp_path / "one")
     with pytest.raises(cf.SceneError, match=r"it holds a motion of a drill-string already: .*resume"):
-        cf.drilling.simulate_drilling(scene(), 1.0, folder=tmp_path / "one")
+        cf.drilling.simulate(scene(), 1.0, folder=tmp_path / "one")
     with pytest.raises(cf.SceneError, match=r"not the one of the motion: Drilling.drive.speed is 7.*where .* 6.28"):
         cf.resume(tmp_path / "one", scene(drive=cf.drilling.TopDrive(7.0)))
     with pytest.raises(cf.SceneError, match="no motion was found there"):
@@ -46,7 +46,7 @@ def test_functions_of_time_are_compared_by_their_values(tmp_path, monkeypatch):
     def moving(factor):
         return scene(drive=cf.drilling.TopDrive(lambda t: factor * min(t, 5.0)))
 
-    cf.drilling.simulate_drilling(moving(1.0), 2.0, folder=tmp_path / "one")
+    cf.drilling.simulate(moving(1.0), 2.0, folder=tmp_path / "one")
     with pytest.raises(cf.SceneError, match=r"expected the scene of .* a function written in Python cannot be stored"):
         cf.resume(tmp_path / "one")
     with pytest.raises(cf.SceneError, match=r"drive.speed at t = .* s is .*, where the motion has"):
@@ -89,5 +89,5 @@ def test_checkpoints_are_seldom(tmp_path, monkeypatch):
     written, write = [], files.write_checkpoint
     monkeypatch.setattr(files, "write_checkpoint", lambda *args: (written.append(1), write(*args)))
     monkeypatch.setattr(time_loop, "CHUNK", 10)
-    cf.drilling.simulate_drilling(scene(), 10.0, folder=tmp_path / "one")
+    cf.drilling.simulate(scene(), 10.0, folder=tmp_path / "one")
     assert len(written) == 3  # at the start, which is kept twice, and at the end

@@ -15,7 +15,7 @@ rpm = cf.units.rpm
 @pytest.fixture
 def history(monkeypatch):
     use(monkeypatch)
-    return cf.drilling.simulate_drilling(scene(), 60.0)
+    return cf.drilling.simulate(scene(), 60.0)
 
 
 def test_rows_are_those_of_the_model(history):
@@ -30,7 +30,7 @@ def test_rows_are_those_of_the_model(history):
 
 
 def test_rows_are_thinned(history, monkeypatch):
-    coarse = cf.drilling.simulate_drilling(scene(), 60.0, save_every=0.05, profile_every=2.0)
+    coarse = cf.drilling.simulate(scene(), 60.0, save_every=0.05, profile_every=2.0)
     assert (coarse.bit_speed == history.bit_speed[4::5]).all() and len(coarse.profile_times) == 30
     assert (coarse.speed[2] == history.speed[39]).all()  # both at 6 s
 
@@ -99,9 +99,9 @@ def test_tables_and_files(history, tmp_path):
 @pytest.mark.parametrize(
     ("given", "words"),
     [
-        ({"duration": -1.0}, r"simulate_drilling.duration = -1.0: expected a positive number \(s\)"),
-        ({"dt": 0.0}, r"simulate_drilling.dt = 0.0: expected a positive number \(s\)"),
-        ({"dt": 100.0}, r"simulate_drilling.dt = 100.0: expected at most the duration, 60 s"),
+        ({"duration": -1.0}, r"simulate.duration = -1.0: expected a positive number \(s\)"),
+        ({"dt": 0.0}, r"simulate.dt = 0.0: expected a positive number \(s\)"),
+        ({"dt": 100.0}, r"simulate.dt = 100.0: expected at most the duration, 60 s"),
         ({"dt": 1e-8}, r"dt = 1e-08: expected at least 6e-07 s: 1e\+08 steps in 60 s"),
         ({"dt": 0.1}, r"dt = 0.1: expected a step of at most 0.0531 s, .* 1 rad in a step at 3 times the speed"),
         ({"duration": 3e5}, r"save_every = None: expected at least 0.015 s: 2e\+07 rows in 300000 s"),
@@ -114,22 +114,22 @@ def test_tables_and_files(history, tmp_path):
 def test_what_is_refused(given, words, monkeypatch):
     use(monkeypatch)
     with pytest.raises(cf.SceneError, match=words):
-        cf.drilling.simulate_drilling(**{"scene": scene(), "duration": 60.0, **given})
+        cf.drilling.simulate(**{"scene": scene(), "duration": 60.0, **given})
 
 
 def test_jumps_in_speed_need_a_drive_that_follows(monkeypatch):
     use(monkeypatch)
     drive = cf.drilling.TopDrive(cf.Step((6.0,), start=3.0))
     with pytest.raises(cf.SceneError, match=r"no jump, such as that of 6 rad/s at t = 3 s: no drive follows it"):
-        cf.drilling.simulate_drilling(scene(drive=drive), 10.0)
+        cf.drilling.simulate(scene(drive=drive), 10.0)
     ramp = cf.drilling.TopDrive(cf.Ramp((6.0,), start=1.0, end=3.0))
-    assert cf.drilling.simulate_drilling(scene(drive=ramp), 10.0).drive_speed[-1] == 6.0
+    assert cf.drilling.simulate(scene(drive=ramp), 10.0).drive_speed[-1] == 6.0
 
 
 def test_a_failing_step_keeps_what_is_done(monkeypatch):
     use(monkeypatch, fails_at=1000)
     with pytest.raises(cf.NotConverged, match="the step at t = 10 s fails") as stop:
-        cf.drilling.simulate_drilling(scene(), 60.0)
+        cf.drilling.simulate(scene(), 60.0)
     assert 900 < len(stop.value.path) <= 1000 and "halved" in stop.value.path.counts
 
 
@@ -138,14 +138,14 @@ def test_ctrl_c_keeps_what_is_done(monkeypatch):
     with pytest.raises(
         cf.Interrupted, match=r"interrupted after \d+ times, which the exception's `path` holds"
     ) as stop:
-        cf.drilling.simulate_drilling(scene(), 60.0)
+        cf.drilling.simulate(scene(), 60.0)
     history = stop.value.path
     assert 1700 < len(history) <= 2000 and history.stick_slip().sticks
 
 
 def test_progress_is_told(monkeypatch, capsys):
     use(monkeypatch)
-    cf.drilling.simulate_drilling(scene(), 20.0, progress=True)
+    cf.drilling.simulate(scene(), 20.0, progress=True)
     assert "torsion, 5 places: t (s) = " in capsys.readouterr().err
 
 
@@ -160,7 +160,7 @@ def test_speeds_of_discs_are_those_at_the_end_of_a_step():
     """Two discs that a constant torque turns, in closed form; means over a step would be off by 3e-3 rad/s."""
     J, k, M = (2122.0, 374.0), 473.0, 1000.0
     drive = cf.drilling.TopDrive(control=cf.drilling.Motor(M))
-    found = cf.drilling.simulate_drilling(
+    found = cf.drilling.simulate(
         cf.drilling.Drilling(cf.drilling.Discs(J, (k,)), drive), 10.0, dt=8e-3, profile_every=1.0
     )
     w = np.sqrt(k * sum(J) / (J[0] * J[1]))
@@ -180,7 +180,7 @@ def test_what_is_a_mean_has_times_of_its_own(model):
     )
     Z = turned.segments[0].torsional_impedance
     for dt in (2e-2, 1e-2):
-        found = cf.drilling.simulate_drilling(turned, 1.8, model=model, dt=dt)
+        found = cf.drilling.simulate(turned, 1.8, model=model, dt=dt)
         exact = Z * 10 * np.sin(1.5 * found.mean_times) ** 2
         off.append(np.abs(found.surface_torque - exact)[found.times > 0.1].max() / exact.max())
     assert off[0] < 2e-3 and off[1] < 0.3 * off[0], off

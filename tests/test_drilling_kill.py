@@ -38,7 +38,7 @@ def run_in(folder, kind):
     from cosserat_fenicsx.storage.store import Store
 
     Store.APART, Store.SELDOM = 0.0, 0
-    cf.drilling.simulate_drilling(scene_of(kind), DURATION, folder=folder)
+    cf.drilling.simulate(scene_of(kind), DURATION, folder=folder)
 
 
 @pytest.mark.parametrize("kind", ["torsion", "axial and torsional", "discs"])
@@ -53,7 +53,7 @@ def test_kill_9(kind, tmp_path):
         time.sleep(0.001)
     process.kill()
     process.wait()
-    whole = cf.drilling.simulate_drilling(scene_of(kind), DURATION)
+    whole = cf.drilling.simulate(scene_of(kind), DURATION)
     assert 0 < len(cf.read(place)) < len(whole)
     again = cf.resume(place)
     assert np.array_equal(again.rows, whole.rows, equal_nan=True) and again.counts == whole.counts

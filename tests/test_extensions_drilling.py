@@ -76,7 +76,7 @@ def test_a_bit_law_as_a_function(law, model):
     """It sticks, slips and follows the weight on bit as the law in closed form."""
     options = {"model": model, "progress": False} | ({"elements": 60} if model == BOTH else {})
     moves = {"hook": cf.drilling.Hook(stiffness=5e6, speed=-1e-3)} if model == BOTH else {}
-    expected, found = (cf.drilling.simulate_drilling(scene(x, **moves), 6.0, **options) for x in (law, _Falling(law)))
+    expected, found = (cf.drilling.simulate(scene(x, **moves), 6.0, **options) for x in (law, _Falling(law)))
     assert expected.bit_speed.max() > 6.0 and (expected.bit_speed[10:] == 0).any()
     same(found, expected, 1e-6)
 
@@ -87,7 +87,7 @@ def test_a_bit_law_as_a_function_starts_steadily_and_is_linearised():
         scene(_Falling(cf.drilling.Stribeck(1.0, 0.7, 2.0, radius=0.1))),
     )
     for model in (TORSION, BOTH):
-        history = cf.drilling.simulate_drilling(replace(stiff, start="steady"), 0.5, model=model, progress=False)
+        history = cf.drilling.simulate(replace(stiff, start="steady"), 0.5, model=model, progress=False)
         assert history.torque_on_bit == pytest.approx(law.torque(6.0, 50e3), rel=1e-3)
         assert np.ptp(history.bit_speed) < 0.01
     speeds, weights = [2.0, 6.0], [30e3, 60e3]
@@ -105,7 +105,7 @@ def test_karnopp(model):
     """With a narrow band it is the law that drops at once; with a wide one the bit needs more to leave it."""
     options = {"model": model, "progress": False} | ({"elements": 60} if model == BOTH else {})
     histories = {
-        law: cf.drilling.simulate_drilling(scene(law), 8.0, **options)
+        law: cf.drilling.simulate(scene(law), 8.0, **options)
         for law in (cf.drilling.Stribeck(6e3, 4e3), Karnopp(6e3, 4e3, 1e-5), Karnopp("6 kN m", "4 kN m", 0.5))
     }
     expected, narrow, wide = histories.values()
@@ -125,7 +125,7 @@ def test_wall_friction_as_a_function():
             options = {"model": model, "dt": 0.01, "progress": False}
             more = {"hole": HOLE, "hook": cf.drilling.Hook(speed=-0.05) if model == BOTH else None}
             expected, found = (
-                cf.drilling.simulate_drilling(scene(friction=x, **more), 4.0, **options)
+                cf.drilling.simulate(scene(friction=x, **more), 4.0, **options)
                 for x in (ours, _Wall(ours, **given))
             )
             assert np.abs(expected.lost_at_wall[-1]) > 1e3
@@ -138,12 +138,12 @@ def test_stribeck_curve(model):
     curve = StribeckCurve(0.3, 0.2, "0.1 m/s", viscous=0.1)
     options = {"model": model, "dt": 0.01, "progress": False}
     film, bare = (
-        cf.drilling.simulate_drilling(scene(friction=x, hole=HOLE), 8.0, **options)
+        cf.drilling.simulate(scene(friction=x, hole=HOLE), 8.0, **options)
         for x in (curve, replace(curve, viscous=0.0))
     )
     assert film.surface_torque[-200:].mean() > 1.02 * bare.surface_torque[-200:].mean()
     assert abs(film.balance[-1]) < 1e-3 * film.work_of_drive[-1]
-    steady = cf.drilling.simulate_drilling(replace(scene(friction=curve, hole=HOLE), start="steady"), 1.0, **options)
+    steady = cf.drilling.simulate(replace(scene(friction=curve, hole=HOLE), start="steady"), 1.0, **options)
     assert np.ptp(steady.surface_torque) < 1e-2 * steady.surface_torque.mean()
 
 
@@ -155,11 +155,11 @@ def test_a_control_called_once_a_sample(model, tmp_path):
     law = cf.drilling.Stribeck(3e3, 2e3, 2.0)
     ours = scene(law, control=LimitedSpeed(**gains, most=1e5, sample=2e-3), inertia=2000.0)
     theirs = scene(law, control=cf.drilling.PI(**gains), inertia=2000.0)
-    whole, expected = (cf.drilling.simulate_drilling(x, 6.0, **options) for x in (ours, theirs))
+    whole, expected = (cf.drilling.simulate(x, 6.0, **options) for x in (ours, theirs))
     assert np.abs(whole.drive_speed - expected.drive_speed).max() < 0.05
     limited = replace(ours, drive=replace(ours.drive, control=replace(ours.drive.control, most=1500.0)))
-    assert cf.drilling.simulate_drilling(limited, 6.0, **options).surface_torque.max() < expected.surface_torque.max()
-    cf.drilling.simulate_drilling(ours, 2.503, folder=tmp_path / "run", **options)
+    assert cf.drilling.simulate(limited, 6.0, **options).surface_torque.max() < expected.surface_torque.max()
+    cf.drilling.simulate(ours, 2.503, folder=tmp_path / "run", **options)
     resumed = cf.resume(tmp_path / "run", ours, duration=6.0, progress=False)
     np.testing.assert_array_equal(resumed.rows, whole.rows)
 
@@ -235,13 +235,13 @@ def test_a_control_called_once_a_sample_in_the_linear_theory():
             return 1e3, state
 
     blind = cf.drilling.TopDrive(6.0, 2000.0, Blind())
-    with pytest.raises(cf.SceneError, match="acts in simulate_drilling, unless Blind has gains"):
+    with pytest.raises(cf.SceneError, match="acts in drilling.simulate, unless Blind has gains"):
         cf.drilling.stability(replace(ours, drive=blind), [6.0])
     rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, 1.0)), COLLAR.stiffness)
-    with pytest.raises(cf.SceneError, match="acts in simulate_drilling"):
+    with pytest.raises(cf.SceneError, match="acts in drilling.simulate"):
         cf.drilling.PipeAbove(rod.start, PIPE, blind)
     with pytest.raises(cf.SceneError, match="'rest' with this drive"):
-        cf.drilling.simulate_drilling(replace(ours, start="steady"), 1.0)
+        cf.drilling.simulate(replace(ours, start="steady"), 1.0)
 
 
 @pytest.mark.parametrize(
@@ -257,7 +257,7 @@ def test_laws_that_fail_are_refused_in_words(torque, words):
     Law = dataclass(frozen=True)(type("_Law", (BitLaw,), {"torque": lambda self, *given: torque(*given)}))
     for model in (TORSION, BOTH):
         with pytest.raises(cf.SceneError, match=words):
-            cf.drilling.simulate_drilling(scene(Law()), 1.0, model=model)
+            cf.drilling.simulate(scene(Law()), 1.0, model=model)
     with pytest.raises(cf.SceneError, match="expected a WallFriction, of which the rod's wall"):
         cf.drilling.mixed_scene(scene(friction=StribeckCurve(0.3, 0.2, 0.1), hole=HOLE), 900.0)
 
@@ -274,7 +274,7 @@ def test_a_law_with_an_array():
             return np.interp(speed, *self.values)
 
     law, same_law = Table(np.array([[0.0, 2.0, 50.0], [6e3, 4e3, 4e3]])), cf.drilling.Stribeck(6e3, 4e3)
-    history = cf.drilling.simulate_drilling(scene(law), 6.0, progress=False)
+    history = cf.drilling.simulate(scene(law), 6.0, progress=False)
     assert history.torque_on_bit.max() == pytest.approx(same_law.static, rel=1e-3) and history.bit_speed.max() > 6.0
 
 
@@ -287,7 +287,7 @@ def test_a_law_that_fails_during_the_motion():
             return 4e3 if weight == 50e3 else 1 / 0
 
     with pytest.raises(cf.SceneError, match="Fails.torque raised ZeroDivisionError"):
-        cf.drilling.simulate_drilling(
+        cf.drilling.simulate(
             scene(Fails(), hook=cf.drilling.Hook(5e6, -1e-3)), 2.0, model=BOTH, progress=False
         )
 
@@ -299,6 +299,6 @@ def test_controls_that_fail_are_refused_in_words():
             return 1e3, (now.time,)
 
     with pytest.raises(cf.SceneError, match=r"Changing.torque = .*expected a state of 0 numbers at t = 0 s"):
-        cf.drilling.simulate_drilling(scene(control=Changing(), inertia=2000.0), 1.0)
+        cf.drilling.simulate(scene(control=Changing(), inertia=2000.0), 1.0)
     with pytest.raises(cf.SceneError, match="expected that of the drive .* for a sampled control"):
         scene(control=Changing())

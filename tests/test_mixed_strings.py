@@ -40,7 +40,7 @@ def test_stick_slip_of_the_bit_is_that_of_the_string():
     string = drilling()
     mixed = cf.drilling.mixed_scene(string, 3000.0)
     history = cf.simulate(mixed.scene, 12.0, dt=0.005, **SMALL)
-    whole = cf.drilling.simulate_drilling(string, 12.0, dt=5e-4, model="torsion")
+    whole = cf.drilling.simulate(string, 12.0, dt=5e-4, model="torsion")
     times, speed = mean_speeds(history, mixed.rod)
     off = np.abs(speed - np.interp(times, whole.times, whole.bit_speed))
     assert off[times < 4].max() < 2e-3 and off.max() < 2e-2
@@ -64,7 +64,7 @@ def test_a_torque_that_drops_at_once():
     law = cf.drilling.Stribeck(2000.0, 1000.0)
     mixed = cf.drilling.mixed_scene(drilling(law, drag=0.0, inertia=0.0), 3000.0)
     history = cf.simulate(mixed.scene, 3.0, dt=0.002, **SMALL)
-    whole = cf.drilling.simulate_drilling(drilling(law, drag=0.0, inertia=0.0), 3.0, dt=2.5e-4, model="torsion")
+    whole = cf.drilling.simulate(drilling(law, drag=0.0, inertia=0.0), 3.0, dt=2.5e-4, model="torsion")
     starts = [t[np.argmax(x > 1e-6)] for t, x in (mean_speeds(history, mixed.rod), (whole.times, whole.bit_speed))]
     assert starts[0] == pytest.approx(starts[1], abs=0.01)
     turned = [np.trapezoid(x, t) if hasattr(np, "trapezoid") else np.trapz(x, t)

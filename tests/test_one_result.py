@@ -52,7 +52,7 @@ RESULTS = {
     "TorqueAndDrag": (answer, "tension", "N", "klbf"),
     "DepthSweep": (sweep, "depth", "m", "ft"),
     "DrillingHistory": (
-        lambda: cf.drilling.simulate_drilling(pipe_and_collars("PI_stiff"), 5.0),
+        lambda: cf.drilling.simulate(pipe_and_collars("PI_stiff"), 5.0),
         "bit_speed",
         "rad/s",
         "rpm",

@@ -171,7 +171,7 @@ def test_a_controlled_drive_turns_the_rod_as_it_turns_the_string(drag):
     mud = {"drag": cf.drilling.ViscousDrag(drag)} if drag else {}
     rod, scene = collars(drive, damping=drag, **mud)
     string = cf.well.DrillString((cf.well.Collar(200.0, **COLLARS), PIPE))
-    whole = cf.drilling.simulate_drilling(cf.drilling.Drilling(string, drive, **mud), 8.0, dt=0.0005, model="torsion")
+    whole = cf.drilling.simulate(cf.drilling.Drilling(string, drive, **mud), 8.0, dt=0.0005, model="torsion")
     history = motion(scene, 8.0, 0.005)
     expected = np.interp(history.times, whole.times - (whole.times[1] - whole.times[0]) / 2, whole.bit_speed)
     np.testing.assert_allclose(bit_speed(history, rod), expected, atol=2e-4 * expected.max())

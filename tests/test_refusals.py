@@ -191,7 +191,7 @@ def test_a_step_longer_than_all_parts(tmp_path, capsys):
     assert "expected a step of at most 0.0531 s" in capsys.readouterr().err
     scene = cf.read(file).scene
     slow = cf.drilling.Drilling(scene.string, cf.drilling.TopDrive(1.0))
-    coarse, fine = (cf.drilling.simulate_drilling(slow, 2.0, dt=dt, progress=False) for dt in (1.0, 1e-3))
+    coarse, fine = (cf.drilling.simulate(slow, 2.0, dt=dt, progress=False) for dt in (1.0, 1e-3))
     assert coarse.dt < 0.1 and coarse.bit_speed[-1] == pytest.approx(fine.bit_speed[-1], abs=0.5)
 
 

@@ -46,7 +46,7 @@ def test_nothing_changes(model, drive):
 
 @pytest.mark.parametrize("model", ["torsion", "axial and torsional"])
 def test_the_books_begin_with_the_energy_of_the_start(model):
-    history = cf.drilling.simulate_drilling(
+    history = cf.drilling.simulate(
         drilling(bit=cf.drilling.BitOnRock(LAW, weight=50e3, inertia=50.0)), 5.0, model=model
     )
     assert np.abs(history.balance).max() < 1e-9 * history.work_of_drive[-1] and history.kinetic[0] > 1e3

@@ -32,12 +32,12 @@ def test_a_rotation_to_the_left_is_the_mirror_image():
 @pytest.mark.parametrize("model", ["torsion", "axial and torsional"])
 def test_where_friction_allows_no_longer_step_a_shorter_one_is_compared(model):
     scene = replace(off_bottom()[0], friction=cf.drilling.WallFriction(0.3, 0.195, 0.05, of_rotation=True))
-    errors = cf.drilling.simulate_drilling(scene, 9, model=model, check=True, progress=False).errors
+    errors = cf.drilling.simulate(scene, 9, model=model, check=True, progress=False).errors
     assert 0 < errors.peak < 5 and 0 < errors.largest_torque < 1000
 
 
 def test_a_mesh_that_cannot_be_coarser_is_compared_with_a_finer_one():
-    found = cf.drilling.simulate_drilling(
+    found = cf.drilling.simulate(
         stick_slip(), 60, model="axial and torsional", elements=2, check=True, progress=False
     )
     assert len(found.depths) == 4
@@ -80,7 +80,7 @@ def test_a_bit_below_a_motor_that_turns_too_far_in_a_step_is_refused(law, torque
         drag=cf.drilling.ViscousDrag(0.1),
     )
     with pytest.raises(cf.NotConverged, match=r"the bit turns by .* rad in a step of .* expected a shorter dt") as stop:
-        cf.drilling.simulate_drilling(scene, 60.0, dt=0.02, progress=False)
+        cf.drilling.simulate(scene, 60.0, dt=0.02, progress=False)
     history = stop.value.path
     assert len(history) > 10 and np.abs(history.bit_speed).max() * history.dt <= most
-    assert len(cf.drilling.simulate_drilling(scene, float(history.times[-1]), dt=0.02, progress=False)) == len(history)
+    assert len(cf.drilling.simulate(scene, float(history.times[-1]), dt=0.02, progress=False)) == len(history)

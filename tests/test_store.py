@@ -59,7 +59,7 @@ def test_kill_9_at_any_write(moment, user, kept, tmp_path, monkeypatch):
     with pytest.MonkeyPatch.context() as patch:
         at_write(patch, number, die)
         assert in_a_child(lambda: user.begin(tmp_path / "killed")) == signal.SIGKILL
-    begun = holds(tmp_path / "killed") and (user.call not in ("simulate", "simulate_drilling") or
+    begun = holds(tmp_path / "killed") and (user.call not in ("simulate", "drilling.simulate") or
                                             (tmp_path / "killed" / "start.npz").exists())  # fmt: skip
     found, said = quietly(user.go_on if begun else user.begin, tmp_path / "killed")
     assert user.digits(found) == kept[user.call]["digits"]
@@ -119,7 +119,7 @@ def test_another_one_is_refused(user, kept, tmp_path):
 @pytest.mark.parametrize("text", ["", "mine", '{"speed": 3}'])
 def test_files_of_the_users_own_stay_as_they_are(name, text, user, kept, tmp_path):
     (tmp_path / name).write_text(text)
-    tables = {"simulate": ["instants.npy"], "simulate_drilling": ["series.npy"]}.get(user.call, [])
+    tables = {"simulate": ["instants.npy"], "drilling.simulate": ["series.npy"]}.get(user.call, [])
     ours = [*tables, *(["start.npz", "checkpoint.npz"] if tables else []), "rows.0.jsonl"]
     if name.endswith(".json") or name in ours:
         with pytest.raises(cf.SceneError, match=name):

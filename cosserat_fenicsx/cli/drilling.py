@@ -11,9 +11,9 @@ from cosserat_fenicsx.cli.say import DONE, INTERRUPTED, NOT_CONVERGED, Files, en
 from cosserat_fenicsx.dimensions import in_si
 from cosserat_fenicsx.drilling.bit_laws import Stribeck
 from cosserat_fenicsx.drilling.choose import chosen, model_of
+from cosserat_fenicsx.drilling.motion import KIND, check_arguments
 from cosserat_fenicsx.drilling.scenefile import SimulateDrilling
 from cosserat_fenicsx.drilling.segments import Discs
-from cosserat_fenicsx.drilling.simulate import KIND, check_arguments
 from cosserat_fenicsx.drilling.tables import turns
 from cosserat_fenicsx.errors import NotConverged, SceneError
 from cosserat_fenicsx.interrupts import patience

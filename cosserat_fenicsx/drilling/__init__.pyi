@@ -23,11 +23,11 @@ from cosserat_fenicsx.drilling.linear.stability import stability as stability
 from cosserat_fenicsx.drilling.mixed import BitTorque as BitTorque
 from cosserat_fenicsx.drilling.mixed import MixedScene as MixedScene
 from cosserat_fenicsx.drilling.mixed import mixed_scene as mixed_scene
+from cosserat_fenicsx.drilling.motion import simulate as simulate
 from cosserat_fenicsx.drilling.pipe_above import PipeAbove as PipeAbove
 from cosserat_fenicsx.drilling.scene import Drilling as Drilling
 from cosserat_fenicsx.drilling.scenefile import DrillingScene as DrillingScene
 from cosserat_fenicsx.drilling.segments import Discs as Discs
-from cosserat_fenicsx.drilling.simulate import simulate_drilling as simulate_drilling
 from cosserat_fenicsx.drilling.stick_slip import StickSlip as StickSlip
 from cosserat_fenicsx.drilling.top_drive import PI as PI
 from cosserat_fenicsx.drilling.top_drive import DriveControl as DriveControl

@@ -25,12 +25,12 @@ def chosen(scene, model="auto"):
         SceneError: an unknown model, or one that does not fit the scene.
     """
     if not isinstance(model, str) or model not in MODELS:
-        raise SceneError(f"simulate_drilling.model = {model!r}: {nearest(model, MODELS)}")
+        raise SceneError(f"simulate.model = {model!r}: {nearest(model, MODELS)}")
     if scene.discs:
         fits = TORSION if scene.discs.masses is None else BOTH
         what = "discs without masses turn alone" if fits == TORSION else "the discs have masses"
         if model not in ("auto", fits):
-            raise SceneError(f"simulate_drilling.model = '{model}': expected '{fits}' or 'auto': {what}")
+            raise SceneError(f"simulate.model = '{model}': expected '{fits}' or 'auto': {what}")
         return fits, [f"{fits}: {what}"]
     asks = _asks_for_axial(scene)
     if model == "auto":
@@ -40,7 +40,7 @@ def chosen(scene, model="auto"):
     why = [f"{model}: as asked"]
     if model == TORSION and asks:
         if scene.bit is not None and scene.bit.law.drills:
-            raise SceneError(f"simulate_drilling.model = '{TORSION}': expected '{BOTH}' or 'auto', since with "
+            raise SceneError(f"simulate.model = '{TORSION}': expected '{BOTH}' or 'auto', since with "
                              f"{type(scene.bit.law).__name__} {scene.bit.law.lifts}")  # fmt: skip
         why.append(f"APPROXIMATE: torsion alone leaves out what moves along the axis ({'; '.join(asks)})")
     return model, [*why, *_left_out(scene, model)]
@@ -150,7 +150,7 @@ def with_step(scene, name, model, factor: float):
     asked = max(2, round((len(model.depths) - 1) / factor))
     other = model_of(scene, name, factor * model.dt, asked)
     if len(other.depths) - 1 > 1.2 * asked or asked * factor > 1.2 * (len(model.depths) - 1):
-        refuse("simulate_drilling", "elements", asked, f"at least {len(other.depths) - 1}, one in each component")
+        refuse("simulate", "elements", asked, f"at least {len(other.depths) - 1}, one in each component")
     return other
 
 
@@ -165,11 +165,11 @@ def model_of(scene, name, dt=None, elements=None):
         SceneError: a scene that the model has no equations for; steps that its laws do not allow.
     """
     if scene.discs and elements is not None:
-        refuse("simulate_drilling", "elements", elements, "None for Discs, which are not divided")
+        refuse("simulate", "elements", elements, "None for Discs, which are not divided")
     if scene.discs or name == BOTH:
         return AxialTorsional(scene, dt, elements)
     if dt is not None and elements is not None:
-        refuse("simulate_drilling", "elements", elements, "None beside dt: waves of torsion have cells of one step")
+        refuse("simulate", "elements", elements, "None beside dt: waves of torsion have cells of one step")
     if elements is not None:
         dt = math.fsum(part.length / part.torsional_speed for part in scene.segments) / elements
     return TorsionWaves(scene, dt)

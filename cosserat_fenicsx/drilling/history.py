@@ -49,7 +49,7 @@ _QUANTITIES = by_name(
 
 
 class DrillingHistory(Result):
-    """The motion of a drill-string, from `simulate_drilling`.
+    """The motion of a drill-string, from `drilling.simulate`.
 
     SI units, angles in rad. Angles, speeds and torques are positive in the sense of drilling; displacements, velocities
     and the advance of the bit are positive downwards, tension and hook load where they pull. A model of torsion alone
@@ -266,7 +266,7 @@ class DrillingHistory(Result):
         Args:
             file: .gif, or .mp4, which needs ffmpeg (rank 0 writes).
             speed: seconds of the motion in a second of the film; None for one of at most ten seconds.
-            fps: frames per second, 1 to 100. progress: see `simulate_drilling`.
+            fps: frames per second, 1 to 100. progress: see `drilling.simulate`.
 
         Raises:
             SceneError: matplotlib, Pillow or ffmpeg is missing, another ending, or fewer than two profiles.

@@ -146,7 +146,7 @@ def _walls(drilling, rod, top, radii):
         law, _, of_hole = law_of(drilling.friction)
         if law.function is not None:
             refuse("mixed_scene", "drilling.friction", drilling.friction, "a WallFriction, of which the rod's wall "
-                   "takes the kinetic coefficient; other laws act in simulate_drilling")  # fmt: skip
+                   "takes the kinetic coefficient; other laws act in drilling.simulate")  # fmt: skip
         friction = [(to, law.kinetic * (x if of_hole else 1.0)) for to, x in friction]
     return [TubeWall(rod, hole.path, radius, radii, **given),
             HoleWall(rod, hole.path, radius, radii, friction=friction, **given)]  # fmt: skip

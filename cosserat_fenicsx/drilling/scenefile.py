@@ -19,7 +19,7 @@ law = { type = "Stribeck", static = "6 kN m", dynamic = "4 kN m", speed = "3 rad
 [wall_friction]                  # optional: static, kinetic, speed, of_rotation, of_hole
 [drag]                           # optional: torsion, axial
 
-[simulate]                       # duration, and what else `simulate_drilling` takes
+[simulate]                       # duration, and what else `simulate` takes
 duration = 60.0
 
 [stability]                      # optional: speeds, weights
@@ -37,10 +37,10 @@ from cosserat_fenicsx.drilling.choose import chosen
 from cosserat_fenicsx.drilling.history import DrillingHistory
 from cosserat_fenicsx.drilling.linear import frequencies
 from cosserat_fenicsx.drilling.linear.stability import Stability, stability
+from cosserat_fenicsx.drilling.motion import check_arguments as check_simulation
+from cosserat_fenicsx.drilling.motion import simulate
 from cosserat_fenicsx.drilling.scene import Drilling
 from cosserat_fenicsx.drilling.segments import Discs
-from cosserat_fenicsx.drilling.simulate import check_arguments as check_simulation
-from cosserat_fenicsx.drilling.simulate import simulate_drilling
 from cosserat_fenicsx.drilling.top_drive import DriveControl, Hook, TopDrive
 from cosserat_fenicsx.drilling.wall_friction import FrictionLaw, ViscousDrag, WallFriction
 from cosserat_fenicsx.errors import SceneError
@@ -65,10 +65,10 @@ class SoftSpeed(_Tuned):
 
 @dataclass(frozen=True)
 class SimulateDrilling(Part):
-    """Arguments of `simulate_drilling` in a scene file; None for its own defaults.
+    """Arguments of `simulate` in a scene file; None for its own defaults.
 
     Args:
-        duration: s; needed for a motion. model, dt, elements, save_every, profile_every: as for `simulate_drilling`.
+        duration: s; needed for a motion. model, dt, elements, save_every, profile_every: as for `simulate`.
     """
 
     duration: Time | None = None
@@ -99,7 +99,7 @@ class DrillingScene(Part):
         drive: the `TopDrive`.
         string: the `DrillString`; or discs: `Discs`.
         bit, hook, mud, drag, depth, start: as for `Drilling`. well: its hole. wall_friction: its friction.
-        simulate: arguments of `simulate_drilling`. stability: a map of stability, or None.
+        simulate: arguments of `simulate`. stability: a map of stability, or None.
         title: for tables and charts.
 
     Attributes:
@@ -149,7 +149,7 @@ class DrillingScene(Part):
 
     @property
     def settings(self) -> dict[str, Any]:
-        """Arguments of `simulate_drilling`."""
+        """Arguments of `simulate`."""
         given = self.simulate.arguments() if self.simulate else {}
         return {name: value for name, value in given.items() if value is not None}
 
@@ -164,15 +164,15 @@ class DrillingScene(Part):
         return self.stability.weights or () if self.stability else ()
 
     def run(self, **changed) -> DrillingHistory:
-        """The motion by `simulate_drilling`; `changed`: arguments other than in the file.
+        """The motion by `simulate`; `changed`: arguments other than in the file.
 
         Raises:
-            SceneError: no duration; see `simulate_drilling`, whose other exceptions it raises too.
+            SceneError: no duration; see `simulate`, whose other exceptions it raises too.
         """
         given = {**self.settings, **changed}
         if given.get("duration") is None:
             raise SceneError("simulate.duration = None: expected a positive number (s), in [simulate]")
-        return simulate_drilling(self.scene, **given)
+        return simulate(self.scene, **given)
 
     def map(self) -> Stability | None:
         """The growth of every mode at the speeds and weights of the file, see `stability`; None where it asks for none.

@@ -78,7 +78,7 @@ class SampledControl(DriveControl):
     """Base of controls of your own that are called once a sample: I om' = T - M, with a torque T that stays in between.
 
     Derive a frozen dataclass from it, and write `torque`. Samples take whole steps. Such controls act in
-    `simulate_drilling`; where a scene has other uses for the drive, such as `stability`, they are refused, unless the
+    `simulate`; where a scene has other uses for the drive, such as `stability`, they are refused, unless the
     class has a method `gains` with the control of continuous time which it stands for.
 
     Attributes:
@@ -98,7 +98,7 @@ class SampledControl(DriveControl):
     def gains(self, impedance):
         """See `DriveControl`: refused."""
         refuse("TopDrive", "control", self, "Stiff(), PI(Kp, Ki), Matched() or Motor(torque) here: a control that is "
-               f"called once a sample acts in simulate_drilling, unless {type(self).__name__} has gains")  # fmt: skip
+               f"called once a sample acts in drilling.simulate, unless {type(self).__name__} has gains")  # fmt: skip
 
     def check(self, drive):
         """See `DriveControl`."""

@@ -12,7 +12,6 @@ from cosserat_fenicsx.algebra.building import module
 from cosserat_fenicsx.algebra.newton import WORDS, Solved
 from cosserat_fenicsx.dynamics.start import drive
 
-
 # The error estimate takes four states, so many steps apart: this averages out unresolved, small vibrations.
 _STRIDE = 8
 #: Weight of rotations (rad) in error norms, relative to positions over the unit of length.

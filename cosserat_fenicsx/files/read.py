@@ -45,7 +45,7 @@ def read(file: File, scene: Any = None) -> Any:
     """What a scene file describes (rods, a string in a well, a drill-string in motion), or what a folder holds so far.
 
     Args:
-        file: path of a TOML file, see the head of this module; or the `folder` of `simulate`, `simulate_drilling` or
+        file: path of a TOML file, see the head of this module; or the `folder` of `simulate` or
             `depth_sweep`, which another process may still be writing to.
         scene: of a folder whose scene cannot be stored as data, see `resume`; else None.
 

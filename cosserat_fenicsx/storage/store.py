@@ -619,7 +619,7 @@ def resume(
     A study goes on by the same call that began it: its folder does not hold the task.
 
     Args:
-        folder: its name, the `folder` of `simulate`, `simulate_drilling` or `depth_sweep`.
+        folder: its name, the `folder` of `simulate` or `depth_sweep`.
         scene: the `Scene` or `Drilling` of the motion; it is compared with the mark in the folder. None for the scene
             stored in the folder, which is missing where a part of it is a function written in Python or of a class of
             your own. It is stored as data, so that a folder cannot run code.

@@ -1,4 +1,4 @@
-"""`simulate_drilling`: a drill-string in motion; it is read from its folder, and gone on with."""
+"""A drill-string in motion, `drilling.simulate`; it is read from its folder, and gone on with."""
 
 import math
 import numbers
@@ -24,14 +24,14 @@ _ROUNDING = 1e-9
 # part of the angle between two blades or lobes.
 _TURN, _FASTER, _OF_BLADES = 1.0, 3.0, 0.25
 KIND = Kind(
-    what="motion of a drill-string", home="drilling.simulate", call="simulate_drilling",
+    what="motion of a drill-string", home="drilling.motion", call="drilling.simulate",
     again="cosserat_fenicsx.resume('{place}'), or `cosserat resume {place}`, continues it",
     differs="the scene is not the one of the motion", tables=("series", "profiles"), starts=True, rounding=1e-9,
     scene=Drilling,
 )  # fmt: skip
 
 
-def simulate_drilling(
+def simulate(
     scene: Drilling,
     duration: float,
     *,
@@ -72,7 +72,7 @@ def simulate_drilling(
         Interrupted: Ctrl-C; `.path` holds the history up to there.
         NotStored: the folder can no longer be written to.
     """
-    instance("simulate_drilling", "scene", scene, Drilling, "a Drilling")
+    instance("simulate", "scene", scene, Drilling, "a Drilling")
     check_arguments(scene, duration, dt, elements, save_every, profile_every)
     name, why = chosen(scene, model)
     running = model_of(scene, name, dt, elements)
@@ -134,7 +134,7 @@ def _running(store, scene):
         if not same:
             raise SceneError(
                 f"{store.place}: the {name} of its motion is another one than that of this release: expected a "
-                "new motion by simulate_drilling"
+                "new motion by drilling.simulate"
             )
     return running
 
@@ -178,7 +178,7 @@ def check_arguments(scene, duration, dt=None, elements=None, save_every=None, pr
     Raises:
         SceneError: naming the argument.
     """
-    where = "simulate_drilling"
+    where = "simulate"
     _seconds(where, "duration", duration)
     for name, value in (("dt", dt), ("save_every", save_every), ("profile_every", profile_every)):
         if value is not None and _seconds(where, name, value) > duration:
@@ -202,7 +202,7 @@ def check_step(scene, dt, duration, save_every=None):
     Raises:
         SceneError: naming the step and what it may be.
     """
-    where, speed = "simulate_drilling", fastest(scene, duration)
+    where, speed = "simulate", fastest(scene, duration)
     if duration / dt > MOST_STEPS:
         refuse(where, "duration", duration, f"at most {MOST_STEPS:g} steps of {dt:g} s, {MOST_STEPS * dt:g} s")
     if duration / max(dt, save_every or 0.0) > MOST_ROWS:
