@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 from cosserat_fenicsx.interrupts import obey
 from cosserat_fenicsx.statics.path.events import UNEXPLAINED, Lost
-from cosserat_fenicsx.statics.path.track import LIMITS, bends, step_control, through
+from cosserat_fenicsx.statics.path.track import LIMITS, bends, between, lagrange, step_control, through
 
 
 @dataclass(frozen=True)
@@ -162,12 +162,12 @@ class ArcLength:
         self._weigh(slope)
         if len(track.history) == 1:  # towards the load factor
             change = self.control.first or abs(load_factor - here.load_factor) / 10 or 0.1
-            self._step = self._scale = change * math.sqrt(track.product(slope, slope) + self._weight)
-            track.set_tangent(here, slope, 0 * slope, math.copysign(1.0, load_factor - here.load_factor), self._weight)
+            self._step = self._scale = change * track.length((slope, 1.0), self._weight)
+            towards = 0 * slope, math.copysign(1.0, load_factor - here.load_factor)
+            track.set_tangent(here, slope, towards, self._weight)
             return
         before = track.history[-2]
-        moved, change = here.numbers[0] - before.numbers[0], here.load_factor - before.load_factor
-        track.set_tangent(here, slope, moved, change, self._weight)
+        track.set_tangent(here, slope, between(before, here), self._weight)
         last = self._length(before, here)
         self._scale = self._length(track.origin, here) or last
         self._step = min(max(last, _STEPS.first * self._scale), 0.1 * self._scale)
@@ -177,16 +177,14 @@ class ArcLength:
         track = self.track
         here = track.here
         self._weigh(slope)
-        moved, change = first.numbers[0] - here.numbers[0], first.load_factor - here.load_factor
-        track.set_tangent(first, slope, moved, change, self._weight)
+        track.set_tangent(first, slope, between(here, first), self._weight)
         here.rise = 0.0
         self._step = self._scale = self._length(here, first)
 
     def _weigh(self, slope):
         """Choose the weight of the load factor in the metric."""
         track = self.track
-        moved = track.here.numbers[0] - track.origin.numbers[0]
-        change = track.here.load_factor - track.origin.load_factor
+        moved, change = between(track.origin, track.here)
         local = track.square(slope)
         self._weight = min(local, track.square(moved) / change**2) if change else local
         self._weight = self._weight or 1.0
@@ -215,27 +213,23 @@ class ArcLength:
         state under the same load factor, with as many negative modes.
         """
         track, w = self.track, self._weight
-        chord, change = b.numbers[0] - a.numbers[0], b.load_factor - a.load_factor
-        moved, gain = place.numbers[0] - a.numbers[0], place.load_factor - a.load_factor
-        size = track.product(chord, chord) + w * change**2
-        onward = track.product(place.along, chord) + w * place.rise * change
+        chord, tangent = between(a, b), (place.along, place.rise)
+        onward = track.dot(tangent, chord, w)
         if onward <= 0 or self._share(place, a, b) is None:
             return False
-        share = (track.product(place.along, moved) + w * place.rise * gain) / onward  # in the plane of the place
+        share = track.dot(tangent, between(a, place), w) / onward  # in the plane of the place
         guess = [u + share * (v - u) for u, v in zip(a.numbers, b.numbers, strict=True)]
-        solved = track.on_plane(guess, a.load_factor + share * change, place.along, w * place.rise)
-        off, gap = track.problem.numbers()[0] - place.numbers[0], track.problem.load_factor - place.load_factor
-        same = solved.converged and track.product(off, off) + w * gap**2 <= (_STEPS.same**2) * size
+        solved = track.on_plane(guess, a.load_factor + share * chord[1], place.along, w * place.rise)
+        off = track.problem.numbers()[0] - place.numbers[0], track.problem.load_factor - place.load_factor
+        same = solved.converged and track.length(off, w) <= _STEPS.same * track.length(chord, w)
         return same and track.point(solved).negative_modes == place.negative_modes
 
     def _share(self, place, a, b):
         """The share of the step from a to b after which it passes beside an earlier point; None where it does not."""
         track, w = self.track, self._weight
-        chord, change = b.numbers[0] - a.numbers[0], b.load_factor - a.load_factor
-        moved, gain = place.numbers[0] - a.numbers[0], place.load_factor - a.load_factor
-        size = track.product(chord, chord) + w * change**2
-        along = track.product(moved, chord) + w * gain * change
-        beside = track.product(moved, moved) + w * gain**2 - along**2 / size
+        chord, moved = between(a, b), between(a, place)
+        size, along = track.dot(chord, chord, w), track.dot(moved, chord, w)
+        beside = track.dot(moved, moved, w) - along**2 / size
         return along / size if 0 <= along < size and beside < (_STEPS.beside**2) * size else None
 
     def _again(self, limit, other):
@@ -246,8 +240,7 @@ class ArcLength:
         return near and apart <= _STEPS.met**0.5 and track.product(limit.direction, other.direction) > 0
 
     def _length(self, a, b):
-        moved, change = b.numbers[0] - a.numbers[0], b.load_factor - a.load_factor
-        return math.sqrt(self.track.product(moved, moved) + self._weight * change**2)
+        return self.track.length(between(a, b), self._weight)
 
     def _predict(self, step):
         """Predictor (numbers, load factor) at the arc length `step` from the last point.
@@ -261,9 +254,8 @@ class ArcLength:
         numbers, _ = through(history, [*places, 0.0], step)
         numbers[0] = here.numbers[0] + step * here.along
         load_factor = here.load_factor + step * here.rise
-        for i, (place, point) in enumerate(zip(places, history, strict=False)):
-            weight = (step / place) ** 2
-            weight *= math.prod((step - other) / (place - other) for j, other in enumerate(places) if j != i)
+        for weight, place, point in zip(lagrange(places, step), places, history, strict=False):
+            weight *= (step / place) ** 2
             numbers[0] += weight * (point.numbers[0] - here.numbers[0] - place * here.along)
             load_factor += weight * (point.load_factor - here.load_factor - place * here.rise)
         return numbers, load_factor
@@ -279,25 +271,22 @@ class ArcLength:
         if bound and abs(load_factor - here.load_factor) > bound:
             self._step *= 0.9 * bound / abs(load_factor - here.load_factor)
             predicted, load_factor = self._predict(self._step)
-        increment = predicted[0] - here.numbers[0]
-        change = load_factor - here.load_factor
-        length = math.sqrt(track.product(increment, increment) + self._weight * change**2)
-        solved = track.on_plane(predicted, load_factor, increment, self._weight * change)
+        increment = predicted[0] - here.numbers[0], load_factor - here.load_factor
+        length = track.length(increment, self._weight)
+        solved = track.on_plane(predicted, load_factor, increment[0], self._weight * increment[1])
         if not solved.converged:
             return self._shorten()
         numbers, found = track.problem.numbers(), track.problem.load_factor
         if bound and abs(found - here.load_factor) > bound:
             return self._shorten(0.9 * bound / abs(found - here.load_factor))
         off = track.distance(numbers, predicted)
-        correction = numbers[0] - predicted[0]
-        bend = math.sqrt(track.product(correction, correction) + self._weight * (found - load_factor) ** 2) / length
+        bend = track.length((numbers[0] - predicted[0], found - load_factor), self._weight) / length
         order = len(track.history) + 1
         if off > LIMITS.far or bend > _STEPS.bend:
             track.failure = "the path bends too sharply"
             return self._shorten()
         point = track.point(solved)
-        moved, change = numbers[0] - here.numbers[0], found - here.load_factor
-        track.set_tangent(point, track.slope_found(), moved, change, self._weight)
+        track.set_tangent(point, track.slope_found(), between(here, point), self._weight)
         if not bends(track, here, point, self._weight).resolved:
             track.failure = "the path bends too sharply"
             return self._shorten()

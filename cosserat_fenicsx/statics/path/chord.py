@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cosserat_fenicsx.statics.path.track import bends, through
+from cosserat_fenicsx.statics.path.track import bends, between, lagrange, through
 
 
 @dataclass(frozen=True)
@@ -73,22 +73,19 @@ class Chord:
     def __init__(self, track, a, b, weight, *, short=False):
         self.track, self._weight, self._short = track, weight, short
         self.known = [(0.0, a), (1.0, b)]
-        self.normal, self.change = b.numbers[0] - a.numbers[0], b.load_factor - a.load_factor
-        self.length = math.sqrt(track.product(self.normal, self.normal) + weight * self.change**2)
+        self._step = self.normal, self.change = between(a, b)
+        self.length = track.length(self._step, weight)
         self._before = {}
         if len(track.history) > 1:  # the point before a, for the curvature
             point = track.history[-2]
-            moved, change = point.numbers[0] - a.numbers[0], point.load_factor - a.load_factor
-            place = (track.product(moved, self.normal) + weight * change * self.change) / (
-                track.product(self.normal, self.normal) + weight * self.change**2
-            )
+            place = track.dot(between(a, point), self._step, weight) / self.length**2
             if -5 < place < -0.2:
                 self._before = {place: point}
 
     @classmethod
     def balanced(cls, track, a, b):
         """A `Chord` with the weight that gives the unknowns and the load factor equal shares in its length."""
-        moved, change = b.numbers[0] - a.numbers[0], b.load_factor - a.load_factor
+        moved, change = between(a, b)
         return cls(track, a, b, (track.square(moved) / change**2 if change else 0.0) or 1.0)
 
     def _near(self, place):
@@ -105,8 +102,7 @@ class Chord:
     def load_factor(self, place):
         """The load factor of `guess` alone."""
         places, points = self._near(place)
-        weights = [math.prod((place - b) / (a - b) for b in places if b != a) for a in places]
-        return float(np.dot(weights, [point.load_factor for point in points]))
+        return float(np.dot(lagrange(places, place), [point.load_factor for point in points]))
 
     def at(self, place):
         """(coordinate, `PathPoint`) of the path at or close to a coordinate; None where Newton's method fails.
@@ -126,7 +122,7 @@ class Chord:
             return None
         slope = track.slope_found()
         point = track.point(solved)
-        track.set_tangent(point, slope, self.normal, self.change, self._weight)
+        track.set_tangent(point, slope, self._step, self._weight)
         self.known = sorted([*self.known, (place, point)], key=lambda item: item[0])
         return point
 
@@ -257,9 +253,4 @@ def zero_of(function, low, high):
 
 def _zero(places, values, low, high):
     """The root in [low, high] of the polynomial through values at coordinates."""
-
-    def polynomial(at):
-        return float(sum(v * math.prod((at - b) / (a - b) for b in places if b != a)
-                         for a, v in zip(places, values, strict=True)))  # fmt: skip
-
-    return zero_of(polynomial, low, high)
+    return zero_of(lambda at: float(np.dot(lagrange(places, at), values)), low, high)

@@ -271,7 +271,7 @@ class Tracing:
                 else:
                     still = k in (0, last) or not track.square(normal)
                     point = self._found(*guesses[k], normal, weight * change, coarse._records[k].neutral, at_load=still)
-                track.set_tangent(point, track.slope(), normal, change, weight)
+                track.set_tangent(point, track.slope(), (normal, change), weight)
                 if before is not None and k > left + 1:  # nothing changes sign in the step onto a branch
                     self._meet_between(before, point, weight)
                 track.keep(point)

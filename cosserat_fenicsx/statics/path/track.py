@@ -168,17 +168,11 @@ class Track:
         point.logarithm = self.stability.logarithm
         return point
 
-    def set_tangent(self, point, slope, moved, change, weight):
-        """Set the unit tangent (`along`, `rise`) of a point from dx/d eta, oriented along an increment of the path.
-
-        Args:
-            point: a `PathPoint`.
-            slope: dx/d eta there.
-            moved, change: increments of the unknowns and of the load factor.
-            weight: of the load factor in the metric.
-        """
-        along = self.product(slope, moved) + weight * change
-        size = math.sqrt(self.product(slope, slope) + weight)
+    def set_tangent(self, point, slope, step, weight):
+        """Set the unit tangent (`along`, `rise`) of a `PathPoint` from dx/d eta there, oriented along a step (dx, d eta)
+        of the path; weight: see `dot`."""
+        onward = slope, 1.0
+        along, size = self.dot(onward, step, weight), math.sqrt(self.dot(onward, onward, weight))
         point.rise = math.copysign(1.0, along) / size
         point.along = point.rise * slope
 
@@ -244,6 +238,24 @@ class Track:
         """Inner product of two changes of the unknowns (owned entries), over all ranks."""
         return self.model.inner(a, b)
 
+    def dot(self, a, b, weight):
+        """Inner product of two steps (dx, d eta) in the metric of arc length; weight: of the load factor."""
+        return self.product(a[0], b[0]) + weight * a[1] * b[1]
+
+    def length(self, step, weight):
+        """The length of a step, see `dot`."""
+        return math.sqrt(self.dot(step, step, weight))
+
+
+def between(a, b):
+    """The step (dx, d eta) from a `PathPoint` to another one."""
+    return b.numbers[0] - a.numbers[0], b.load_factor - a.load_factor
+
+
+def lagrange(places, at):
+    """Lagrange's weights of values at different places for the value of their polynomial at another one."""
+    return [math.prod([(at - b) / (a - b) for b in places if b != a]) for a in places]
+
 
 def through(points, places, at):
     """Lagrange interpolation of points of a path.
@@ -256,13 +268,7 @@ def through(points, places, at):
     Returns:
         (numbers, load factor).
     """
-    weights = []  # Lagrange's
-    for a in places:
-        weight = 1.0
-        for b in places:
-            if b != a:
-                weight *= (at - b) / (a - b)
-        weights.append(weight)
+    weights = lagrange(places, at)
     numbers = [weights[0] * values for values in points[0].numbers]
     for weight, point in zip(weights[1:], points[1:], strict=True):
         for total, values in zip(numbers, point.numbers, strict=True):
@@ -297,15 +303,12 @@ class Bends:
 def bends(track, a, b, weight):
     """The `Bends` of a step between two points with tangents; weight: of the load factor in the metric."""
 
-    def product(u, v):
-        return track.product(u[0], v[0]) + weight * u[1] * v[1]
-
     def cosine(u, v):
-        return product(u, v) / math.sqrt(product(u, u) * product(v, v))
+        return track.dot(u, v, weight) / math.sqrt(track.dot(u, u, weight) * track.dot(v, v, weight))
 
-    chord = b.numbers[0] - a.numbers[0], b.load_factor - a.load_factor
+    chord = between(a, b)
     begin, end = (a.along, a.rise), (b.along, b.rise)
     turn = math.acos(min(max(cosine(begin, end), -1.0), 1.0))
     mean = math.sqrt(max(2 + 2 * math.cos(turn), 1e-30))
     along = (cosine(begin, chord) + cosine(end, chord)) / mean
-    return Bends(turn, math.sqrt(max(2 - 2 * along, 0.0)), math.sqrt(product(chord, chord)))
+    return Bends(turn, math.sqrt(max(2 - 2 * along, 0.0)), track.length(chord, weight))
