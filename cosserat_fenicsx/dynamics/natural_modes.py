@@ -25,8 +25,7 @@ from cosserat_fenicsx.scene.scene import Scene, check_magnitudes
 from cosserat_fenicsx.scene.statical import without_mechanism
 from cosserat_fenicsx.statics.circulatory import circulatory_part
 from cosserat_fenicsx.statics.meshes import FIRST_ELEMENTS, layers_of, until_two_meshes_agree
-from cosserat_fenicsx.statics.path.follower import Follower
-from cosserat_fenicsx.statics.path.load_control import StepControl
+from cosserat_fenicsx.statics.path.follower import standing
 from cosserat_fenicsx.statics.problem import solvers_of
 from cosserat_fenicsx.statics.solve import check_arguments
 from cosserat_fenicsx.statics.stability import shapes_of
@@ -165,9 +164,7 @@ def _loaded(scene, layout, load_factor, degree, comm):
     held = without_mechanism(scene) if loaded else scene
     with solvers_of(held, layout, degree=degree, comm=comm) as (problem, newton, stability):
         if loaded:
-            follower = Follower(problem, newton, stability, StepControl(), control="load")
-            if not follower.to(load_factor, abs(load_factor) or 1.0):
-                _give_up(load_factor, follower.track.failure)
+            standing(problem, newton, stability, load_factor)
         if held is scene:
             yield problem, stability
             return
@@ -180,12 +177,11 @@ def _loaded(scene, layout, load_factor, degree, comm):
         newton.allow(_CORRECTIONS)
         solved = newton.solve()
         if not solved.converged:
-            _give_up(load_factor, f"{solved.reason} next to the reference, where the scene is a mechanism")
+            raise NotConverged(
+                f"no equilibrium was found at the load factor {load_factor:g}: {solved.reason} next to the reference, "
+                "where the scene is a mechanism"
+            )
         yield problem, stability
-
-
-def _give_up(load_factor, why):
-    raise NotConverged(f"no equilibrium was found at the load factor {load_factor:g}: {why}")
 
 
 def _stiffness(problem):

@@ -32,6 +32,12 @@ class Sensitivity(Mapping):
     quantity: str = "value"
     unit: str = ""
 
+    @classmethod
+    def by(cls, parameters, value, derivatives, error, quantity="value"):
+        """Of `Parameter`s of a scene, which tell their values and units."""
+        values, units = ({x.name: getattr(x, what) for x in parameters} for what in ("value", "unit"))
+        return cls(value, derivatives, error, values, units, quantity)
+
     def __getitem__(self, name):
         if name not in self.derivatives:
             raise SceneError(f"no derivative by '{name}': {nearest(name, self.derivatives)}")

@@ -29,11 +29,9 @@ from cosserat_fenicsx.models.data_derivative import EnergyOfMotion, made_once
 from cosserat_fenicsx.numerics import PLACES, derivative
 from cosserat_fenicsx.results.records import Event
 from cosserat_fenicsx.results.sensitivity import Sensitivity, called
-from cosserat_fenicsx.scene.parameters import parameter_of
-from cosserat_fenicsx.statics.path.follower import Follower
+from cosserat_fenicsx.statics.path.follower import Follower, standing
 from cosserat_fenicsx.statics.path.load_control import StepControl
-from cosserat_fenicsx.statics.problem import solvers_of
-from cosserat_fenicsx.statics.sensitivity import Direct, check_scene, scenes_near, sensitivity
+from cosserat_fenicsx.statics.sensitivity import Direct, parameters_of, sensitivity
 
 # Load factors are equal that differ by less, relative; derivatives of equal ones, likewise, with rounding.
 _EQUAL, _PAIRED = 1e-5, 1e-5
@@ -46,39 +44,20 @@ def critical_sensitivity(buckling, parameters):
     if not len(buckling) or not buckling.conservative:
         why = "the loads have no potential" if not buckling.conservative else "there is no critical load factor"
         raise SceneError(f"sensitivity: {why}: expected a Buckling with load factors, of loads that have a potential")
-    parameters = [parameters] if isinstance(parameters, str) else list(parameters)
     scene, layout, at = buckling.scene, buckling.equilibrium.layout, buckling.load_factor
-    check_scene(scene, critical=True)
-    found = [parameter_of(scene, given) for given in parameters]
-    scenes = [scenes_near(scene, parameter) for parameter in found]
-    with (
-        solvers_of(scene, layout, degree=buckling.degree, comm=buckling.comm) as solvers,
-        Direct(*solvers, scene, layout) as direct,
-    ):
-        direct.check(scenes, found)
-        direct.points = [_state(direct, at)]
+    found = parameters_of(scene, parameters, critical=True)
+    with Direct.on(scene, layout, found, degree=buckling.degree, comm=buckling.comm) as direct:
+        direct.points = [(at, standing(*direct.solvers, at).problem.numbers(), None)]
         modes, pairs = _buckling_modes(buckling, direct.model.scales.length)
         quotient = _Quotient(direct, modes, buckling.load_factors[0] - at)
         derivatives, errors = {}, {}
-        for parameter, rates in zip(found, direct.rates(scenes, found), strict=True):
+        for parameter, rates in zip(found, direct.rates(), strict=True):
             relative, error = _relative(direct, quotient, parameter, rates)
             _check_pairs(buckling, parameter, relative, pairs)
             critical = buckling.load_factors - at
             derivatives[parameter.name] = critical * relative[: len(critical)]
             errors[parameter.name] = critical * error[: len(critical)]
-    return Sensitivity(
-        buckling.load_factors, derivatives, errors, {x.name: x.value for x in found}, {x.name: x.unit for x in found},
-        "load factor",
-    )  # fmt: skip
-
-
-def _state(direct, load_factor):
-    """(load factor, numbers, None) of the state that modes belong to."""
-    follower = Follower(direct.problem, direct.newton, direct.stability, StepControl(), control="load")
-    follower.begin()
-    if load_factor and not follower.to(load_factor, abs(load_factor)):
-        raise NotConverged(f"no equilibrium was found at the load factor {load_factor:g}: {follower.track.failure}")
-    return load_factor, direct.problem.numbers(), None
+    return Sensitivity.by(found, buckling.load_factors, derivatives, errors, "load factor")
 
 
 def _buckling_modes(buckling, length):
@@ -195,28 +174,17 @@ def _of_event(path, event, parameters):
         raise SceneError("sensitivity: the event is none of this path's: expected one of path.events")
     if event.kind == "bifurcation" and not path.conservative:
         raise SceneError("sensitivity: the loads have no potential, so that an energy does not tell of bifurcations")
-    check_scene(path.scene, critical=True)
-    parameters = [parameters] if isinstance(parameters, str) else list(parameters)
-    found = [parameter_of(path.scene, given) for given in parameters]
-    scenes = [scenes_near(path.scene, parameter) for parameter in found]
-    with solvers_of(
-        path.scene, path.layout, formulation=path.formulation, degree=path.degree, points=len(path.rule.gauss),
-        comm=path.comm, model=path.model,
-    ) as solvers:  # fmt: skip
-        with Direct(*solvers, path.scene, path.layout) as direct:
-            direct.check(scenes, found)
-            track, crossing, before = _located(direct, path, event)
-            direct.points = _beside(direct, track, crossing, before)
-            of = _of_limit if event.kind == "limit" else _of_bifurcation
-            rates, errors = of(direct, crossing, found, direct.rates(scenes, found))
-    return Sensitivity(
-        np.asarray(event.load_factor), _named(found, rates), _named(found, errors), {x.name: x.value for x in found},
-        {x.name: x.unit for x in found}, f"load factor of the {event.kind}",
-    )  # fmt: skip
-
-
-def _named(parameters, values):
-    return {x.name: np.asarray(value) for x, value in zip(parameters, values, strict=True)}
+    found = parameters_of(path.scene, parameters, critical=True)
+    with Direct.along(path, found) as direct:
+        track, crossing, before = _located(direct, path, event)
+        direct.points = _beside(direct, track, crossing, before)
+        of = _of_limit if event.kind == "limit" else _of_bifurcation
+        derivatives, errors = (
+            {x.name: np.asarray(value) for x, value in zip(found, values, strict=True)}
+            for values in of(direct, crossing, found, direct.rates())
+        )
+    value, quantity = np.asarray(event.load_factor), f"load factor of the {event.kind}"
+    return Sensitivity.by(found, value, derivatives, errors, quantity)
 
 
 class _Met(Exception):

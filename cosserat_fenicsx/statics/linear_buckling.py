@@ -20,8 +20,7 @@ from cosserat_fenicsx.scene.scene import Scene, check_magnitudes
 from cosserat_fenicsx.statics.circulatory import circulatory_part, static_bifurcations
 from cosserat_fenicsx.statics.critical import Energies, critical_sensitivity
 from cosserat_fenicsx.statics.meshes import FIRST_ELEMENTS, layers_of, until_two_meshes_agree
-from cosserat_fenicsx.statics.path.follower import Follower
-from cosserat_fenicsx.statics.path.load_control import StepControl
+from cosserat_fenicsx.statics.path.follower import standing
 from cosserat_fenicsx.statics.problem import solvers_of
 from cosserat_fenicsx.statics.solve import check_arguments
 from cosserat_fenicsx.statics.stability import shapes_of
@@ -151,15 +150,11 @@ def _critical(scene, layout, count, load_factor, tol, degree, comm):
 def _critical_by(problem, newton, stability, circulatory, count, load_factor, tol):
     model = problem.model
     at_rest = problem.numbers()
-    follower = Follower(problem, newton, stability, StepControl(), control="load")
-    track = follower.track
-    follower.begin()
-    if not load_factor and not has_permanent(model.scene):
+    track, loaded = standing(problem, newton, stability, load_factor), load_factor or has_permanent(model.scene)
+    if not loaded:
         _stay_at(track, at_rest)
-    if load_factor and not follower.to(load_factor, abs(load_factor)):
-        raise NotConverged(f"no equilibrium was found at the load factor {load_factor:g}: {track.failure}")
     here = track.here
-    layers = layers_of(model) if load_factor or has_permanent(model.scene) else None
+    layers = layers_of(model) if loaded else None
     if here.negative_modes:
         raise NotConverged(f"the structure is unstable at the load factor {load_factor:g}: expected a stable state")
     conservative = circulatory.vanishes(model.snapshot()[0], load_factor or 1.0)

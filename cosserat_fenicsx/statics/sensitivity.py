@@ -39,21 +39,19 @@ _AHEAD, _FOLLOWED, _SETTLED = 1e-5, 50, 1e-7
 
 def sensitivity(path, query, parameters):
     """Derivatives of a query of a path by numbers of its scene; see `Path.sensitivity`."""
-    if isinstance(parameters, str) or not hasattr(parameters, "__iter__"):
-        parameters = [parameters]
-    found = [parameter_of(path.scene, given) for given in parameters]
     if not callable(query):
         raise SceneError(f"query = {query!r}: expected a function of the path, lambda path: path.position('rod.end')")
     if not len(path):
         raise SceneError("sensitivity: the path has no converged point to differentiate at: expected at least one")
-    check_scene(path.scene)
+    found = parameters_of(path.scene, parameters)
     value, derivatives, errors = _numbers(query(path)), {}, {}
-    with directly(path, found) as (direct, rates):
-        for parameter, rate in zip(found, rates, strict=True):
+    with Direct.along(path, found) as direct:
+        direct.find(path)
+        for parameter, rate in zip(found, direct.rates(), strict=True):
             step, paths = direct.paths(path, parameter, rate)
             values = [_numbers(query(each)) for each in paths]
             derivatives[parameter.name], errors[parameter.name] = derivative(values, step)
-    return Sensitivity(value, derivatives, errors, {x.name: x.value for x in found}, {x.name: x.unit for x in found})
+    return Sensitivity.by(found, value, derivatives, errors)
 
 
 def _numbers(value):
@@ -64,8 +62,17 @@ def _numbers(value):
         raise SceneError(f"query returns a {kind}: expected a number or an array, such as one of its parts") from None
 
 
-def check_scene(scene, critical=False):
-    """Refuse loads whose derivatives are not known; critical: those of critical loads."""
+def parameters_of(scene, given, critical=False):
+    """The `Parameter`s of a scene from one or several names or parameters.
+
+    Args:
+        critical: whether critical loads are differentiated by them.
+
+    Raises:
+        SceneError: no such parameter, or loads whose derivatives are not known.
+    """
+    given = [given] if isinstance(given, str) or not hasattr(given, "__iter__") else given
+    found = [parameter_of(scene, each) for each in given]
     if path_dependent(scene):
         raise SceneError("sensitivity: a load of the scene has memory: expected loads that depend on the state alone")
     for load in scene.actions:
@@ -74,26 +81,10 @@ def check_scene(scene, critical=False):
                 f"sensitivity: derivatives of critical loads are not known with a {type(load).__name__}, whose data "
                 "turn with the position: expected other loads, such as a Wall or a Foundation"
             )
+    return found
 
 
-@contextlib.contextmanager
-def directly(path, parameters):
-    """Context manager that gives the `Direct` of a path and, for each parameter, the rates of its points."""
-    scenes = [scenes_near(path.scene, parameter) for parameter in parameters]
-    model = path.model
-    if model != "spatial" and path.scene.plane is not None and not all(map(_same_plane(path), sum(scenes, []))):
-        model = "spatial"
-    with solvers_of(
-        path.scene, path.layout, formulation=path.formulation, degree=path.degree, points=len(path.rule.gauss),
-        comm=path.comm, model=model,
-    ) as solvers:  # fmt: skip
-        with Direct(*solvers, path.scene, path.layout) as direct:
-            direct.check(scenes, parameters)
-            direct.find(path)
-            yield direct, direct.rates(scenes, parameters)
-
-
-def scenes_near(scene, parameter):
+def _scenes_near(scene, parameter):
     """The scenes with the parameter at `PLACES` times its step from its value."""
     try:
         found = [parameter.scene_of(parameter.value + k * STEP * parameter.size) for k in PLACES]
@@ -119,25 +110,47 @@ class Direct:
     Args:
         problem, newton, stability: see `solvers_of`, loaded with the scene.
         scene, layout: these.
+        parameters: the `Parameter`s; scenes: for each the scenes near by, see `_scenes_near`.
 
     Attributes:
         points: [(load factor, numbers, `Record`)] of the states where derivatives are taken.
     """
 
-    def __init__(self, problem, newton, stability, scene, layout):
-        self.problem, self.newton, self.stability = self.solvers = problem, newton, stability
-        self.model, self._scene, self._layout = problem.model, scene, layout
+    def __init__(self, solvers, scene, layout, parameters, scenes):
+        self.problem, self.newton, self.stability = self.solvers = solvers
+        self.model, self._scene, self._layout = self.problem.model, scene, layout
+        self._parameters, self._scenes = parameters, scenes
         self._by_data = made_once(self.model, "data_derivative", DataDerivative)
         self._refreshes = bool(self.model.actions.refreshed)
         self.points = []
 
-    def __enter__(self):
-        self.model.EI = self.model.scales.moment * self.model.scales.length  # so that units depend on no parameter
-        return self
+    @classmethod
+    @contextlib.contextmanager
+    def on(cls, scene, layout, parameters, scenes=None, **options):
+        """Context manager that gives the `Direct` of a scene on a mesh; options: see `solvers_of`."""
+        scenes = scenes or [_scenes_near(scene, parameter) for parameter in parameters]
+        with solvers_of(scene, layout, **options) as solvers:
+            direct, model = cls(solvers, scene, layout, parameters, scenes), solvers[0].model
+            model.EI = model.scales.moment * model.scales.length  # so that units depend on no parameter
+            try:
+                direct.check()
+                yield direct
+            finally:
+                model.EI = None
+                direct.problem.forget()
 
-    def __exit__(self, *failure):
-        self.model.EI = None
-        self.problem.forget()
+    @classmethod
+    def along(cls, path, parameters):
+        """Context manager that gives the `Direct` of a path's mesh and model, in space where parameters move its
+        plane."""
+        scenes = [_scenes_near(path.scene, parameter) for parameter in parameters]
+        model = path.model
+        if model != "spatial" and path.scene.plane is not None and not all(map(_same_plane(path), sum(scenes, []))):
+            model = "spatial"
+        return cls.on(
+            path.scene, path.layout, parameters, scenes, formulation=path.formulation, degree=path.degree,
+            points=len(path.rule.gauss), comm=path.comm, model=model,
+        )  # fmt: skip
 
     def find(self, path):
         """Take the points of a path, solved again to rounding."""
@@ -146,10 +159,10 @@ class Direct:
         starts = zip(path._records, self.model.unknowns_of(rq), n, strict=True)
         self.points = [self._solved(*each) for each in starts]
 
-    def check(self, scenes, parameters):
+    def check(self):
         """Refuse parameters that change what the compiled code depends on, or the proportions of the mesh."""
-        for each, parameter in zip(scenes, parameters, strict=True):
-            self._check(each, parameter)
+        for scenes, parameter in zip(self._scenes, self._parameters, strict=True):
+            self._check(scenes, parameter)
 
     def _check(self, scenes, parameter):
         signature = self.model.signature
@@ -203,20 +216,20 @@ class Direct:
 
     # -- derivatives -------------------------------------------------------------------------------------------------
 
-    def rates(self, scenes, parameters):
+    def rates(self):
         """For each parameter the derivatives of the numbers of every point (see `Problem.numbers`)."""
-        steps = [STEP * parameter.size for parameter in parameters]
-        changes = [self._data_changes(*each) for each in zip(scenes, steps, parameters, strict=True)]
+        changes = [self._data_changes(*each) for each in zip(self._scenes, self._parameters, strict=True)]
         self._load(self._scene)
-        found = [[] for _ in scenes]
+        found = [[] for _ in changes]
         for i, (load_factor, numbers, _) in enumerate(self.points):
             self.factor(load_factor, numbers)
             for rates, of_points in zip(found, changes, strict=True):
                 rates.append(self._rate(*of_points[i]))
         return found
 
-    def _data_changes(self, scenes, step, parameter):
+    def _data_changes(self, scenes, parameter):
         """For every point the derivatives of the data, and of the constraint equations' part of the residual."""
+        step = STEP * parameter.size
 
         def smooth(arrays):
             if not is_smooth(arrays, step, lambda sizes: np.max(self.model.comm.allgather(sizes), axis=0)):

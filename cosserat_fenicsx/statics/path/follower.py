@@ -7,7 +7,7 @@ from cosserat_fenicsx.errors import NotConverged
 from cosserat_fenicsx.statics.path.arclength import ArcLength
 from cosserat_fenicsx.statics.path.chord import Chord
 from cosserat_fenicsx.statics.path.events import UNEXPLAINED, Locator, Lost
-from cosserat_fenicsx.statics.path.load_control import Continuation, Sweep
+from cosserat_fenicsx.statics.path.load_control import Continuation, StepControl, Sweep
 from cosserat_fenicsx.statics.path.track import LIMITS, Track
 
 #: Control parameters of the continuation, see `solve`.
@@ -16,6 +16,19 @@ CONTROLS = ("auto", "load", "arc")
 _PATIENCE = 4
 # Largest number of halvings of the first step onto a branch.
 _TRIES = 8
+
+
+def standing(problem, newton, stability, load_factor):
+    """The `Track` of a loaded problem that load control has brought to a load factor.
+
+    Raises:
+        NotConverged: no equilibrium was found there.
+    """
+    follower = Follower(problem, newton, stability, StepControl(), control="load")
+    follower.begin()
+    if load_factor and not follower.to(load_factor, abs(load_factor)):
+        raise NotConverged(f"no equilibrium was found at the load factor {load_factor:g}: {follower.track.failure}")
+    return follower.track
 
 
 class Follower:

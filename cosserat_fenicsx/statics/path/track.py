@@ -169,8 +169,8 @@ class Track:
         return point
 
     def set_tangent(self, point, slope, step, weight):
-        """Set the unit tangent (`along`, `rise`) of a `PathPoint` from dx/d eta there, oriented along a step (dx, d eta)
-        of the path; weight: see `dot`."""
+        """Set the unit tangent (`along`, `rise`) of a `PathPoint` from dx/d eta there, oriented along a step of the
+        path, (dx, d eta); weight: see `dot`."""
         onward = slope, 1.0
         along, size = self.dot(onward, step, weight), math.sqrt(self.dot(onward, onward, weight))
         point.rise = math.copysign(1.0, along) / size
