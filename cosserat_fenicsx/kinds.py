@@ -276,14 +276,12 @@ class Number(Kind):
 
     @property
     def words(self):
-        """See `Kind`."""
         limits = self.limits
         if self.whole and not limits.what:
             limits = dataclasses.replace(limits, what="a whole number")
         return limits.words(self.unit)
 
     def check(self, owner, field, value):
-        """See `Kind`."""
         if type(value) is float and 1 / LARGEST < abs(value) < 1e5 and not self.whole and self.limits.admit(value):
             return value  # as most are; the whole check takes longer
         if self.dimension and isinstance(value, str):
@@ -295,7 +293,6 @@ class Number(Kind):
         return int(found) if self.whole else found
 
     def schema(self, definitions):
-        """See `Kind`."""
         low, high = self.limits.low, self.limits.high
         bounds = {"exclusiveMinimum" if self.limits.above else "minimum": low} if low > -math.inf else {}
         bounds |= {"maximum": high} if high < math.inf else {}
@@ -316,18 +313,15 @@ class Several(Kind):
 
     @property
     def words(self):
-        """See `Kind`."""
         unit = self.unit or Number(self.dimension).unit
         return f"{self.size} finite numbers" + (f" ({unit})" if unit else "")
 
     def check(self, owner, field, value):
-        """See `Kind`."""
         if self.dimension and isinstance(value, list | tuple) and any(isinstance(x, str) for x in value):
             value = [in_si(f"{checks.name_of(owner)}.{field}[{i}]", x, self.dimension) for i, x in enumerate(value)]
         return checks.vector(owner, field, value, self.unit or Number(self.dimension).unit or "number", self.size)
 
     def schema(self, definitions):
-        """See `Kind`."""
         item = Number(self.dimension).schema(definitions)
         return {"type": "array", "items": item, "minItems": self.size, "maxItems": self.size}
 
@@ -339,11 +333,9 @@ class Text(Kind):
     words = "a text"
 
     def check(self, owner, field, value):
-        """See `Kind`."""
         return instance(owner, field, value, str, self.words)
 
     def schema(self, definitions):
-        """See `Kind`."""
         return {"type": "string"}
 
 
@@ -354,11 +346,9 @@ class Flag(Kind):
     words = "True or False"
 
     def check(self, owner, field, value):
-        """See `Kind`."""
         return instance(owner, field, value, bool, self.words)
 
     def schema(self, definitions):
-        """See `Kind`."""
         return {"type": "boolean"}
 
 
@@ -369,15 +359,12 @@ class FileName(Kind):
     words = "the name of a file"
 
     def check(self, owner, field, value):
-        """See `Kind`."""
         return instance(owner, field, value, str | PathLike, self.words)
 
     def read(self, where, data, reading):
-        """See `Kind`."""
         return reading.folder / data if reading.folder is not None and isinstance(data, str) else data
 
     def schema(self, definitions):
-        """See `Kind`."""
         return {"type": ["string", "array"]}
 
 
@@ -389,17 +376,14 @@ class Choice(Kind):
 
     @property
     def words(self):
-        """See `Kind`."""
         return " or ".join(map(repr, self.values))
 
     def check(self, owner, field, value):
-        """See `Kind`."""
         if not isinstance(value, type(self.values[0])) or value not in self.values:
             refuse(owner, field, value, self.words)
         return value
 
     def schema(self, definitions):
-        """See `Kind`."""
         return {"enum": list(self.values)}
 
 
@@ -418,13 +402,11 @@ class Object(Kind):
 
     @property
     def words(self):
-        """See `Kind`."""
         known = [f"{name}(...)" for name in self.known()]
         *first, last = known or [f"a {cls._of}" if is_family(cls) else "an object" for cls in self.classes[:1]]
         return f"{', '.join(first)} or {last}" if first else last
 
     def check(self, owner, field, value):
-        """See `Kind`."""
         return value if isinstance(value, self.classes) else instance(owner, field, value, self.classes, self.words)
 
     @property
@@ -472,7 +454,6 @@ class Object(Kind):
         return made(cls, data, where, reading)
 
     def write(self, value, writing):
-        """See `Kind`."""
         cls = type(value)
         twice = any(cls.__name__ in getattr(known, "_twice", ()) for known in self.classes)
         if twice or not isinstance(value, self.classes) or self._find(cls.__name__) is not cls:
@@ -494,7 +475,6 @@ class Object(Kind):
         raise NotData(f"a part of the class {cls.__name__} cannot be stored as data")
 
     def schema(self, definitions):
-        """See `Kind`."""
         found, named = [], any(cls.__name__ == "Material" for cls in self.classes)
         for name, cls in self.known().items():
             if name not in definitions:
@@ -519,23 +499,18 @@ class Optional(Kind):
 
     @property
     def words(self):
-        """See `Kind`."""
         return f"{self.inner.words}, or None"
 
     def check(self, owner, field, value):
-        """See `Kind`."""
         return None if value is None else self.inner.check(owner, field, value)
 
     def read(self, where, data, reading):
-        """See `Kind`."""
         return None if data is None else self.inner.read(where, data, reading)
 
     def write(self, value, writing):
-        """See `Kind`."""
         return None if value is None else self.inner.write(value, writing)
 
     def schema(self, definitions):
-        """See `Kind`."""
         return self.inner.schema(definitions)
 
 
@@ -554,13 +529,11 @@ class Either(Kind):
 
     @property
     def words(self):
-        """See `Kind`."""
         if self.functions:
             return f"{self.inner.words}, or a function of time that gives one"
         return f"{self.inner.words}, or {self.objects.words}"
 
     def check(self, owner, field, value):
-        """See `Kind`."""
         if callable(value) or isinstance(value, self.objects.classes):
             scaled = getattr(value, "in_units", None)
             return value if scaled is None else scaled(lambda x: self.inner.check(owner, field, x))
@@ -569,15 +542,12 @@ class Either(Kind):
         return self.inner.check(owner, field, value)
 
     def read(self, where, data, reading):
-        """See `Kind`."""
         return (self.objects if isinstance(data, dict) else self.inner).read(where, data, reading)
 
     def write(self, value, writing):
-        """See `Kind`."""
         return (self.objects if isinstance(value, self.objects.classes) else self.inner).write(value, writing)
 
     def schema(self, definitions):
-        """See `Kind`."""
         return {"anyOf": [self.inner.schema(definitions), self.objects.schema(definitions)]}
 
 
@@ -589,16 +559,13 @@ class Items(Kind):
 
     @property
     def words(self):
-        """See `Kind`."""
         return f"a list, each {self.inner.words}"
 
     def check(self, owner, field, value):
-        """See `Kind`."""
         instance(owner, field, value, list | tuple | np.ndarray, self.words)
         return tuple(self.inner.check(owner, f"{field}[{i}]", x) for i, x in enumerate(value))
 
     def read(self, where, data, reading):
-        """See `Kind`."""
         if isinstance(data, dict) and isinstance(self.inner, Object):
             raise misplaced(where, f"{spoken(where)} = {data!r}: expected an array of tables, [[{spoken(where)}]]")
         if not isinstance(data, list):
@@ -606,7 +573,6 @@ class Items(Kind):
         return [self.inner.read((*where, i), x, reading) for i, x in enumerate(data)]
 
     def write(self, value, writing):
-        """See `Kind`."""
         found = []
         for i, x in enumerate(value):
             try:
@@ -616,7 +582,6 @@ class Items(Kind):
         return found
 
     def schema(self, definitions):
-        """See `Kind`."""
         return {"type": "array", "items": self.inner.schema(definitions)}
 
 
@@ -625,7 +590,6 @@ class Values(Items):
     """A list of numbers; or `count` equally spaced ones in a table of "from", "to" and "count"."""
 
     def check(self, owner, field, value):
-        """See `Kind`."""
         if isinstance(value, dict):
             where = f"{checks.name_of(owner)}.{field}"
             for key in value:
@@ -643,11 +607,9 @@ class Values(Items):
 
     @property
     def words(self):
-        """See `Kind`."""
         return f"a list, each {self.inner.words}, or {{ from = ..., to = ..., count = ... }}"
 
     def schema(self, definitions):
-        """See `Kind`."""
         ends = self.inner.schema(definitions)
         known = {"from": ends, "to": ends, "count": {"type": "integer", "minimum": 2}}
         table = {"type": "object", "properties": known, "required": list(known), "additionalProperties": False}

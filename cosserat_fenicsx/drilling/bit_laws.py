@@ -133,7 +133,6 @@ class Stribeck(BitLaw):
     radius: Length | None = None
 
     def validate(self):
-        """See `Part`."""
         if self.static < self.dynamic:
             refuse(self, "static", self.static, f"at least the dynamic one, {self.dynamic:g}")
 
@@ -143,12 +142,10 @@ class Stribeck(BitLaw):
         return self.radius is not None
 
     def torque(self, speed: float, weight: float) -> float:
-        """See `BitLaw`."""
         law = self.resistance(weight)
         return float(law(speed)) if speed > 0 else law.still
 
     def resistance(self, weight: float | None) -> Resistance:
-        """See `BitLaw`."""
         factor = 1.0 if self.radius is None else weight * self.radius
         return Resistance(self.static * factor, self.dynamic * factor, self.speed or 0.0)
 
@@ -204,11 +201,9 @@ class Cutting(BitLaw):
         """See `BitLaw`."""
 
     def end(self, weight, place, motion):
-        """See `BitLaw`."""
         return CuttingEnd(self, weight, place, motion)
 
     def steady_forces(self, weight, motion):
-        """See `BitLaw`."""
         return np.array(CuttingEnd(self, 0.0, np.zeros(2), motion).steady_forces(*motion))
 
     @property
@@ -247,7 +242,6 @@ class Lobes(BitLaw):
     lifts = "the lobes of the rock lift the bit"
 
     def validate(self):
-        """See `Part`."""
         if self.law is not None and self.law.lifts:
             refuse(self, "law", self.law, "a law of the torque alone, such as Stribeck(...), or None")
 
@@ -262,15 +256,12 @@ class Lobes(BitLaw):
         return self.count, "lobes"
 
     def resistance(self, weight):
-        """See `BitLaw`."""
         return self.law and self.law.resistance(weight)
 
     def in_c(self):
-        """See `BitLaw`."""
         return self.law and self.law.in_c()
 
     def end(self, weight, place, motion):
-        """See `BitLaw`."""
         return LobedEnd(self, place[1], motion[1])
 
 
@@ -300,7 +291,6 @@ class BitOnRock(Part):
     rock_stiffness: Stiffness = math.inf
 
     def validate(self):
-        """See `Part`."""
         if self.law.drills and self.rock_stiffness < math.inf:
             name = type(self.law).__name__
             refuse(self, "rock_stiffness", self.rock_stiffness, f"infinity: {name} has a depth of cut in its place")

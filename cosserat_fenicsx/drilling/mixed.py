@@ -204,7 +204,6 @@ class BitTorque(PointAction):
             store(self, **{field: value})
 
     def inertia(self, rod):
-        """See `Action`."""
         return (0.0, np.array([0.0, 0.0, self.inertia_of_bit])) if self.inertia_of_bit else None
 
     def resists(self, speed):

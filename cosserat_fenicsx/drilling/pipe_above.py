@@ -117,7 +117,6 @@ class PipeAbove(PointAction):
     acting = None
 
     def data(self, rod, s):
-        """See `Action`."""
         springs, forces, damping = self._springs, (-self.tension, 0.0), (0.0, 0.0)
         if self.acting is not None:
             springs, (forces, damping) = (0.0, 0.0), self.acting
@@ -125,7 +124,6 @@ class PipeAbove(PointAction):
         return (vector(self.down(), "1"), *(scalar(value, unit) for value, unit in values))
 
     def holds(self, scene):
-        """See `Action`."""
         none = np.zeros(3)
         return [(self.station, np.r_[self.down(), none]), (self.station, np.r_[none, self.down()])]
 

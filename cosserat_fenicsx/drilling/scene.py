@@ -49,7 +49,6 @@ class Drilling(Part):
     start: Literal["rest", "steady"] = "rest"
 
     def validate(self):
-        """See `Part`."""
         if self.discs is not None:
             for field in ("hole", "mud", "friction", "drag", "depth"):
                 if getattr(self, field) is not None:

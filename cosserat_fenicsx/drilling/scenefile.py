@@ -125,7 +125,6 @@ class DrillingScene(Part):
     title: str = ""
 
     def validate(self):
-        """See `Part`."""
         if (self.string is None) == (self.discs is None):
             raise SceneError("expected [drive], and either [string] or [discs]")
         parts = {"bit": self.bit, "hole": self.well, "hook": self.hook, "mud": self.mud, "drag": self.drag}

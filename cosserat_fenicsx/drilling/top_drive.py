@@ -101,7 +101,6 @@ class SampledControl(DriveControl):
                f"called once a sample acts in drilling.simulate, unless {type(self).__name__} has gains")  # fmt: skip
 
     def check(self, drive):
-        """See `DriveControl`."""
         if drive.inertia == 0:
             refuse(drive, "inertia", 0.0, "that of the drive (kg m^2), about 2000 to 4000, for a sampled control")
 
@@ -159,7 +158,6 @@ class Stiff(DriveControl):
     """The drive turns at the speed asked for, whatever the torque."""
 
     def gains(self, impedance):
-        """See `DriveControl`."""
         return Gains(rigid=True)
 
 
@@ -182,7 +180,6 @@ class PI(DriveControl):
     rule: Literal["SoftTorque", "SoftSpeed"] | None = field(default=None, compare=False)
 
     def validate(self):
-        """See `Part`."""
         for name, unit in (("Kp", "N m s/rad"), ("Ki", "N m/rad")):
             if getattr(self, name) is None:
                 refuse(self, name, None, f"{_GAINS} ({unit})")
@@ -190,11 +187,9 @@ class PI(DriveControl):
             refuse(self, "Kp", 0.0, f"{_GAINS}; without Kp the speed oscillates for ever")
 
     def gains(self, impedance):
-        """See `DriveControl`."""
         return Gains(Kp=self.Kp, Ki=self.Ki)
 
     def check(self, drive):
-        """See `DriveControl`."""
         if drive.inertia == 0:
             refuse(drive, "inertia", 0.0, "that of the drive (kg m^2), about 2000 to 4000, for a PI control")
         super().check(drive)
@@ -220,13 +215,11 @@ class Matched(DriveControl):
     torque: Torque = 0.0
 
     def gains(self, impedance):
-        """See `DriveControl`."""
         if self.impedance is None and impedance is None:
             refuse(self, "impedance", None, "an impedance (N m s/rad): Discs have none")
         return Gains(given=self.torque, Kp=self.impedance or impedance)
 
     def check(self, drive):
-        """See `DriveControl`."""
         if drive.inertia > 0:
             refuse(drive, "inertia", drive.inertia, "0: a matched drive has none, PI(Kp, Ki) is one with inertia")
         super().check(drive)
@@ -248,11 +241,9 @@ class Motor(DriveControl):
     drag: TorsionalDamping = 0.0
 
     def gains(self, impedance):
-        """See `DriveControl`."""
         return Gains(given=self.torque, Kp=self.drag)
 
     def check(self, drive):
-        """See `DriveControl`."""
         if drive.speed is not None:
             refuse(drive, "speed", drive.speed, "None: a motor of given torque has no speed asked for")
 
@@ -278,7 +269,6 @@ class TopDrive(Part):
     control: DriveControl = Stiff()
 
     def validate(self):
-        """See `Part`."""
         self.control.check(self)
         if self.speed is not None:
             signal = self.signal()
@@ -310,7 +300,6 @@ class Hook(Part):
     speed: InTime[Speed] = 0.0
 
     def validate(self):
-        """See `Part`."""
         self.signal()
 
     def signal(self) -> ScalarSignal:

@@ -72,7 +72,6 @@ class WallFriction(FrictionLaw):
     of_hole: bool = False
 
     def validate(self):
-        """See `Part`."""
         if self.kinetic is None:
             store(self, kinetic=self.static)
         if self.static < self.kinetic:
@@ -82,12 +81,10 @@ class WallFriction(FrictionLaw):
             store(self, speed=kind.check(self, "speed", self.speed))
 
     def coefficient(self, slip: float) -> float:
-        """See `FrictionLaw`."""
         return float(self.resistance(slip)) if slip > 0 else self.static
 
     @property
     def resistance(self) -> Resistance:
-        """See `FrictionLaw`."""
         return Resistance(self.static, self.kinetic, self.speed or 0.0, drops=self.static > self.kinetic)
 
 

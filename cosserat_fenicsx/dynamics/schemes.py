@@ -43,7 +43,6 @@ class TurnedStepProblem(StepProblem):
         return x[: 7 * nodes].reshape(-1, 7)[:, 3:]
 
     def begin_step(self, t, h):
-        """See `StepProblem`."""
         self._q_start = self._of_nodes(self.x.array_r).copy()
         super().begin_step(t, h)
         self._known.set(0.0)
@@ -152,7 +151,6 @@ class TripleJump(Momentum):
         super().begin()
 
     def step(self, t, h):
-        """See `Stepper`."""
         iterations = 0
         for done, share in enumerate((_GAMMA, 1 - 2 * _GAMMA, _GAMMA)):
             solved = super().step(t, share * h)
@@ -212,7 +210,6 @@ class EndTies(MovingTies):
     share = 1.0
 
     def begin(self, ties):
-        """See `MovingTies`."""
         super().begin(ties)
         self._shift = 0.0
         self._reactions_before = self.seen[1]
@@ -247,7 +244,6 @@ class CollocationProblem(StepProblem):
     ties_class, acting_share = EndTies, 1.0
 
     def begin_step(self, t, h):
-        """See `StepProblem`."""
         model = self.model
         self.h, self._middle = h / model.time, t + h / 2
         model.h.value = self.h
@@ -313,12 +309,10 @@ class GeneralisedAlpha(Stepper):
     impulse_error = 1 / 12  # loads are evaluated at the ends of steps
 
     def begin(self):
-        """See `Stepper`."""
         super().begin()
         self.problem.model.begin_rates()
 
     def jump(self):
-        """See `Stepper`."""
         super().jump()
         self.kink()
 
@@ -328,7 +322,6 @@ class GeneralisedAlpha(Stepper):
         self._accelerations_known = False
 
     def step(self, t, h):
-        """See `Stepper`."""
         iterations = 0
         if self.problem.ties and self._h is not None and abs(h - self._h) > 1e-9 * abs(h):
             self._settle(t)
@@ -371,16 +364,13 @@ class GeneralisedAlpha(Stepper):
         return solved
 
     def error(self, early=False):
-        """See `Stepper`."""
         found = super().error(early)
         return None if found is None else 12 * Rule.of(self.rho_inf).leading_error * found
 
     def memory(self):
-        """See `Stepper`."""
         return {**super().memory(), "accelerations_known": self._accelerations_known, "rho_inf": self.rho_inf}
 
     def recall(self, memory):
-        """See `Stepper`."""
         super().recall(memory)
         self._accelerations_known, self.rho_inf = memory["accelerations_known"], memory["rho_inf"]
 

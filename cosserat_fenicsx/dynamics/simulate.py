@@ -2,44 +2,33 @@
 
 import cosserat_fenicsx.compat  # noqa: F401, I001  first: its message says what is missing where dolfinx is
 
+import contextlib
 import math
 import numbers
+
 from mpi4py import MPI
-from cosserat_fenicsx.checks import instance
-from cosserat_fenicsx.checks import number
-from cosserat_fenicsx.checks import refuse
-from cosserat_fenicsx.errors import SceneError
-from cosserat_fenicsx.errors import nearest
-from cosserat_fenicsx.checks import File
+
+from cosserat_fenicsx.algebra.pool import PROBLEMS
+from cosserat_fenicsx.checks import File, instance, number, refuse
+from cosserat_fenicsx.dynamics.pace import Adaptive, Fixed
+from cosserat_fenicsx.dynamics.schemes import SCHEMES
+from cosserat_fenicsx.dynamics.start import equilibrium, put_start, starts_in
+from cosserat_fenicsx.dynamics.time_loop import TimeLoop, marks_of
+from cosserat_fenicsx.errors import NotConverged, SceneError, nearest
+from cosserat_fenicsx.models.choose import not_flat
+from cosserat_fenicsx.models.collocated import CollocatedEccentric, CollocatedPlanar, CollocatedSpatial
+from cosserat_fenicsx.models.directors import ConservingSpatial, EccentricSpatial
+from cosserat_fenicsx.models.moving import MovingSpatial
+from cosserat_fenicsx.models.moving_planar import MovingPlanar
+from cosserat_fenicsx.models.rodmesh import Layout
+from cosserat_fenicsx.models.signature import Signature
 from cosserat_fenicsx.ranks import communicator
 from cosserat_fenicsx.results.history import History
 from cosserat_fenicsx.results.path import Path
-from cosserat_fenicsx.dynamics.time_loop import marks_of
-from cosserat_fenicsx.models.rodmesh import Layout
-from cosserat_fenicsx.dynamics.time_loop import TimeLoop
-from cosserat_fenicsx.dynamics.pace import Adaptive
-from cosserat_fenicsx.dynamics.pace import Fixed
-from cosserat_fenicsx.storage.store import Nowhere, Store
 from cosserat_fenicsx.scene.action import path_dependent
-from cosserat_fenicsx.scene.scene import check_magnitudes
-from cosserat_fenicsx.scene.scene import Scene
-from cosserat_fenicsx.dynamics.start import equilibrium
-from cosserat_fenicsx.dynamics.start import put_start
-from cosserat_fenicsx.dynamics.schemes import SCHEMES
+from cosserat_fenicsx.scene.scene import Scene, check_magnitudes
+from cosserat_fenicsx.storage.store import Nowhere, Store
 from cosserat_fenicsx.storage.stored_history import KIND, StoredHistory
-import contextlib
-from cosserat_fenicsx.algebra.pool import PROBLEMS
-from cosserat_fenicsx.dynamics.start import starts_in
-from cosserat_fenicsx.errors import NotConverged
-from cosserat_fenicsx.models.choose import not_flat
-from cosserat_fenicsx.models.collocated import CollocatedEccentric, CollocatedPlanar
-from cosserat_fenicsx.models.collocated import CollocatedSpatial
-from cosserat_fenicsx.models.directors import ConservingSpatial
-from cosserat_fenicsx.models.directors import EccentricSpatial
-from cosserat_fenicsx.models.moving import MovingSpatial
-from cosserat_fenicsx.models.moving_planar import MovingPlanar
-from cosserat_fenicsx.models.signature import Signature
-
 
 #: Default elements per rod, polynomial degree and tolerance.
 ELEMENTS, DEGREE, TOL = 8, 3, 1e-3

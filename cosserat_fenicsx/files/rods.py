@@ -83,7 +83,6 @@ class Solve(_Settings):
     called = "solve"
 
     def validate(self):
-        """See `Part`."""
         if isinstance(self.load_factors, str):
             store(self, load_factors=load_factors_in(self.load_factors))
         elif self.load_factors is not None:
@@ -142,7 +141,6 @@ class RodScene(Part):
     simulate: Simulate | None = None
 
     def validate(self):
-        """See `Part`."""
         names = [field.name for field in dataclasses.fields(Scene)]
         store(self, scene=Scene(**{name: getattr(self, name) for name in names}))
 

@@ -63,11 +63,9 @@ class Deformed(Resting):
         self.factor, self.time = (1.0, result.along_axis[k]) if timed else (result.along_axis[k], 0.0)
 
     def line(self, rod):
-        """See `Resting`."""
         return self._moved(rod, np.linspace(0, 1, 101))[0]
 
     def pose(self, station):
-        """See `Resting`."""
         places, directors = self._moved(station.rod, np.array([station.s / station.rod.length]))
         return self._pose(station, places[0], directors[0])
 

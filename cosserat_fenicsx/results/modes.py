@@ -119,7 +119,6 @@ class Buckling(Shapes):
         return f"<Buckling: {text}. {self.caution}>" if self.caution else f"<Buckling: {text}>"
 
     def label(self, k):
-        """See `Shapes`."""
         return f"critical load factor {self.load_factors[k]:.5g}"
 
     def _answer(self, units):
@@ -224,7 +223,6 @@ class Modes(Shapes):
         return np.sqrt(np.maximum(-self.squares, 0.0))
 
     def label(self, k):
-        """See `Shapes`."""
         if self.squares[k] < 0:
             return f"unstable, growth {self.growth[k]:.4g} 1/s"
         return f"{self.frequencies[k]:.4g} Hz" if self.squares[k] else "0 Hz, free motion"

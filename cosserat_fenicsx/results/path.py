@@ -419,13 +419,11 @@ class PerturbedPath(Path):
         return rod.end if share == 1 else rod.at(share * rod.length)
 
     def rod(self, rod=None):
-        """See `OnNodes`."""
         if rod in self.scene.rods:
             return rod
         return self.scene.rods[self._given.scene.rods.index(self._given.rod(rod))]
 
     def reaction(self, support):
-        """See `Reactions`."""
         if support not in self.scene.supports:
             found = [self.scene.supports[i] for i in self._given.scene.supports_of(support)]
             parts = [super(PerturbedPath, self).reaction(x) for x in found]

@@ -27,7 +27,6 @@ class StoredResult(Result):
 
     @property
     def quantities(self) -> dict[str, Quantity]:
-        """See `Result`."""
         found = Quantities()
         for said in self._head["quantities"]:
             said = {name: tuple(x) if isinstance(x, list) else x for name, x in said.items()}

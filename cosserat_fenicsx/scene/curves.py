@@ -561,7 +561,6 @@ class UniformCurvature(_Uniform):
         store(self, quaternion=tuple(q.tolist()), _frame=rotation(q), _curvature=np.array(self.curvature))
 
     def arguments(self):
-        """See `Part`."""
         return {"frame" if name == "quaternion" else name: value for name, value in super().arguments().items()}
 
 

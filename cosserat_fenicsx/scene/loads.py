@@ -43,7 +43,6 @@ class _WeightOffAxis(LineAction):
         return not self.permanent
 
     def data(self, rod, s):
-        """See `Action`."""
         force = rod.stiffness_at(s).mass[..., None] * np.asarray(self.gravity)
         arm = np.einsum("...ij,...j->...i", rod.curve.frame(s), rod.mass_centre.at(s))
         return action.vector(force, "N/m"), action.vector(arm, "m")
@@ -100,7 +99,6 @@ class Force(PointLoad):
         self._check("force", "N")
 
     def data(self, rod, s):
-        """See `Action`."""
         return (action.vector(self.force, "N"),)
 
 
@@ -128,7 +126,6 @@ class Moment(PointLoad):
         self._check("moment", "N m")
 
     def data(self, rod, s):
-        """See `Action`."""
         return (action.vector(self.moment, "N m"),)
 
 
@@ -159,7 +156,6 @@ class EccentricForce(PointLoad):
         store(self, offset=vector(self, "offset", self.offset, "m", size=2))
 
     def data(self, rod, s):
-        """See `Action`."""
         return (action.vector(self.force, "N"), action.vector(self._turned(rod, [*self.offset, 0.0]), "m"))
 
 
@@ -187,7 +183,6 @@ class FollowerForce(PointLoad):
         self._check("force", "N")
 
     def data(self, rod, s):
-        """See `Action`."""
         return (action.vector(self._turned(rod, self.force), "N"),)
 
 
@@ -215,7 +210,6 @@ class FollowerMoment(PointLoad):
         self._check("moment", "N m")
 
     def data(self, rod, s):
-        """See `Action`."""
         return (action.vector(self._turned(rod, self.moment), "N m"),)
 
 
@@ -252,7 +246,6 @@ class Weight(Load, LineAction):
         return True
 
     def data(self, rod, s):
-        """See `Action`."""
         return (action.vector(rod.stiffness_at(s).mass[..., None] * np.asarray(self.gravity), "N/m"),)
 
     def companions(self, scene):
@@ -304,15 +297,12 @@ class LineForce(LineLoad):
         self._check("force", "N/m")
 
     def data(self, rod, s):
-        """See `Action`."""
         return (action.vector(values_of(self.force, s), "N/m"),)
 
     def breaks(self, rod):
-        """See `Action`."""
         return breaks_of(self.force)
 
     def kinks(self, rod):
-        """See `Action`."""
         return kinks_of(self.force)
 
 
@@ -340,13 +330,10 @@ class LineMoment(LineLoad):
         self._check("moment", "N m/m")
 
     def data(self, rod, s):
-        """See `Action`."""
         return (action.vector(values_of(self.moment, s), "N m/m"),)
 
     def breaks(self, rod):
-        """See `Action`."""
         return breaks_of(self.moment)
 
     def kinks(self, rod):
-        """See `Action`."""
         return kinks_of(self.moment)

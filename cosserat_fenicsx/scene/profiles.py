@@ -56,7 +56,6 @@ class InPieces(Kind):
     key: str = ""
 
     def read(self, where, data, reading):
-        """See `Kind`."""
         if not isinstance(data, list):
             return self.inner.read(where, data, reading)
         if not any(isinstance(piece, dict) for piece in data):
@@ -78,7 +77,6 @@ class InPieces(Kind):
         return pieces
 
     def write(self, value, writing):
-        """See `Kind`."""
         if not _has_pieces(value):
             return self.inner.write(value, writing)
         pieces = []
@@ -88,7 +86,6 @@ class InPieces(Kind):
         return pieces
 
     def schema(self, definitions):
-        """See `Kind`."""
         item = {"properties": {self.key: self.inner.schema(definitions)}} if self.key else {}
         return {"anyOf": [self.inner.schema(definitions), {"type": "array", "items": {"type": "object", **item}}]}
 

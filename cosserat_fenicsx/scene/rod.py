@@ -85,7 +85,6 @@ class Damping(Part):
 
     @classmethod
     def constructors(cls):
-        """See `Part`."""
         return cls, cls.ratio
 
     @property
@@ -234,11 +233,9 @@ class ByName(Text):
     words = "a rod, a station such as rod.end, or its name"
 
     def check(self, owner, field, value):
-        """See `Kind`."""
         return instance(owner, field, value, Station | Rod | str, self.words)
 
     def write(self, value, writing):
-        """See `Kind`."""
         return value if isinstance(value, str) else value.name if isinstance(value, Rod) else value.full_name
 
 

@@ -301,7 +301,6 @@ class Stiffness(Section):
 
     @classmethod
     def constructors(cls):
-        """See `Part`."""
         return cls, cls.offset
 
     @classmethod
@@ -387,7 +386,6 @@ class Tube(Section):
     shear_factor: ShearFactor | None = None
 
     def validate(self):
-        """See `Part`."""
         if self.inner_diameter >= self.outer_diameter:
             refuse(self, "inner_diameter", self.inner_diameter, f"less than outer_diameter = {self.outer_diameter}")
 

@@ -24,8 +24,7 @@ from cosserat_fenicsx.results.accuracy import FEW
 from cosserat_fenicsx.results.compared import NAMES, Criterion, criteria_of
 from cosserat_fenicsx.results.path import Path
 from cosserat_fenicsx.scene.action import path_dependent
-from cosserat_fenicsx.scene.scene import check_magnitudes
-from cosserat_fenicsx.scene.scene import Scene
+from cosserat_fenicsx.scene.scene import Scene, check_magnitudes
 from cosserat_fenicsx.scene.statical import check_no_mechanism
 from cosserat_fenicsx.scene.supports import Prescribed
 from cosserat_fenicsx.statics.meshes import first_layout, meshes_for, resolving_turns

@@ -78,7 +78,6 @@ class Borehole(Part):
 
     @classmethod
     def constructors(cls):
-        """See `Part`."""
         return cls, cls.from_survey
 
     @classmethod

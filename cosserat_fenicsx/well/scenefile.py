@@ -120,7 +120,6 @@ class WellScene(Part):
     title: str = ""
 
     def validate(self):
-        """See `Part`."""
         hole, settings, sweep = self.well, self.settings, self.sweep
         here = [settings.pop("depth", hole.length)]
         friction, depths = sweep.get("friction", []), sweep.get("depths", [])
