@@ -34,7 +34,7 @@ class Sensitivity(Mapping):
 
     @classmethod
     def by(cls, parameters, value, derivatives, error, quantity="value"):
-        """Of `Parameter`s of a scene, which tell their values and units."""
+        """Of parameters of a scene, which tell their values and units."""
         values, units = ({x.name: getattr(x, what) for x in parameters} for what in ("value", "unit"))
         return cls(value, derivatives, error, values, units, quantity)
 
