@@ -99,6 +99,18 @@ def number(owner, field, value, expected, accept):
     return given
 
 
+def whole(owner, field, value):
+    """`value` where it is a whole number above zero; refused otherwise."""
+    if isinstance(value, bool) or not isinstance(value, numbers.Integral) or value < 1:
+        refuse(owner, field, value, "a whole number above zero")
+    return value
+
+
+def tolerance(owner, value):
+    """`value` where it serves as `tol`; refused otherwise."""
+    return number(owner, "tol", value, "a number from 1e-12 to below 1", lambda x: 1e-12 <= x < 1)
+
+
 def _most(owner, unit):
     """The largest size of a number with a unit that an object has."""
     of_strings = any(kind.__module__.startswith(_OF_STRINGS) for kind in type(owner).__mro__)

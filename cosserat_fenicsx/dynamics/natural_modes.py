@@ -2,7 +2,6 @@
 
 import contextlib
 import math
-import numbers
 
 import numpy as np
 from mpi4py import MPI
@@ -10,7 +9,7 @@ from scipy import sparse
 
 from cosserat_fenicsx.algebra.packed import Packed
 from cosserat_fenicsx.algebra.pencil import Pencil
-from cosserat_fenicsx.checks import instance, number, refuse
+from cosserat_fenicsx.checks import instance, number, tolerance, whole
 from cosserat_fenicsx.errors import NotConverged, SceneError
 from cosserat_fenicsx.models.rod_data import check_inertia, nodal_inertia, nodal_lateral, nodal_offsets
 from cosserat_fenicsx.models.traits import traits_of
@@ -81,12 +80,11 @@ def modes(
                 "its place, or the spectrum of a simulated motion, show the modes"
             )
     number("modes", "load_factor", load_factor, "a finite number", math.isfinite)
-    for name, value in (("count", count), ("elements", 1 if elements is None else elements)):
-        if isinstance(value, bool) or not isinstance(value, numbers.Integral) or value < 1:
-            refuse("modes", name, value, "a whole number above zero")
-    number("modes", "tol", tol, "a number from 1e-12 to below 1", lambda x: 1e-12 <= x < 1)
+    whole("modes", "count", count)
+    whole("modes", "elements", 1 if elements is None else elements)
+    tolerance("modes", tol)
     if load_factor or has_permanent(scene):
-        check_arguments(without_mechanism(scene), tol, elements)
+        check_arguments(without_mechanism(scene), tol, elements, owner="modes")
         check_magnitudes(scene, load_factor)
     comm = communicator(comm)
 

@@ -9,7 +9,7 @@ import numbers
 from mpi4py import MPI
 
 from cosserat_fenicsx.algebra.pool import PROBLEMS
-from cosserat_fenicsx.checks import File, instance, number, refuse
+from cosserat_fenicsx.checks import File, instance, number, refuse, whole
 from cosserat_fenicsx.dynamics.pace import Adaptive, Fixed
 from cosserat_fenicsx.dynamics.schemes import SCHEMES
 from cosserat_fenicsx.dynamics.start import equilibrium, put_start, starts_in
@@ -163,8 +163,7 @@ def pace_of(duration, *, tol=None, dt=None, scheme="momentum", save_every=None, 
         raise SceneError(f"scheme = {scheme!r}: {nearest(scheme, SCHEMES)}")
     if save_every is not None:
         positive_time("save_every", save_every)
-    if isinstance(elements, bool) or not isinstance(elements, numbers.Integral) or elements < 1:
-        refuse("simulate", "elements", elements, "a whole number above zero")
+    whole("simulate", "elements", elements)
     if dt is not None:
         if tol is not None:
             raise SceneError(

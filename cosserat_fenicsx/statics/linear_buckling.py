@@ -2,15 +2,14 @@
 
 import contextlib
 import math
-import numbers
 from typing import NamedTuple
 
 import numpy as np
 from mpi4py import MPI
 
 from cosserat_fenicsx.algebra import eigen
-from cosserat_fenicsx.checks import number
-from cosserat_fenicsx.errors import NotConverged, SceneError
+from cosserat_fenicsx.checks import number, whole
+from cosserat_fenicsx.errors import NotConverged
 from cosserat_fenicsx.progress import MeshProgress
 from cosserat_fenicsx.ranks import communicator
 from cosserat_fenicsx.results.modes import Buckling
@@ -88,9 +87,8 @@ def buckling(
         SceneError: an argument outside its range.
         NotConverged: the load factor is not reached, the structure is unstable there, or the accuracy is not met.
     """
-    check_arguments(scene, tol, elements)
-    if isinstance(count, bool) or not isinstance(count, numbers.Integral) or count < 1:
-        raise SceneError(f"count = {count!r}: expected a whole number above zero")
+    check_arguments(scene, tol, elements, owner="buckling")
+    whole("buckling", "count", count)
     number("buckling", "load_factor", load_factor, "a finite number", math.isfinite)
     check_magnitudes(scene, max(abs(load_factor), 1.0))
     comm = communicator(comm)

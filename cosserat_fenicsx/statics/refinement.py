@@ -63,6 +63,10 @@ class Refinement:
 _REFINEMENT = Refinement()
 
 
+class _TooCoarse(Exception):
+    """The path on a first mesh that is coarser than usual is not plain."""
+
+
 def refine(trace, correct, scene, layout, tol, bound, degree, usual=None):
     """A path whose estimated errors are at most `tol`.
 
@@ -73,7 +77,7 @@ def refine(trace, correct, scene, layout, tol, bound, degree, usual=None):
         scene: the scene; layout: the first mesh.
         usual: where that one is coarser than usual, the mesh to begin with again unless the path on it is plain: load
             control, no events, no negative modes, elements shorter than boundary layers.
-        tol: largest estimated error, relative; bound: what it bounds, see `criteria_of`.
+        tol: largest estimated error, relative; bound: the criteria of the user among what it bounds, see `criteria_of`.
         degree: of the elements.
 
     Raises:
@@ -85,6 +89,9 @@ def refine(trace, correct, scene, layout, tol, bound, degree, usual=None):
         while True:
             try:
                 found = search.on(layout)
+            except _TooCoarse:
+                layout, search = usual, _Search(trace, correct, scene, tol, bound, degree, None)
+                continue
             except NotConverged:
                 if search.accurate is None:
                     raise
@@ -106,17 +113,14 @@ class _Search:
 
     def __init__(self, trace, correct, scene, tol, bound, degree, usual):
         self._trace, self._correct, self._scene, self._tol, self._degree = trace, correct, scene, tol, degree
-        self._bound, self._presses = bound, any(action.presses for action in scene.actions)
+        self._presses = any(action.presses for action in scene.actions)
         self._usual, self._next = usual, None  # `_next`: the next mesh and its refinement factor, where it is known
-        self._begin()
-
-    def _begin(self):
         self.whole = self._few = self._which = None  # `_few`: sample points on the last mesh; `_which`: their indices
         self._apart, self._apart_of_whole = None, None  # their differences to the mesh before, and those of all points
         self._level, self._level_of_whole = -1, -2
         self._plain = False  # see `_plain`, of the complete path
         # Assumed orders of the errors in h; refinement factor over the mesh before, None where meshes are not nested.
-        self._order, self._factor = np.ones(len(NAMES) + len(self._bound[1])), 2.0
+        self._order, self._factor = np.ones(len(NAMES) + len(bound)), 2.0
         self._failed, self._promoted, self._best = False, None, math.inf
         self.accurate, self._meshes_for_events, self._lost_events = None, _REFINEMENT.for_events, []
         self._halved = None  # sample points on this mesh and on the one before, if this one halves its elements
@@ -130,30 +134,24 @@ class _Search:
         elements = max(layout.counts)
         try:
             found = self._found_on(layout)
-        except NotConverged:
+        except (NotConverged, Promoted) as problem:
             if self._usual is not None:
-                return self._begin_again()
-            if self._failed or elements >= _REFINEMENT.most_elements:
+                raise _TooCoarse from None
+            promoted = isinstance(problem, Promoted)
+            again = problem.agrees(self._promoted) if promoted else self._failed
+            if again or elements >= _REFINEMENT.most_elements:
                 raise
-            self._failed, self._few, self._apart, self._halved = True, None, None, None
-            return None
-        except Promoted as found:
-            if self._usual is not None:
-                return self._begin_again()
-            if found.agrees(self._promoted) or elements >= _REFINEMENT.most_elements:
-                raise
-            self._promoted, self._few, self._apart, self._halved = found, None, None, None
+            self._promoted, self._failed = (problem, self._failed) if promoted else (self._promoted, True)
+            self._few = self._apart = self._halved = None
             return None
         self._failed = False
-        if found is None:
-            return self._begin_again()
         if found is self.whole and self._level_of_whole < self._level:
             return self.confirmed(found)
         layers = of_path(found)
         if found is self.whole:
             self._plain = _plain(found, layers)
             if self._usual is not None and not self._plain:
-                return self._begin_again()
+                raise _TooCoarse
         self._layered = with_layers(self._scene, found.layout, layers) or with_turns(self._scene, found)
         if self._layered is None and self._presses and self._moved < _REFINEMENT.most_moves:
             self._layered = with_edges(self._scene, found)
@@ -175,11 +173,6 @@ class _Search:
             self._few, self._which = hardest(found)
             self._apart = None if self._apart_of_whole is None else self._apart_of_whole[:, self._which]
         return None
-
-    def _begin_again(self):
-        """Begin again on a mesh that is not coarser than usual."""
-        self._begin()
-        self._next, self._usual = (self._usual, None), None
 
     def _events_agree(self, path):
         return all(event.error <= max(self._tol, _REFINEMENT.located) for event in path.events)
@@ -230,15 +223,14 @@ class _Search:
     def _found_on(self, layout):
         """The sample points, or all points, on a mesh, with their errors where these are known.
 
-        All points on the mesh before where the sample points show that it suffices; None where a mesh that is coarser
-        than usual does not resolve them.
+        All points on the mesh before where the sample points show that it suffices.
         """
-        few = None if self._few is None else self._corrected(layout, self._few)
+        few = None if self._few is None else self._correct(layout, self._few)
         apart = None if few is None else self._judge(few, self._few, self._apart)
         if few is None or apart[POSITION].max() > _REFINEMENT.resolved:
             if self._usual is not None and self.whole is not None:
-                return None
-            whole, apart = self._traced(layout), None
+                raise _TooCoarse
+            whole, apart = self._trace(layout, self.whole), None
             if self._level == self._level_of_whole + 1:
                 apart = self._judge(whole, self.whole, self._apart_of_whole)
             return self._keep(whole, apart)
@@ -262,18 +254,6 @@ class _Search:
                 self._few, self._apart = coarse, None
                 return few
         return self._all_points(layout, few) if few.worst.max() <= self._tol else few
-
-    def _corrected(self, layout, like):
-        return self._bounding(self._correct(layout, like))
-
-    def _traced(self, layout):
-        return self._bounding(self._trace(layout, self.whole))
-
-    def _bounding(self, path):
-        """The path, which knows what `tol` bounds."""
-        if path is not None:
-            path.bounded, path.criteria = self._bound
-        return path
 
     def _all_judged(self, few):
         """All points of the last mesh with the errors that those of the sample points tell."""
@@ -321,8 +301,8 @@ class _Search:
         """All points on a mesh where the sample points are known."""
         others = np.ones(len(self.whole), dtype=bool)
         others[self._which] = False
-        rest = self._corrected(layout, self.whole.at_points(np.flatnonzero(others)))
-        whole = self._traced(layout) if rest is None else few.with_points(rest, others)
+        rest = self._correct(layout, self.whole.at_points(np.flatnonzero(others)))
+        whole = self._trace(layout, self.whole) if rest is None else few.with_points(rest, others)
         spread_error(whole, few, self._which, self.whole)
         return self._keep(whole, None)
 

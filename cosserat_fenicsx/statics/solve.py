@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 from mpi4py import MPI
 
-from cosserat_fenicsx.checks import instance
+from cosserat_fenicsx.checks import instance, tolerance, whole
 from cosserat_fenicsx.errors import NotConverged, SceneError, nearest
 from cosserat_fenicsx.models.choose import choose
 from cosserat_fenicsx.models.formulation import formulation_of
@@ -127,7 +127,7 @@ def solve(
     oscillates = elements is None and gauss_points is not None and gauss_points > degree
     if oscillates:
         bound = [name for name in bound if name in _MOTION] or _MOTION
-    in_order = _in_order(scene)
+    bounded, in_order = criteria_of(bound), _in_order(scene)
     simple = not (branch or control == "arc" or until or in_order) and steps.adaptive
 
     def take(choice, bar):
@@ -144,7 +144,10 @@ def solve(
                 comm=comm,
                 model=choice.model,
             ) as solvers:
-                yield Tracing(solvers, follow, choice, bar, from_rest=from_rest)
+                tracer = Tracing(solvers, follow, choice, bar, from_rest=from_rest)
+                if elements is None:
+                    tracer.path.bounded, tracer.path.criteria = bounded
+                yield tracer
 
         def trace(layout, like=None):
             """Follow the path; `like`: a path on a coarser mesh whose points are reused where the solver chose them."""
@@ -171,7 +174,7 @@ def solve(
         layout, usual = meshes_for(scene, degree, tol, many) if simple else (first_layout(scene, degree), None)
         turning = resolving_turns(scene, layout, max(map(abs, load_factors)))
         layout, usual = (layout, usual) if turning is None else (turning, None)
-        return refine(trace, correct, scene, layout, tol, criteria_of(bound), degree, usual)
+        return refine(trace, correct, scene, layout, tol, bounded[1], degree, usual)
 
     with Progress(load_factors, progress, comm) as bar:
         try:
@@ -266,8 +269,8 @@ def _requested(load_factors):
     return [float(value) for value in values], free
 
 
-def check_arguments(scene, tol, elements, bound=NAMES):
-    """Refuse arguments of `solve` outside their range.
+def check_arguments(scene, tol, elements, bound=NAMES, *, owner="solve"):
+    """Refuse arguments of `solve`, or of another function of static scenes (`owner`), outside their range.
 
     Raises:
         SceneError: naming the argument, its value and what was expected.
@@ -276,13 +279,10 @@ def check_arguments(scene, tol, elements, bound=NAMES):
         hint = ", as in read(file).scene" if hasattr(scene, "scene") else ""
         raise SceneError(f"scene is a {type(scene).__name__}: expected a Scene{hint}")
     _check_static(scene)
-    if isinstance(tol, bool) or not isinstance(tol, numbers.Real) or not 1e-12 <= tol < 1:
-        raise SceneError(f"tol = {tol!r}: expected a number from 1e-12 to below 1")
+    tolerance(owner, tol)
     criteria_of(bound)
-    if elements is not None and (
-        isinstance(elements, bool) or not isinstance(elements, numbers.Integral) or elements < 1
-    ):
-        raise SceneError(f"elements = {elements!r}: expected a whole number above zero")
+    if elements is not None:
+        whole(owner, "elements", elements)
 
 
 @per_scene

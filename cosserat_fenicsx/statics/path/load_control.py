@@ -16,7 +16,7 @@ import numpy as np
 
 from cosserat_fenicsx.algebra.building import Pointers, undisturbed
 from cosserat_fenicsx.algebra.newton import petsc
-from cosserat_fenicsx.checks import number, refuse
+from cosserat_fenicsx.checks import number, refuse, whole
 from cosserat_fenicsx.errors import NotConverged
 from cosserat_fenicsx.interrupts import obey
 from cosserat_fenicsx.statics.path.track import LIMITS, NOTHING, PathPoint, Track, step_control, through
@@ -74,11 +74,8 @@ class StepControl:
         number(self, "smallest", self.smallest, "a number in (0, 1)", lambda x: 0 < x < 1)
         if not isinstance(self.adaptive, bool):
             refuse(self, "adaptive", self.adaptive, "True or False")
-        for name in ("max_iterations", "most_steps"):
-            value = getattr(self, name)
-            left_open = name == "max_iterations" and value is None
-            if not left_open and (not isinstance(value, int) or isinstance(value, bool) or value < 1):
-                refuse(self, name, value, "a whole number above zero")
+        whole(self, "max_iterations", 1 if self.max_iterations is None else self.max_iterations)
+        whole(self, "most_steps", self.most_steps)
 
 
 class Continuation:

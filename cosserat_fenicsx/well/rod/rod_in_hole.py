@@ -2,14 +2,13 @@
 
 import contextlib
 import math
-import numbers
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 from mpi4py import MPI
 
-from cosserat_fenicsx.checks import number, refuse
+from cosserat_fenicsx.checks import refuse, tolerance, whole
 from cosserat_fenicsx.errors import NotConverged
 from cosserat_fenicsx.models.rodmesh import Layout
 from cosserat_fenicsx.progress import Progress
@@ -154,7 +153,7 @@ def solve_in_hole(
     first = _WALLS.first if wall_stiffness is None else wall_stiffness
     string = string_in(path, lengths, stiffness, weight, contact_radius, radius, friction, slip, bottom_tension,
                        bottom_torque, rings, first, hinge, extensible, has_arm)  # fmt: skip
-    tol = number("solve_in_hole", "tol", tol, "a number from 1e-12 to below 1", lambda x: 1e-12 <= x < 1)
+    tol = tolerance("solve_in_hole", tol)
     comm, counts = communicator(comm), _counts(elements, len(Layout.of(string.scene, 1).breaks[0]) - 1)
     with Progress([float(len(stages_from(string.spring)))], progress, comm, "stage") as bar:
         job = _Job(degree, bool(helix), tol, _WALLS.stiffest if wall_stiffness is None else 1.0, bar, comm)
@@ -200,8 +199,7 @@ def _counts(elements, pieces):
         first *= finer ** max(0, math.ceil(math.log(_MESHES.per_piece * pieces / first, finer)))
         most = max(_MESHES.most, first * finer**2)
         return [first * finer**k for k in range(1 + int(np.log2(most / first)))]
-    if isinstance(elements, bool) or not isinstance(elements, numbers.Integral) or elements < 1:
-        refuse("solve_in_hole", "elements", elements, "a whole number above zero")
+    whole("solve_in_hole", "elements", elements)
     if elements < pieces:
         refuse("solve_in_hole", "elements", elements, f"at least one for each of the {pieces} pieces of the string")
     return [max(1, int(elements) // _MESHES.before), int(elements)]
