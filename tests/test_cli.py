@@ -42,6 +42,17 @@ def test_help_and_version_load_nothing_heavy():
     assert cosserat("--version").stdout.startswith("cosserat_fenicsx 0.")
 
 
+@pytest.mark.parametrize("arguments", [["--help"], ["run", "--help"], ["schema"], ["explain", DEMO]])
+def test_a_reader_that_has_enough_ends_no_command(arguments):
+    """Such as `head`: the pipe is closed before the first line."""
+    reading, writing = os.pipe()
+    os.close(reading)
+    command = [sys.executable, "-m", "cosserat_fenicsx", *map(str, arguments)]
+    done = subprocess.run(command, stdout=writing, stderr=subprocess.PIPE, text=True, cwd=ROOT)
+    os.close(writing)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
 def test_run_prints_a_table_and_writes_files(tmp_path):
     out = tmp_path / "new" / "out"
     done = cosserat("run", DEMO, "--load-factors", "0.5,0.9", "-o", out)

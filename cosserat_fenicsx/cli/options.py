@@ -4,6 +4,14 @@ import argparse
 from pathlib import Path
 
 from cosserat_fenicsx import __version__
+from cosserat_fenicsx.cli.say import say
+
+
+class _Parser(argparse.ArgumentParser):
+    """Prints by one rank, and says nothing where its reader, such as `head`, has gone."""
+
+    def _print_message(self, message, file=None):
+        say(message.rstrip("\n"), file)
 
 
 def parser(do):
@@ -12,7 +20,7 @@ def parser(do):
     Args:
         do: {name of a command: function that is called with the options}.
     """
-    whole = argparse.ArgumentParser(
+    whole = _Parser(
         prog="cosserat",
         description="Geometrically exact rods on FEniCSx: equilibrium path or motion of a scene described in a TOML "
         "file; a motion where the file has a [simulate] table, or --duration is given. A file with a [well] is a "

@@ -38,7 +38,8 @@ def say(text, file=None):
         try:
             print(text, file=stream, flush=True)
         except BrokenPipeError:  # the reader, such as `head`, has enough: files are still written
-            os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
+            with open(os.devnull, "w") as nowhere:
+                os.dup2(nowhere.fileno(), stream.fileno())
 
 
 @contextmanager
