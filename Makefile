@@ -18,10 +18,11 @@ export VTK_DEFAULT_OPENGL_WINDOW = vtkEGLRenderWindow
 # A numpy in the user's own site directory would hide the distribution's.
 export PYTHONNOUSERSITE = 1
 
-.PHONY: help setup packages demo motion gallery well string whirl test docs tables figure3 work-precision failures rods-in-wells folders random random-wells imperfect mutants clean
+.PHONY: help setup packages demo animation motion gallery well string whirl test docs tables figure3 work-precision failures rods-in-wells folders random random-wells imperfect mutants clean
 
 help:
 	@echo "make demo    solve the eccentric cantilever of the paper on two processes; writes out/"
+	@echo "make animation  the animation at the top of the README: the column far past its limit load"
 	@echo "make motion  seven motions, each a scene file, a picture and a number that must come out; writes out/ (a minute)"
 	@echo "make gallery the scene files of demos/, each with a picture and a number that must come out; writes out/"
 	@echo "make well    strings in wells: torque and drag, each with pictures and a number that must come out; writes out/wells/ (half a minute)"
@@ -43,6 +44,9 @@ help:
 
 demo: setup
 	$(MPIRUN) -n 2 $(PYTHON) demos/eccentric_cantilever.py
+
+animation: setup
+	$(PYTHON) demos/animation.py
 
 motion: setup
 	$(PYTHON) demos/motion.py

@@ -53,6 +53,15 @@ def test_eccentric_cantilever_in_one_way(tmp_path_all):
         eccentric_cantilever.options(["--formulation", "none"])
 
 
+@pytest.mark.serial
+def test_animation_quick(tmp_path):
+    import animation
+
+    path = animation.main(tmp_path, quick=True)
+    assert (tmp_path / "column.gif").stat().st_size > 20_000
+    assert path.load_factors[-1] == animation.FAR and path.error.max() < 1e-6
+
+
 def test_bare_dolfinx():
     """dolfinx and SNES by hand find what the package finds with the same elements."""
     import bare_dolfinx

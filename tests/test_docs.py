@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import cosserat_fenicsx as cf
-from cosserat_fenicsx.parts import FAMILIES
+from cosserat_fenicsx.parts import FAMILIES, members
 
 pytestmark = pytest.mark.serial
 ROOT = Path(__file__).parent.parent
@@ -33,7 +33,7 @@ def blocks(language):
 
 def test_the_readme_is_short():
     lines = text_of(ROOT / "README.md").splitlines()
-    assert len(lines) <= 160 and max(map(len, lines)) <= 120
+    assert len(lines) <= 90 and max(map(len, lines)) <= 120
 
 
 def headings(page):
@@ -55,7 +55,8 @@ def test_links_lead_somewhere(page):
 def test_pictures_are_small_and_shown():
     shown = "".join(map(text_of, PAGES))
     for picture in (DOCS / "pictures").iterdir():
-        assert picture.stat().st_size <= 150_000 and f"pictures/{picture.name}" in shown, picture
+        most = 3_000_000 if picture.suffix == ".gif" else 150_000
+        assert picture.stat().st_size <= most and f"pictures/{picture.name}" in shown, picture
 
 
 def test_every_public_name_is_in_the_reference():
@@ -73,7 +74,8 @@ def test_every_public_name_is_in_the_reference():
 )
 def test_programs_run(page, program, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    for family in FAMILIES.values():  # which other tests find as they were
+    for family in list(FAMILIES.values()):  # whose members other tests find as they were; imported now, not in the copy
+        members(family)
         monkeypatch.setattr(family, "_members", dict(family._members))
         monkeypatch.setattr(family, "_twice", set(family._twice))
     names = {"__name__": "program"}
