@@ -77,7 +77,8 @@ def main(folder="docs/pictures", quick=False):
         force.xy, force.xyann = tip[k, [0, 2]], (tip[k, 0], tip[k, 2] + 0.7 * eta[k] + 0.3)
         line.set_data(eta[: k + 1], delta[: k + 1])
         point.set_data([eta[k]], [delta[k]])
-        says.set_text(f"load factor {eta[k]:.2f}: the tip moves {delta[k]:.5f} m sideways, relative error about {path.error[k]:.0e}")
+        moved = f"load factor {eta[k]:.2f}: the tip moves {delta[k]:.5f} m sideways"
+        says.set_text(f"{moved}, relative error about {path.error[k]:.0e}")
 
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
