@@ -227,13 +227,8 @@ class Equations(Called):
     def _factor_interface(self):
         comm = self.numbering.comm
         singular = comm.allreduce(self.c.singular, op=MPI.MAX) if comm.size > 1 else self.c.singular
-        self.c.singular = 1 if singular else not self.interface.factor(*self._derivatives_of_ties())
-
-    def _derivatives_of_ties(self):
-        """The tangent's part of supports and joints, see `Interface.factor`."""
-        if not self.ties:
-            return (np.empty(0),)
-        return self.ties.tangent_blocks(self.tie_load_factor)
+        of_ties = self.ties.tangent_blocks(self.tie_load_factor) if self.ties and not singular else (np.empty(0),)
+        self.c.singular = 1 if singular else not self.interface.factor(*of_ties)
 
     def _solve_interface(self):
         b, comm = self._on_interface, self.numbering.comm

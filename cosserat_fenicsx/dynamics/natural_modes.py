@@ -128,27 +128,22 @@ def _on_mesh(scene, layout, count, load_factor, degree, comm):
         Squares (n,), the lengths of boundary layers or None, relative rounding errors (n,), shapes (n, N, 6), the
         number of negative modes, the `Equilibrium`, and whether the loads have a potential.
     """
+    loaded = load_factor or has_permanent(scene)
     with _loaded(scene, layout, load_factor, degree, comm) as (problem, stability):
-        found = _of_problem(problem, stability, count, load_factor)
-        state, rq = Equilibrium.of(problem.model, load_factor), problem.model.snapshot()[0]
-    with circulatory_part(scene, layout, degree, comm) as circulatory:
-        return *found, state, circulatory.vanishes(rq, load_factor)
-
-
-def _of_problem(problem, stability, count, load_factor):
-    loaded = load_factor or has_permanent(problem.model.scene)
-    negative = stability.count() if loaded else 0
-    K, rows, held = _stiffness(problem)
-    unit = max(float(rod.profile.range[1].mass) for rod in problem.model.scene.rods)
-    M = _mass(problem.model, rows, K.shape[0], unit)
-    squares, vectors, rounding = Pencil(K, M, held).lowest(count)
-    if (squares == 0).any():  # `stability` counts these by the sign of their rounding; all negative ones are known here
-        negative = np.count_nonzero(squares < 0)
-    scales = problem.model.scales
-    shapes = shapes_of(vectors.T, squares, rows, scales.length)
-    layers = layers_of(problem.model) if loaded else None
+        model, scales = problem.model, problem.model.scales
+        negative = stability.count() if loaded else 0
+        K, rows, held = _stiffness(problem)
+        unit = max(float(rod.profile.range[1].mass) for rod in scene.rods)
+        squares, vectors, rounding = Pencil(K, _mass(model, rows, K.shape[0], unit), held).lowest(count)
+        if (squares == 0).any():  # `stability` counts these by the sign of their rounding; all below are known here
+            negative = np.count_nonzero(squares < 0)
+        shapes = shapes_of(vectors.T, squares, rows, scales.length)
+        layers = layers_of(model) if loaded else None
+        state, rq = Equilibrium.of(model, load_factor), model.snapshot()[0]
     rounding = np.where(squares == 0, 0.0, rounding / np.abs(np.where(squares == 0, 1.0, squares)))
-    return squares * scales.force / (unit * scales.length**2), layers, rounding, shapes, negative
+    squares = squares * scales.force / (unit * scales.length**2)
+    with circulatory_part(scene, layout, degree, comm) as circulatory:
+        return squares, layers, rounding, shapes, negative, state, circulatory.vanishes(rq, load_factor)
 
 
 @contextlib.contextmanager

@@ -135,19 +135,14 @@ class TripleJump(Momentum):
             SceneError: a rod with damping, which would make the motion grow without bound back in time; an action with
                 memory; or a wall that nodes touch.
         """
-        if self.problem.model.damped:
-            raise SceneError(
-                "scheme = 'triple-jump' steps back in time: expected rods without damping, or another scheme"
-            )
-        if self.problem.model.actions.memory or np.isfinite(self.problem.model.delays.longest):
-            raise SceneError(
-                "scheme = 'triple-jump' steps back in time: expected actions without memory, or another scheme"
-            )
-        if self.problem.touching:
-            raise SceneError(
-                "scheme = 'triple-jump' steps back in time, and needs smooth motions: expected no walls such as a "
-                "HoleWall, or another scheme"
-            )
+        model = self.problem.model
+        for found, expected in (
+            (model.damped, ": expected rods without damping"),
+            (model.actions.memory or np.isfinite(model.delays.longest), ": expected actions without memory"),
+            (self.problem.touching, ", and needs smooth motions: expected no walls such as a HoleWall"),
+        ):
+            if found:
+                raise SceneError(f"scheme = 'triple-jump' steps back in time{expected}, or another scheme")
         super().begin()
 
     def step(self, t, h):
@@ -193,11 +188,6 @@ class Rule(NamedTuple):
         v1 = v0 + h * ((1 - self.gamma) * b0 + self.gamma * b1)
         a1 = ((1 - self.alpha_m) * b1 + self.alpha_m * b0 - self.alpha_f * a0) / (1 - self.alpha_f)
         return np.array([v1, a1, (b1 - a1) / h])
-
-    @property
-    def leading_error(self):
-        """The local error of positions over h^3 times their third derivative."""
-        return abs((self.alpha_m - self.alpha_f) / 2 + self.beta - 1 / 6)
 
 
 # The coefficients of a step that does not depend on the accelerations before it.
@@ -364,8 +354,10 @@ class GeneralisedAlpha(Stepper):
         return solved
 
     def error(self, early=False):
-        found = super().error(early)
-        return None if found is None else 12 * Rule.of(self.rho_inf).leading_error * found
+        found, rule = super().error(early), Rule.of(self.rho_inf)
+        # the local error of positions over h^3 times their third derivative
+        leading = abs((rule.alpha_m - rule.alpha_f) / 2 + rule.beta - 1 / 6)
+        return None if found is None else 12 * leading * found
 
     def memory(self):
         return {**super().memory(), "accelerations_known": self._accelerations_known, "rho_inf": self.rho_inf}

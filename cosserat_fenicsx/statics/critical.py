@@ -52,7 +52,12 @@ def critical_sensitivity(buckling, parameters):
         quotient = _Quotient(direct, modes, buckling.load_factors[0] - at)
         derivatives, errors = {}, {}
         for parameter, rates in zip(found, direct.rates(), strict=True):
-            relative, error = _relative(direct, quotient, parameter, rates)
+            step, values = direct.step(parameter, rates), []
+            for k in PLACES:
+                direct.load_near(parameter, k * step)
+                direct.put(direct.points[0], rates[0], k * step)
+                values.append(np.log(quotient.here()))
+            relative, error = derivative(values, step)  # of the quotients, over the quotients
             _check_pairs(buckling, parameter, relative, pairs)
             critical = buckling.load_factors - at
             derivatives[parameter.name] = critical * relative[: len(critical)]
@@ -98,16 +103,6 @@ class _Quotient:
                 sides.append(self._energies.here(springs=False))
         direct.put((load_factor, numbers, None), slope, 0.0)
         return -stiff / derivative(sides, self._step)[0]
-
-
-def _relative(direct, quotient, parameter, rates):
-    """(derivatives of the quotients over the quotients, their errors)."""
-    step, values = direct.step(parameter, rates), []
-    for k in PLACES:
-        direct.load_near(parameter, k * step)
-        direct.put(direct.points[0], rates[0], k * step)
-        values.append(np.log(quotient.here()))
-    return derivative(values, step)
 
 
 def _check_pairs(buckling, parameter, relative, pairs):

@@ -161,7 +161,8 @@ class _Search:
         if np.isfinite(found.worst).all():
             reached = float(found.worst.max())
             if reached <= self._tol and found is self.whole and self._layered is None:
-                if elements >= _REFINEMENT.most_elements or self._events_agree(found) or not self._meshes_for_events:
+                agree = all(event.error <= max(self._tol, _REFINEMENT.located) for event in found.events)
+                if agree or elements >= _REFINEMENT.most_elements or not self._meshes_for_events:
                     return self.confirmed(found)
                 self.accurate, self._meshes_for_events = found, self._meshes_for_events - 1
             elif elements >= _REFINEMENT.most_elements or (reached > self._best and self._best < 1e-8):
@@ -173,9 +174,6 @@ class _Search:
             self._few, self._which = hardest(found)
             self._apart = None if self._apart_of_whole is None else self._apart_of_whole[:, self._which]
         return None
-
-    def _events_agree(self, path):
-        return all(event.error <= max(self._tol, _REFINEMENT.located) for event in path.events)
 
     def confirmed(self, path):
         """A path without the events that were not found on two meshes, and with what rounding leaves of its bounds."""
@@ -243,7 +241,9 @@ class _Search:
             coarse.set_errors(self._error_before)
             judged = coarse
             if coarse.worst.max() <= self._tol:
-                judged = self._all_judged(coarse) if traced else self._all_points(coarse.layout, coarse)
+                if traced:
+                    spread_error(self.whole, coarse, self._which)
+                judged = self.whole if traced else self._all_points(coarse.layout, coarse)
                 if judged.worst.max() <= self._tol:
                     return judged
             if (
@@ -254,11 +254,6 @@ class _Search:
                 self._few, self._apart = coarse, None
                 return few
         return self._all_points(layout, few) if few.worst.max() <= self._tol else few
-
-    def _all_judged(self, few):
-        """All points of the last mesh with the errors that those of the sample points tell."""
-        spread_error(self.whole, few, self._which)
-        return self.whole
 
     def _factor_for(self, path):
         """The refinement factor, at most 2, that is to make the errors of a path small enough."""

@@ -161,12 +161,9 @@ class Direct:
 
     def check(self):
         """Refuse parameters that change what the compiled code depends on, or the proportions of the mesh."""
-        for scenes, parameter in zip(self._scenes, self._parameters, strict=True):
-            self._check(scenes, parameter)
-
-    def _check(self, scenes, parameter):
         signature = self.model.signature
-        for scene in scenes:
+        near_by = zip(self._parameters, self._scenes, strict=True)
+        for parameter, scene in ((parameter, scene) for parameter, scenes in near_by for scene in scenes):
             near = Signature.of(
                 scene, self._layout, formulation=signature.formulation.name, degree=signature.degree,
                 points=signature.points, model=signature.model,

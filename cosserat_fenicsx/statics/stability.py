@@ -166,21 +166,17 @@ class Part:
 
     def count_without_neutral(self):
         """See `NegativeModes.count`."""
-        self._factor()
-        return self._negative - int(not self._zero and self._nearest(1)[0][0] < 0)
+        return self.factor() - int(not self._zero and self._nearest(1)[0][0] < 0)
 
-    def count_of_matrix(self):
-        """The number of negative eigenvalues of K, whose factors give eigenvalues and modes."""
-        self._factor()
-        return self._negative
-
-    def _factor(self):
-        """Assemble K at the problem's state and factorise it."""
+    def factor(self):
+        """Assemble K at the problem's state and factorise it; its number of negative eigenvalues, by the factors that
+        give eigenvalues and modes."""
         self.assemble()
         self.pc.setOperators(self.K)
         self.pc.setUp()
-        self._negative, self._zero, _ = self.pc.getFactorMatrix().getInertia()
+        negative, self._zero, _ = self.pc.getFactorMatrix().getInertia()
         self._shift = 0.0
+        return negative
 
     def _nearest(self, count, side=0):
         """(eigenvalues nearest zero, their eigenvectors) of K as last factorised; side: 1, -1 or 0 for both."""
@@ -204,7 +200,7 @@ class Part:
 
     def is_neutral(self):
         """Whether the eigenvalue nearest zero vanishes to rounding at the problem's state."""
-        self._factor()
+        self.factor()
         values, _ = self._nearest(2)
         return abs(values[0]) < 1e-3 * abs(values[-1]) and abs(values[0]) < 30 * _ROUNDING * self.K.norm(_LARGEST_ROW)
 
@@ -213,8 +209,7 @@ class Part:
 
         Only eigenvalues near zero are cheap: all those between it and zero are computed.
         """
-        self._factor()
-        above = j - self._negative  # 0: the smallest positive one, -1: the negative one nearest zero
+        above = j - self.factor()  # 0: the smallest positive one, -1: the negative one nearest zero
         needed, side = (1 + above, 1) if above >= 0 else (-above, -1)
         values = self._nearest(needed, side)[0]
         found = np.sort(np.abs(values[values * side >= 0]))
@@ -225,8 +220,7 @@ class Part:
     def negative_space(self, count):
         """Orthonormal eigenvectors of the `count` negative eigenvalues at the problem's state, (owned entries, count);
         None where the eigensolver finds another number."""
-        self._factor()
-        if self._negative != count:
+        if self.factor() != count:
             return None
         values, vectors = self._nearest(count, -1)
         if (values < 0).sum() != count:
@@ -243,7 +237,7 @@ class Part:
         Returns:
             Changes of the unknowns, arrays over the entries that this rank owns.
         """
-        self._factor()
+        self.factor()
         return oriented(self.model, self._nearest(count, side)[1])
 
 

@@ -206,7 +206,8 @@ class Locator:
         for near, point, modes in candidates(chord, sorted(counts), limits):
             if not modes:  # rounding hides them
                 continue
-            place = chord.root(self._stiffness_against(self.track.motion_at(point, modes[0])), near)
+            motion = self.track.motion_at(point, modes[0])
+            place = chord.root(lambda at, v=motion: self.track.response(at.numbers, at.load_factor, v)[0], near)
             if place is not None:
                 here = self._singular("bifurcation", chord, place, modes)
                 here = [x for x in here if x.residual <= _TOLERANCES.singular and not self._known(x, (*limits, *found))]
@@ -214,9 +215,6 @@ class Locator:
                     raise Lost(0.5, ASIDE)
                 found += here
         return _in_order(found)
-
-    def _stiffness_against(self, motion):
-        return lambda point: self.track.response(point.numbers, point.load_factor, motion)[0]
 
     def _known(self, crossing, others):
         """Whether one of other `Crossing`s has the same null vector at the same point."""
@@ -285,7 +283,7 @@ class Locator:
             if unstable.negative_modes <= stable:
                 continue
             track.put(unstable.numbers, unstable.load_factor)
-            if stability.count_of_matrix() <= stable:
+            if stability.factor() <= stable:
                 continue
             negative = stability.modes(1, side=-1)
             if not modes or not negative:
