@@ -207,7 +207,8 @@ def test_mistakes_are_told_in_words_of_the_command_line(tmp_path, capsys, monkey
     assert "the scene is not the one of the motion: " in refused(capsys, "run", other, "--folder", folder)
     use(monkeypatch, stops_at=500)
     assert main(["run", str(file)]) == 130
-    assert capsys.readouterr().err.startswith("cosserat: interrupted at t = ")
+    told = capsys.readouterr().err
+    assert told.startswith("cosserat: interrupted after ") and "(t = " in told and "with --folder DIR" in told
 
 
 def test_explain_tells_what_may_be_mistaken(tmp_path, capsys):

@@ -16,10 +16,9 @@ from test_scene_fuzz import damaged
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx import checks
-from cosserat_fenicsx.cli.drilling import explain_drilling
+from cosserat_fenicsx.cli import drilling, well
 from cosserat_fenicsx.cli.main import main
 from cosserat_fenicsx.cli.options import parser
-from cosserat_fenicsx.cli.well import explain_well
 from cosserat_fenicsx.files.read import from_tables
 from cosserat_fenicsx.storage.mark import mark_of
 
@@ -142,7 +141,7 @@ def test_too_little_memory_in_words(monkeypatch, capsys):
     def explain(options):
         raise MemoryError("Unable to allocate 153. MiB for an array")
 
-    monkeypatch.setattr("cosserat_fenicsx.cli.main._explain", explain)
+    monkeypatch.setattr("cosserat_fenicsx.cli.main._with", lambda deed: explain)
     assert main(["explain", "scene.toml"]) == 2
     assert capsys.readouterr().err.startswith("cosserat: not enough memory (Unable to allocate 153. MiB for an array)")
 
@@ -247,8 +246,8 @@ def test_damaged_files_of_strings(seed):
     """Scene files of wells and of strings in motion: explained, or refused in words."""
     tables = {file: tomllib.loads(file.read_text(encoding="utf-8")) for file in sorted(DEMOS.glob("**/*.toml"))}
     kinds = [
-        (explain_drilling, {file: x for file, x in tables.items() if "drive" in x}),
-        (explain_well, {file: x for file, x in tables.items() if "well" in x and "drive" not in x}),
+        (drilling.explain, {file: x for file, x in tables.items() if "drive" in x}),
+        (well.explain, {file: x for file, x in tables.items() if "well" in x and "drive" not in x}),
     ]
     chance, refused = random.Random(seed), 0
     commands = parser(dict.fromkeys(("run", "resume", "buckling", "modes", "explain", "schema"), main))

@@ -2,12 +2,14 @@
 
 import math
 import sys
+from argparse import Namespace
 from dataclasses import replace
-from pathlib import Path
+from functools import partial
 
 from cosserat_fenicsx import units
-from cosserat_fenicsx.cli.rods import prepare
-from cosserat_fenicsx.cli.say import DONE, INTERRUPTED, NOT_CONVERGED, Files, ended, keep_inputs, say, warnings_in_words
+from cosserat_fenicsx.cli.output import deliver, given, refuse_of_rods
+from cosserat_fenicsx.cli.say import DONE, say
+from cosserat_fenicsx.cli.well import hole_in_words
 from cosserat_fenicsx.dimensions import in_si
 from cosserat_fenicsx.drilling.bit_laws import Stribeck
 from cosserat_fenicsx.drilling.choose import chosen, model_of
@@ -15,45 +17,39 @@ from cosserat_fenicsx.drilling.motion import KIND, check_arguments
 from cosserat_fenicsx.drilling.scenefile import SimulateDrilling
 from cosserat_fenicsx.drilling.segments import Discs
 from cosserat_fenicsx.drilling.tables import turns
-from cosserat_fenicsx.errors import NotConverged, SceneError
-from cosserat_fenicsx.interrupts import patience
-from cosserat_fenicsx.storage.store import Store, holds, resume
+from cosserat_fenicsx.errors import SceneError
+from cosserat_fenicsx.storage.store import Store, holds
 
 _TAKEN = ("duration", "dt", "elements", "model", "save_every")
 # Files that may be written.
 _NAMES = ("drilling.csv", "drilling.png", "energy.png", "phase.png", "map.png", "stability.csv", "stability.png")
-# Options of the command line that are for rods alone.
-_OTHERS = ("load_factors", "tol", "bound", "degree", "formulation", "control", "branch", "scheme", "start", "station",
-           "at", "color", "magnify")  # fmt: skip
 
 
 def _scene(options, found):
-    for name in _OTHERS:
-        if getattr(options, name, None) is not None:
-            option = f"--{name.replace('_', '-')}"
-            raise SceneError(f"{option} is for rods, and this scene is a drill-string in motion")
+    refuse_of_rods(options, "a drill-string in motion")
     if options.static:
         raise SceneError("--static is for rods, and this scene is a drill-string in motion: strings in equilibrium are "
                          "scenes with [well] and [[operations]]")  # fmt: skip
-    asked = {name: getattr(options, name) for name in _TAKEN if getattr(options, name, None) is not None}
-    return replace(found, simulate=replace(found.simulate or SimulateDrilling(), **asked))
+    return replace(found, simulate=replace(found.simulate or SimulateDrilling(), **given(options, _TAKEN)))
 
 
-@warnings_in_words()
-def run_drilling(options, found, tables):
-    """`cosserat run` of the tables of a scene file; returns the exit code."""
+def run(options, found, tables):
+    """`cosserat run` of a `DrillingScene` and the tables of its file; returns the exit code."""
     found = _scene(options, found)
     if found.title:
         say(found.title, file=sys.stdout)
     _check_folder(options.folder, found.scene)
-    if options.output:
-        keep_inputs(
-            Path(options.output), [*_NAMES, *([options.animate] if options.animate else [])], options.scene, tables
-        )
     code = DONE
     if "duration" in found.settings or not found.speeds:
-        code = _deliver(lambda: found.run(folder=options.folder), options)
-    return _stability(found, options) if code == DONE and found.speeds else code
+        code = deliver_motion(lambda: found.run(folder=options.folder), options, tables)
+    if code != DONE or not found.speeds:
+        return code
+
+    def files_of(answer):
+        return {"stability.csv": answer.write, "stability.png": not options.no_picture and answer.plot}
+
+    of_output = Namespace(output=options.output, scene=options.scene)
+    return deliver(found.map, of_output, ("stability.csv", "stability.png"), files_of, tables)
 
 
 def _check_folder(folder, scene):
@@ -65,79 +61,26 @@ def _check_folder(folder, scene):
                          "or expected another name")  # fmt: skip
 
 
-def _stability(found, options):
-    """Compute, print and write the map of stability; returns the exit code."""
-    try:
-        with patience():
-            answer = found.map()
-    except NotConverged as failure:
-        say(f"cosserat: {failure}")
-        return NOT_CONVERGED
-    say(answer.details(), file=sys.stdout)
-    if options.output:
-        out = Path(options.output)
-        prepare(out)
-        written = Files(out, stops=False)
-        written.put("stability.csv", answer.write)
-        if not options.no_picture:
-            written.put("stability.png", answer.plot)
-        written.tell()
-    return DONE
+def deliver_motion(computed, options, tables=None):
+    """Deliver a `DrillingHistory`, see `deliver`."""
+    picture, film = not options.no_picture, options.animate
+
+    def files(history):
+        picture_in_time, in_depth = picture and len(history) > 1, len(history.profile_times) > 1
+        return {
+            "drilling.csv": history.write,
+            "drilling.png": picture_in_time and history.plot,
+            "energy.png": picture_in_time and history.plot_energy,
+            "phase.png": picture_in_time and turns(history) and history.plot_phase,
+            "map.png": picture_in_time and in_depth and history.plot_map,
+            film: film and in_depth and partial(history.animate, speed=options.speed),
+        }
+
+    return deliver(computed, options, _NAMES, files, tables, moving=True)
 
 
-@warnings_in_words()
-def resume_run(options):
-    """`cosserat resume` of a folder that holds a drill-string in motion; returns the exit code."""
-    return _deliver(lambda: resume(options.folder, duration=options.duration), options)
-
-
-def _deliver(compute, options):
-    """Compute, print and write, also what there is after a failure or an interruption; returns the exit code."""
-    out = Path(options.output) if options.output else None
-    if out is not None:
-        prepare(out)
-    film = options.animate
-    if film is not None:
-        from cosserat_fenicsx.pictures.animation import check_name
-
-        if out is None or Path(film).name != film:
-            raise SceneError(f"--animate {film}: expected a name without folders, and -o DIR to write the film to")
-        check_name(film)
-    history, trouble, code = ended(compute)
-    if len(history):
-        say(history.details(), file=sys.stdout)
-        if out is not None:
-            _write(history, out, not options.no_picture, film if code == DONE else None, options.speed, code == DONE)
-    if trouble is not None:
-        reached = f" at t = {history.times[-1]:.6g} s of the motion" if len(history) else ""
-        say(f"cosserat: interrupted{reached}" if code == INTERRUPTED else f"cosserat: {trouble}")
-        if options.folder and code in (INTERRUPTED, NOT_CONVERGED) and not isinstance(trouble, NotConverged):
-            say(f"cosserat: `cosserat resume {options.folder}` continues from there")
-    return code
-
-
-def _write(history, out, pictures, film, speed, stops):
-    """Write the files of a motion; `stops`: whether a signal ends the writing."""
-    files = {"drilling.csv": history.write}
-    if pictures and len(history) > 1:
-        files |= {"drilling.png": history.plot, "energy.png": history.plot_energy}
-        if turns(history):
-            files["phase.png"] = history.plot_phase
-        if len(history.profile_times) > 1:
-            files |= {"map.png": history.plot_map}
-    if film and len(history.profile_times) > 1:
-        files[film] = lambda file: history.animate(file, speed=speed)
-    written = Files(out, stops)
-    try:
-        for name, write in files.items():
-            written.put(name, write)
-    finally:
-        written.tell()
-
-
-@warnings_in_words()
-def explain_drilling(options, found):
-    """Text of `cosserat explain` of the tables of a scene file."""
+def explain(options, found):
+    """The text of `cosserat explain` of a `DrillingScene`."""
     found = _scene(options, found)
     scene, settings = found.scene, found.settings
     lines = [found.title] if found.title else []
@@ -193,9 +136,7 @@ def _in_hole(scene):
     if scene.hole is None:
         yield f"Hole: none, no walls; bit at md = {scene.bit_depth:g} m, the string hangs vertically."
         return
-    for i, section in enumerate(scene.hole.sections, start=1):
-        yield (f"Hole, {section.name or f'section {i}'}: to {section.to:g} m, {section.diameter:g} m wide, friction "
-               f"{section.friction:g}.")  # fmt: skip
+    yield from hole_in_words(scene.hole)
     inclination = math.degrees(scene.hole.path.inclination.max())
     yield f"Bit at md = {scene.bit_depth:g} m; largest inclination of the hole {inclination:.4g} degrees."
 

@@ -3,23 +3,18 @@
 import math
 import sys
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 
 from cosserat_fenicsx import units
-from cosserat_fenicsx.cli.rods import prepare
-from cosserat_fenicsx.cli.say import DONE, INTERRUPTED, Files, keep_inputs, say, warnings_in_words
-from cosserat_fenicsx.errors import Interrupted, SceneError
+from cosserat_fenicsx.cli.output import Files, given, output_of, refuse_of_rods
+from cosserat_fenicsx.cli.say import DONE, INTERRUPTED, say
+from cosserat_fenicsx.errors import Interrupted
 from cosserat_fenicsx.ranks import on_first, world
 from cosserat_fenicsx.storage.store import discard
 from cosserat_fenicsx.well.components import weight_in_mud
 from cosserat_fenicsx.well.scenefile import TorqueAndDragSettings
 
-# Options of the command line that are for rods alone.
-_OTHERS = ("load_factors", "bound", "elements", "degree", "formulation", "control", "branch", "duration", "dt",
-           "scheme", "save_every", "start", "folder", "station", "at", "animate", "speed", "color",
-           "magnify")  # fmt: skip
 _OF_SWEEPS = ("depth_sweep.csv", "depth_sweep", "depth_sweep.png")
 _SOFT = (
     "the soft string by a differential equation along the axis, and what that leaves out is estimated with each answer."
@@ -35,22 +30,16 @@ _MODELS = {
 
 
 def _scene(options, scene):
-    for name in _OTHERS:
-        if getattr(options, name, None) is not None:
-            raise SceneError(f"--{name.replace('_', '-')} is for rods, and this scene is a well")
-    asked = {name: getattr(options, name) for name in ("tol", "model") if getattr(options, name) is not None}
+    refuse_of_rods(options, "a well")
+    asked = given(options, ("tol", "model"))
     return replace(scene, torque_and_drag=replace(scene.torque_and_drag or TorqueAndDragSettings(), **asked))
 
 
-@warnings_in_words()
-def run_well(options, scene, tables):
-    """`cosserat run` of the tables of a scene file; returns the exit code."""
-    scene, out = _scene(options, scene), Path(options.output) if options.output else None
-    stems = _stems(scene.operations)
-    if out is not None:
-        names = [f"{stem}{ending}" for stem in stems for ending in (".csv", "_contacts.csv", ".png", "_3d.png")]
-        keep_inputs(out, [*names, *_OF_SWEEPS], options.scene, tables)
-        prepare(out)
+def run(options, scene, tables):
+    """`cosserat run` of a `WellScene` and the tables of its file; returns the exit code."""
+    scene, stems = _scene(options, scene), _stems(scene.operations)
+    names = [f"{stem}{ending}" for stem in stems for ending in (".csv", "_contacts.csv", ".png", "_3d.png")]
+    out = output_of(options, [*names, *_OF_SWEEPS], tables)
     if scene.title:
         say(scene.title, file=sys.stdout)
     written = Files(out, stops=False)
@@ -58,7 +47,10 @@ def run_well(options, scene, tables):
         answer = scene.answer(operation)
         say(answer.details(), file=sys.stdout)
         if out is not None:
-            _write(answer, written, stem, not options.no_picture)
+            written.put(f"{stem}.csv", answer.write, f"{stem}_contacts.csv")
+            if not options.no_picture:
+                written.put(f"{stem}.png", answer.plot)
+                written.put(f"{stem}_3d.png", answer.plot_3d)
     code = DONE
     try:
         sweep = scene.swept(out / "depth_sweep" if out is not None else None)
@@ -83,17 +75,15 @@ def _stems(operations):
     return [name + (f"_{names[:i].count(name) + 1}" if name in names[:i] else "") for i, name in enumerate(names)]
 
 
-def _write(answer, written, stem, pictures):
-    """Write the files of an answer, see `Files`."""
-    written.put(f"{stem}.csv", answer.write, f"{stem}_contacts.csv")
-    if pictures:
-        written.put(f"{stem}.png", answer.plot)
-        written.put(f"{stem}_3d.png", answer.plot_3d)
+def hole_in_words(hole):
+    """Sentences on the sections of a `Borehole`."""
+    for i, section in enumerate(hole.sections, start=1):
+        name = section.name or f"section {i}"
+        yield f"Hole, {name}: to {section.to:g} m, {section.diameter:g} m wide, friction {section.friction:g}."
 
 
-@warnings_in_words()
-def explain_well(options, scene):
-    """Text of `cosserat explain` of the tables of a scene file."""
+def explain(options, scene):
+    """The text of `cosserat explain` of a `WellScene`."""
     scene = _scene(options, scene)
     hole, path = scene.hole, scene.hole.path
     end, worst = path.position(path.length), int(np.argmax(path.dogleg_severity))
@@ -103,9 +93,7 @@ def explain_well(options, scene):
         f"down {end[2]:.2f} m; largest inclination {math.degrees(path.inclination.max()):.2f} degrees, largest dogleg "
         f"{path.dogleg_severity[worst] / units.deg_per_30m:.2f} degrees per 30 m below {path.md[worst]:g} m."
     )
-    for i, section in enumerate(hole.sections, start=1):
-        name = section.name or f"section {i}"
-        lines.append(f"Hole, {name}: to {section.to:g} m, {section.diameter:g} m wide, friction {section.friction:g}.")
+    lines += hole_in_words(hole)
     depth = scene.settings.get("depth", hole.length)
     for place in scene.string.laid(depth):
         part, S = place.component, place.component.stiffness

@@ -1,0 +1,219 @@
+"""The results and files of the command line: what is computed is printed and written, also the part of it that there is
+after a failure or an interruption."""
+
+import os
+import sys
+import tempfile
+from pathlib import Path
+
+from cosserat_fenicsx.cli.say import BAD_INPUT, DONE, INTERRUPTED, NOT_CONVERGED, in_words, say, together
+from cosserat_fenicsx.errors import Interrupted, LibraryMissing, NotConverged, NotStored, SceneError
+from cosserat_fenicsx.interrupts import obey, patience
+
+# Options that are for rods alone, but for those that a kind of scene takes; and the kinds in words.
+_OPTIONS = ("load_factors", "tol", "bound", "elements", "degree", "formulation", "model", "control", "branch",
+            "duration", "dt", "scheme", "save_every", "start", "folder", "station", "at", "animate", "speed", "color",
+            "magnify")  # fmt: skip
+_TAKEN = {
+    "a well": ("tol", "model"),
+    "a drill-string in motion": ("duration", "dt", "elements", "model", "save_every", "folder", "animate", "speed"),
+}
+
+
+def given(options, names):
+    """{name: value} of the options with these names that were given."""
+    found = {name: getattr(options, name, None) for name in names}
+    return {name: value for name, value in found.items() if value is not None}
+
+
+def refuse_of_rods(options, kind):
+    """Refuse the options of rods for another kind of scene, such as "a well".
+
+    Raises:
+        SceneError: naming the option.
+    """
+    for name in given(options, [name for name in _OPTIONS if name not in _TAKEN[kind]]):
+        raise SceneError(f"--{name.replace('_', '-')} is for rods, and this scene is {kind}")
+
+
+def deliver(computed, options, names, files_of, tables=None, moving=False):
+    """Compute, then print and write the result, or the partial result where the computation fails or is interrupted.
+
+    Args:
+        computed: function without arguments that returns the result.
+        options: of the command line.
+        names: of all files that may be written. files_of: function of the result that returns {name: function that
+            writes this file, or what is false for none}.
+        tables: of the scene file, where there is one.
+        moving: whether it is a motion.
+
+    Returns:
+        the exit code.
+    """
+    film = getattr(options, "animate", None)
+    _check_film(film, options, moving)
+    out = output_of(options, [*names, *([film] if film else [])], tables)
+    result, trouble, code = _ended(lambda: together(computed))
+    if result is not None and (len(result) or code == DONE):
+        say(result.details(**given(options, ["station"])), file=sys.stdout)
+        if out is not None:
+            if code == INTERRUPTED:
+                say("cosserat: interrupted; writing the partial result, Ctrl-C again skips what is not written yet")
+            try:
+                with patience():
+                    files = files_of(result)
+                    if code == INTERRUPTED:  # a film would take long
+                        files.pop(film, None)
+                    _write(files, out, stops=code != INTERRUPTED)
+            except KeyboardInterrupt:
+                trouble, code = "interrupted; what is not written yet is left out", INTERRUPTED
+            except (OSError, SceneError) as problem:
+                say(f"cosserat: {in_words(problem)}")
+                code = code or BAD_INPUT
+    if trouble is not None:
+        reached = f" (t = {result.times[-1]:.6g} s)" if isinstance(trouble, Interrupted) and moving and result else ""
+        say(f"cosserat: {getattr(trouble, 'words', trouble)}{reached}")
+        if getattr(options, "folder", None) and not isinstance(trouble, NotConverged | SceneError):
+            say(f"cosserat: `cosserat resume {options.folder}` continues from there")
+        elif moving and code == INTERRUPTED:
+            say("cosserat: a motion that is run with --folder DIR can be continued by `cosserat resume DIR`")
+    return code
+
+
+def _write(files, out, stops):
+    written = Files(out, stops)
+    try:
+        for name, write in files.items():
+            if write:
+                written.put(name, write)
+    finally:
+        written.tell()
+
+
+def _ended(compute):
+    """(result or partial result, the exception or None, exit code) of a function without arguments.
+
+    Raises:
+        SceneError: bad input, found before anything was computed.
+    """
+    try:
+        with patience():
+            return compute(), None, DONE
+    except (NotConverged, NotStored) as failure:
+        return failure.path, failure, NOT_CONVERGED
+    except SceneError as failure:
+        if failure.path is None:
+            raise
+        return failure.path, failure, BAD_INPUT
+    except Interrupted as stop:
+        return stop.path, stop, INTERRUPTED
+
+
+def output_of(options, names, tables=None):
+    """The output folder, a Path, which is made before anything is computed; None without one.
+
+    Args:
+        names: of all files that may be written. tables: of the scene file, where there is one.
+
+    Raises:
+        SceneError: it cannot be written to, or a file there is read from.
+    """
+    if not options.output:
+        return None
+    out = Path(options.output)
+    if tables is not None:
+        _keep_inputs(out, names, options.scene, tables)
+    _prepare(out)
+    return out
+
+
+def _prepare(out):
+    """Make the output folder, and check that it can be written to.
+
+    Raises:
+        SceneError: it cannot.
+    """
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=out):
+            pass
+    except OSError as problem:
+        raise SceneError(f"output folder {out}: {problem.strerror}: expected a folder that can be written to") from None
+
+
+def _check_film(film, options, moving):
+    """Refuse a film that cannot be made, before the computation."""
+    if film is None:
+        return
+    if not moving or not options.output:
+        raise SceneError("--animate: expected a motion, and -o DIR to write its film to")
+    from cosserat_fenicsx.pictures.animation import check_name
+
+    if Path(film).name != film:
+        raise SceneError(f"--animate {film}: expected a name without folders; it is written to -o DIR")
+    check_name(film)
+
+
+class Files:
+    """Files in a folder, one after another.
+
+    Args:
+        out: the folder, a Path. stops: whether a signal ends the writing between two files.
+    """
+
+    def __init__(self, out, stops=True):
+        self._out, self._stops = out, stops
+        self.names, self._left_out = [], {}
+
+    def put(self, name, write, *more):
+        """Call `write` with a file of this name; `more`: names of files that it writes too, beside the .h5 of an .xdmf.
+        A picture whose library is missing is left out.
+
+        Raises:
+            KeyboardInterrupt: a signal asked for a stop.
+            OSError, SceneError: as `write` does.
+        """
+        if self._stops:
+            obey()
+        try:
+            write(self._out / name)
+        except LibraryMissing as problem:
+            self._left_out.setdefault(str(problem), []).append(name)
+        else:
+            self.names += [name, *([f"{Path(name).stem}.h5"] if name.endswith(".xdmf") else []), *more]
+
+    def tell(self):
+        """Say what was written, and what was left out."""
+        if self.names:
+            say(f"written to {self._out}/: {', '.join(self.names)}", file=sys.stdout)
+        for why, names in self._left_out.items():
+            say(f"cosserat: left out: {', '.join(names)}: {why}")
+
+
+def _keep_inputs(out, names, scene, tables):
+    """Refuse an output that would replace the scene file, or a file that it names.
+
+    Args:
+        out: the output folder, a Path. names: of all files that may be written there.
+        scene: the name of the scene file. tables: what is in it.
+
+    Raises:
+        SceneError: naming the file.
+    """
+    folder = Path(scene).parent
+    read = {os.path.realpath(scene)} | {os.path.realpath(folder / text) for text in _texts(tables) if "\0" not in text}
+    for name in names:
+        if os.path.realpath(out / name) in read:
+            raise SceneError(
+                f"-o {out}: {name} would replace the file of that name which the scene is read from: expected another "
+                "folder, or another name of that file"
+            )
+
+
+def _texts(value):
+    """All texts in nested tables and lists."""
+    if isinstance(value, str):
+        yield value
+    elif isinstance(value, dict | list):
+        for inner in value.values() if isinstance(value, dict) else value:
+            yield from _texts(inner)
