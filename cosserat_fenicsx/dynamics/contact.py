@@ -14,7 +14,7 @@ import numpy as np
 
 from cosserat_fenicsx.algebra.building import Pointers
 from cosserat_fenicsx.errors import SceneError
-from cosserat_fenicsx.numerics import directors, small_rotations
+from cosserat_fenicsx.numerics import directors, lobatto_weights, small_rotations
 
 
 class TouchingNodes:
@@ -310,11 +310,10 @@ def _places(model, walls):
 
 def _shares(breaks, nodes):
     """The share of a rod's length that belongs to each node: weights of the quadrature rule with these points."""
-    moments = 1 / np.arange(1, len(nodes) + 1)
-    weights = np.linalg.solve(np.vander(nodes, increasing=True).T, moments)
     sizes, p = np.diff(breaks), len(nodes) - 1
     shares = np.zeros(len(sizes) * p + 1)
-    np.add.at(shares, np.arange(len(sizes))[:, None] * p + np.arange(p + 1), sizes[:, None] * weights)
+    places = np.arange(len(sizes))[:, None] * p + np.arange(p + 1)
+    np.add.at(shares, places, sizes[:, None] * lobatto_weights(nodes))
     return shares
 
 

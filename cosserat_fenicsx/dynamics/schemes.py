@@ -20,7 +20,7 @@ class Momentum(Stepper):
 class TurnedStepProblem(StepProblem):
     """See `StepProblem`: the rows of q of every node are transformed to those of a rotation, and |q|^2 = 1 is added."""
 
-    changes = RESIDUAL | MATRICES
+    changes, takes_momentum = RESIDUAL | MATRICES, False
 
     def __init__(self, model):
         super().__init__(model)
@@ -45,8 +45,6 @@ class TurnedStepProblem(StepProblem):
     def begin_step(self, t, h):
         self._q_start = self._of_nodes(self.x.array_r).copy()
         super().begin_step(t, h)
-        self._known.set(0.0)
-        self._known.axpy(1.0, self._loads)
 
     def _change_residual(self, x, b):
         q, rows = self._of_nodes(x), self._of_nodes(b)
@@ -231,22 +229,13 @@ class CollocationProblem(StepProblem):
         rule: the `Rule` of the next steps.
     """
 
-    ties_class, acting_share = EndTies, 1.0
+    ties_class, acting_share, loads_share, takes_momentum = EndTies, 1.0, 1 - _BEFORE_END, False
 
     def begin_step(self, t, h):
-        model = self.model
-        self.h, self._middle = h / model.time, t + h / 2
-        model.h.value = self.h
+        self._middle, self._end = t + h / 2, t + self.loads_share * h
         self._start[:] = self._state
-        model.take_scheme(self.rule.ahead(self.h))
-        self._end = t + (1 - _BEFORE_END) * h
-        self._take_loads(self._end)
-        self._known.set(0.0)
-        self._known.axpy(1.0, self._loads)
-        if self.ties:
-            self.ties.begin(model.ties_at(t + h))
-        for part in self.touching:
-            part.begin(self.h)
+        self.model.take_scheme(self.rule.ahead(h / self.model.time))
+        super().begin_step(t, h)
 
     def work(self):
         """See `StepProblem`: by loads at mid-step, and the mean of the reactions at both ends."""

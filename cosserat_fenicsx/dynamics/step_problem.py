@@ -71,8 +71,10 @@ class StepProblem(Equations):
     ties_class = MovingTies
     #: see `Equations`
     changes = 0
-    #: where actions act, from the start (0) to the end (1) of a step
-    acting_share = 0.5
+    #: where actions act, from the start (0) to the end (1) of a step; and where loads are evaluated
+    acting_share = loads_share = 0.5
+    #: whether the momentum at the start of a step is part of its equations
+    takes_momentum = True
 
     def __init__(self, model):
         self._refreshes = bool(model.actions.refreshed)
@@ -155,9 +157,11 @@ class StepProblem(Equations):
         model = self.model
         self.h = model.h.value = h / model.time
         self._start[:] = self._state
-        self._take_loads(t + h / 2)
-        self._assemble(self._momentum, self._known)
-        self._known.scale(1 / self.h)
+        self._take_loads(t + self.loads_share * h)
+        self._known.set(0.0)
+        if self.takes_momentum:
+            self._assemble(self._momentum, self._known)
+            self._known.scale(1 / self.h)
         self._known.axpy(1.0, self._loads)
         if self.ties:
             self.ties.begin(model.ties_at(t + h))
