@@ -24,6 +24,23 @@ _PASSES = 100
 _MANY = 500
 
 
+def on_every_rank(A):
+    """A PETSc matrix as one of scipy, whole on every rank."""
+    size, parts = A.getSize()[1], A.comm.tompi4py().allgather(A.getValuesCSR())
+    return sparse.vstack([sparse.csr_matrix((v, j, i), shape=(len(i) - 1, size)) for i, j, v in parts])
+
+
+def constraint_rows(gradients, tied, size):
+    """(equations, size) gradients of constraint equations by all unknowns.
+
+    Args:
+        gradients: (equations, tied nodes, block); tied: (tied nodes, block) numbers of the unknowns, -1 where clamped.
+    """
+    held = np.zeros((len(gradients), size + 1))  # number -1 goes to the last column
+    held[:, tied.ravel()] = gradients.reshape(len(gradients), tied.size)
+    return held[:, :size]
+
+
 class Pencil:
     """K x = lambda M x, held x = 0.
 

@@ -8,7 +8,7 @@ from mpi4py import MPI
 from scipy import sparse
 
 from cosserat_fenicsx.algebra.packed import Packed
-from cosserat_fenicsx.algebra.pencil import Pencil
+from cosserat_fenicsx.algebra.pencil import Pencil, constraint_rows, on_every_rank
 from cosserat_fenicsx.checks import instance, number, tolerance, whole
 from cosserat_fenicsx.errors import NotConverged, SceneError
 from cosserat_fenicsx.models.rod_data import check_inertia, nodal_inertia, nodal_lateral, nodal_offsets
@@ -195,15 +195,9 @@ def _stiffness(problem):
         if model.comm.rank == 0:
             problem.ties.add_to_matrix(K, tied, of_ties)
     K.assemble()
-    size = K.getSize()[0]
-    parts = model.comm.allgather(K.getValuesCSR())
-    K = sparse.vstack([sparse.csr_matrix((v, j, i), shape=(len(i) - 1, size)) for i, j, v in parts])
-    held = np.zeros((0, size + 1))
-    if problem.ties:
-        gradients = problem.ties.gradients()
-        held = np.zeros((len(gradients), size + 1))  # number -1, a clamped component, goes to the last column
-        held[:, tied.ravel()] = gradients.reshape(len(gradients), -1)
-    return (K + K.T) / 2, model.rows_of_nodes, held[:, :size]
+    K = on_every_rank(K)
+    gradients = problem.ties.gradients() if problem.ties else np.empty((0, *tied.shape))
+    return (K + K.T) / 2, model.rows_of_nodes, constraint_rows(gradients, tied, K.shape[0])
 
 
 def _mass(model, rows, size, unit):

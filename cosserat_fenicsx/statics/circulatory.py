@@ -10,6 +10,7 @@ from scipy import sparse
 
 from cosserat_fenicsx.algebra import eigen
 from cosserat_fenicsx.algebra.packed import Packed
+from cosserat_fenicsx.algebra.pencil import constraint_rows, on_every_rank
 from cosserat_fenicsx.algebra.pool import PROBLEMS
 from cosserat_fenicsx.errors import NotConverged
 from cosserat_fenicsx.models.signature import Signature
@@ -81,17 +82,9 @@ class CirculatoryPart:
             return False
         if not self._form:
             return True
-        matrix = self._assembled(rq, load_factor)
-        total = matrix.getSize()[0]
-        parts = self._model.comm.allgather(matrix.getValuesCSR())
-        h = sparse.vstack([sparse.csr_matrix((v, j, i), shape=(len(i) - 1, total)) for i, j, v in parts])
-        held = np.zeros((0, total))
-        gradients = self._model.held(rq, load_factor)
-        if len(gradients):
-            held = np.zeros((len(gradients), total + 1))  # number -1, a clamped component, goes to the last column
-            held[:, self._variation.tied.ravel()] = gradients.reshape(len(gradients), -1)
-            held = held[:, :total]
-        held = sparse.csr_matrix(held)
+        h, tied = on_every_rank(self._assembled(rq, load_factor)), self._variation.tied
+        total = h.shape[0]
+        held = sparse.csr_matrix(constraint_rows(self._model.held(rq, load_factor), tied, total))
         solve = sparse.csr_matrix(np.linalg.pinv((held @ held.T).toarray(), rcond=_ROUNDING))
         allowed = sparse.identity(total) - held.T @ solve @ held
         return bool(abs(allowed @ (h - h.T) @ allowed).max() <= _ROUNDING * abs(h).max())
