@@ -77,7 +77,7 @@ class Fixed:
         """Restore what `memory` returned."""
 
 
-class Adaptive:
+class Adaptive(Fixed):
     """Steps whose local errors add up to `tol` over the duration, and that resolve loads and prescribed motions.
 
     The length changes only where that saves time: every change costs a new tangent and its factorisation.
@@ -104,27 +104,20 @@ class Adaptive:
     _HOLD = 24
 
     def __init__(self, tol, duration):
-        self._duration, self._rate, self._dt, self._longest = (
-            duration,
-            tol / duration,
-            duration * self._INITIAL,
-            duration / 100,
-        )
+        super().__init__(duration * self._INITIAL)
+        self._duration, self._rate, self._longest = duration, tol / duration, duration / 100
         self._largest_prediction_error, self._always_accepted = self._PREDICTION * tol, self._ALWAYS_ACCEPTED * duration
         self._tol, self._hold, self._tiny = tol, 0, 0
 
     def watch(self, scene, duration, load_factor, impulse_error):
-        """See `Fixed`: steps will resolve them."""
         self._resolution = Resolution(scene, duration, self._tol, load_factor, impulse_error)
         return []
 
     @property
     def stuck(self):
-        """See `Fixed`."""
         return self._tiny > self._MANY
 
     def length(self, t, left):
-        """See `Fixed`."""
         h = _even(left, self._dt)
         resolved = self._resolution.longest(t, h)
         if resolved < h:
@@ -133,7 +126,6 @@ class Adaptive:
         return h
 
     def accepts(self, stepper, h):
-        """See `Fixed`."""
         accepted = self._accepts(stepper, h)
         if h < self._TINY * self._duration:
             self._tiny += 1
@@ -160,20 +152,16 @@ class Adaptive:
         return error <= 2 * allowed
 
     def failed(self, h):
-        """See `Fixed`."""
         self._dt = h / 2
         return h > self._always_accepted
 
     def jump(self):
-        """See `Fixed`."""
         self._dt *= self._AFTER_JUMP
 
     def memory(self):
-        """See `Fixed`."""
         return {"dt": self._dt, "stay": self._hold, "tiny": self._tiny, "seen": self._resolution.memory()}
 
     def recall(self, memory):
-        """See `Fixed`."""
         self._dt, self._hold, self._tiny = memory["dt"], memory["stay"], memory["tiny"]
         self._resolution.recall(memory["seen"])
 
