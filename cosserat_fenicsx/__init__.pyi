@@ -2,6 +2,7 @@
 
 from cosserat_fenicsx import analytic as analytic
 from cosserat_fenicsx import drilling as drilling
+from cosserat_fenicsx import signals as signals
 from cosserat_fenicsx import units as units
 from cosserat_fenicsx import well as well
 from cosserat_fenicsx.actions.centrifugal import Centrifugal as Centrifugal
@@ -12,10 +13,6 @@ from cosserat_fenicsx.actions.springs import Dashpot as Dashpot
 from cosserat_fenicsx.actions.springs import Foundation as Foundation
 from cosserat_fenicsx.actions.springs import PointMass as PointMass
 from cosserat_fenicsx.actions.springs import Spring as Spring
-from cosserat_fenicsx.actions.walls import HoleRing as HoleRing
-from cosserat_fenicsx.actions.walls import HoleWall as HoleWall
-from cosserat_fenicsx.actions.walls import TubeRing as TubeRing
-from cosserat_fenicsx.actions.walls import TubeWall as TubeWall
 from cosserat_fenicsx.actions.walls import Wall as Wall
 from cosserat_fenicsx.dynamics.natural_modes import modes as modes
 from cosserat_fenicsx.dynamics.resuming import read_history as read_history
@@ -39,8 +36,6 @@ from cosserat_fenicsx.results.records import Event as Event
 from cosserat_fenicsx.results.sensitivity import Sensitivity as Sensitivity
 from cosserat_fenicsx.results.sensitivity import Uncertainty as Uncertainty
 from cosserat_fenicsx.results.stored import read_result as read_result
-from cosserat_fenicsx.results.whirl import Orbit as Orbit
-from cosserat_fenicsx.results.whirl import Whirl as Whirl
 from cosserat_fenicsx.scene.action import Action as Action
 from cosserat_fenicsx.scene.action import LineAction as LineAction
 from cosserat_fenicsx.scene.action import PointAction as PointAction
@@ -68,15 +63,6 @@ from cosserat_fenicsx.scene.sections import Material as Material
 from cosserat_fenicsx.scene.sections import Rectangle as Rectangle
 from cosserat_fenicsx.scene.sections import Stiffness as Stiffness
 from cosserat_fenicsx.scene.sections import Tube as Tube
-from cosserat_fenicsx.scene.signals import Along as Along
-from cosserat_fenicsx.scene.signals import AlongPieces as AlongPieces
-from cosserat_fenicsx.scene.signals import AlongTable as AlongTable
-from cosserat_fenicsx.scene.signals import Ramp as Ramp
-from cosserat_fenicsx.scene.signals import RunUp as RunUp
-from cosserat_fenicsx.scene.signals import Sine as Sine
-from cosserat_fenicsx.scene.signals import Step as Step
-from cosserat_fenicsx.scene.signals import Table as Table
-from cosserat_fenicsx.scene.signals import Triangle as Triangle
 from cosserat_fenicsx.scene.supports import Clamp as Clamp
 from cosserat_fenicsx.scene.supports import Hinge as Hinge
 from cosserat_fenicsx.scene.supports import InitialVelocity as InitialVelocity

@@ -102,7 +102,7 @@ def cable_in_conduit(folder):
     names = "held", "bend", "pulled"
     rods = [cf.Rod(curve, cable, polymer, name=name) for curve, name in zip(curves, names, strict=True)]
     conduit = [
-        cf.TubeWall(rod, axis, radius=0.016, contact_radius=0.006, stiffness=1e6, friction=mu, slip=(-1.0, 0.0),
+        cf.well.TubeWall(rod, axis, radius=0.016, contact_radius=0.006, stiffness=1e6, friction=mu, slip=(-1.0, 0.0),
                     begins=begin, has_arm=False)
         for rod, begin in zip(rods, md.tolist(), strict=False)
     ]  # fmt: skip

@@ -39,8 +39,10 @@ def spun_up(speed, until, friction, stiffness=1e9):
         collar, wall, scene.
     """
     collar, coupling, joints, bearings = rods()
-    drive = cf.Prescribed(coupling.start, displacement=(0, 0, 0), rotation=cf.RunUp((0, 0, speed), 0.0, until))
-    wall = cf.HoleWall(collar, _AXIS, HOLE / 2, ARM, stiffness=stiffness, friction=friction, damping=0.2, begins=_BEGIN)
+    drive = cf.Prescribed(coupling.start, displacement=(0, 0, 0), rotation=cf.signals.RunUp((0, 0, speed), 0.0, until))
+    wall = cf.well.HoleWall(
+        collar, _AXIS, HOLE / 2, ARM, stiffness=stiffness, friction=friction, damping=0.2, begins=_BEGIN
+    )
     scene = cf.Scene([collar, coupling], [drive, *bearings], [wall, *_mud(collar)], joints,
                      title="Eccentric collar in its hole")  # fmt: skip
     return collar, wall, scene
@@ -65,7 +67,7 @@ def rolling(spin, friction, duration, stiffness=1e9):
         x = b * min(s, LENGTH - s)
         return size * (np.sin(x) + ratio * np.sinh(x))
 
-    pull = cf.LineForce(collar, cf.Along(lambda s: (mass * rate**2 * deflection(s), 0, 0)))
+    pull = cf.LineForce(collar, cf.signals.Along(lambda s: (mass * rate**2 * deflection(s), 0, 0)))
     held = [cf.Clamp(coupling.start), *bearings, cf.Prescribed(collar.at(_MIDDLE), displacement=(CLEARANCE, 0, 0))]
     start = cf.solve(cf.Scene([collar, coupling], held, [pull], joints), [1.0], **MESH)
     s = np.linspace(0, LENGTH, 201)
@@ -81,10 +83,11 @@ def rolling(spin, friction, duration, stiffness=1e9):
         cf.InitialVelocity(collar, linear=lambda s: (0.0, rate * float(w(s)), 0.0), angular=angular),
         cf.InitialVelocity(coupling, angular=coupled),
     ]
-    turn = cf.Ramp((0, 0, spin * 2 * duration), 0.0, 2 * duration)
+    turn = cf.signals.Ramp((0, 0, spin * 2 * duration), 0.0, 2 * duration)
     drive = cf.Prescribed(coupling.start, displacement=(0, 0, 0), rotation=turn)
-    ring = cf.HoleRing(collar.at(_MIDDLE), _AXIS, CLEARANCE, ARM, stiffness=stiffness, friction=friction, damping=0.2,
-                       begins=_BEGIN)  # fmt: skip
+    ring = cf.well.HoleRing(
+        collar.at(_MIDDLE), _AXIS, CLEARANCE, ARM, stiffness=stiffness, friction=friction, damping=0.2, begins=_BEGIN
+    )
     scene = cf.Scene([collar, coupling], [drive, *bearings], [ring, *_mud(collar)], joints, velocities=velocities)
     return collar, ring, scene, start
 

@@ -18,8 +18,8 @@ def spaghetti(*loads, **more):
 def flying_in_space():
     """Force (T/10, 0, 0) and moment (0, -T, -T/2) at the start, T a triangle of 200 at 2.5 s."""
     return spaghetti(
-        lambda rod: cf.Force(rod.start, cf.Triangle((20, 0, 0), 0, 2.5, 5)),
-        lambda rod: cf.Moment(rod.start, cf.Triangle((0, -200, -100), 0, 2.5, 5)),
+        lambda rod: cf.Force(rod.start, cf.signals.Triangle((20, 0, 0), 0, 2.5, 5)),
+        lambda rod: cf.Moment(rod.start, cf.signals.Triangle((0, -200, -100), 0, 2.5, 5)),
     )
 
 
@@ -34,7 +34,7 @@ def flying_in_a_plane():
     """Force (8, 0, 0) and moment (0, 0, -80) at the start for 2.5 s."""
     return spaghetti(
         lambda rod: cf.Force(rod.start, lambda t: (8.0 if t < 2.5 else 0.0, 0, 0), jumps=(2.5,)),
-        lambda rod: cf.Moment(rod.start, cf.Step((0, 0, -80), end=2.5)),
+        lambda rod: cf.Moment(rod.start, cf.signals.Step((0, 0, -80), end=2.5)),
     )
 
 
@@ -43,7 +43,7 @@ def right_angle():
     section = cf.Stiffness((1e6, 1e6), 1e6, (1e3, 1e3), 1e3, mass=1.0, inertia=(10, 10, 20))
     foot = cf.Rod(cf.Line((0, 0, 0), (10, 0, 0)), section, name="foot")
     arm = cf.Rod(cf.Line((10, 0, 0), (10, 10, 0)), section, name="arm")
-    load = cf.Force(foot.end, cf.Triangle((0, 0, 50), 0, 1, 2))
+    load = cf.Force(foot.end, cf.signals.Triangle((0, 0, 50), 0, 1, 2))
     return arm, cf.Scene([foot, arm], [cf.Clamp(foot.start)], [load], [cf.Joint(foot.end, arm.start)])
 
 

@@ -70,7 +70,7 @@ def rolling(spin, stiffness, friction):
         return size * (np.sin(x) + ratio * np.sinh(x))
 
     pins = [cf.Pin(rod.start), cf.Pin(rod.end)]
-    pull = cf.LineForce(rod, cf.Along(lambda s: (COLLAR["total_mass"] * rate**2 * deflection(s), 0, 0)))
+    pull = cf.LineForce(rod, cf.signals.Along(lambda s: (COLLAR["total_mass"] * rate**2 * deflection(s), 0, 0)))
     held = [*pins, cf.Prescribed(rod.at(middle), displacement=(radius, 0, 0))]
     start = cf.solve(cf.Scene([rod], held, [pull, cf.Spring(rod.start, rotational=1e2)]), [1.0], elements=8, degree=2)
     s = np.linspace(0, LENGTH, 201)

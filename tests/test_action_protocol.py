@@ -39,20 +39,21 @@ def test_loads_that_change_along_a_rod(tmp_path):
     q = 1e-3
     (tmp_path / "load.csv").write_text(f"# s, fx, fy, fz\n0, 0, 0, 0\n1.0, 0, 0, {q}\n")
     kinds = [
-        cf.Along(lambda s: (0, 0, q * s)),
-        cf.AlongTable([0, 1.0], [(0, 0, 0), (0, 0, q)]),
-        cf.AlongTable(tmp_path / "load.csv"),
+        cf.signals.Along(lambda s: (0, 0, q * s)),
+        cf.signals.AlongTable([0, 1.0], [(0, 0, 0), (0, 0, q)]),
+        cf.signals.AlongTable(tmp_path / "load.csv"),
     ]
     for force in kinds:
         path = cf.solve(cf.Scene([ROD], [cf.Clamp(ROD.start)], [cf.LineForce(ROD, force)]), [1.0], elements=2)
         assert path.displacement(ROD.end)[0, 2] == pytest.approx(11 * q / 120, rel=1e-5)
         np.testing.assert_allclose(path.force(ROD.at(0.5))[0, 2], q * (1 - 0.25) / 2, rtol=1e-9)
-    half = cf.LineForce(ROD, cf.AlongPieces([(0.3, (0, 0, 0)), (0.7, (0, 0, q))]))
+    half = cf.LineForce(ROD, cf.signals.AlongPieces([(0.3, (0, 0, 0)), (0.7, (0, 0, q))]))
     path = cf.solve(cf.Scene([ROD], [cf.Clamp(ROD.start)], [half]), [1.0], elements=2)
     assert path.moment(ROD.start)[0, 1] == pytest.approx(-q * 0.4 * 0.5, rel=1e-9)
-    for bad in (lambda: cf.Along(3), lambda: cf.AlongTable([1, 0], [(0, 0, 0)] * 2),
-                lambda: cf.AlongPieces([(0.0, (0, 0, 1))]),
-                lambda: cf.AlongTable("no.csv"), lambda: cf.LineForce(ROD, cf.Along(lambda s: 1 / 0))):  # fmt: skip
+    for bad in (lambda: cf.signals.Along(3), lambda: cf.signals.AlongTable([1, 0], [(0, 0, 0)] * 2),
+                lambda: cf.signals.AlongPieces([(0.0, (0, 0, 1))]),
+                lambda: cf.signals.AlongTable("no.csv"),
+                lambda: cf.LineForce(ROD, cf.signals.Along(lambda s: 1 / 0))):  # fmt: skip
         with pytest.raises(cf.SceneError):
             bad()
 
@@ -214,7 +215,9 @@ def slid(duration, k=100.0, limit=1.0, steps=100000):
 @pytest.mark.serial
 @pytest.mark.parametrize("scheme", ["momentum", "energy", "generalised-alpha"])
 def test_memory_and_refreshed_data_in_motion(scheme):
-    scene = cf.Scene([FREE], [], [Slider(FREE.at(0.5), 100.0, 1.0), cf.Force(FREE.at(0.5), cf.Sine((3.0, 0, 0), 1.0))])
+    scene = cf.Scene(
+        [FREE], [], [Slider(FREE.at(0.5), 100.0, 1.0), cf.Force(FREE.at(0.5), cf.signals.Sine((3.0, 0, 0), 1.0))]
+    )
     exact = slid(2.0)
     for options in ({"tol": 1e-3}, {"dt": 0.005}):
         history = cf.simulate(scene, 2.0, scheme=scheme, elements=1, degree=2, **options)
@@ -278,7 +281,7 @@ def test_no_peak_of_a_long_table_is_missed(rows, peak):
     tip = F * (3 * (a**2 + variance) - (a**3 + 3 * a * variance)) / 6
     section = cf.Stiffness((1e9, 1e9), 1e9, (1.0, 1.0), 1.0)
     rod = cf.Rod(cf.Line((0, 0, 0), (1.0, 0, 0)), section)
-    scene = cf.Scene([rod], [cf.Clamp(rod.start)], [cf.LineForce(rod, cf.AlongTable(s, values))])
+    scene = cf.Scene([rod], [cf.Clamp(rod.start)], [cf.LineForce(rod, cf.signals.AlongTable(s, values))])
     for accuracy, options in ((1e-7, {"tol": 1e-4}), (3e-2, {"elements": 3, "degree": 2}),
                               (1e-4, {"elements": 3, "model": "spatial"})):  # fmt: skip
         path = cf.solve(scene, [1.0], **options)
@@ -288,7 +291,7 @@ def test_no_peak_of_a_long_table_is_missed(rows, peak):
 
 def test_a_function_may_change_between_calls():
     size = [1e-3]
-    scene = cf.Scene([ROD], [cf.Clamp(ROD.start)], [cf.LineForce(ROD, cf.Along(lambda s: (0, 0, size[0])))])
+    scene = cf.Scene([ROD], [cf.Clamp(ROD.start)], [cf.LineForce(ROD, cf.signals.Along(lambda s: (0, 0, size[0])))])
     first = cf.solve(scene, [1.0], elements=4).displacement(ROD.end)[0, 2]
     size[0] = 2e-3
     assert cf.solve(scene, [1.0], elements=4).displacement(ROD.end)[0, 2] == pytest.approx(2 * first, rel=1e-6)

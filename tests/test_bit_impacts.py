@@ -90,7 +90,7 @@ def test_steps_that_do_not_resolve_an_impact_are_told():
 def test_a_bit_that_is_set_down_on_rigid_rock_has_the_impulse_of_its_mass(mass):
     """It is lifted, then lowered with 1 m/s, at rest in itself: m v, and the force Z v of the wave that starts."""
     times = [0.0, 2.0, 4.0, 9.0, 11.0, 13.0]
-    hook = cf.drilling.Hook(speed=cf.Table(times, [(0.0,), (0.5,), (0.0,), (0.0,), (-1.0,), (-1.0,)]))
+    hook = cf.drilling.Hook(speed=cf.signals.Table(times, [(0.0,), (0.5,), (0.0,), (0.0,), (-1.0,), (-1.0,)]))
     bit = cf.drilling.BitOnRock(cf.drilling.Stribeck(0.0, 0.0), 1e4, mass=mass)
     scene = hanging(hook, bit=bit, weight=300.0, drag=cf.drilling.ViscousDrag(0.0, 2.0))
     Z = scene.segments[-1].axial_impedance
@@ -191,7 +191,7 @@ def test_rock_in_a_scene_file(tmp_path):
 @pytest.mark.parametrize("stiffness", [1e6, 1e8, math.inf])
 def test_the_weight_of_a_hook_that_is_lowered_is_that_of_springs_in_a_row(stiffness):
     """Lines, string and rock; and in steady rotation on rock that gives way nothing changes."""
-    down = cf.Table([0.0, 1.0, 2.0, 60.0], [(0.0,), (-0.01,), (0.0,), (0.0,)])
+    down = cf.signals.Table([0.0, 1.0, 2.0, 60.0], [(0.0,), (-0.01,), (0.0,), (0.0,)])
     bit = cf.drilling.BitOnRock(cf.drilling.Stribeck(0.0, 0.0), 6e4, rock_stiffness=stiffness)
     scene = hanging(cf.drilling.Hook(6e6, down), bit=bit, weight=300.0, drag=cf.drilling.ViscousDrag(0.0, 3.0))
     history = cf.drilling.simulate(scene, 25.0, dt=5e-3)

@@ -217,10 +217,11 @@ def test_what_a_start_takes_from_loads_in_time():
     def scene(signal):
         return cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Force(rod.end, signal)])
 
-    for signal, factor in ((cf.Step(v), 0), (cf.Step(v, -1, 0), 1), (cf.Ramp(v), 0), (cf.Ramp(v, -1, 1), 0.5),
-                           (cf.Table((0, 1), (v, v)), 1)):  # fmt: skip
+    for signal, factor in ((cf.signals.Step(v), 0), (cf.signals.Step(v, -1, 0), 1), (cf.signals.Ramp(v), 0),
+                           (cf.signals.Ramp(v, -1, 1), 0.5),
+                           (cf.signals.Table((0, 1), (v, v)), 1)):  # fmt: skip
         np.testing.assert_allclose(before(scene(signal)).loads[0].force, np.multiply(factor, v))
-    released = cf.simulate(scene(cf.Step(v, -1, 0)), 0.2, dt=0.01, start=2.0, elements=2, degree=2)
+    released = cf.simulate(scene(cf.signals.Step(v, -1, 0)), 0.2, dt=0.01, start=2.0, elements=2, degree=2)
     path = cf.solve(scene(v), [2.0], elements=2, degree=2, model="planar")
     np.testing.assert_allclose(released.position(rod.end)[0], path.position(rod.end)[0], atol=1e-12)
     assert (
@@ -232,7 +233,7 @@ def test_what_a_start_takes_from_loads_in_time():
 
 def test_a_run_up():
     """Its acceleration is continuous, and its angle is the integral of its speed."""
-    run = cf.RunUp((0, 0, 6.0), 1.0, 16.0)
+    run = cf.signals.RunUp((0, 0, 6.0), 1.0, 16.0)
     t = np.linspace(0, 20, 20001)
     angle = np.array([run(x)[2] for x in t])
     speed = np.gradient(angle, t)

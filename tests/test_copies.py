@@ -16,7 +16,7 @@ HISTORY = ("times", "steps", "iterations", "kinetic", "strain", "work", "dissipa
            "angular_momentum", "along_axis")  # fmt: skip
 
 
-def swinging(force=cf.Sine((0, 0, 2.0), 0.5)):
+def swinging(force=cf.signals.Sine((0, 0, 2.0), 0.5)):
     rod = cf.Rod(cf.Line((0, 0, 0), (10, 0, 0)), SPAGHETTI, name="rod")
     return rod, cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Force(rod.end, force)])
 

@@ -44,8 +44,8 @@ def test_frequencies_of_turned_principal_axes():
 
 def whirl(rod):
     """A load with components in all directions that ends, drag, and viscosity proportional to the stiffness."""
-    load = cf.Force(rod.end, cf.Triangle((0.5, 0.8, 0.4), 0, 0.1, 0.2))
-    turning = cf.Moment(rod.end, cf.Step((0.1, -0.2, 0.1), end=0.15))
+    load = cf.Force(rod.end, cf.signals.Triangle((0.5, 0.8, 0.4), 0, 0.1, 0.2))
+    turning = cf.Moment(rod.end, cf.signals.Step((0.1, -0.2, 0.1), end=0.15))
     return cf.Scene([rod], [cf.Clamp(rod.start)], [load, turning])
 
 
@@ -96,7 +96,7 @@ def off_centroid(**damping):
 def test_energy_is_exact_and_momentum_too():
     """A free rod with initial velocities and no load."""
     rod = off_centroid()
-    load = cf.Force(rod.end, cf.Triangle((2.0, 1.0, 3.0), 0, 0.1, 0.2))
+    load = cf.Force(rod.end, cf.signals.Triangle((2.0, 1.0, 3.0), 0, 0.1, 0.2))
     for scheme in ("energy", "momentum"):
         history = cf.simulate(cf.Scene([rod], loads=[load]), 1.0, dt=0.01, elements=4, degree=2, scheme=scheme)
         free = history.times > 0.2 + 1e-9
@@ -128,7 +128,7 @@ def test_a_mode_of_a_rope_decays_as_it_should():
 def test_a_plane_motion_of_a_coupled_section_is_one_in_space():
     section = cf.Stiffness.offset((3e2, 5e2), 8e2, (1.0, 2.5), 0.7, centroid=(0.05, 0), **MOVING)
     rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, L)), section, name="rod", damping=cf.Damping(time=0.01))
-    scene = cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Force(rod.end, cf.Triangle((2.0, 0, 3.0), 0, 0.1, 0.2))])
+    scene = cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Force(rod.end, cf.signals.Triangle((2.0, 0, 3.0), 0, 0.1, 0.2))])
     for scheme in ("momentum", "generalised-alpha"):
         flat, space = (
             cf.simulate(scene, 0.3, dt=0.02, elements=3, degree=2, scheme=scheme, model=model)

@@ -103,7 +103,7 @@ def test_curvatures_are_those_of_the_shape_and_not_moments_over_stiffness(dampin
     """The curvature along a cantilever in a plane sums up to the angle of its end, while damping adds to the moment."""
     rod = cf.Rod(cf.Line((0, 0, 0), (1, 0, 0)), cf.Rectangle(0.01, 0.01), cf.Material(210e9, 0.3, 7850.0), name="rod",
                  damping=damping)  # fmt: skip
-    loads = [cf.Force(rod.end, cf.Ramp((0, 0, 1.0), 0, 0.05))]
+    loads = [cf.Force(rod.end, cf.signals.Ramp((0, 0, 1.0), 0, 0.05))]
     history = cf.simulate(cf.Scene([rod], [cf.Clamp(rod.start)], loads), 0.04, dt=2e-3, elements=3)
     fields = history.fields(-1)
     nodes = np.arange(3)[:, None] * history.degree + np.arange(history.degree + 1)

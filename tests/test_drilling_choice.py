@@ -45,7 +45,7 @@ def bit():
             "the lobes of the rock lift the bit",
         ),
         ({"bit": None, "hook": cf.drilling.Hook(speed=0.3)}, BOTH, "the hook moves"),
-        ({"bit": None, "hook": cf.drilling.Hook(speed=cf.Ramp((0.3,)))}, BOTH, "the hook moves"),
+        ({"bit": None, "hook": cf.drilling.Hook(speed=cf.signals.Ramp((0.3,)))}, BOTH, "the hook moves"),
         ({"hook": cf.drilling.Hook(stiffness=5e6)}, TORSION, "nothing moves along the axis"),
         ({"string": cf.drilling.Discs((9.0, 4.0), (7.0,))}, TORSION, "turn alone"),
         (
@@ -115,7 +115,7 @@ def test_rotation_alone_moves_nothing_along_the_axis():
     """Which is why torsion is enough for a torque that follows the weight on bit: both models agree."""
     string = cf.well.DrillString([cf.well.Collar(200.0, "NC46-65"), cf.well.DrillPipe(size="5 in 19.50 lb/ft")])
     given = scene(
-        string=string, bit=bit(), hole=hole(BENT), mud=MUD, drive=cf.drilling.TopDrive(cf.Ramp((6.0,), end=2.0))
+        string=string, bit=bit(), hole=hole(BENT), mud=MUD, drive=cf.drilling.TopDrive(cf.signals.Ramp((6.0,), end=2.0))
     )
     found, both = (cf.drilling.simulate(given, 30.0, model=name) for name in ("auto", BOTH))
     assert found.model == TORSION and both.model == BOTH

@@ -60,7 +60,7 @@ def test_scenes_as_data():
     string = cf.well.DrillString([cf.well.Collar(200.0, "NC56-80"), cf.well.DrillPipe(size="5 in 19.50 lb/ft")])
     whole = cf.drilling.Drilling(
         string,
-        cf.drilling.TopDrive(cf.Ramp((4.0,), 0.0, 2.0), 2900.0, cf.drilling.PI(38e3, 1e5)),
+        cf.drilling.TopDrive(cf.signals.Ramp((4.0,), 0.0, 2.0), 2900.0, cf.drilling.PI(38e3, 1e5)),
         cf.drilling.BitOnRock(
             cf.drilling.Cutting(0.108, 60e6, 0.6, 4, cf.drilling.Wear(60e6, 0.011, 0.6)), inertia=41.0
         ),

@@ -119,10 +119,10 @@ def test_what_is_refused(given, words, monkeypatch):
 
 def test_jumps_in_speed_need_a_drive_that_follows(monkeypatch):
     use(monkeypatch)
-    drive = cf.drilling.TopDrive(cf.Step((6.0,), start=3.0))
+    drive = cf.drilling.TopDrive(cf.signals.Step((6.0,), start=3.0))
     with pytest.raises(cf.SceneError, match=r"no jump, such as that of 6 rad/s at t = 3 s: no drive follows it"):
         cf.drilling.simulate(scene(drive=drive), 10.0)
-    ramp = cf.drilling.TopDrive(cf.Ramp((6.0,), start=1.0, end=3.0))
+    ramp = cf.drilling.TopDrive(cf.signals.Ramp((6.0,), start=1.0, end=3.0))
     assert cf.drilling.simulate(scene(drive=ramp), 10.0).drive_speed[-1] == 6.0
 
 

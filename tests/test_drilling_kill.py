@@ -29,7 +29,7 @@ def scene_of(kind):
     string = cf.well.DrillString([cf.well.Collar(150.0, "NC46-65"), cf.well.DrillPipe(size="5 in 19.50 lb/ft")])
     friction = cf.drilling.WallFriction(0.3, 0.2, 1.0, of_rotation=True)
     drive = cf.drilling.TopDrive(4.0, 2900.0, cf.drilling.SoftSpeed(string, 2900.0, depth=2000.0))
-    hook = cf.drilling.Hook(speed=cf.Sine((0.1,), 0.2)) if kind == "axial and torsional" else None
+    hook = cf.drilling.Hook(speed=cf.signals.Sine((0.1,), 0.2)) if kind == "axial and torsional" else None
     return cf.drilling.Drilling(string, drive, None, hole, hook, cf.well.Mud(1200.0), friction)
 
 

@@ -74,7 +74,7 @@ def test_what_a_file_says(tmp_path):
     found = read(tmp_path, FILE)
     scene, rpm = found.scene, cf.units.rpm
     assert found.title == "Drilling in an inclined hole" and found.settings == {"duration": 60.0, "dt": 0.01}
-    assert scene.drive.speed == cf.Ramp((60 * rpm,), 1.0, 10.0)
+    assert scene.drive.speed == cf.signals.Ramp((60 * rpm,), 1.0, 10.0)
     assert scene.drive.control.Kp == pytest.approx(4 * scene.segments[0].torsional_impedance)
     assert scene.bit == cf.drilling.BitOnRock(cf.drilling.Stribeck(6e3, 4e3, 30 * rpm), 80e3, 50.0)
     assert scene.hook.stiffness == 5e6 and scene.hook.speed(5.0) == pytest.approx((10 / 3600,))

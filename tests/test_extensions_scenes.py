@@ -144,13 +144,13 @@ def test_functions_written_in_python_are_refused(mast, tmp_path):
 
 def test_functions_of_time_have_units():
     rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, "2 m")), cf.Circle("1 cm"), cf.Material("1 GPa"))
-    force = cf.Force(rod.end, cf.Ramp(("1 kN", 0, 0), end="2 s")).force
+    force = cf.Force(rod.end, cf.signals.Ramp(("1 kN", 0, 0), end="2 s")).force
     assert force(1.0) == (500.0, 0.0, 0.0) and force.jumps == (0.0, 2.0)
-    drive = cf.drilling.TopDrive(cf.Table(["0 s", 10], ["0 rpm", "120 rpm"]))
+    drive = cf.drilling.TopDrive(cf.signals.Table(["0 s", 10], ["0 rpm", "120 rpm"]))
     assert drive.signal()(5.0) == pytest.approx(60 * cf.units.rpm)
-    assert cf.drilling.TopDrive(cf.Ramp("60 rpm", end=5.0)).signal()(2.5) == pytest.approx(30 * cf.units.rpm)
+    assert cf.drilling.TopDrive(cf.signals.Ramp("60 rpm", end=5.0)).signal()(2.5) == pytest.approx(30 * cf.units.rpm)
     with pytest.raises(cf.SceneError, match="TopDrive.speed = '60 s': s is a unit of time"):
-        cf.drilling.TopDrive(cf.Ramp("60 s"))
+        cf.drilling.TopDrive(cf.signals.Ramp("60 s"))
 
 
 def test_places_in_files():

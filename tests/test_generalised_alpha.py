@@ -111,7 +111,7 @@ def test_what_is_dissipated_numerically_is_in_the_balance():
     """A sudden axial force makes a stiff rod vibrate; half of the
     energy is lost in the end, without physical damping."""
     rod = cf.Rod(cf.Line((0, 0, 0), (2, 0, 0)), STIFF)
-    scene = cf.Scene([rod], loads=[cf.Force(rod.end, cf.Step((1e3, 0, 0), end=0.001))])
+    scene = cf.Scene([rod], loads=[cf.Force(rod.end, cf.signals.Step((1e3, 0, 0), end=0.001))])
     history = cf.simulate(scene, 1, dt=0.01, elements=4, degree=2, scheme=SCHEME, rho_inf=0.5)
     late = history.times >= 0.1
     rigid = history.linear_momentum[-1, 0] ** 2 / (2 * 4.0)
@@ -126,7 +126,7 @@ def test_starts_and_jumps_are_consistent(model):
     """Under a constant force accelerations are exact from the first step
     on, and so are free fall and the flight after it."""
     rod = cf.Rod(cf.Line((0, 0, 0), (2, 0, 0)), STIFF)
-    scene = cf.Scene([rod], loads=[cf.LineForce(rod, cf.Step((0, 0, 4.0), end=0.5))])
+    scene = cf.Scene([rod], loads=[cf.LineForce(rod, cf.signals.Step((0, 0, 4.0), end=0.5))])
     history = cf.simulate(scene, 1, dt=0.07, elements=2, degree=2, scheme=SCHEME, model=model)
     t = history.times
     np.testing.assert_allclose(history.position(rod.end)[:, 2], np.where(t < 0.5, t**2, t - 0.25), atol=1e-11)
@@ -141,7 +141,7 @@ def test_from_a_static_point_nothing_moves_and_kinks_of_a_drive_do_no_harm():
     still = cf.simulate(loaded, 0.2, dt=0.01, start=path, elements=4, degree=2, scheme=SCHEME)
     assert np.ptp(still.position(rod.at(1.0)), axis=0).max() < 1e-11
     kinked = cf.Prescribed(
-        rod.start, displacement=cf.Table((0, 0.5, 1), ((0, 0, 0), (0, 0, 0), (0, 0, 0.5))), rotation=(0, 0, 0)
+        rod.start, displacement=cf.signals.Table((0, 0.5, 1), ((0, 0, 0), (0, 0, 0), (0, 0, 0.5))), rotation=(0, 0, 0)
     )
     history = cf.simulate(cf.Scene([rod], [kinked]), 1, dt=0.01, elements=4, degree=2, scheme=SCHEME)
     assert np.abs(history.position(rod.start)[:, 2] - np.maximum(history.times - 0.5, 0)).max() < 1e-12

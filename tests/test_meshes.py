@@ -231,7 +231,7 @@ def test_narrow_loads_are_seen(width, centre, degree):
     """A load in a part of the rod that is narrower than the distance of its quadrature points; small, so that the tip
     moves by the sum of what s^2 (3L - s)/6EI + s/GA gives."""
     rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, 1)), cf.Stiffness((3e3, 3e3), 8e3, (1.0, 1.0), 0.7))
-    load = cf.LineForce(rod, cf.Along(lambda s: (1e-6 / width * np.exp(-(((s - centre) / width) ** 2)), 0, 0)))
+    load = cf.LineForce(rod, cf.signals.Along(lambda s: (1e-6 / width * np.exp(-(((s - centre) / width) ** 2)), 0, 0)))
     path = cf.solve(cf.Scene([rod], [cf.Clamp(rod.start)], [load]), [1.0], degree=degree, tol=1e-3)
     moved = 1e-6 * np.sqrt(np.pi) * (centre**2 * (3 - centre) / 6 + width**2 * (1 - centre) / 4 + centre / 3e3)
     assert path.displacement(rod.end)[0, 0] == pytest.approx(moved, rel=1e-3)

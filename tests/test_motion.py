@@ -25,12 +25,12 @@ def test_momenta_and_energy_of_free_flight():
 def test_impulses_of_scenes_that_share_a_compiled_problem():
     """Loads that vary, stay, begin late and end: nothing is kept of a step, or of a scene, that another one changes."""
     loads = {
-        (50.0, 0, 0): cf.Triangle((20, 0, 0), 0, 2.5, 5),
+        (50.0, 0, 0): cf.signals.Triangle((20, 0, 0), 0, 2.5, 5),
         (0, 18.0, 0): (0, 3, 0),
-        (0, 0, 8.0): cf.Step((0, 0, 4), 1, 3),
+        (0, 0, 8.0): cf.signals.Step((0, 0, 4), 1, 3),
         (12.0, 0, -6.0): lambda t: (2.0, 0, -1),
         (0, 0, 0): (0, 0, 0),
-        (25.0, 0, 0): cf.Triangle((10, 0, 0), 0, 2.5, 5),
+        (25.0, 0, 0): cf.signals.Triangle((10, 0, 0), 0, 2.5, 5),
     }
     for impulse, force in loads.items():
         _, scene = spaghetti(lambda rod, force=force: cf.Force(rod.start, force))
@@ -77,12 +77,12 @@ def test_adaptive_steps_keep_their_promise():
 
 def test_where_a_load_bends_steps_stay_and_where_it_jumps_they_begin_anew():
     _, scene = spaghetti(
-        lambda rod: cf.Force(rod.start, cf.Table((0, 1, 1.5, 2), [(0, 0, 0), (9, 0, 0), (9, 5, 0), (0, 5, 0)]))
+        lambda rod: cf.Force(rod.start, cf.signals.Table((0, 1, 1.5, 2), [(0, 0, 0), (9, 0, 0), (9, 5, 0), (0, 5, 0)]))
     )
     steps = np.diff(cf.simulate(scene, 2, tol=1e-3, elements=4, degree=2).times)
     after = np.cumsum(steps)[:-1].searchsorted([1 - 1e-9, 1.5 - 1e-9])
     assert (steps[after + 1] > 0.2 * steps[after]).all()
-    _, scene = spaghetti(lambda rod: cf.Force(rod.start, cf.Step((9, 0, 0), 0, 1)))
+    _, scene = spaghetti(lambda rod: cf.Force(rod.start, cf.signals.Step((9, 0, 0), 0, 1)))
     steps = np.diff(cf.simulate(scene, 2, tol=1e-3, elements=4, degree=2).times)
     after = np.cumsum(steps).searchsorted(1 - 1e-9)
     assert steps[after + 1] < 0.3 * steps[after]
@@ -92,7 +92,10 @@ def test_a_step_that_fails_is_halved():
     """The stiff thin rod: some steps of 0.04 s fail and are halved; momenta are conserved."""
     section = cf.Stiffness((1e6, 1e6), 1e6, (100, 100), 100, mass=1.0, inertia=(1e-4, 1e-4, 2e-4))
     rod = cf.Rod(cf.Line((6, 0, 0), (0, 8, 0)), section)
-    pulls = [cf.Force(rod.start, cf.Step((8, 0, 3), end=1)), cf.Force(rod.end, cf.Step((0, 6, -5), end=1))]
+    pulls = [
+        cf.Force(rod.start, cf.signals.Step((8, 0, 3), end=1)),
+        cf.Force(rod.end, cf.signals.Step((0, 6, -5), end=1)),
+    ]
     history = cf.simulate(cf.Scene([rod], loads=pulls), 60, dt=0.04, elements=4, degree=2, save_every=1)
     assert history.steps[-1] > 1500
     free = history.times >= 1

@@ -42,7 +42,7 @@ REFUSED = {
     "start at 0": (lambda: cf.simulate(FREE, 1.0, start=0),
                    "simulate.start = 0: expected a load factor that is finite and not 0"),
     "start of nothing": (lambda: cf.simulate(FREE, 1.0, start=3), "Scene.loads is empty"),
-    "run-up": (lambda: cf.RunUp((1, 0, 0), 2.0, 1.0), "RunUp.end = 1.0: expected a time after 2 s"),
+    "run-up": (lambda: cf.signals.RunUp((1, 0, 0), 2.0, 1.0), "RunUp.end = 1.0: expected a time after 2 s"),
     "no mass": (lambda: moving(rods=[cf.Rod(ROD.curve, sections(mass=None), name="a")]), "'a': Stiffness.mass = None"),
     "no inertia": (lambda: moving(rods=[cf.Rod(ROD.curve, sections(inertia=None), name="a")]),
                    "Stiffness.inertia = None"),
@@ -52,12 +52,12 @@ REFUSED = {
     "two numbers": (lambda: cf.Moment(ROD.end, lambda t: (1, 2)),
                     "Moment.moment = (1, 2): expected 3 finite numbers (N m), at the time t = 0 s"),
     "jumps of a vector": (lambda: cf.Force(ROD.end, (1, 2, 3), jumps=(1,)), "Force.jumps = (1,): expected none"),
-    "jumps": (lambda: cf.Force(ROD.end, cf.Step((1, 2, 3)), jumps=("a",)), "Force.jumps = 'a'"),
-    "ramp": (lambda: cf.Ramp((1, 0, 0), 2.0, 1.0), "Ramp.end = 1.0: expected a time after 2 s"),
-    "triangle": (lambda: cf.Triangle((1, 0, 0), 0, 3, 2), "Triangle.end = 2"),
-    "sine": (lambda: cf.Sine((1, 0, 0), math.nan), "Sine.frequency = nan"),
-    "table": (lambda: cf.Table((0, 0), ((0, 0, 0), (1, 1, 1))), "Table.times = (0, 0): expected ascending"),
-    "table rows": (lambda: cf.Table((0, 1), ((0, 0, 0),)), "Table.values"),
+    "jumps": (lambda: cf.Force(ROD.end, cf.signals.Step((1, 2, 3)), jumps=("a",)), "Force.jumps = 'a'"),
+    "ramp": (lambda: cf.signals.Ramp((1, 0, 0), 2.0, 1.0), "Ramp.end = 1.0: expected a time after 2 s"),
+    "triangle": (lambda: cf.signals.Triangle((1, 0, 0), 0, 3, 2), "Triangle.end = 2"),
+    "sine": (lambda: cf.signals.Sine((1, 0, 0), math.nan), "Sine.frequency = nan"),
+    "table": (lambda: cf.signals.Table((0, 0), ((0, 0, 0), (1, 1, 1))), "Table.times = (0, 0): expected ascending"),
+    "table rows": (lambda: cf.signals.Table((0, 1), ((0, 0, 0),)), "Table.values"),
     "against a clamp": (lambda: moving(cf.InitialVelocity(ROD, (1, 0, 0)), supports=[cf.Clamp(ROD.start)]),
                         "goes against supports[0] (Clamp"),
     "against a pin": (lambda: moving(cf.InitialVelocity(ROD, (1, 0, 0)), supports=[cf.Pin(ROD.end)]),
@@ -76,7 +76,7 @@ REFUSED = {
                         "the Force depends on time, which a static analysis excludes"),
     "a step longer than the motion": (lambda: cf.simulate(FREE, 1.0, dt=50.0),
                                       "simulate.dt = 50.0: expected at most the duration, 1 s"),
-    "a number for a vector": (lambda: cf.Force(FREE.rods[0].end, cf.Sine(5.0, 2.0)),
+    "a number for a vector": (lambda: cf.Force(FREE.rods[0].end, cf.signals.Sine(5.0, 2.0)),
                               "Force.force = (0.0,): expected 3 finite numbers (N)"),
     "no end of steps": (lambda: cf.simulate(FREE, 1.0, dt=1e-18),
                         "simulate: duration = 1 s and dt = 1e-18 s: expected at most 1e+09 steps"),
@@ -102,7 +102,7 @@ def test_refused(case):
 
 
 def driven(**motion):
-    return cf.Scene([ROD], [cf.Prescribed(ROD.start, **motion)], [cf.Force(ROD.end, cf.Step((0, 1, 0), 0.5))])
+    return cf.Scene([ROD], [cf.Prescribed(ROD.start, **motion)], [cf.Force(ROD.end, cf.signals.Step((0, 1, 0), 0.5))])
 
 
 @pytest.mark.parametrize("scheme", ["momentum", "energy", "triple-jump", "generalised-alpha"])
@@ -113,12 +113,14 @@ def test_a_support_that_jumps_is_refused(scheme):
         return (0, 0, 0) if t < 0.5 else (0, 0.01 + 1e-3 * (t - 0.5), 0)
 
     refused = {
-        "displacement jumps at t = 0.5 s, by 0.05 m": {"displacement": cf.Step((0, 0.05, 0), 0.5)},
-        "rotation jumps at t = 1 s, by 0.3 rad": {"rotation": cf.Step((0, 0, 0.3), 1.0)},
+        "displacement jumps at t = 0.5 s, by 0.05 m": {"displacement": cf.signals.Step((0, 0.05, 0), 0.5)},
+        "rotation jumps at t = 1 s, by 0.3 rad": {"rotation": cf.signals.Step((0, 0, 0.3), 1.0)},
         "displacement jumps at t = 0.5 s, by 0.03 m": {
-            "displacement": cf.Table((0.5, 0.5 + 1e-12), ((0, 0, 0), (0, 0.03, 0)))
+            "displacement": cf.signals.Table((0.5, 0.5 + 1e-12), ((0, 0, 0), (0, 0.03, 0)))
         },
-        "displacement jumps at t = 0.25 s, by 0.02 m": {"displacement": cf.Sine((0, 0.02, 0), 1.0, math.pi / 2, 0.25)},
+        "displacement jumps at t = 0.25 s, by 0.02 m": {
+            "displacement": cf.signals.Sine((0, 0.02, 0), 1.0, math.pi / 2, 0.25)
+        },
         "displacement jumps at t = 0.5 s, by 0.01 m": {"displacement": jumping, "jumps": (0.25, 0.5)},
     }
     for words, motion in refused.items():
@@ -130,7 +132,7 @@ def test_a_support_that_jumps_is_refused(scheme):
 
 
 def test_a_support_that_bends_and_a_load_that_jumps_are_taken():
-    back = cf.Table((0, 0.5, 0.6), ((0, 0, 0), (0, 0.05, 0), (0, 0, 0)))
+    back = cf.signals.Table((0, 0.5, 0.6), ((0, 0, 0), (0, 0.05, 0), (0, 0, 0)))
 
     def run_up(t):
         """Small values have the rounding error of 1 - cos; it is not defined after the end."""
@@ -140,7 +142,7 @@ def test_a_support_that_bends_and_a_load_that_jumps_are_taken():
     assert (
         cf.simulate(driven(displacement=run_up, jumps=(0.25, 1.0)), 1.0, dt=0.25, elements=1, degree=2).times[-1] == 1.0
     )
-    for motion in (back, cf.Ramp((0, 1e-3, 0), 0.25, 0.5), cf.RunUp((0, 1e-3, 0), 0.25, 0.5)):
+    for motion in (back, cf.signals.Ramp((0, 1e-3, 0), 0.25, 0.5), cf.signals.RunUp((0, 1e-3, 0), 0.25, 0.5)):
         assert cf.simulate(driven(displacement=motion), 1.0, dt=0.25, elements=1, degree=2).times[-1] == 1.0
 
 
@@ -168,12 +170,12 @@ def test_a_function_of_time_that_fails_late_leaves_the_history(force):
 def test_functions_of_time():
     v = (2.0, 0, -4.0)
     cases = {
-        cf.Step(v, 1.0, 2.0): ({0.9: 0, 1.0: 1, 1.9: 1, 2.0: 0}, (1, 2)),
-        cf.Step(v): ({-1: 0, 0: 1, 99: 1}, (0,)),
-        cf.Ramp(v, 1, 3): ({1: 0, 2: 0.5, 3: 1, 4: 1}, (1, 3)),
-        cf.Triangle(v, 0, 1, 3): ({0.5: 0.5, 1: 1, 2: 0.5, 3: 0, 4: 0, -1: 0}, (0, 1, 3)),
-        cf.Sine(v, 0.25, start=1): ({0: 0, 1: 0, 2: 1, 4: -1}, (1,)),
-        cf.Table((0, 2), ((0, 0, 0), v)): ({-1: 0, 1: 0.5, 3: 1}, (0, 2)),
+        cf.signals.Step(v, 1.0, 2.0): ({0.9: 0, 1.0: 1, 1.9: 1, 2.0: 0}, (1, 2)),
+        cf.signals.Step(v): ({-1: 0, 0: 1, 99: 1}, (0,)),
+        cf.signals.Ramp(v, 1, 3): ({1: 0, 2: 0.5, 3: 1, 4: 1}, (1, 3)),
+        cf.signals.Triangle(v, 0, 1, 3): ({0.5: 0.5, 1: 1, 2: 0.5, 3: 0, 4: 0, -1: 0}, (0, 1, 3)),
+        cf.signals.Sine(v, 0.25, start=1): ({0: 0, 1: 0, 2: 1, 4: -1}, (1,)),
+        cf.signals.Table((0, 2), ((0, 0, 0), v)): ({-1: 0, 1: 0.5, 3: 1}, (0, 2)),
     }
     for signal, (values, jumps) in cases.items():
         for t, factor in values.items():
@@ -189,7 +191,7 @@ def test_steps_land_on_jumps_and_on_saved_times():
     np.testing.assert_allclose(history.linear_momentum[-1], [0, 0, 0.37], atol=1e-12)
     saved = cf.simulate(scene, 1.0, dt=0.1, save_every=0.3, elements=2, degree=2)
     np.testing.assert_allclose(saved.times, [0, 0.3, 0.6, 0.9, 1.0])
-    line = cf.Scene([ROD], loads=[cf.LineForce(ROD, cf.Ramp((0, 3, 0), 0, 1))])
+    line = cf.Scene([ROD], loads=[cf.LineForce(ROD, cf.signals.Ramp((0, 3, 0), 0, 1))])
     pushed = cf.simulate(line, 2.0, dt=0.1, elements=2, degree=2)
     np.testing.assert_allclose(pushed.linear_momentum[-1], [0, 3 * 2 * 1.5, 0], atol=1e-10)
     assert repr(pushed).startswith("<History: 21 times, t = 0 .. 2 s, planar, 15 unknowns")

@@ -30,7 +30,7 @@ def by_names():
         supports=[cf.Clamp("post.start"), cf.Roller("beam.end", (0, 0, 1))],
         loads=[
             cf.Force("beam@0.5", (0, 0, -5.0)),
-            cf.LineForce("post", cf.AlongTable([0, 2], [(0, 0, 0), (3.0, 0, 0)])),
+            cf.LineForce("post", cf.signals.AlongTable([0, 2], [(0, 0, 0), (3.0, 0, 0)])),
             cf.Foundation("beam", 10.0),
             cf.Wall("post", (0, 0, 0), (0, 0, 1), 0.5, 1e3),
             cf.Spring("post.end", stiffness=20.0),
@@ -47,7 +47,7 @@ def by_objects():
         supports=[cf.Clamp(post.start), cf.Roller(beam.end, (0, 0, 1))],
         loads=[
             cf.Force(beam.at(0.5), (0, 0, -5.0)),
-            cf.LineForce(post, cf.AlongTable([0, 2], [(0, 0, 0), (3.0, 0, 0)])),
+            cf.LineForce(post, cf.signals.AlongTable([0, 2], [(0, 0, 0), (3.0, 0, 0)])),
             cf.Foundation(beam, 10.0),
             cf.Wall(post, (0, 0, 0), (0, 0, 1), 0.5, 1e3),
             cf.Spring(post.end, stiffness=20.0),

@@ -10,7 +10,9 @@ pytestmark = pytest.mark.serial
 
 
 @pytest.mark.parametrize(
-    "signal", [cf.Ramp((0, 0, 2.0), 50, 50.5), lambda t: (0, 0, 1 + np.tanh(4 * (t - 50)))], ids=["ramp", "tanh"]
+    "signal",
+    [cf.signals.Ramp((0, 0, 2.0), 50, 50.5), lambda t: (0, 0, 1 + np.tanh(4 * (t - 50)))],
+    ids=["ramp", "tanh"],
 )
 def test_what_sets_in_after_a_rest_is_seen(signal):
     section = cf.Stiffness((1e6, 1e6), 1e6, (100, 100), 100, mass=1.0, inertia=(1e-3, 1e-3, 2e-3))
@@ -28,7 +30,7 @@ def test_kinks_of_a_prescribed_motion(scheme, start):
     """The driven end has the prescribed speed; a sudden change of its momentum counts as work of the support."""
     section = cf.Stiffness((1e4, 1e4), 1e4, (50, 50), 50, mass=1.0, inertia=(1e-2, 1e-2, 2e-2))
     rod = cf.Rod(cf.Line((0, 0, 0), (2, 0, 0)), section)
-    drive = cf.Ramp((0, 0, 0.5), start, 1.0)
+    drive = cf.signals.Ramp((0, 0, 0.5), start, 1.0)
     scene = cf.Scene([rod], [cf.Prescribed(rod.start, displacement=drive, rotation=(0, 0, 0))])
     history = cf.simulate(scene, 1.5, dt=0.01, scheme=scheme, elements=4, degree=2)
     t = history.times
@@ -50,7 +52,7 @@ def test_what_swings_fast_and_moves_little_is_not_taken_for_a_constant(scheme, f
     w = 2 * np.pi * f
     section = cf.Stiffness((1e3, 1e3), 1e3, (10, 10), 10, mass=1.0, inertia=(1e-3, 1e-3, 2e-3))
     rod = cf.Rod(cf.Line((0, 0, 0), (1, 0, 0)), section)
-    load = cf.Sine((0, A * w**2, 0), f, phase=np.pi / 2)
+    load = cf.signals.Sine((0, A * w**2, 0), f, phase=np.pi / 2)
     load = cf.LineForce(rod, (lambda t: (0, A * w**2 * np.cos(w * t), 0)) if function else load)
     history = cf.simulate(
         cf.Scene([rod], [], [load]), duration, tol=tol, scheme=scheme, elements=1, degree=2, save_every=duration / 9.7
@@ -63,11 +65,11 @@ def test_what_swings_fast_and_moves_little_is_not_taken_for_a_constant(scheme, f
 def test_a_load_that_moves_nothing_costs_no_steps():
     section = cf.Stiffness((1e3, 1e3), 1e3, (10, 10), 10, mass=1.0, inertia=(1e-3, 1e-3, 2e-3))
     rod = cf.Rod(cf.Line((0, 0, 0), (1, 0, 0)), section)
-    scene = cf.Scene([rod], [], [cf.Force(rod.end, cf.Sine((0, 1e-9, 0), 20.0))])
+    scene = cf.Scene([rod], [], [cf.Force(rod.end, cf.signals.Sine((0, 1e-9, 0), 20.0))])
     assert cf.simulate(scene, 20.0, elements=1, degree=2).steps[-1] < 250
 
 
-@pytest.mark.parametrize("signal", [cf.Sine((0, 1.0, 0), 2.0), lambda t: (0, np.sin(4 * np.pi * t), 0)])
+@pytest.mark.parametrize("signal", [cf.signals.Sine((0, 1.0, 0), 2.0), lambda t: (0, np.sin(4 * np.pi * t), 0)])
 def test_a_fixed_step_that_does_not_follow_a_load_is_told(signal):
     section = cf.Stiffness((1e3, 1e3), 1e3, (10, 10), 10, mass=1.0, inertia=(1e-3, 1e-3, 2e-3))
     rod = cf.Rod(cf.Line((0, 0, 0), (1, 0, 0)), section)
@@ -84,8 +86,8 @@ def test_straight_signals_are_not_told():
     section = cf.Stiffness((1e3, 1e3), 1e3, (10, 10), 10, mass=1.0, inertia=(1e-3, 1e-3, 2e-3))
     rod = cf.Rod(cf.Line((0, 0, 0), (1, 0, 0)), section)
     loads = [
-        cf.Force(rod.end, cf.Triangle((0, 0.01, 0), 0.13, 0.2, 0.31)),
-        cf.Moment(rod.end, cf.Step((0, 0, 0.01), 0.4)),
+        cf.Force(rod.end, cf.signals.Triangle((0, 0.01, 0), 0.13, 0.2, 0.31)),
+        cf.Moment(rod.end, cf.signals.Step((0, 0, 0.01), 0.4)),
     ]
     history = cf.simulate(cf.Scene([rod], [cf.Clamp(rod.start)], loads), 0.5, dt=0.1, elements=1, degree=2)
     assert "faster than steps" not in " ".join(history.why)

@@ -111,12 +111,12 @@ def test_loads_are_read_by_their_units():
     loads = [
         cf.EccentricForce(rod.end, (0, 0, -5), (0.1, 0.2)),
         cf.FollowerMoment(rod.end, (0, 3, 0)),
-        cf.LineForce(rod, cf.Along(lambda s: (0, 0, -s))),
+        cf.LineForce(rod, cf.signals.Along(lambda s: (0, 0, -s))),
         cf.Weight(permanent=True),
         cf.Spring(rod.at(1.0), 10.0, direction=(0, 0, 1)),
         cf.PointMass(rod.end, 2.0),
         cf.Foundation(rod, 5.0),
-        cf.Force(rod.end, cf.Step((0, 7, 0), start=0.25)),
+        cf.Force(rod.end, cf.signals.Step((0, 7, 0), start=0.25)),
     ]
     scene = cf.Scene([rod], [cf.Clamp(rod.start)], loads)
     kinds = [loads_of(load, scene, factor=2.0, time=0.0) for load in loads]
@@ -172,7 +172,10 @@ def test_tubes_are_drawn_around_their_rods():
     """With their true clearance, 0.05 m, around rods that are drawn thicker; not where displacements are magnified."""
     rod = cf.Rod(cf.Line((0.5, 0, 0), (3.5, 0, 0)), cf.Circle(0.02), STEEL, name="r")
     axis = cf.well.WellPath.from_survey([0, 4], [90, 90], [0, 0])
-    walls = [cf.TubeWall(rod, axis, 0.06, 0.01, begins=0.5), cf.TubeRing(rod.at(1.5), axis, 0.02, 0.03, begins=0.5)]
+    walls = [
+        cf.well.TubeWall(rod, axis, 0.06, 0.01, begins=0.5),
+        cf.well.TubeRing(rod.at(1.5), axis, 0.02, 0.03, begins=0.5),
+    ]
     scene = cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Force(rod.end, (0, 0, 1.0)), *walls])
     path = cf.solve(scene, [1.0], elements=2)
     for plotter in (scene.plot(), path.plot(points=[0])):

@@ -23,7 +23,7 @@ def blade(d1):
 def test_the_plane_is_as_space(d1):
     """About either axis of the section; with damping, a hinge, follower loads and loads that depend on time."""
     rod = blade(d1)
-    tip = cf.EccentricForce(rod.end, cf.Ramp((3, 0, -9)), (0.0, 0.1) if d1[1] else (0.1, 0.0))
+    tip = cf.EccentricForce(rod.end, cf.signals.Ramp((3, 0, -9)), (0.0, 0.1) if d1[1] else (0.1, 0.0))
     loads = [cf.Weight(), tip, cf.FollowerForce(rod.at(1.0), (3.0, 0, 2.0) if not d1[1] else (0, 3.0, 2.0))]
     spin = cf.InitialVelocity(rod, angular=(0, 1.5, 0))
     scene = cf.Scene([rod], [cf.Hinge(rod.start, (0, 1, 0))], loads, velocities=[spin])

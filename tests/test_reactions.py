@@ -154,12 +154,14 @@ def moving_frame(planar=False, damping=None):
         cf.Clamp(a.start),
         cf.Clamp(b.end),
         cf.Roller(b.at(1.0), (0, 1, 0) if planar else (0, 0.6, 0.8)),
-        cf.Prescribed(c.end, displacement=cf.RunUp((0.2, 0.1, 0.3 * z)), rotation=cf.RunUp((0, 0, 0.5))),
+        cf.Prescribed(
+            c.end, displacement=cf.signals.RunUp((0.2, 0.1, 0.3 * z)), rotation=cf.signals.RunUp((0, 0, 0.5))
+        ),
     ]
     loads = [
-        cf.Force(a.end, cf.Sine((3.0, 5.0, 4.0 * z), 2.0)),
+        cf.Force(a.end, cf.signals.Sine((3.0, 5.0, 4.0 * z), 2.0)),
         cf.LineForce(b, (0, -1.0, 0.5 * z)),
-        cf.Force(a.start, cf.Ramp((3.0, 1.0, 2.0 * z))),
+        cf.Force(a.start, cf.signals.Ramp((3.0, 1.0, 2.0 * z))),
         cf.FollowerForce(b.end, (0.0, 0, 2.0) if planar else (0.5, 0, 2.0)),
         cf.Moment(c.at(1.0), (0, 0, 0.5)),
     ]

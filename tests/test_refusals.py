@@ -123,7 +123,7 @@ def test_files_of_bounded_size(tmp_path, monkeypatch):
 
 
 def test_other_files_are_plain_ones_too(tmp_path):
-    for read in (cf.read, lambda file: cf.Spline("/dev/zero"), cf.AlongTable):
+    for read in (cf.read, lambda file: cf.Spline("/dev/zero"), cf.signals.AlongTable):
         with pytest.raises(cf.SceneError, match="/dev/zero"):
             read("/dev/zero")
     os.symlink("/dev/zero", tmp_path / "points.csv")

@@ -47,7 +47,7 @@ def test_everything_that_steps_depend_on_is_remembered(scheme, tmp_path, monkeyp
     numbers in the solvers are those of an uninterrupted run."""
     section = cf.Stiffness((1e6, 1e6), 1e6, (1e3, 1e3), 1e3, mass=1.0, inertia=(1, 1, 2))
     rod = cf.Rod(cf.Line((0, 0, 0), (10, 0, 0)), section)
-    scene = cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Force(rod.end, cf.Sine((0, 0, 3.0), 0.05))])
+    scene = cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Force(rod.end, cf.signals.Sine((0, 0, 3.0), 0.05))])
     write, over, kept, motions = files.write_checkpoint, time_loop.TimeLoop.over, [], []
 
     def write_and_keep(file, *given):
@@ -225,7 +225,7 @@ def test_ctrl_c_and_a_lost_motion_keep_what_is_done(tmp_path, monkeypatch, never
     cf.resume(tmp_path / "motion")
     assert_same(tmp_path / "motion", never_ended("fixed"))
     rod, _ = flying_in_space()
-    torn = cf.Scene([rod], loads=[cf.Force(rod.end, cf.Step((1e9, 0, 0), start=0.2))])
+    torn = cf.Scene([rod], loads=[cf.Force(rod.end, cf.signals.Step((1e9, 0, 0), start=0.2))])
     with pytest.raises(cf.NotConverged) as lost:
         cf.simulate(torn, 1, dt=0.05, folder=tmp_path / "torn", **SMALL)
     times = lost.value.path.times

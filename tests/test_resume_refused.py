@@ -68,10 +68,10 @@ def test_another_scene_is_told_from_the_one_of_the_motion(tmp_path, monkeypatch)
         "rods[0].damping is": cf.Scene([damped]),
         "loads is '1 items'": cf.Scene([rod], loads=scene.loads[:1]),
         "loads[0].force.value is": cf.Scene(
-            [rod], loads=[cf.Force(rod.start, cf.Triangle((10, 0, 0), 0, 2.5, 5)), scene.loads[1]]
+            [rod], loads=[cf.Force(rod.start, cf.signals.Triangle((10, 0, 0), 0, 2.5, 5)), scene.loads[1]]
         ),
         "loads[0].station.s is 10.0": cf.Scene(
-            [rod], loads=[cf.Force(rod.end, cf.Triangle((20, 0, 0), 0, 2.5, 5)), scene.loads[1]]
+            [rod], loads=[cf.Force(rod.end, cf.signals.Triangle((20, 0, 0), 0, 2.5, 5)), scene.loads[1]]
         ),
         "supports is '1 items'": cf.Scene([rod], [cf.Pin(rod.start)], scene.loads),
     }
@@ -172,7 +172,7 @@ def test_what_leaves_its_plane_later_is_refused_before_anything_is_written(tmp_p
 def test_a_longer_duration_that_is_refused_leaves_no_trace(tmp_path):
     """A support that jumps later; too many steps."""
     folder = tmp_path / "motion"
-    scene = cf.Scene([ROD], [cf.Prescribed(ROD.start, cf.Step((0, 0.1, 0), 2.0), (0, 0, 0))])
+    scene = cf.Scene([ROD], [cf.Prescribed(ROD.start, cf.signals.Step((0, 0.1, 0), 2.0), (0, 0, 0))])
     cf.simulate(scene, 1.0, folder=folder, **BEGUN)
     before = (folder / "stored.json").read_bytes()
     for until, words in ((3.0, "displacement jumps at t = 2 s, by 0.1 m"), (1e12, "expected at most 1e.09 steps")):

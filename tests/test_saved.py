@@ -49,7 +49,7 @@ def buckled():
 
 def swing(folder=None):
     rod = cf.Rod(cf.Line((0, 0, 0), (10, 0, 0)), SPAGHETTI, name="rod", damping=cf.Damping(drag=0.1))
-    loads = [cf.Force(rod.end, cf.Sine((0, 0, 2.0), 0.5))]
+    loads = [cf.Force(rod.end, cf.signals.Sine((0, 0, 2.0), 0.5))]
     scene = cf.Scene([rod], [cf.Clamp(rod.start)], loads)
     return cf.simulate(scene, 0.2, dt=0.05, elements=3, degree=2, folder=folder)
 

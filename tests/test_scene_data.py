@@ -39,16 +39,18 @@ def everything():
     supports = [
         cf.Clamp(rods[0].start), cf.Pin(rods[1].start), cf.Hinge(rods[2].start, (0.1, 0.7, 0.2)),
         cf.Roller(rods[3].at(0.3), (0.6, 0.7, 0.1)),
-        cf.Prescribed(rods[4].start, cf.Ramp((0, 0.1, 0), 0.0, 2.0), (0, 0, 0)),
+        cf.Prescribed(rods[4].start, cf.signals.Ramp((0, 0.1, 0), 0.0, 2.0), (0, 0, 0)),
     ]  # fmt: skip
     end = rods[0].end
     loads = [
-        cf.Force(end, (0, 0, -1.0)), cf.Moment(end, cf.Sine((0, 1.0, 0), 2.0, phase=0.3)),
-        cf.EccentricForce(end, (1.0, 0, 0), (0.1, 0.2)), cf.FollowerForce(end, cf.Triangle((1.0, 0, 0), 0, 1.0, 3.0)),
-        cf.FollowerMoment(end, cf.Table([0, 1.0], [(0, 0, 0), (1.0, 0, 0)])),
-        cf.LineForce(rods[1], cf.AlongTable([0, 1.0], [(0, 0, 0), (0, 0, 1.0)]), permanent=True),
-        cf.LineMoment(rods[2], cf.AlongPieces([(0.5, (0, 0, 1.0))])), cf.Weight(permanent=True),
-        cf.Force(end, cf.Step((0, 0, 1.0), 0.5), jumps=(0.7,)), cf.Force(end, cf.RunUp((0, 0, 1.0), 0.0, 0.5)),
+        cf.Force(end, (0, 0, -1.0)), cf.Moment(end, cf.signals.Sine((0, 1.0, 0), 2.0, phase=0.3)),
+        cf.EccentricForce(end, (1.0, 0, 0), (0.1, 0.2)),
+        cf.FollowerForce(end, cf.signals.Triangle((1.0, 0, 0), 0, 1.0, 3.0)),
+        cf.FollowerMoment(end, cf.signals.Table([0, 1.0], [(0, 0, 0), (1.0, 0, 0)])),
+        cf.LineForce(rods[1], cf.signals.AlongTable([0, 1.0], [(0, 0, 0), (0, 0, 1.0)]), permanent=True),
+        cf.LineMoment(rods[2], cf.signals.AlongPieces([(0.5, (0, 0, 1.0))])), cf.Weight(permanent=True),
+        cf.Force(end, cf.signals.Step((0, 0, 1.0), 0.5), jumps=(0.7,)),
+        cf.Force(end, cf.signals.RunUp((0, 0, 1.0), 0.0, 0.5)),
         cf.Foundation(rods[1], 3.0, direction=(0.3, 0.4, 0.7)), cf.Spring(end, 3.0, rotational=0.1),
         cf.Dashpot(end, 3.0), cf.Drag(rods[1], 0.3, 0.1, current=(0.1, 0, 0)), cf.PointMass(end, 3.0),
         cf.Wall(rods[5], (5, 0, 0), (1, 0, 0), 0.1),

@@ -60,9 +60,9 @@ def everything():
     b = cf.Rod(cf.Line((2, 0, 0), (2, 1, 1)), SECTION, name="b")
     loads = [
         cf.Weight(),
-        cf.FollowerForce(b.end, cf.Ramp((20, 30, 0))),
-        cf.EccentricForce(b.end, cf.Sine((0, 0, 3), 0.5), (0.1, 0.1)),
-        cf.LineMoment(a, cf.Ramp((0, 2, 0))),
+        cf.FollowerForce(b.end, cf.signals.Ramp((20, 30, 0))),
+        cf.EccentricForce(b.end, cf.signals.Sine((0, 0, 3), 0.5), (0.1, 0.1)),
+        cf.LineMoment(a, cf.signals.Ramp((0, 2, 0))),
     ]
     return b, cf.Scene([a, b], [cf.Hinge(a.start, (0, 1, 0))], loads, [cf.Joint(a.end, b.start, "all")])
 

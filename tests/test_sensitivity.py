@@ -250,7 +250,7 @@ def test_a_cable_that_is_pulled_through_a_conduit():
     def scene(stiffness=1e6, friction=0.3):
         material = cf.Material(E=2e9, nu=0.4)
         cable = cf.Rod(cf.Arc((0, 1, 0), (0, 0, 0), np.pi / 2), cf.Circle(0.012), material, name="cable")
-        wall = cf.TubeWall(cable, axis, radius=0.016, contact_radius=0.006, stiffness=stiffness, friction=friction,
+        wall = cf.well.TubeWall(cable, axis, radius=0.016, contact_radius=0.006, stiffness=stiffness, friction=friction,
                            slip=(-1.0, 0.0), has_arm=False)  # fmt: skip
         pulled = cf.Prescribed(cable.end, displacement=(0.0, 0.03, 0.0))
         return cf.Scene([cable], [cf.Clamp(cable.start), pulled], [wall])

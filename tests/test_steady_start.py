@@ -74,7 +74,7 @@ def test_surface_torque_is_that_of_torque_and_drag(model):
         cf.drilling.TopDrive(control=cf.drilling.Motor(5e3)),
         cf.drilling.TopDrive(SPEED, 0.0, cf.drilling.Matched()),
         cf.drilling.TopDrive(0.0),
-        cf.drilling.TopDrive(cf.RunUp((SPEED,), end=5.0)),
+        cf.drilling.TopDrive(cf.signals.RunUp((SPEED,), end=5.0)),
     ],
 )
 @pytest.mark.parametrize("model", [TorsionWaves, AxialTorsional])

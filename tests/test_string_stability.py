@@ -295,7 +295,7 @@ def test_speeds_in_revolutions_a_minute_are_doubted():
     with pytest.warns(cf.SceneWarning, match=r"TopDrive.speed = 120 rad/s are 1146 rev/min.*120 \* units.rpm"):
         fast = cf.drilling.TopDrive(120)
     assert fast.speed == 120
-    for function in (cf.Ramp((120.0,), 1.0, 5.0), lambda t: 120.0):
+    for function in (cf.signals.Ramp((120.0,), 1.0, 5.0), lambda t: 120.0):
         with pytest.warns(cf.SceneWarning, match=r"TopDrive.speed = 120 rad/s are 1146 rev/min"):
             cf.drilling.TopDrive(function)
     with warnings.catch_warnings():

@@ -16,7 +16,7 @@ def thin(factor):
     section = cf.Stiffness((1e6, 1e6), 1e6, (100, 100), 100, mass=1.0, inertia=(1e-4, 1e-4, 2e-4))
     rod = cf.Rod(cf.Line((6, 0, 0), (0, 8, 0)), section)
     first, second = (factor * np.array(v) for v in ((8.0, 0, 3), (0, 6.0, -5)))
-    pulls = [cf.Force(rod.start, cf.Step(first, end=1)), cf.Force(rod.end, cf.Step(second, end=1))]
+    pulls = [cf.Force(rod.start, cf.signals.Step(first, end=1)), cf.Force(rod.end, cf.signals.Step(second, end=1))]
     return cf.Scene([rod], loads=pulls)
 
 

@@ -291,7 +291,7 @@ def test_a_pipe_at_rest_stays_there():
     rod = cf.Rod(cf.Line(start, start + (30, 0, 0)), cf.Tube(0.127, 0.1), STEEL, name="pipe")
     sizes = {"path": path, "radius": 0.1135, "contact_radius": 0.0635, "stiffness": 1e6, "begins": 100}
     loads, mesh = [cf.Spring(rod.start, 1e3, 1e3), cf.Weight((0, 0, G))], {"elements": 15, "degree": 2}
-    lying = cf.solve(cf.Scene([rod], [], [cf.TubeWall(rod, **sizes), *loads]), [1.0], **mesh)
+    lying = cf.solve(cf.Scene([rod], [], [cf.well.TubeWall(rod, **sizes), *loads]), [1.0], **mesh)
     scene = cf.Scene([rod], [], [HoleWall(rod, friction=0.3, **sizes), *loads])
     history = cf.simulate(scene, 0.06, dt=1e-3, scheme="generalised-alpha", start=lying, **mesh)
     assert history.steps[-1] == 60

@@ -29,12 +29,12 @@ from cosserat_fenicsx.drilling.scene import Drilling as Drilling
 from cosserat_fenicsx.drilling.scenefile import DrillingScene as DrillingScene
 from cosserat_fenicsx.drilling.segments import Discs as Discs
 from cosserat_fenicsx.drilling.stick_slip import StickSlip as StickSlip
-from cosserat_fenicsx.drilling.top_drive import PI as PI
 from cosserat_fenicsx.drilling.top_drive import DriveControl as DriveControl
 from cosserat_fenicsx.drilling.top_drive import Gains as Gains
 from cosserat_fenicsx.drilling.top_drive import Hook as Hook
 from cosserat_fenicsx.drilling.top_drive import Matched as Matched
 from cosserat_fenicsx.drilling.top_drive import Motor as Motor
+from cosserat_fenicsx.drilling.top_drive import PI as PI
 from cosserat_fenicsx.drilling.top_drive import Sample as Sample
 from cosserat_fenicsx.drilling.top_drive import SampledControl as SampledControl
 from cosserat_fenicsx.drilling.top_drive import Stiff as Stiff
@@ -42,3 +42,5 @@ from cosserat_fenicsx.drilling.top_drive import TopDrive as TopDrive
 from cosserat_fenicsx.drilling.wall_friction import FrictionLaw as FrictionLaw
 from cosserat_fenicsx.drilling.wall_friction import ViscousDrag as ViscousDrag
 from cosserat_fenicsx.drilling.wall_friction import WallFriction as WallFriction
+from cosserat_fenicsx.results.whirl import Orbit as Orbit
+from cosserat_fenicsx.results.whirl import Whirl as Whirl

@@ -1,5 +1,9 @@
 """The public names of this package and their modules, see the stub of `cosserat_fenicsx`."""
 
+from cosserat_fenicsx.actions.walls import HoleRing as HoleRing
+from cosserat_fenicsx.actions.walls import HoleWall as HoleWall
+from cosserat_fenicsx.actions.walls import TubeRing as TubeRing
+from cosserat_fenicsx.actions.walls import TubeWall as TubeWall
 from cosserat_fenicsx.well.answer import TorqueAndDrag as TorqueAndDrag
 from cosserat_fenicsx.well.calibrate import FrictionFit as FrictionFit
 from cosserat_fenicsx.well.calibrate import RigMeasurement as RigMeasurement

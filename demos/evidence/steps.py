@@ -29,7 +29,7 @@ def pipe():
     steel = cf.Material(E=210e9, nu=0.3, density=7850.0)
     rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, 1000.0)), cf.Tube(0.127, 0.1086), steel, name="pipe")
     held, weight = [cf.Clamp(rod.end)], cf.Weight((0, 0, -9.81))
-    pull = cf.Force(rod.start, cf.Sine((300.0, 0, 0), 0.2))
+    pull = cf.Force(rod.start, cf.signals.Sine((300.0, 0, 0), 0.2))
 
     def hanging(model):
         return cf.solve(cf.Scene([rod], held, [weight]), [1.0], elements=ELEMENTS, degree=DEGREE, model=model)
@@ -58,7 +58,7 @@ def pushed(held):
     rods = [half, rest] if held == "rotating joint" else [whole]
     joints = [cf.Joint(half.end, rest.start, release=(0, 0, 1))] if held == "rotating joint" else []
     support = cf.Hinge(whole.start, (0, 0, 1)) if held == "hinge" else cf.Clamp(rods[0].start)
-    push = cf.Force(rods[-1].end, cf.Triangle((0, 20, 5), 0, 1, 2))
+    push = cf.Force(rods[-1].end, cf.signals.Triangle((0, 20, 5), 0, 1, 2))
     return cf.Scene(rods, [support], [push], joints), rods[-1].end
 
 

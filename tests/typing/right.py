@@ -15,9 +15,9 @@ scene = cf.Scene(
     [
         cf.Force(rod.end, (0, 0, -cf.euler_load(rod))),
         cf.Moment("column.end", lambda t: (0.0, t, 0.0)),
-        cf.LineForce("column", cf.AlongTable([0, 20], [(0, 0, 0), (1, 0, 0)])),
-        cf.LineForce(rod, cf.Along(lambda s: (s, 0.0, 0.0)), permanent=True),
-        cf.Force(rod.at(3), cf.Ramp((1, 0, 0), end=2)),
+        cf.LineForce("column", cf.signals.AlongTable([0, 20], [(0, 0, 0), (1, 0, 0)])),
+        cf.LineForce(rod, cf.signals.Along(lambda s: (s, 0.0, 0.0)), permanent=True),
+        cf.Force(rod.at(3), cf.signals.Ramp((1, 0, 0), end=2)),
         cf.Weight(),
         cf.Wall(rod, point=(0, 0, 0), direction=(0, 0, 1), clearance=1 * cf.units.inch),
         cf.PointMass(rod.end, 3.0),

@@ -46,7 +46,7 @@ def motion_of(problem):
     joints = [cf.Joint(a.end, b.start) for a, b in pairwise(rods)]
     place = getattr(rods[0], problem["loaded"])
     loads = [
-        load(place, cf.Triangle(problem[key], *problem["rise"]))
+        load(place, cf.signals.Triangle(problem[key], *problem["rise"]))
         for load, key in ((cf.Force, "force"), (cf.Moment, "moment"))
         if any(problem[key])
     ]
