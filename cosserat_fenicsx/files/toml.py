@@ -8,11 +8,17 @@ from pathlib import Path
 
 from cosserat_fenicsx.checks import text_of
 from cosserat_fenicsx.errors import SceneError
+from cosserat_fenicsx.parts import spoken
 
 _BLANK = re.compile(r"(?:\s|#[^\n]*)*")
 _KEY = re.compile(r"""[ \t]*("(?:[^"\\\n]|\\.)*"|'[^'\n]*'|[A-Za-z0-9_-]+)[ \t]*(\.?)""")
 _TEXT = re.compile(r'''"""(?:[^\\]|\\.)*?"{3,5}|\'\'\'.*?\'{3,5}|"(?:[^"\\\n]|\\.)*"|'[^'\n]*\'''', re.S)
 _OTHER = re.compile(r"[^,\]}\n#]*")
+_AT = re.compile(r" \(at line (\d+), column (\d+)\)$")
+
+
+class _GivenTwice(Exception):
+    """A table or a key is defined twice; `args`: its name, and the offsets of both definitions."""
 
 
 def text_and_tables(file):
@@ -26,26 +32,53 @@ def text_and_tables(file):
     try:
         return text, tomllib.loads(text)
     except tomllib.TOMLDecodeError as problem:
-        hint = "; text, and a number with its unit, stand in quotes" if "Invalid value" in str(problem) else ""
-        raise SceneError(f"{file}: not valid TOML: {problem}{hint}") from None
+        raise SceneError(f"{file}{_refused(text, str(problem))}") from None
     except ValueError as problem:  # of a whole number of thousands of digits
         raise SceneError(f"{file}: not valid TOML: {str(problem).partition(';')[0]}") from None
     except RecursionError:
         raise SceneError(f"{file}: not valid TOML: nested too deeply") from None
 
 
+def _refused(text, problem):
+    """Line, column and reason of a text that `tomllib` refuses with this message."""
+    if problem.startswith(("Cannot ", "Duplicate ")):
+        try:
+            places(text)
+        except _GivenTwice as twice:
+            name, offset, first = twice.args
+            return f"{_at(text, offset)}: {name} is given twice, first at{_at(text, first)[1:]}: expected one"
+        except (AttributeError, IndexError):  # the text is no TOML further down
+            pass
+    at = _AT.search(problem)
+    hint = "; text, and a number with its unit, stand in quotes" if "Invalid value" in problem else ""
+    where = f", line {at[1]}, column {at[2]}" if at else ""
+    return f"{where}: not valid TOML: {_AT.sub('', problem)}{hint}"
+
+
+def _at(text, offset):
+    """", line ..., column ..." of an offset."""
+    line, column = _line_and_column(text, offset)
+    return f", line {line}, column {column}"
+
+
+def _line_and_column(text, offset):
+    before = text[:offset]
+    return before.count("\n") + 1, len(before) - before.rfind("\n")
+
+
 def place_of(text, where):
     """(line, column), from 1, of the innermost key or item of a place that valid TOML has, see `places`; or None."""
     found = places(text)
-    for n in range(len(where), 0, -1):
-        if where[:n] in found:
-            before = text[: found[where[:n]]]
-            return before.count("\n") + 1, len(before) - before.rfind("\n")
-    return None
+    inner = next((where[:n] for n in range(len(where), 0, -1) if where[:n] in found), None)
+    return None if inner is None else _line_and_column(text, found[inner])
 
 
 def places(text):
-    """{place: offset} of all keys and items of valid TOML; a place is a tuple of keys and numbers from 0."""
+    """{place: offset} of all keys and items of TOML; a place is a tuple of keys and numbers from 0.
+
+    Raises:
+        _GivenTwice: a table or a key.
+    """
     found, counts, table, i = {}, {}, (), 0
     while (i := _BLANK.match(text, i).end()) < len(text):
         if text[i] != "[":
@@ -59,6 +92,8 @@ def places(text):
             table = (*table, key)
             table = (*table, counts[table] - 1) if table in counts else table
         table = (*table, keys[-1])
+        if table in found and not (many and table in counts):
+            raise _GivenTwice(f"[{'[' * many}{spoken(table)}]{']' * many}", begin, found[table])
         found.setdefault(table, begin)
         if many:
             counts[table] = counts.get(table, 0) + 1
@@ -80,6 +115,8 @@ def _keys(text, i):
 def _pair(text, i, table, found):
     """Note a key and what its value holds; returns where it ends."""
     keys, end = _keys(text, i)
+    if (*table, *keys) in found:
+        raise _GivenTwice(spoken((*table, *keys)), i, found[(*table, *keys)])
     for n in range(1, len(keys) + 1):
         found.setdefault((*table, *keys[:n]), i)
     return _value(text, end + 1, (*table, *keys), found)
