@@ -85,7 +85,7 @@ def test_it_is_written_and_refused_by_its_fields(mast, tmp_path):
         ('"Gust"', '"Gusts"', r"line 14, column 1: loads\[0\].type = 'Gusts': did you mean 'Gust'"),
         ("extensions.gust", "extensions.gusts", r"line 1, column 8: use\[0\] = 'extensions.gusts': cannot be imported"),
         ("[solve]", "[solved]", r"line 19, column 1: the file: unknown key 'solved', did you mean 'solve'"),
-        ("[[supports]]", "[solve]\n[[supports]]", r"line 22, column 1: \[solve\] is given twice, first at line 19"),
+        ("[[supports]]", "[solve]\n[[supports]]", r"line 20, column 1: \[solve\] is given twice, first at line 9,"),
     ):
         assert old in MAST
         mast.write_text(MAST.replace(old, new), encoding="utf-8")
