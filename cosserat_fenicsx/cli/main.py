@@ -20,9 +20,7 @@ def main(arguments=None):
     Returns:
         0 done, 1 not converged (the partial path is written), 2 bad input, 130 interrupted (likewise written).
     """
-    eigenvalues = _with(_eigenvalues)
-    whole = parser({"run": _with(_run), "resume": _resume, "buckling": eigenvalues, "modes": eigenvalues,
-                    "explain": _with(_explain), "schema": _schema})  # fmt: skip
+    whole = parser()
     options = whole.parse_args(arguments)
     if options.command is None:
         whole.print_help()
@@ -33,7 +31,7 @@ def main(arguments=None):
             stream.reconfigure(errors="backslashreplace")
     try:
         with warnings_in_words():
-            return together(lambda: options.do(options))
+            return together(lambda: _DO.get(options.command, _of_a_scene)(options))
     except KeyboardInterrupt:  # of commands without partial results; `deliver` handles paths and motions
         say("cosserat: interrupted")
         return INTERRUPTED
@@ -50,36 +48,23 @@ def main(arguments=None):
         return BAD_INPUT
 
 
-def _with(deed):
-    """A command that does this with the scene of a file and its tables, in the module of the scene's kind."""
+def _of_a_scene(options):
+    """`run`, `explain`, `buckling` and `modes` of a scene file, in the module of its kind."""
+    from cosserat_fenicsx.files.read import kind_of, read_with_tables
 
-    def command(options):
-        from cosserat_fenicsx.files.read import kind_of, read_with_tables
-
-        found, tables = read_with_tables(options.scene)
-        kind = kind_of(tables)
-        if kind != "rods" and options.command in ("buckling", "modes"):
-            refused = f"cosserat {options.command} is for rods, and {options.scene} is"
-            if kind == "well":
-                raise SceneError(f"{refused} a string in a well")
-            raise SceneError(f"{refused} a drill-string in motion: `cosserat run` with a table [stability] computes "
-                             "its modes")  # fmt: skip
-        return deed(import_module(f"cosserat_fenicsx.cli.{kind}"), options, found, tables)
-
-    return command
-
-
-def _run(kind, options, found, tables):
-    return kind.run(options, found, tables)
-
-
-def _explain(kind, options, found, _):
-    say(kind.explain(options, found), file=sys.stdout)
-    return DONE
-
-
-def _eigenvalues(kind, options, found, tables):
-    return kind.eigenvalues(options, found, tables)
+    found, tables = read_with_tables(options.scene)
+    kind = kind_of(tables)
+    module = import_module(f"cosserat_fenicsx.cli.{kind}")
+    if options.command == "run":
+        return module.run(options, found, tables)
+    if options.command == "explain":
+        say(module.explain(options, found), file=sys.stdout)
+        return DONE
+    if kind == "rods":
+        return module.eigenvalues(options, found, tables)
+    words = {"well": "a string in a well", "drilling": "a drill-string in motion: `cosserat run` with a table "
+             "[stability] computes its modes"}  # fmt: skip
+    raise SceneError(f"cosserat {options.command} is for rods, and {options.scene} is {words[kind]}")
 
 
 def _resume(options):
@@ -111,6 +96,8 @@ def _schema(options):
     say(json.dumps(schema_of_files(), indent=1), file=sys.stdout)
     return DONE
 
+
+_DO = {"resume": _resume, "schema": _schema}
 
 if __name__ == "__main__":
     sys.exit(main())

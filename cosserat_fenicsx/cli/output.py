@@ -4,6 +4,7 @@ after a failure or an interruption."""
 import os
 import sys
 import tempfile
+from contextlib import nullcontext
 from pathlib import Path
 
 from cosserat_fenicsx.cli.say import BAD_INPUT, DONE, INTERRUPTED, NOT_CONVERGED, in_words, say, together
@@ -36,16 +37,17 @@ def refuse_of_rods(options, kind):
         raise SceneError(f"--{name.replace('_', '-')} is for rods, and this scene is {kind}")
 
 
-def deliver(computed, options, names, files_of, tables=None, moving=False):
+def deliver(computed, options, names, files_of, tables=None, *, moving=False, obeys=True):
     """Compute, then print and write the result, or the partial result where the computation fails or is interrupted.
 
     Args:
         computed: function without arguments that returns the result.
         options: of the command line.
         names: of all files that may be written. files_of: function of the result that returns {name: function that
-            writes this file, or what is false for none}.
+            writes this file; True where the one before writes it as well; or what is false for none}.
         tables: of the scene file, where there is one.
         moving: whether it is a motion.
+        obeys: whether the computation looks for requested stops itself, by `interrupts.obey`; others end at once.
 
     Returns:
         the exit code.
@@ -53,8 +55,8 @@ def deliver(computed, options, names, files_of, tables=None, moving=False):
     film = getattr(options, "animate", None)
     _check_film(film, options, moving)
     out = output_of(options, [*names, *([film] if film else [])], tables)
-    result, trouble, code = _ended(lambda: together(computed))
-    if result is not None and (len(result) or code == DONE):
+    result, trouble, code = _ended(lambda: together(computed), patience() if obeys else nullcontext())
+    if result is not None and (code == DONE or len(result)):
         say(result.details(**given(options, ["station"])), file=sys.stdout)
         if out is not None:
             if code == INTERRUPTED:
@@ -81,23 +83,41 @@ def deliver(computed, options, names, files_of, tables=None, moving=False):
 
 
 def _write(files, out, stops):
-    written = Files(out, stops)
+    """Write files one after another, and say which; pictures whose library is missing are left out.
+
+    Args:
+        files: see `deliver`. stops: whether a signal ends the writing between two files.
+
+    Raises:
+        KeyboardInterrupt: a signal asked for a stop.
+        OSError, SceneError: as the functions do.
+    """
+    written, left_out = [], {}
     try:
         for name, write in files.items():
-            if write:
-                written.put(name, write)
+            if stops:
+                obey()
+            try:
+                if callable(write):
+                    write(out / name)
+                written += [name] if write else []
+            except LibraryMissing as problem:
+                left_out.setdefault(str(problem), []).append(name)
     finally:
-        written.tell()
+        if written:
+            say(f"written to {out}/: {', '.join(written)}", file=sys.stdout)
+        for why, names in left_out.items():
+            say(f"cosserat: left out: {', '.join(names)}: {why}")
 
 
-def _ended(compute):
-    """(result or partial result, the exception or None, exit code) of a function without arguments.
+def _ended(compute, waiting):
+    """(result or partial result, the exception or None, exit code) of a function, called in a context manager.
 
     Raises:
         SceneError: bad input, found before anything was computed.
     """
     try:
-        with patience():
+        with waiting:
             return compute(), None, DONE
     except (NotConverged, NotStored) as failure:
         return failure.path, failure, NOT_CONVERGED
@@ -123,22 +143,13 @@ def output_of(options, names, tables=None):
     out = Path(options.output)
     if tables is not None:
         _keep_inputs(out, names, options.scene, tables)
-    _prepare(out)
-    return out
-
-
-def _prepare(out):
-    """Make the output folder, and check that it can be written to.
-
-    Raises:
-        SceneError: it cannot.
-    """
     try:
         out.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=out):
             pass
     except OSError as problem:
         raise SceneError(f"output folder {out}: {problem.strerror}: expected a folder that can be written to") from None
+    return out
 
 
 def _check_film(film, options, moving):
@@ -152,42 +163,6 @@ def _check_film(film, options, moving):
     if Path(film).name != film:
         raise SceneError(f"--animate {film}: expected a name without folders; it is written to -o DIR")
     check_name(film)
-
-
-class Files:
-    """Files in a folder, one after another.
-
-    Args:
-        out: the folder, a Path. stops: whether a signal ends the writing between two files.
-    """
-
-    def __init__(self, out, stops=True):
-        self._out, self._stops = out, stops
-        self.names, self._left_out = [], {}
-
-    def put(self, name, write, *more):
-        """Call `write` with a file of this name; `more`: names of files that it writes too, beside the .h5 of an .xdmf.
-        A picture whose library is missing is left out.
-
-        Raises:
-            KeyboardInterrupt: a signal asked for a stop.
-            OSError, SceneError: as `write` does.
-        """
-        if self._stops:
-            obey()
-        try:
-            write(self._out / name)
-        except LibraryMissing as problem:
-            self._left_out.setdefault(str(problem), []).append(name)
-        else:
-            self.names += [name, *([f"{Path(name).stem}.h5"] if name.endswith(".xdmf") else []), *more]
-
-    def tell(self):
-        """Say what was written, and what was left out."""
-        if self.names:
-            say(f"written to {self._out}/: {', '.join(self.names)}", file=sys.stdout)
-        for why, names in self._left_out.items():
-            say(f"cosserat: left out: {', '.join(names)}: {why}")
 
 
 def _keep_inputs(out, names, scene, tables):

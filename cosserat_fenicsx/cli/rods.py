@@ -104,6 +104,7 @@ def eigenvalues(options, found, tables):
         return {
             f"{name}.csv": result.write,
             f"{name}.xdmf": len(result) and result.write,
+            f"{name}.h5": bool(len(result)),
             f"{name}.png": len(result) and not options.no_picture and result.plot,
         }
 
@@ -129,6 +130,7 @@ def deliver_rods(computed, options, moving, tables=None):
         return {
             f"{name}.csv": partial(path.write, station=options.station),
             f"{name}.xdmf": path.write,
+            f"{name}.h5": True,
             "result.h5": path.save,
             "rods.png": picture and (lambda file: path.plot(file, shown, magnify=magnify, color=color)),
             "rods.html": picture and path.write,
@@ -137,7 +139,7 @@ def deliver_rods(computed, options, moving, tables=None):
         }
 
     names = [f"{name}.csv", f"{name}.xdmf", f"{name}.h5", "result.h5", "rods.png", "rods.html"]
-    return deliver(computed, options, [*names, *(["energy.png"] if moving else [])], files, tables, moving)
+    return deliver(computed, options, [*names, *(["energy.png"] if moving else [])], files, tables, moving=moving)
 
 
 def _shown(path, at):

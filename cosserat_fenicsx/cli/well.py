@@ -3,18 +3,20 @@
 import math
 import sys
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
 from cosserat_fenicsx import units
-from cosserat_fenicsx.cli.output import Files, given, output_of, refuse_of_rods
-from cosserat_fenicsx.cli.say import DONE, INTERRUPTED, say
-from cosserat_fenicsx.errors import Interrupted
+from cosserat_fenicsx.cli.output import deliver, given, output_of, refuse_of_rods
+from cosserat_fenicsx.cli.say import DONE, say
 from cosserat_fenicsx.ranks import on_first, world
 from cosserat_fenicsx.storage.store import discard
 from cosserat_fenicsx.well.components import weight_in_mud
 from cosserat_fenicsx.well.scenefile import TorqueAndDragSettings
 
+# Ends of the names of files of an operation, and names of those of a sweep.
+_ENDINGS = (".csv", "_contacts.csv", ".png", "_3d.png")
 _OF_SWEEPS = ("depth_sweep.csv", "depth_sweep", "depth_sweep.png")
 _SOFT = (
     "the soft string by a differential equation along the axis, and what that leaves out is estimated with each answer."
@@ -37,36 +39,35 @@ def _scene(options, scene):
 
 def run(options, scene, tables):
     """`cosserat run` of a `WellScene` and the tables of its file; returns the exit code."""
-    scene, stems = _scene(options, scene), _stems(scene.operations)
-    names = [f"{stem}{ending}" for stem in stems for ending in (".csv", "_contacts.csv", ".png", "_3d.png")]
-    out = output_of(options, [*names, *_OF_SWEEPS], tables)
+    scene, stems, picture = _scene(options, scene), _stems(scene.operations), not options.no_picture
+    names = [f"{stem}{ending}" for stem in stems for ending in _ENDINGS] + list(_OF_SWEEPS)
+    out = output_of(options, names, tables)
     if scene.title:
         say(scene.title, file=sys.stdout)
-    written = Files(out, stops=False)
+
+    def files_of(stem, answer):
+        csv, contacts, chart, in_space = (f"{stem}{ending}" for ending in _ENDINGS)
+        return {csv: answer.write, contacts: True, chart: picture and answer.plot, in_space: picture and answer.plot_3d}
+
     for operation, stem in zip(scene.operations, stems, strict=True):
-        answer = scene.answer(operation)
-        say(answer.details(), file=sys.stdout)
-        if out is not None:
-            written.put(f"{stem}.csv", answer.write, f"{stem}_contacts.csv")
-            if not options.no_picture:
-                written.put(f"{stem}.png", answer.plot)
-                written.put(f"{stem}_3d.png", answer.plot_3d)
-    code = DONE
-    try:
-        sweep = scene.swept(out / "depth_sweep" if out is not None else None)
-    except Interrupted as stop:
-        sweep, code = stop.path, INTERRUPTED
-        say(f"cosserat: {stop.words}")
-    if sweep is not None:
-        say(sweep.details(), file=sys.stdout)
-        if out is not None:
-            if code == DONE:  # complete: another run begins anew
-                on_first(world(), lambda: discard(out / "depth_sweep"))
-            written.put("depth_sweep.csv", sweep.write)
-            if not options.no_picture and len(sweep):
-                written.put("depth_sweep.png", sweep.plot)
-    written.tell()
-    return code
+        solved = partial(scene.answer, operation)
+        code = deliver(solved, options, names, partial(files_of, stem), tables, obeys=False)
+        if code != DONE:
+            return code
+    if scene.depth_sweep is None:
+        return DONE
+    folder = None if out is None else out / "depth_sweep"
+
+    def swept():
+        sweep = scene.swept(folder)
+        if folder is not None:  # complete: another run begins anew
+            on_first(world(), lambda: discard(folder))
+        return sweep
+
+    def files_of_sweep(sweep):
+        return {"depth_sweep.csv": sweep.write, "depth_sweep.png": picture and len(sweep) and sweep.plot}
+
+    return deliver(swept, options, names, files_of_sweep, tables, obeys=False)
 
 
 def _stems(operations):
