@@ -75,11 +75,12 @@ def _in_si(owner, field, value, unit):
     return in_si(f"{name_of(owner)}.{field}", value, BY_UNIT[unit])
 
 
-def number(owner, field, value, expected, accept):
+def number(owner, field, value, expected, accept, above_zero=False):
     """`value` as a float where it is a number that `accept` accepts, or text with a unit; refused otherwise.
 
     Args:
         expected: for messages, with the SI unit in its first parentheses.
+        above_zero: whether numbers so small that their powers are zero are refused too.
     """
     if isinstance(value, str):
         value = _in_si(owner, field, value, _unit_of(expected))
@@ -91,6 +92,8 @@ def number(owner, field, value, expected, accept):
         refuse(owner, field, f"{str(value)[:10]}...", expected)
     if math.isnan(given) or not accept(given):
         refuse(owner, field, value, expected)
+    if above_zero and given < 1 / LARGEST:
+        refuse(owner, field, value, f"{expected} from {1 / LARGEST:g} to {LARGEST:g}")
     if abs(given) > _SMALLEST and abs(given) != math.inf:
         unit = _unit_of(expected)
         most = _most(owner, unit)
@@ -119,10 +122,7 @@ def _most(owner, unit):
 
 def positive(owner, field, value, unit):
     """A number above zero, neither so small nor so large that its powers are not numbers."""
-    found = number(owner, field, value, f"a positive number ({unit})", lambda x: 0 < x < math.inf)
-    if found < 1 / LARGEST:
-        refuse(owner, field, value, f"a positive number ({unit}) from {1 / LARGEST:g} to {LARGEST:g}")
-    return found
+    return number(owner, field, value, f"a positive number ({unit})", lambda x: 0 < x < math.inf, above_zero=True)
 
 
 def stiffness(owner, field, value, unit):

@@ -3,6 +3,7 @@
 See `parts`, which this module serves: annotations become kinds by `kind_of`.
 """
 
+import contextlib
 import dataclasses
 import functools
 import importlib
@@ -39,9 +40,14 @@ class NotData(Exception):
     def __str__(self):
         return f"{spoken(self.where)}: {self.why}" if self.where else self.why
 
-    def inside(self, *where):
-        """The same within an outer place."""
-        return NotData(self.why, (*where, *self.where))
+
+@contextlib.contextmanager
+def _inside(key):
+    """Context manager: a `NotData` names its place within an outer one."""
+    try:
+        yield
+    except NotData as problem:
+        raise NotData(problem.why, (key, *problem.where)) from None
 
 
 def members(family):
@@ -147,15 +153,10 @@ def made(make, data, where=(), reading=Reading()):
     name = make.__name__
     if hasattr(make, "constructors"):
         make = make.constructor(data.keys())
-    known, at = arguments_of(make), "the file"
+    known, at = arguments_of(make), ""
     if where:
         at = f"[{spoken(where)}]" if getattr(make, "called", "") else f"{spoken(where)} ({name})"
-    for key in data:
-        if key not in known:
-            raise misplaced((*where, key), f"{at}: unknown key '{key}', {nearest(key, known)}")
-    for key, (_, needed) in known.items():
-        if needed and key not in data:
-            raise misplaced(where, f"{at}: '{key}' is missing" if where else f"[{key}] is missing")
+    _check_keys(data, known, [key for key, (_, needed) in known.items() if needed], at, where)
     given = {key: known[key][0].read((*where, key), value, reading) for key, value in data.items()}
     try:
         return make(**given)
@@ -165,6 +166,17 @@ def made(make, data, where=(), reading=Reading()):
         at = "" if str(problem).startswith(f"{spoken(where)}.") else f"{spoken(where)}: "
         field = re.match(r"\w+\.(\w+)", str(problem))  # 'Owner.field = value: ...'
         raise misplaced((*where, field[1]) if field and field[1] in data else where, f"{at}{problem}") from None
+
+
+def _check_keys(data, known, needed, at, where=None):
+    """Refuse unknown and missing keys of a table, which messages call `at`, "" for the file."""
+    for key in data:
+        if key not in known:
+            place = None if where is None else (*where, key)
+            raise misplaced(place, f"{at or 'the file'}: unknown key '{key}', {nearest(key, known)}")
+    for key in needed:
+        if key not in data:
+            raise misplaced(where, f"{at}: '{key}' is missing" if at else f"[{key}] is missing")
 
 
 def table_schema(cls, definitions):
@@ -287,9 +299,8 @@ class Number(Kind):
         if self.dimension and isinstance(value, str):
             value = in_si(f"{checks.name_of(owner)}.{field}", value, self.dimension)
         whole = (lambda x: x == int(x)) if self.whole else (lambda x: True)
-        found = checks.number(owner, field, value, self.words, lambda x: self.limits.admit(x) and whole(x))
-        if self.limits.above and self.limits.low == 0 and found < 1 / LARGEST:
-            refuse(owner, field, value, f"{self.words} from {1 / LARGEST:g} to {LARGEST:g}")
+        above_zero = self.limits.above and self.limits.low == 0
+        found = checks.number(owner, field, value, self.words, lambda x: self.limits.admit(x) and whole(x), above_zero)
         return int(found) if self.whole else found
 
     def schema(self, definitions):
@@ -326,46 +337,37 @@ class Several(Kind):
         return {"type": "array", "items": item, "minItems": self.size, "maxItems": self.size}
 
 
-@dataclasses.dataclass(frozen=True)
-class Text(Kind):
+class _Instance(Kind):
+    """An object of a class of Python: its `class_`, and the `json` type of its data."""
+
+    class_, json = object, ""
+
+    def check(self, owner, field, value):
+        return instance(owner, field, value, self.class_, self.words)
+
+    def schema(self, definitions):
+        return {"type": self.json}
+
+
+class Text(_Instance):
     """A text."""
 
-    words = "a text"
-
-    def check(self, owner, field, value):
-        return instance(owner, field, value, str, self.words)
-
-    def schema(self, definitions):
-        return {"type": "string"}
+    words, class_, json = "a text", str, "string"
 
 
-@dataclasses.dataclass(frozen=True)
-class Flag(Kind):
+class Flag(_Instance):
     """True or False."""
 
-    words = "True or False"
-
-    def check(self, owner, field, value):
-        return instance(owner, field, value, bool, self.words)
-
-    def schema(self, definitions):
-        return {"type": "boolean"}
+    words, class_, json = "True or False", bool, "boolean"
 
 
-@dataclasses.dataclass(frozen=True)
-class FileName(Kind):
+class FileName(_Instance):
     """The name of a file; in a scene file, beside it. Where others than names are allowed, these stay as they are."""
 
-    words = "the name of a file"
-
-    def check(self, owner, field, value):
-        return instance(owner, field, value, str | PathLike, self.words)
+    words, class_, json = "the name of a file", str | PathLike, ("string", "array")
 
     def read(self, where, data, reading):
         return reading.folder / data if reading.folder is not None and isinstance(data, str) else data
-
-    def schema(self, definitions):
-        return {"type": ["string", "array"]}
 
 
 @dataclasses.dataclass(frozen=True)
@@ -421,11 +423,8 @@ class Object(Kind):
         return first if not is_family(first) and all(map(is_family, others)) else None
 
     def _find(self, name):
-        for cls in self.classes:
-            found = member(cls, name) if is_family(cls) else cls if cls.__name__ == name else None
-            if found is not None:
-                return found
-        return None
+        found = (member(cls, name) if is_family(cls) else cls for cls in self.classes)
+        return next((cls for cls in found if cls is not None and cls.__name__ == name), None)
 
     def read(self, where, data, reading):
         """See `Kind`: a table; the name of an object; or the name of a class, for an object without arguments."""
@@ -457,7 +456,9 @@ class Object(Kind):
         cls = type(value)
         twice = any(cls.__name__ in getattr(known, "_twice", ()) for known in self.classes)
         if twice or not isinstance(value, self.classes) or self._find(cls.__name__) is not cls:
-            return super().write(value, writing) if not hasattr(value, "arguments") else self._refuse(cls)
+            if hasattr(value, "arguments"):
+                raise NotData(f"a part of the class {cls.__name__} cannot be stored as data")
+            return super().write(value, writing)
         if not cls.__module__.startswith("cosserat_fenicsx."):
             writing.modules.add(cls.__module__)
         data, defaults = {"type": cls.__name__} if self._typed else {}, inspect.signature(cls).parameters
@@ -465,14 +466,9 @@ class Object(Kind):
             default = defaults[name].default
             same = given is default or given is None or (type(given) is type(default) and given == default)
             if writing.whole or not same:
-                try:
+                with _inside(name):
                     data[name] = arguments_of(cls)[name][0].write(given, writing)
-                except NotData as problem:
-                    raise problem.inside(name) from None
         return data
-
-    def _refuse(self, cls):
-        raise NotData(f"a part of the class {cls.__name__} cannot be stored as data")
 
     def schema(self, definitions):
         found, named = [], any(cls.__name__ == "Material" for cls in self.classes)
@@ -575,14 +571,15 @@ class Items(Kind):
     def write(self, value, writing):
         found = []
         for i, x in enumerate(value):
-            try:
+            with _inside(i):
                 found.append(self.inner.write(x, writing))
-            except NotData as problem:
-                raise problem.inside(i) from None
         return found
 
     def schema(self, definitions):
         return {"type": "array", "items": self.inner.schema(definitions)}
+
+
+_SPACED = ("from", "to", "count")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -591,13 +588,7 @@ class Values(Items):
 
     def check(self, owner, field, value):
         if isinstance(value, dict):
-            where = f"{checks.name_of(owner)}.{field}"
-            for key in value:
-                if key not in ("from", "to", "count"):
-                    raise SceneError(f"{where}: unknown key '{key}', {nearest(key, ('from', 'to', 'count'))}")
-            for key in ("from", "to", "count"):
-                if key not in value:
-                    raise SceneError(f"{where}: '{key}' is missing: expected from, to and count")
+            _check_keys(value, _SPACED, _SPACED, f"{checks.name_of(owner)}.{field}")
             low, high = (self.inner.check(owner, f"{field}.{key}", value[key]) for key in ("from", "to"))
             count = Number(limits=between(2, 10_000, "how many"), whole=True)
             value = np.linspace(low, high, count.check(owner, f"{field}.count", value["count"])).tolist()

@@ -26,34 +26,19 @@ def _asked(options, found):
     """
     asked, motion = given(options, (*_MOTION, *_PATH, *_BOTH)), found.motion
     moves = not options.static and bool(motion or "duration" in asked)
-    for name in _PATH if moves else _MOTION:
-        if name in asked:
-            _refuse_other(name, moves)
+    for name in (name for name in (_PATH if moves else _MOTION) if name in asked):
+        option, kinds = f"--{name.replace('_', '-')}", ["an equilibrium path", "a motion"]
+        expected = "a duration too, under [simulate] in the file or by --duration, and no --static"
+        expected = "--static as well" if moves else expected
+        raise SceneError(f"{option} is for {kinds[not moves]}, and this scene is {kinds[moves]}: expected {expected}")
     if moves:
-        for name, other in (("dt", "tol"), ("tol", "dt")):
-            if name in asked:
-                motion.pop(other, None)
-        return True, {**motion, **asked}
+        replaced = {"dt": "tol", "tol": "dt"}
+        return True, {**{name: x for name, x in motion.items() if replaced.get(name) not in asked}, **asked}
     if "load_factors" in asked:
         from cosserat_fenicsx.files.rods import load_factors_in
 
         asked["load_factors"] = load_factors_in(asked["load_factors"])
     return False, {"load_factors": (0.0, 1.0), **found.settings, **asked}
-
-
-def _refuse_other(name, moves):
-    """Refuse an option of a path for a motion, or of a motion for a path.
-
-    Raises:
-        SceneError: always.
-    """
-    option = f"--{name.replace('_', '-')}"
-    if moves:
-        raise SceneError(f"{option} is for an equilibrium path, and this scene is a motion: expected --static as well")
-    raise SceneError(
-        f"{option} is for a motion, and this scene is an equilibrium path: expected a duration too, under [simulate] "
-        "in the file or by --duration, and no --static"
-    )
 
 
 def run(options, found, tables):
