@@ -120,14 +120,10 @@ if _VERSION < (0, 8):
 
     def _usual_elements(p):
         """Those of rods with nodal unknowns in P_p."""
-        families = ("Lagrange", p), ("Discontinuous Lagrange", p), ("Discontinuous Lagrange", 1)
-        found = [
-            ufl.VectorElement(family, ufl.interval, q, dim=size) for family, q in families for size in range(1, 10)
-        ]
-        rule = 2 * p - 1
-        found += [
-            ufl.VectorElement("Quadrature", ufl.interval, rule, dim=n, quad_scheme="default") for n in range(1, 10)
-        ]
+        families = [("Lagrange", p, {}), ("Discontinuous Lagrange", p, {}), ("Discontinuous Lagrange", 1, {}),
+                    ("Quadrature", 2 * p - 1, {"quad_scheme": "default"})]  # fmt: skip
+        found = [ufl.VectorElement(family, ufl.interval, q, dim=size, **more) for family, q, more in families
+                 for size in range(1, 10)]  # fmt: skip
         return list(dict.fromkeys(found))
 
     def mixed(*elements):
@@ -161,52 +157,41 @@ if _VERSION < (0, 8):
         """Indices into `mesh.geometry.x` of the two ends of every local cell, shape (cells, 2)."""
         return mesh.geometry.dofmap.array.reshape(-1, 2)
 
-else:
+else:  # the same functions, see above
     import basix.ufl
 
     def lagrange(mesh, degree, size, *, discontinuous=False):
-        """A Lagrange element with `size` components: nodes at the Gauss-Lobatto points, numbered node by node."""
         return basix.ufl.element(
             "Lagrange", mesh.basix_cell(), degree, shape=(size,), discontinuous=discontinuous or degree == 0
         )
 
     def at_quadrature_points(mesh, quadrature_degree, size):
-        """An element whose `size`-component values live at the Gauss points of `quadrature_degree`."""
         return basix.ufl.quadrature_element(mesh.basix_cell(), value_shape=(size,), degree=quadrature_degree)
 
     def mixed(*elements):
-        """The product of several elements."""
         return basix.ufl.mixed_element(list(elements))
 
     def function_space(mesh, element):
-        """The finite element space of `element` on `mesh`."""
         return fem.functionspace(mesh, element)
 
     def interval_domain():
-        """UFL's domain of a line, without a mesh."""
         return ufl.Mesh(basix.ufl.element("Lagrange", "interval", 1, shape=(1,)))
 
     def create_interval_mesh(comm, cells, x):
-        """A mesh of intervals on a line from `cells (n, 2)` and `x (m, 1)`, given on rank 0 alone."""
-        coordinates = basix.ufl.element("Lagrange", "interval", 1, shape=(1,))
-        if _VERSION < (0, 10):
-            return dolfinx_mesh.create_mesh(comm, cells, x, coordinates)
-        return dolfinx_mesh.create_mesh(comm, cells, coordinates, x)
+        return _mesh(comm, cells, x, basix.ufl.element("Lagrange", "interval", 1, shape=(1,)))
 
     def create_solid_mesh(comm, cells, x):
-        """A mesh of second-order hexahedra from `cells (n, 27)`, in basix' order of nodes, and `x (m, 3)`."""
-        coordinates = basix.ufl.element("Lagrange", "hexahedron", 2, shape=(3,))
-        if _VERSION < (0, 10):
-            return dolfinx_mesh.create_mesh(comm, cells, x, coordinates)
-        return dolfinx_mesh.create_mesh(comm, cells, coordinates, x)
+        return _mesh(comm, cells, x, basix.ufl.element("Lagrange", "hexahedron", 2, shape=(3,)))
+
+    def _mesh(comm, cells, x, coordinates):
+        given = (x, coordinates) if _VERSION < (0, 10) else (coordinates, x)
+        return dolfinx_mesh.create_mesh(comm, cells, *given)
 
     def evaluate(expression, mesh, cells):
-        """Values of a compiled expression in `cells`, shape (cells, points * components)."""
         values = expression.eval(mesh, cells)
         return values.reshape(len(cells), math.prod(values.shape[1:]))
 
     def geometry_dofs(mesh):
-        """Indices into `mesh.geometry.x` of the two ends of every local cell, shape (cells, 2)."""
         return mesh.geometry.dofmap if _VERSION < (0, 11) else mesh.geometry.dofmaps[0]
 
 

@@ -32,23 +32,12 @@ from typing import Annotated, Any, TypeVar
 from cosserat_fenicsx.checks import Numbers, direction, store
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.kinds import FAMILIES, Writing, fields_of, table_schema
-from cosserat_fenicsx.kinds import FileName as FileName
-from cosserat_fenicsx.kinds import Items as Items
-from cosserat_fenicsx.kinds import Kind as Kind
-from cosserat_fenicsx.kinds import Limits as Limits
-from cosserat_fenicsx.kinds import NotData as NotData
-from cosserat_fenicsx.kinds import Number as Number
-from cosserat_fenicsx.kinds import Object as Object
-from cosserat_fenicsx.kinds import Reading as Reading
-from cosserat_fenicsx.kinds import Several as Several
-from cosserat_fenicsx.kinds import Text as Text
-from cosserat_fenicsx.kinds import Values as Values
-from cosserat_fenicsx.kinds import arguments_of as arguments_of
-from cosserat_fenicsx.kinds import between as between
-from cosserat_fenicsx.kinds import made as made
-from cosserat_fenicsx.kinds import members as members
-from cosserat_fenicsx.kinds import misplaced as misplaced
-from cosserat_fenicsx.kinds import spoken as spoken
+from cosserat_fenicsx.kinds import (
+    FileName as FileName, Items as Items, Kind as Kind, Limits as Limits, NotData as NotData, Number as Number,
+    Object as Object, Reading as Reading, Several as Several, Text as Text, Values as Values,
+    arguments_of as arguments_of, between as between, made as made, members as members, misplaced as misplaced,
+    spoken as spoken,
+)  # fmt: skip
 
 
 class _Readable(type):

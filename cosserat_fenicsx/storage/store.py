@@ -78,20 +78,13 @@ class Nowhere:
 
     due, kept = False, ""
 
-    def put(self, result, what, **rows):
+    def put(self, *given, **rows):
         """See `Store`, and so for all others."""
+
+    keep = checkpoint = release = put
 
     def lines(self, read):
         return []
-
-    def keep(self, row, result=()):
-        pass
-
-    def checkpoint(self, memory, result):
-        pass
-
-    def release(self):
-        pass
 
     @contextlib.contextmanager
     def ending(self, result):
@@ -156,11 +149,16 @@ class Store(Nowhere):
     def _make(self):
         self.place.mkdir(parents=True, exist_ok=True)
         self._take()
-        try:
+        with self._released_on_failure():
             self._check_vacant()
             for file in self._own():
                 file.unlink()
             self._put_head()
+
+    @contextlib.contextmanager
+    def _released_on_failure(self):
+        try:
+            yield
         except BaseException:
             self.release()
             raise
@@ -170,9 +168,8 @@ class Store(Nowhere):
 
     def _own(self):
         """The files in the folder that have names of this kind's, but for stored.json."""
-        names = [f"{name}.npy" for name in self.kind.tables]
-        found = [self.place / name for name in (*names, *((_START, _LATEST) if self.kind.starts else ()))]
-        return [file for file in (*found, *self.place.glob(_LINES.format("*"))) if file.exists()]
+        names = [f"{name}.npy" for name in self.kind.tables] + ([_START, _LATEST] if self.kind.starts else [])
+        return [file for name in (*names, _LINES.format("*")) for file in self.place.glob(name)]
 
     def _check_vacant(self):
         """Refuse a folder that holds something, but for what was ended before its start."""
@@ -187,10 +184,10 @@ class Store(Nowhere):
         for name in (HEAD, *EARLIER):
             if (self.place / name).exists():
                 raise SceneError(f"{where}: it holds {name}, and so another computation: expected a new name")
-        for file in self._own():
+        if own := self._own():
             raise SceneError(
-                f"{where}: it holds {file.name}, which no {what} wrote: expected a new name, or a folder without files "
-                "of that name"
+                f"{where}: it holds {own[0].name}, which no {what} wrote: expected a new name, or a folder without "
+                "files of that name"
             )
 
     def open(self):
@@ -313,11 +310,8 @@ class Store(Nowhere):
         if self._from_first(lambda: holds(self.place)) != self.kind.what:
             return self._made({"scene": _data(as_data) if as_data else None, "mark": marked})
         self.open().hold()
-        try:
+        with self._released_on_failure():
             self.compare(marked)
-        except BaseException:
-            self.release()
-            raise
         return self
 
     def lines(self, read):
@@ -432,13 +426,13 @@ class Store(Nowhere):
         lost = []
         for name in (_LATEST, _START):
             whole, memory, why = self._read(name, like or {})
-            why = next((text for text in self.comm.allgather(why) if text), "")
+            why = next(filter(None, self.comm.allgather(why)), "")
             why = why or self._from_first(lambda whole=whole: self._rows_differ(whole))
-            if not why and recall is not None:
-                why = self._not_recalled(name, recall, memory)
+            if not why and recall is None:
+                return memory
+            why = why or self._not_recalled(name, recall, memory)
             if not why:
-                if recall is not None:
-                    self._go_on_from(whole[_ROWS], lost)
+                self._go_on_from(whole[_ROWS], lost)
                 return memory
             lost.append(why)
         raise SceneError(
@@ -553,6 +547,7 @@ class Store(Nowhere):
 
 
 def _data(as_data):
+    """What a function returns as data, or why it cannot."""
     try:
         return as_data()
     except NotData as problem:
