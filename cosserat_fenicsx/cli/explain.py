@@ -1,7 +1,4 @@
-"""`cosserat explain` of an equilibrium path or a motion of rods: the scene, the model, its size and its steps in
-sentences, without solving."""
-
-import dataclasses
+"""`cosserat explain` of rods: sentences on the scene, the model, its size and its steps, without solving."""
 
 import numpy as np
 
@@ -34,15 +31,7 @@ _UNKNOWNS = {
 
 
 def explain(scene, load_factors, settings):
-    """Sentences on a scene, the model that would be solved, and its size.
-
-    Args:
-        scene: a `Scene`.
-        load_factors, settings: the arguments of `solve`.
-
-    Raises:
-        SceneError: arguments that `solve` would refuse.
-    """
+    """Sentences on a scene, the model that would be solved, and its size; the arguments are those of `solve`."""
     formulation = formulation_of(settings.get("formulation"))
     elements, tol = settings.get("elements"), settings.get("tol", 1e-6)
     degree = settings.get("degree", formulation.default_degree)
@@ -94,9 +83,11 @@ def of_the_scene(scene):
     """Sentences on rods, supports, loads and joints."""
     lines = [scene.title] if scene.title else []
     for rod in scene.rods:
+        centre = rod.mass_centre
+        off = f" Its mass centre is up to {centre.largest:.4g} m off the axis." if centre else ""
         lines.append(
             f"Rod '{rod.name}': {_curve(rod.curve)}, length {rod.length:g} m, {_sections(rod)}; "
-            f"{_stiffnesses(rod)}. {_directions(rod)}{_mass_centre(rod)}"
+            f"{_stiffnesses(rod)}. {_directions(rod)}{off}"
         )
     lines.append(
         f"{len(scene.supports)} support(s): {', '.join(describe(x) for x in scene.supports) or 'none'}. "
@@ -104,13 +95,6 @@ def of_the_scene(scene):
         + "".join(f" {joint.first} is joined to {joint.second}{_release(joint)}." for joint in scene.joints)
     )
     return lines
-
-
-def _mass_centre(rod):
-    """Where the mass centre of a rod is, if not on its axis."""
-    if not rod.mass_centre:
-        return ""
-    return f" Its mass centre is up to {rod.mass_centre.largest:.4g} m off the axis."
 
 
 def _curve(curve):
@@ -140,22 +124,19 @@ def _sections(rod):
 
 
 def _release(joint):
-    """How a joint connects: rigidly, or by a ball or a hinge."""
     if joint.rigid:
         return " rigidly"
-    axis = joint.release if joint.release == "all" else "(" + ", ".join(f"{x:.3g}" for x in joint.release) + ")"
-    return " by a ball" if axis == "all" else f" by a hinge about {axis}"
+    ball = joint.release == "all"
+    return " by a ball" if ball else f" by a hinge about ({', '.join(f'{x:.3g}' for x in joint.release)})"
 
 
 def _section(section):
     """The type of a section and its dimensions."""
     if isinstance(section, Profile):
         return f"Profile {section.name}"
-    given = ((f.name, getattr(section, f.name)) for f in dataclasses.fields(section))
-    measures = ", ".join(
-        f"{name} {value:g} m" for name, value in given if isinstance(value, float) and "factor" not in name
-    )
-    return f"{type(section).__name__}" + (f" ({measures})" if measures and not isinstance(section, Stiffness) else "")
+    given = {} if isinstance(section, Stiffness) else section.arguments()
+    given = {name: x for name, x in given.items() if isinstance(x, float) and "factor" not in name}
+    return type(section).__name__ + (f" ({', '.join(f'{name} {x:g} m' for name, x in given.items())})" if given else "")
 
 
 def _stiffnesses(rod):
@@ -163,8 +144,7 @@ def _stiffnesses(rod):
     low, high = rod.profile.range
 
     def spread(name, i):
-        least, most = getattr(low, name)[i], getattr(high, name)[i]
-        return f"{least:.4g}" + (f" to {most:.4g}" if most > least else "")
+        return _from_to(getattr(low, name)[i], getattr(high, name)[i])
 
     slender = rod.length * np.sqrt(high.K[2] / max(low.J[:2]))
     coupled = "; sections couple strains: EI about the principal axes" if rod.profile.coupled else ""
@@ -185,15 +165,7 @@ def _directions(rod):
 
 
 def explain_motion(scene, settings):
-    """Sentences on a scene and the motion that would be simulated.
-
-    Args:
-        scene: a `Scene`.
-        settings: arguments of `simulate`, `duration` among them.
-
-    Raises:
-        SceneError: arguments that `simulate` would refuse, or a rod without inertia.
-    """
+    """Sentences on a scene and the motion that would be simulated; `settings`: arguments of `simulate`."""
     checked = ("duration", "tol", "dt", "scheme", "save_every", "elements")
     pace_of(**{name: settings[name] for name in checked if name in settings})
     duration = settings["duration"]
@@ -219,8 +191,11 @@ def explain_motion(scene, settings):
 
 def _inertia(rod):
     low, high = rod.profile.range
-    mass = f"{low.mass:.4g}" + (f" to {high.mass:.4g}" if high.mass > low.mass else "")
-    return f"Rod '{rod.name}': mass {mass} kg/m; {_damping(rod.damping)}."
+    return f"Rod '{rod.name}': mass {_from_to(low.mass, high.mass)} kg/m; {_damping(rod.damping)}."
+
+
+def _from_to(low, high):
+    return f"{low:.4g}" + (f" to {high:.4g}" if high > low else "")
 
 
 def _damping(damping):

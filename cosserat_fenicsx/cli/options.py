@@ -127,6 +127,6 @@ def _common(parser):
     motion.add_argument("--dt", type=float, help="fixed step, s, instead of --tol [1e-3]")
     motion.add_argument("--scheme", help="momentum, energy, triple-jump or generalised-alpha [momentum]")
     motion.add_argument("--save-every", type=float, help="s between saved states [every step]")
-    motion.add_argument("--start", type=float,
-                        help="begin at the equilibrium for this load factor of the scene just before t = 0")  # fmt: skip
+    motion.add_argument("--start", type=float, help="begin at the equilibrium for this load factor of the scene just "
+                        "before t = 0")  # fmt: skip
     return motion

@@ -1,5 +1,4 @@
-"""The results and files of the command line: what is computed is printed and written, also the part of it that there is
-after a failure or an interruption."""
+"""Results of the command line: printed and written, also the partial ones after a failure or an interruption."""
 
 import os
 import sys
@@ -28,33 +27,25 @@ def given(options, names):
 
 
 def refuse_of_rods(options, kind):
-    """Refuse the options of rods for another kind of scene, such as "a well".
-
-    Raises:
-        SceneError: naming the option.
-    """
+    """Refuse options of rods for another kind of scene, such as "a well"."""
     for name in given(options, [name for name in _OPTIONS if name not in _TAKEN[kind]]):
         raise SceneError(f"--{name.replace('_', '-')} is for rods, and this scene is {kind}")
 
 
 def deliver(computed, options, names, files_of, tables=None, *, moving=False, obeys=True):
-    """Compute, then print and write the result, or the partial result where the computation fails or is interrupted.
+    """Compute, then print and write the result, or the partial one; returns the exit code.
 
     Args:
         computed: function without arguments that returns the result.
-        options: of the command line.
         names: of all files that may be written. files_of: function of the result that returns {name: function that
             writes this file; True where the one before writes it as well; or what is false for none}.
-        tables: of the scene file, where there is one.
-        moving: whether it is a motion.
+        tables: of the scene file, where there is one. moving: whether it is a motion.
         obeys: whether the computation looks for requested stops itself, by `interrupts.obey`; others end at once.
-
-    Returns:
-        the exit code.
     """
     film = getattr(options, "animate", None)
-    _check_film(film, options, moving)
-    out = output_of(options, [*names, *([film] if film else [])], tables)
+    if film is not None:
+        _check_film(film, options, moving)
+    out = output_of(options, [*names, *filter(None, [film])], tables)
     result, trouble, code = _ended(lambda: together(computed), patience() if obeys else nullcontext())
     if result is not None and (code == DONE or len(result)):
         say(result.details(**given(options, ["station"])), file=sys.stdout)
@@ -83,14 +74,9 @@ def deliver(computed, options, names, files_of, tables=None, *, moving=False, ob
 
 
 def _write(files, out, stops):
-    """Write files one after another, and say which; pictures whose library is missing are left out.
+    """Write files, see `deliver`, and say which; pictures whose library is missing are left out.
 
-    Args:
-        files: see `deliver`. stops: whether a signal ends the writing between two files.
-
-    Raises:
-        KeyboardInterrupt: a signal asked for a stop.
-        OSError, SceneError: as the functions do.
+    With `stops`, a signal ends the writing between two files by a KeyboardInterrupt.
     """
     written, left_out = [], {}
     try:
@@ -113,8 +99,7 @@ def _write(files, out, stops):
 def _ended(compute, waiting):
     """(result or partial result, the exception or None, exit code) of a function, called in a context manager.
 
-    Raises:
-        SceneError: bad input, found before anything was computed.
+    A SceneError before anything was computed is raised.
     """
     try:
         with waiting:
@@ -136,13 +121,20 @@ def output_of(options, names, tables=None):
         names: of all files that may be written. tables: of the scene file, where there is one.
 
     Raises:
-        SceneError: it cannot be written to, or a file there is read from.
+        SceneError: it cannot be written to; or a file would replace the scene file, or one that this names.
     """
     if not options.output:
         return None
     out = Path(options.output)
     if tables is not None:
-        _keep_inputs(out, names, options.scene, tables)
+        inputs = [options.scene, *(Path(options.scene).parent / text for text in _texts(tables) if "\0" not in text)]
+        read = set(map(os.path.realpath, inputs))
+        for name in names:
+            if os.path.realpath(out / name) in read:
+                raise SceneError(
+                    f"-o {out}: {name} would replace the file of that name which the scene is read from: expected "
+                    "another folder, or another name of that file"
+                )
     try:
         out.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=out):
@@ -154,35 +146,13 @@ def output_of(options, names, tables=None):
 
 def _check_film(film, options, moving):
     """Refuse a film that cannot be made, before the computation."""
-    if film is None:
-        return
     if not moving or not options.output:
         raise SceneError("--animate: expected a motion, and -o DIR to write its film to")
-    from cosserat_fenicsx.pictures.animation import check_name
-
     if Path(film).name != film:
         raise SceneError(f"--animate {film}: expected a name without folders; it is written to -o DIR")
+    from cosserat_fenicsx.pictures.animation import check_name
+
     check_name(film)
-
-
-def _keep_inputs(out, names, scene, tables):
-    """Refuse an output that would replace the scene file, or a file that it names.
-
-    Args:
-        out: the output folder, a Path. names: of all files that may be written there.
-        scene: the name of the scene file. tables: what is in it.
-
-    Raises:
-        SceneError: naming the file.
-    """
-    folder = Path(scene).parent
-    read = {os.path.realpath(scene)} | {os.path.realpath(folder / text) for text in _texts(tables) if "\0" not in text}
-    for name in names:
-        if os.path.realpath(out / name) in read:
-            raise SceneError(
-                f"-o {out}: {name} would replace the file of that name which the scene is read from: expected another "
-                "folder, or another name of that file"
-            )
 
 
 def _texts(value):

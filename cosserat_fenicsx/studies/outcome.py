@@ -91,7 +91,26 @@ class Study(Result):
             InstallationError: xarray is missing.
             SceneError: arrays of a result differ in shape.
         """
-        return dataset(self, Units(units))
+        xarray, units = import_library("xarray", "to_xarray"), Units(units)
+        given, found = _columns(self)
+        if self.grid is None:
+            dims, shape = ("case",), (len(self.cases),)
+            coordinates = {"case": np.arange(len(self.cases))}
+            coordinates |= {name: ("case", _labels(values)) for name, values in given.items()}
+        else:
+            dims, shape = tuple(self.grid), tuple(map(len, self.grid.values()))
+            coordinates = {name: _labels(values) for name, values in self.grid.items()}
+        known, failures = self.quantities, [self.why(i) for i in range(len(self.cases))]
+        variables = {"failure": (dims, np.array(failures).reshape(shape))}
+        for name, values in found.items():
+            array = _filled(values)
+            if array.dtype == object and any(isinstance(value, np.ndarray) for value in values):
+                raise SceneError(f"to_xarray: the arrays of '{name}' differ in shape: expected one in all cases")
+            more = tuple(f"{name}_{k}" for k in range(array.ndim - 1))
+            unit, size = units.of(known[name])
+            array = array if size == 1.0 else array / size
+            variables[name] = ((*dims, *more), array.reshape(*shape, *array.shape[1:]), {"units": unit})
+        return xarray.Dataset(variables, coordinates)
 
     def plot(self, file: File | None = None, name: str | None = None, *, units: str | Mapping = "SI",
              width: int | None = None):  # fmt: skip
@@ -155,34 +174,13 @@ def _names(dicts):
 def _series(values):
     """(n,) values as numbers or texts, or as objects."""
     array = _filled(values)
-    if array.ndim > 1 or array.dtype == object:
-        array = np.empty(len(values), object)
-        array[:] = values
+    return _objects(values) if array.ndim > 1 else array
+
+
+def _objects(values):
+    array = np.empty(len(values), object)
+    array[:] = values
     return array
-
-
-def dataset(study, units):
-    """See `Study.to_xarray`."""
-    xarray = import_library("xarray", "to_xarray")
-    given, found = _columns(study)
-    if study.grid is None:
-        dims, shape = ("case",), (len(study.cases),)
-        coordinates = {"case": np.arange(len(study.cases))}
-        coordinates |= {name: ("case", _labels(values)) for name, values in given.items()}
-    else:
-        dims, shape = tuple(study.grid), tuple(map(len, study.grid.values()))
-        coordinates = {name: _labels(values) for name, values in study.grid.items()}
-    known, failures = study.quantities, [study.why(i) for i in range(len(study.cases))]
-    variables = {"failure": (dims, np.array(failures).reshape(shape))}
-    for name, values in found.items():
-        array = _filled(values)
-        if array.dtype == object and any(isinstance(value, np.ndarray) for value in values):
-            raise SceneError(f"to_xarray: the arrays of '{name}' differ in shape: expected the same one in all cases")
-        more = tuple(f"{name}_{k}" for k in range(array.ndim - 1))
-        unit, size = units.of(known[name])
-        array = array if size == 1.0 else array / size
-        variables[name] = ((*dims, *more), array.reshape(*shape, *array.shape[1:]), {"units": unit})
-    return xarray.Dataset(variables, coordinates)
 
 
 def _filled(values):
@@ -191,9 +189,7 @@ def _filled(values):
     kinds = {np.asarray(value).dtype.kind if _is_plain(value) else "O" for value in known}
     shapes = {np.shape(value) for value in known if _is_plain(value)}
     if not known or len(shapes) != 1 or "O" in kinds or ("U" in kinds and len(kinds) > 1):
-        array = np.empty(len(values), object)
-        array[:] = values
-        return array if known else np.full(len(values), np.nan)
+        return _objects(values) if known else np.full(len(values), np.nan)
     missing = "" if kinds == {"U"} else np.nan
     filler = np.full(shapes.pop(), missing)
     return np.array([filler if value is None else value for value in values])

@@ -19,7 +19,7 @@ from cosserat_fenicsx.interrupts import obey
 from cosserat_fenicsx.progress import CaseProgress
 from cosserat_fenicsx.ranks import apart, communicator
 from cosserat_fenicsx.storage.mark import NotMarked, mark_of
-from cosserat_fenicsx.storage.store import Kind, Store
+from cosserat_fenicsx.storage.store import Kind, Nowhere, Store
 from cosserat_fenicsx.studies.outcome import Study
 from cosserat_fenicsx.studies.values import from_data, to_data
 
@@ -82,25 +82,21 @@ def study(
         raise SceneError("study.cases: they differ between ranks: expected the same cases on every rank")
     if comm.size > 1:
         gc.collect()  # what ranks must free together is not left for times at which they are apart
-    store = None if folder is None else Store(folder, KIND, comm).begin(told)
+    store = Nowhere() if folder is None else Store(folder, KIND, comm).begin(told)
     try:
-        rows = {} if store is None else _latest(store.lines(lambda row: _outcome_in(row, len(cases))))
+        rows = _latest(store.lines(lambda row: _outcome_in(row, len(cases))))
         run = _Run(task, cases, rows, retry, store, comm)
         rows, troubles = run.over(progress)
     finally:
-        if store is not None:
-            store.release()
-    found = Study(cases, grid, {i: _outcome(row) for i, row in sorted(rows.items())})
+        store.release()
+    found = {i: (from_data(row.get("result")), row.get("failure", ""), row["seconds"]) for i, row in rows.items()}
+    found = Study(cases, grid, dict(sorted(found.items())))
     _raise_first(run.trouble, troubles, found, store)
     return found
 
 
 def go_on(store, *given):
-    """`resume` and `read` of a study, whose folder does not hold the task.
-
-    Raises:
-        SceneError: always.
-    """
+    """`resume` and `read` of a study are refused: its folder does not hold the task."""
     raise SceneError(f"{store.place}: it holds a study: expected the same call of study, which goes on")
 
 
@@ -108,11 +104,7 @@ read = go_on
 
 
 def _told(task, cases, *, strictly):
-    """The mark of task and cases, by which they are compared with those of a folder, and cases between ranks.
-
-    Raises:
-        SceneError: something cannot be compared, and `strictly` is true.
-    """
+    """The mark of task and cases; `strictly`: what cannot be compared is refused."""
     told = {"cases: number": len(cases)}
     for name, value in (("task", task), *((f"cases[{i}]", case) for i, case in enumerate(cases))):
         try:
@@ -128,11 +120,7 @@ def _told(task, cases, *, strictly):
 
 
 def _outcome_in(row, count):
-    """A stored row, which is that of one of `count` cases.
-
-    Raises:
-        ValueError, LookupError, TypeError: it is not.
-    """
+    """A stored row; ValueError, LookupError or TypeError where it is not that of one of `count` cases."""
     if not 0 <= row["case"] < count or ("result" in row) == ("failure" in row):
         raise ValueError(f"case = {row['case']}: expected a result or a failure of one of {count} cases")
     row["attempt"] + row["seconds"], from_data(row.get("result"))
@@ -140,23 +128,15 @@ def _outcome_in(row, count):
 
 
 class _Run:
-    """The computation of the cases that are missing.
+    """The computation of the missing cases; `trouble`: the exception that ended it on this rank, or None."""
 
-    Attributes:
-        trouble: the exception that ended it on this rank, or None.
-    """
-
-    def __init__(self, task, cases, rows, retry, kept, comm):
-        self._task, self._cases, self._rows, self._kept, self._comm = task, cases, rows, kept, comm
+    def __init__(self, task, cases, rows, retry, store, comm):
+        self._task, self._cases, self._rows, self._store, self._comm = task, cases, rows, store, comm
         self._missing = [i for i in range(len(cases)) if i not in rows or (retry and "failure" in rows[i])]
         self.trouble = None
 
     def over(self, progress):
-        """Compute them. Collective.
-
-        Returns:
-            ({number of the case: row} of all ranks and of the folder, the kinds of trouble of all ranks).
-        """
+        """({number of the case: row} of all ranks and of the folder, the `_kind`s of trouble of all ranks)."""
         pool = TaskPool(self._comm, len(self._missing))
         before = len(self._cases) - len(self._missing)
         failed = sum("failure" in row for i, row in self._rows.items() if i not in set(self._missing))
@@ -185,11 +165,10 @@ class _Run:
             i = self._missing[k]
             row = {"case": i, "attempt": self._rows.get(i, {}).get("attempt", 0) + 1, **self._computed(i)}
             own.append(row)
-            if self._kept is not None:
-                try:
-                    self._kept.keep(row)
-                except OSError as problem:
-                    raise _CannotKeep(problem.strerror or str(problem)) from problem
+            try:
+                self._store.keep(row)
+            except OSError as problem:
+                raise _CannotKeep(problem.strerror or str(problem)) from problem
             pool.tell("failure" in row)
 
     def _computed(self, i):
@@ -219,22 +198,7 @@ def _sentence(problem):
 
 def _latest(rows):
     """{number of the case: its row}: a result rather than a failure, else the last attempt."""
-    found = {}
-    for row in rows:
-        old = found.get(row["case"])
-        if old is None or _worth(row) >= _worth(old):
-            found[row["case"]] = row
-    return found
-
-
-def _worth(row):
-    return "result" in row, row["attempt"]
-
-
-def _outcome(row):
-    """(result, why it failed or "", s) of a row."""
-    failed = row.get("failure", "")
-    return None if failed else from_data(row["result"]), failed, row["seconds"]
+    return {row["case"]: row for row in sorted(rows, key=lambda row: ("result" in row, row["attempt"]))}
 
 
 def _kind(trouble):
@@ -253,12 +217,8 @@ def _raise_first(own, troubles, found, store):
         return
     name, text = min(troubles, key=lambda trouble: trouble[0] == KeyboardInterrupt.__name__)
     if name == KeyboardInterrupt.__name__:
-        kept = (
-            "; with a folder they would be kept there, and the same call would go on from them"
-            if store is None
-            else store.kept
-        )
-        raise Interrupted(found, kept) from None
+        without = "; with a folder they would be kept there, and the same call would go on from them"
+        raise Interrupted(found, store.kept or without) from None
     if name == _CannotKeep.__name__:
         raise store.not_stored(OSError(0, text), found, "an outcome")
     if name == InstallationError.__name__:
@@ -276,16 +236,12 @@ def cases_of(cases):
         SceneError: they are something else, or there is none.
     """
     if isinstance(cases, Mapping):
-        grid = {_name(name): _values(name, values) for name, values in cases.items()}
+        grid = {_name(name): _values(f"cases['{name}']", values, "value") for name, values in cases.items()}
         if not grid:
             refuse("study", "cases", cases, "at least one name with a list of values")
         return [dict(zip(grid, values, strict=True)) for values in itertools.product(*grid.values())], grid
     expected = "dicts of arguments by name, or one dict of lists of values by name"
-    if not isinstance(cases, Iterable) or isinstance(cases, str | bytes):
-        refuse("study", "cases", cases, expected)
-    found = list(cases)
-    if not found:
-        refuse("study", "cases", cases, "at least one case")
+    found = _values("cases", cases, "case", expected)
     for i, case in enumerate(found):
         if not isinstance(case, Mapping):
             refuse("study", f"cases[{i}]", case, expected)
@@ -298,15 +254,15 @@ def _name(name):
     return name
 
 
-def _values(name, values):
+def _values(field, values, what, expected="a list of values"):
     if isinstance(values, np.ndarray) and values.ndim == 1:
         values = values.tolist()  # Python's numbers, as those of a list are
     if isinstance(values, str | bytes | Mapping) or not isinstance(values, Iterable):
-        refuse("study", f"cases['{name}']", values, "a list of values")
-    values = list(values)
-    if not values:
-        refuse("study", f"cases['{name}']", values, "at least one value")
-    return values
+        refuse("study", field, values, expected)
+    found = list(values)
+    if not found:
+        refuse("study", field, values, f"at least one {what}")
+    return found
 
 
 def unshared(value):
@@ -320,11 +276,7 @@ def unshared(value):
 
 
 def check_task(task, cases):
-    """Refuse a task that cannot be called with its cases, before any of them is computed.
-
-    Raises:
-        SceneError: it is no function, or has no such arguments.
-    """
+    """Refuse a task that cannot be called with its cases, before any of them is computed."""
     if not callable(task):
         refuse("study", "task", task, "a function of the arguments of a case")
     try:
