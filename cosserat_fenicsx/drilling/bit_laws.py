@@ -1,15 +1,12 @@
-"""What acts between bit and rock.
+"""Laws between bit and rock.
 
-`BitLaw` is the family, and its base class the protocol. `Stribeck`: a torque that falls with the speed, set-valued at
-rest. `Cutting`: the depth of cut of Richard, Germay & Detournay, J. Sound Vib. 305 (2007) 432,
-doi:10.1016/j.jsv.2007.04.015, with the delay of the part of a revolution from blade to blade. `Lobes`: a rock whose
-face is wavy. `EndCondition` is the protocol of what laws with a memory do in the model by elements, `CuttingEnd` and
-`LobedEnd` fulfil it.
+`BitLaw` is the family, and its base class the interface. `Stribeck`: a torque that falls with the speed, set-valued at
+rest. `Cutting`: a drag bit that cuts. `Lobes`: a roller-cone bit on rock with a wavy face. `EndCondition` is the
+interface of laws with a memory to the model by elements; `CuttingEnd` and `LobedEnd` implement it.
 
-The rock below a drag bit: how deep it is cut at every angle, which the next blade meets. n equal blades follow each
-other at angles of 2 pi/n. All move alike, so one function is enough: S(Phi), the depth of the rock left behind at the
-angle Phi of the first blade. A blade at the depth U and the angle Phi meets the rock that the one before it left at Phi
-- 2 pi/n: its depth of cut is
+The rock below a drag bit: n equal blades follow each other at angles of 2 pi/n. All move alike, so one function is
+enough: S(Phi), the depth of the rock that the first blade leaves at its angle Phi. A blade at the depth U and the angle
+Phi meets the rock that the one before it left at Phi - 2 pi/n. Its depth of cut is
 
     d = U - S(Phi - 2 pi/n),        S(Phi) = max(U, S(Phi - 2 pi/n)).
 
@@ -17,25 +14,20 @@ Where the bit never leaves the rock, S = U, and d = U(t) - U(t - tau) with the d
 Detournay define by Phi(t) - Phi(t - tau) = 2 pi/n (J. Sound Vib. 305 (2007) 432, doi:10.1016/j.jsv.2007.04.015). Where
 it has left the rock, the older surface remains, however many blades pass over it.
 
-A drag bit that cuts. The law of Richard, Germay & Detournay, see `bit_laws.Cutting` and `RockSurface`. In a step from t
-to t + h the depth of cut is that at its middle,
+In a step from t to t + h the depth of cut is taken at the middle, d = u + h/2 w - S, with S at the angle predicted for
+it and the unknown mean velocity w. The weight on bit n zeta epsilon a d is linear in w. The torque n epsilon a^2 d/2,
+at the predicted w, acts against the rotation, and holds a bit at rest up to that size. Where d would be negative the
+bit is above the rock, and free. Wear flats bear all or nothing as the bit moves down or up, and anything between at
+rest.
 
-    d = u + h/2 w - S,    S = S(Phi - 2 pi/n) at the angle Phi that the bit is expected to have there,
-
-with the unknown mean velocity w. The weight on bit n zeta epsilon a d is linear in it. The torque n epsilon a^2 d/2,
-with the velocity that is expected for w, acts against the rotation, and holds a bit at rest up to that size. Where d
-would be negative the bit is above the rock, and free. Wear flats bear all or nothing as the bit moves down or up, and
-anything between at rest.
-
-A roller-cone bit on a rock with lobes: the rock lifts the bit as it turns. The rock is rigid or a spring; it pushes and
-does not pull. Its face below the bit is at u = -amplitude sin(count Phi), downwards positive, at the angle Phi by which
-the bit is expected to have turned since the start at the end of the step.
+The face of the rock below a bit on lobes is at u = -amplitude sin(count Phi), downwards positive, at the angle Phi since
+the start that is predicted for the end of the step. The rock is rigid or a spring; it pushes and does not pull.
 """
 
 import math
 from bisect import bisect_right
 from dataclasses import dataclass
-from typing import Annotated, Any, NamedTuple, Protocol
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
@@ -57,16 +49,16 @@ from cosserat_fenicsx.parts import (
     positive,
 )
 
-# Depths (m) beyond this to which a weight presses a bit are those of a stiffness in other units by all appearance.
+# Static penetration (m) above which the rock stiffness is probably given in other units.
 _DEEP = 0.1
-# rad; shorter rotations add no place to the surface of the rock.
+# Shortest rotation (rad) that adds a point to the surface of the rock.
 _SHORTEST_TURN = 1e-9
 # A bit below this share of its mean speed in a step nearly stops.
 _SLOWING = 0.3
 
 
 class BitLaw(Part, family="bit law"):
-    """Base of the laws of what acts between bit and rock.
+    """Base of the laws between bit and rock.
 
     A law of friction of your own is a frozen dataclass with a method `torque(speed, weight)`: the torque (N m) against
     a rotation of the bit at a speed from 0 on (rad/s), at 0 the largest one that holds it at rest, under a weight on
@@ -99,11 +91,11 @@ class BitLaw(Part, family="bit law"):
         return lambda speed, weight: checked(self, "torque", weight if self.needs_weight else math.nan)(speed)
 
     def end(self, weight: float, place: np.ndarray, motion: np.ndarray) -> "EndCondition | None":
-        """What the law remembers in a motion by elements, None for nothing.
+        """The memory of the law in a motion by elements, None where it has none.
 
         Args:
-            weight: static weight on bit, N. place: (2,) of the bit at the start, m downwards and rad. motion: (2,) its
-                velocities there, m/s and rad/s, of steady drilling; zeros at rest.
+            weight: static weight on bit, N. place: (2,) of the bit at the start, m downwards and rad. motion: (2,)
+                velocities of steady drilling at the start, m/s and rad/s; zeros at rest.
         """
 
     def steady_forces(self, weight: float, motion: np.ndarray) -> np.ndarray:
@@ -138,7 +130,6 @@ class Stribeck(BitLaw):
 
     @property
     def needs_weight(self) -> bool:
-        """See `BitLaw`."""
         return self.radius is not None
 
     def torque(self, speed: float, weight: float) -> float:
@@ -194,11 +185,10 @@ class Cutting(BitLaw):
 
     @property
     def repeats(self) -> tuple[int, str]:
-        """See `BitLaw`."""
         return self.blades, "blades"
 
     def resistance(self, weight):
-        """See `BitLaw`."""
+        return None
 
     def end(self, weight, place, motion):
         return CuttingEnd(self, weight, place, motion)
@@ -247,12 +237,10 @@ class Lobes(BitLaw):
 
     @property
     def needs_weight(self) -> bool:
-        """See `BitLaw`."""
         return self.law is not None and self.law.needs_weight
 
     @property
     def repeats(self) -> tuple[int, str]:
-        """See `BitLaw`."""
         return self.count, "lobes"
 
     def resistance(self, weight):
@@ -308,7 +296,7 @@ class BitOnRock(Part):
 
 
 class EndForce(NamedTuple):
-    """What the rock does to the bit in a step: a linear part and set-valued ones.
+    """The force of the rock on the bit in a step: a linear part and set-valued ones.
 
     Attributes:
         force: (2,) weight on bit (N) and torque on bit (N m) of a bit at rest.
@@ -316,8 +304,8 @@ class EndForce(NamedTuple):
         torque: N m, against the rotation, and anything up to that at rest; None for that of the bit's Stribeck law.
         flats: N, half of what wear flats bear: their force is flats above the given one where the bit moves down, flats
             below it where it moves up, and anything between at rest.
-        rock: None, or place (m below that at the start) and velocity (m/s, downwards), at the end of the step, of the
-            face of a rigid rock, which pushes but does not pull.
+        rock: None, or place (m below the start) and velocity (m/s, downwards) of the face of a rigid rock at the end of
+            the step.
     """
 
     force: np.ndarray
@@ -327,8 +315,8 @@ class EndForce(NamedTuple):
     rock: tuple[float, float] | None = None
 
 
-class EndCondition(Protocol):
-    """The force of the rock on the bit, told at the begin of every step.
+class EndCondition:
+    """The force of the rock on the bit, given at the begin of every step.
 
     A step that does not converge is done in halves with the same numbers. The model calls `memory` and `recall` with
     its own.
@@ -336,15 +324,18 @@ class EndCondition(Protocol):
 
     def begin(self, model, h: float) -> EndForce:
         """The force in the coming step of the length h (s), from the state of the model at its begin."""
+        raise NotImplementedError
 
     def commit(self, model, h: float) -> None:
         """The step has been done."""
 
     def memory(self) -> dict[str, Any]:
         """All that later steps depend on."""
+        raise NotImplementedError
 
     def recall(self, memory: dict[str, Any]) -> None:
-        """Restore what `memory` returned."""
+        """Restore the result of `memory`."""
+        raise NotImplementedError
 
 
 class RockSurface:
@@ -352,9 +343,8 @@ class RockSurface:
 
     Args:
         blades: n. angle, depth: of the bit at the start, rad and m.
-        slope: dS/dPhi of the rock that is there before the bit has turned, m/rad: advance over rotation of steady
-            drilling, or 0 for a flat face.
-        cut: depth of cut at the start, m: that of steady drilling is 2 pi slope/n.
+        slope: initial dS/dPhi, m/rad: advance over rotation of steady drilling, or 0 for a flat face.
+        cut: depth of cut at the start, m; 2 pi slope/n in steady drilling.
     """
 
     def __init__(self, blades: int, angle: float = 0.0, depth: float = 0.0, slope: float = 0.0, cut: float = 0.0):
@@ -384,12 +374,8 @@ class RockSurface:
         return depths[i] + x * (left + x * (c2 + x * c3)), (left + x * (2 * c2 + 3 * x * c3)) / width
 
     def pass_over(self, angle: float, depth: float, slope: float) -> float:
-        """Leave the rock that a blade leaves which has come to an angle (rad) and depth (m), and return its depth of
-        cut there (m), negative above the rock.
-
-        Args:
-            slope: rate of penetration over speed of rotation there, m/rad.
-        """
+        """Move a blade to an angle (rad) and depth (m), at a slope (m/rad, rate of penetration over speed of rotation):
+        the rock behind it is cut. Returns the depth of cut there (m), negative above the rock."""
         old, old_slope = self.under(angle)
         cuts = depth >= old
         if angle > self._angles[-1] + _SHORTEST_TURN:
@@ -405,28 +391,20 @@ class RockSurface:
         return depth - old
 
     def memory(self) -> dict:
-        """Everything, as arrays."""
-        return {
-            "angles": np.array(self._angles), "depths": np.array(self._depths), "slopes": np.array(self._slopes),
-            "first": self._first,
-        }  # fmt: skip
+        """The surface, as arrays."""
+        arrays = {name: np.array(getattr(self, f"_{name}")) for name in ("angles", "depths", "slopes")}
+        return arrays | {"first": self._first}
 
     def recall(self, memory: dict) -> None:
-        """Restore what `memory` returned."""
+        """Restore the result of `memory`."""
         self._angles, self._depths, self._slopes = (memory[name].tolist() for name in ("angles", "depths", "slopes"))
         self._first = int(memory["first"])
 
 
-class CuttingEnd:
-    """An `EndCondition`.
+class CuttingEnd(EndCondition):
+    """The `EndCondition` of `Cutting`; see `BitLaw.end`. A weight of 0 stands for a bit that just touches."""
 
-    Args:
-        law: a `Cutting`. weight: static weight on bit, N, that the string starts with; 0 for a bit that just touches.
-        place: (2,) of the bit at the start, m downwards and rad. motion: (2,) its velocities there, m/s and rad/s, of
-            steady drilling; zeros at rest.
-    """
-
-    def __init__(self, law: "Cutting", weight: float, place: np.ndarray, motion: np.ndarray):
+    def __init__(self, law: Cutting, weight: float, place: np.ndarray, motion: np.ndarray):
         self.law, wear = law, law.wear
         self._flats = law.idle
         self._rubbing = 0.0 if wear is None else wear.geometry * wear.friction * law.a / 2
@@ -437,7 +415,9 @@ class CuttingEnd:
             cut = max(weight - self._flats, 0.0) / law.axial_stiffness
         self.rock = RockSurface(law.blades, float(place[1]), float(place[0]), slope, cut)
         self._before = np.array(motion, dtype=float)  # velocities at the start of the last step
-        self._bears = self._flats if rate > 0 else min(weight, self._flats)  # what the wear flats bore in it
+        self._bears = (
+            self._flats if rate > 0 else min(weight, self._flats)
+        )  # force of the wear flats during the last step
 
     def steady_forces(self, rate: float, speed: float) -> tuple[float, float]:
         """Weight (N) and torque (N m) on bit at a steady rate of penetration (m/s) and speed (rad/s)."""
@@ -446,7 +426,6 @@ class CuttingEnd:
         return self.law.axial_stiffness * cut + flats, self.law.torsional_stiffness * cut + self._rubbing * flats
 
     def begin(self, model, h: float) -> EndForce:
-        """See `EndCondition`."""
         self._at, velocity = model.bit_state()
         w = velocity + (velocity - self._before) / 2
         self._before = velocity
@@ -462,7 +441,6 @@ class CuttingEnd:
         return EndForce(force, tangent, torque, self._flats / 2)
 
     def commit(self, model, h: float) -> None:
-        """See `EndCondition`."""
         (u, angle), (v, turning) = model.bit_state()
         moved, turned = u - self._at[0], angle - self._at[1]
         borne = model.weight_on_bit - self.law.axial_stiffness * max(self._gap + moved / 2, 0.0)
@@ -473,27 +451,20 @@ class CuttingEnd:
             self.rock.pass_over(float(angle), float(u), float(slope))
 
     def memory(self) -> dict:
-        """See `EndCondition`."""
         return {"rock": self.rock.memory(), "before": self._before.copy(), "bears": self._bears}
 
     def recall(self, memory: dict) -> None:
-        """See `EndCondition`."""
         self.rock.recall(memory["rock"])
         self._before, self._bears = memory["before"].copy(), float(memory["bears"])
 
 
-class LobedEnd:
-    """An `EndCondition` for `Lobes`.
+class LobedEnd(EndCondition):
+    """The `EndCondition` of `Lobes`: the angle (rad) and the rotation (rad/s) of the bit at the start."""
 
-    Args:
-        law: `Lobes`. angle, turning: of the bit at the start, rad and rad/s.
-    """
-
-    def __init__(self, law: "Lobes", angle: float = 0.0, turning: float = 0.0):
+    def __init__(self, law: Lobes, angle: float, turning: float):
         self.law, self._start, self._before = law, float(angle), float(turning)
 
     def begin(self, model, h: float) -> EndForce:
-        """See `EndCondition`."""
         (_, angle), (_, turning) = model.bit_state()
         faster, self._before = turning - self._before, float(turning)
         phase = self.law.count * (angle - self._start + h * (turning + faster / 2))
@@ -501,13 +472,8 @@ class LobedEnd:
         moving = -self.law.amplitude * self.law.count * (turning + faster) * math.cos(phase)
         return EndForce(np.zeros(2), np.zeros((2, 2)), torque=None, rock=(face, moving))
 
-    def commit(self, model, h: float) -> None:
-        """See `EndCondition`."""
-
-    def memory(self) -> dict:
-        """See `EndCondition`."""
+    def memory(self):
         return {"before": self._before}
 
     def recall(self, memory: dict) -> None:
-        """See `EndCondition`."""
         self._before = float(memory["before"])

@@ -11,32 +11,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cosserat_fenicsx.drilling.wall_friction import law_of, scene_pieces
+from cosserat_fenicsx.drilling.wall_friction import law_of, scene_pieces, static_weight
 
 
-@dataclass(frozen=True)
-class _Settings:
-    """Settings of meshes and steps.
-
-    Attributes:
-        coupling: least and largest share of an element's mass that couples its nodes.
-        longest: longest step where none is asked for, s. elements: their number without that and without a step.
-        fewest, most: elements for a step that is asked for. disc: longest step over 1/omega of the stiffest disc.
-        impact: the usual step over the time in which rock stops a bit. resolved: longest step, and passing time of a
-            wave along the lowest element, over that time, with which the largest weight on bit is right to 1 %.
-    """
-
-    coupling: tuple[float, float] = (1 / 12, 0.235)
-    longest: float = 0.01
-    elements: int = 250
-    fewest: int = 40
-    most: int = 400
-    disc: float = 0.1
-    impact: float = 0.2
-    resolved: float = 0.4
-
-
-_SETTINGS = _Settings()
+# Least and largest share of an element's mass that couples its nodes.
+_COUPLING = (1 / 12, 0.235)
+# Defaults: longest step (s), and elements without a step; least and largest number of elements for a given step.
+_LONGEST, _ELEMENTS, _FEWEST, _MOST = 0.01, 250, 40, 400
+# Longest step over 1/omega of the stiffest disc; and over the time in which rock stops a bit.
+_DISC, _IMPACT = 0.1, 0.2
+# Longest step, and passing time of a wave along the lowest element, over that time, for a largest weight on bit to 1 %.
+_RESOLVED = 0.4
 
 
 @dataclass(frozen=True)
@@ -45,8 +30,8 @@ class Chain:
 
     Attributes:
         depths: (nodes,) measured depth, m; for discs their numbers.
-        mass, mass_off: (nodes, dofs), (nodes - 1, dofs), kg and kg m^2: mass matrix. drag, drag_off: the same of what
-            is proportional to velocities. spring: (nodes - 1, dofs), N/m and N m/rad.
+        mass, mass_off: (nodes, dofs), (nodes - 1, dofs), kg and kg m^2: tridiagonal mass matrix. drag, drag_off: drag
+            matrix. spring: (nodes - 1, dofs), N/m and N m/rad.
         hanging: (nodes - 1,) tension of elements at rest, N; hanging_top: at the top.
         wall: the `Wall`.
     """
@@ -64,7 +49,7 @@ class Chain:
 
 @dataclass(frozen=True)
 class Wall:
-    """Pieces of a string along the wall, arrays over these.
+    """Arrays over the pieces of a string along the wall.
 
     Attributes:
         element: number. first, second: the nodes that take the friction of its ends. share: of the second.
@@ -85,17 +70,20 @@ class Wall:
     radius: np.ndarray
 
 
+_NO_WALL = Wall(*[np.zeros(0, dtype=np.int32)] * 3, *[np.zeros(0)] * 8)
+
+
 def usual_step(scene, elements: int | None, axial: bool) -> float:
     """The time step (s) of a `Drilling` for so many elements, where none is asked for."""
-    longest = min(_SETTINGS.longest, _SETTINGS.impact * time_of_impact(scene)) if axial else _SETTINGS.longest
+    longest = min(_LONGEST, _IMPACT * time_of_impact(scene)) if axial else _LONGEST
     if scene.discs:
         discs, shortest = scene.discs, math.inf
         for inertias, springs in ((discs.inertias, discs.stiffnesses), (discs.masses, discs.axial_stiffnesses)):
             if inertias is not None:
                 around = np.append(springs, 0.0) + np.append(0.0, springs)
                 shortest = min(shortest, float(np.sqrt(np.array(inertias) / around).min()))
-        return min(longest, _SETTINGS.disc * shortest)
-    return min(longest, _travel_time(scene) / (elements or _SETTINGS.elements))
+        return min(longest, _DISC * shortest)
+    return min(longest, _travel_time(scene) / (elements or _ELEMENTS))
 
 
 def _travel_time(scene):
@@ -105,9 +93,9 @@ def _travel_time(scene):
 def chain_of(scene, dt: float, elements: int | None, axial: bool) -> Chain:
     """The `Chain` of a `Drilling` for steps of `dt` (s), of about so many elements, or None for the usual number."""
     if scene.discs:
-        return _chain_of_discs(scene.discs, axial, _static_weight(scene) if axial else 0.0)
+        return _chain_of_discs(scene.discs, axial, static_weight(scene) if axial else 0.0)
     if elements is None:
-        elements = min(max(_travel_time(scene) / dt, _SETTINGS.fewest), _SETTINGS.most)
+        elements = min(max(_travel_time(scene) / dt, _FEWEST), _MOST)
     return _chain_of_string(scene, dt, elements, axial)
 
 
@@ -121,10 +109,12 @@ def _chain_of_discs(discs, axial, weight):
         diagonal[:-1] += between
         diagonal[1:] += between
         columns.append((np.array(inertia), np.zeros(n - 1), diagonal, -np.array(between), np.array(spring)))
-    nothing = np.zeros(0)
-    wall = Wall(*[np.zeros(0, dtype=np.int32)] * 3, *[nothing] * 8)
-    arrays = [np.ascontiguousarray(np.stack(parts, axis=1)) for parts in zip(*columns, strict=True)]
-    return Chain(np.arange(n, dtype=float), *arrays, np.full(n - 1, -weight), -weight, wall)
+    return Chain(np.arange(n, dtype=float), *_stacked(columns), np.full(n - 1, -weight), -weight, _NO_WALL)
+
+
+def _stacked(columns):
+    """Arrays (n, dofs) from a column of each for every unknown of a node."""
+    return [np.ascontiguousarray(np.stack(parts, axis=1)) for parts in zip(*columns, strict=True)]
 
 
 def _chain_of_string(drilling, dt, elements, axial):
@@ -146,26 +136,23 @@ def _chain_of_string(drilling, dt, elements, axial):
     for inertia, stiffness, rate in kinds:
         mass, spring = of(inertia) * lengths, of(stiffness) / lengths
         courant = dt * np.sqrt(spring / mass)
-        share = np.minimum(_SETTINGS.coupling[0] + courant**2 / 6, _SETTINGS.coupling[1])
+        share = np.minimum(_COUPLING[0] + courant**2 / 6, _COUPLING[1])
         diagonal = np.zeros(len(depths))
         diagonal[:-1] += (0.5 - share) * mass
         diagonal[1:] += (0.5 - share) * mass
         columns.append((diagonal, share * mass, rate * diagonal, rate * share * mass, spring))
-    arrays = [np.ascontiguousarray(np.stack(parts, axis=1)) for parts in zip(*columns, strict=True)]
-    return Chain(depths, *arrays, *_against_the_wall(drilling, depths))
+    return Chain(depths, *_stacked(columns), *_against_the_wall(drilling, depths))
 
 
 def _against_the_wall(drilling, depths):
     """Tension of elements and of the top at rest, N, and the `Wall`."""
-    weight = _static_weight(drilling)
+    weight = static_weight(drilling)
     if drilling.hole is None:
         segments = drilling.segments
         ends = np.concatenate([[0.0], np.cumsum([s.length for s in segments])])
         total = np.concatenate([[0.0], np.cumsum([s.length * s.weight for s in segments])])
         below = total[-1] - np.interp(depths, ends, total) - weight
-        nothing = np.zeros(0)
-        wall = Wall(*[np.zeros(0, dtype=np.int32)] * 3, *[nothing] * 8)
-        return (below[:-1] + below[1:]) / 2, below[0], wall
+        return (below[:-1] + below[1:]) / 2, below[0], _NO_WALL
     pieces = scene_pieces(drilling)
     cuts = np.union1d(np.concatenate([[0.0], pieces.bottom]), depths)
     cuts = np.concatenate([[0.0], cuts[1:-1][np.diff(cuts[:-1]) > 1e-9 * cuts[-1]], [drilling.bit_depth]])
@@ -190,10 +177,6 @@ def _against_the_wall(drilling, depths):
     return hanging, float(below[0]), wall
 
 
-def _static_weight(drilling):
-    return 0.0 if drilling.bit is None or drilling.bit.weight is None else drilling.bit.weight
-
-
 def time_of_impact(scene) -> float:
     """Time (s) in which the rock of a `Drilling` stops the bit: Z/k by the impedance Z (N s/m) of the lowest section,
     or sqrt(m/k) by the mass m (kg) of the bit, the longer one; infinite without rock of a stiffness k (N/m)."""
@@ -215,7 +198,7 @@ def passing_time(scene, depths) -> float:
 def unresolved(scene, depths, dt) -> str:
     """A sentence where the steps (s) or the elements are too long for impacts, or ""."""
     impact, passing = time_of_impact(scene), passing_time(scene, depths)
-    longest = _SETTINGS.resolved * impact
+    longest = _RESOLVED * impact
     if max(dt, passing) <= longest:
         return ""
     most = longest * scene.segments[-1].axial_speed if passing > longest else 0.0

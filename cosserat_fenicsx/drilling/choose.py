@@ -1,6 +1,5 @@
-"""Which model a drill-string in motion takes, why, and what that leaves out."""
+"""The choice of the model of a drill-string in motion, its reasons, and what the model leaves out."""
 
-import math
 import warnings
 
 import numpy as np
@@ -8,7 +7,7 @@ import numpy as np
 from cosserat_fenicsx.checks import refuse
 from cosserat_fenicsx.drilling.elements import AxialTorsional
 from cosserat_fenicsx.drilling.torsion import TorsionWaves
-from cosserat_fenicsx.drilling.wall_friction import law_of
+from cosserat_fenicsx.drilling.wall_friction import law_of, static_weight
 from cosserat_fenicsx.errors import NotConverged, SceneError, SceneWarning, nearest
 from cosserat_fenicsx.well import criteria
 from cosserat_fenicsx.well.operations import RotaryDrilling, RotateOffBottom, TripIn, TripOut
@@ -19,7 +18,7 @@ MODELS = ("auto", TORSION, BOTH)
 
 
 def chosen(scene, model="auto"):
-    """(name, [sentence]) of the model, and why.
+    """(name, [sentence]): the model and the reasons for it.
 
     Raises:
         SceneError: an unknown model, or one that does not fit the scene.
@@ -35,7 +34,8 @@ def chosen(scene, model="auto"):
     asks = _asks_for_axial(scene)
     if model == "auto":
         name = BOTH if asks else TORSION
-        why = asks or [f"nothing moves along the axis{_still(scene)}"]
+        stays = ", and the weight on bit stays as it is" if scene.bit and scene.bit.law.needs_weight else ""
+        why = asks or [f"nothing moves along the axis{stays}"]
         return name, [f"{name}: {'; '.join(why)}", *_left_out(scene, name)]
     why = [f"{model}: as asked"]
     if model == TORSION and asks:
@@ -47,20 +47,15 @@ def chosen(scene, model="auto"):
 
 
 def _asks_for_axial(scene):
-    """What takes the axial motion, in words; empty where nothing does.
+    """Reasons for axial motion, in words; empty where there is none.
 
-    A string that hangs in its weight, or stands on the rock with a weight on bit, does so in equilibrium: rotation
-    slips around alone, without a force along the hole, and the weight on bit that the torque may follow stays.
+    A string that hangs in its weight or stands on the rock is in equilibrium along the hole. Rotation alone slips
+    around, without a force along the hole, and leaves the weight on bit as it is.
     """
     hook, found = scene.hook, []
     if hook is not None and not (hook.signal().constant and hook.signal()(0.0) == 0.0):
         found.append("the hook moves")
     return found + ([scene.bit.law.lifts] if scene.bit is not None and scene.bit.law.lifts else [])
-
-
-def _still(scene):
-    follows = scene.bit is not None and scene.bit.law.needs_weight
-    return ", and the weight on bit stays as it is" if follows else ""
 
 
 def _left_out(scene, name):
@@ -69,8 +64,8 @@ def _left_out(scene, name):
 
 
 def _pushed(scene):
-    """A sentence where more weight is on the bit than the string has along the hole."""
-    weight = getattr(scene.bit, "weight", None) or 0.0
+    """A sentence where the weight on bit exceeds the weight of the string along the hole."""
+    weight = static_weight(scene)
     depths = np.concatenate([[0.0], np.cumsum([part.length for part in scene.segments])])
     down = depths if scene.hole is None else np.array([scene.hole.path.position(md)[2] for md in depths])
     along = float(np.dot([part.weight for part in scene.segments], np.diff(down)))
@@ -83,12 +78,12 @@ def _pushed(scene):
 
 
 def _buckled(scene, name):
-    """A sentence where the compression is above the load of buckling in the hole."""
+    """A sentence where the compression exceeds the buckling load in the hole."""
     try:
         states = [torque_and_drag(_with_friction(scene), scene.string, operation, mud=scene.mud, depth=scene.bit_depth,
                                   model="soft") for operation in _operations(scene)]  # fmt: skip
     except NotConverged as problem:
-        return [f"whether the string buckles in the hole was not found out: {problem}"]
+        return [f"whether the string buckles in the hole is unknown: {problem}"]
     worst = max(states, key=lambda answer: (answer.buckling > criteria.STRAIGHT).sum())
     bent = worst.buckling > criteria.STRAIGHT
     if not bent.any():
@@ -104,24 +99,18 @@ def _buckled(scene, name):
 
 
 def _operations(scene):
-    """What is done, at rest in time: which of these compresses the string most is not known in advance."""
-    bit = scene.bit
-    weight = (bit.weight or 0.0) if bit is not None else 0.0
+    """Steady operations, of which the one that compresses the string most is not known in advance."""
+    bit, weight = scene.bit, static_weight(scene)
     law = None if bit is None else bit.law.resistance(bit.weight)
-    follows = law is not None and bit.law.needs_weight
-    yield _drills(weight, law.kinetic if law else 0.0, follows) if weight > 0 else RotateOffBottom()
+    with warnings.catch_warnings():
+        if law is not None and bit.law.needs_weight:  # a torque by the weight may be small without a mistake in units
+            warnings.filterwarnings("ignore", r"RotaryDrilling\.torque", SceneWarning)
+        drills = RotaryDrilling(weight, law.kinetic if law else 0.0) if weight > 0 else RotateOffBottom()
+    yield drills
     if scene.hook is not None:
         signal = scene.hook.signal()
         speeds = [signal(t) for t in (0.0, *signal.jumps)]
         yield from (kind(weight) for kind, there in ((TripIn, min(speeds) < 0), (TripOut, max(speeds) > 0)) if there)
-
-
-def _drills(weight, torque, follows):
-    """Rotary drilling; a torque that follows from the weight may be small, and is no mistake in units."""
-    with warnings.catch_warnings():
-        if follows:
-            warnings.filterwarnings("ignore", r"RotaryDrilling\.torque", SceneWarning)
-        return RotaryDrilling(weight, torque)
 
 
 def _with_friction(scene):
@@ -140,7 +129,7 @@ def fastest(scene, until):
 
 
 def with_step(scene, name, model, factor: float):
-    """A new `StringModel` at rest with so many times the step of another one, and elements of so many times the length.
+    """A new `StringModel` at rest with the step of another one, and the length of its elements, times a factor.
 
     Raises:
         SceneError: a step that the laws of friction do not allow, or a mesh that is as coarse as it can be.
@@ -170,6 +159,4 @@ def model_of(scene, name, dt=None, elements=None):
         return AxialTorsional(scene, dt, elements)
     if dt is not None and elements is not None:
         refuse("simulate", "elements", elements, "None beside dt: waves of torsion have cells of one step")
-    if elements is not None:
-        dt = math.fsum(part.length / part.torsional_speed for part in scene.segments) / elements
-    return TorsionWaves(scene, dt)
+    return TorsionWaves(scene, dt, elements)

@@ -121,7 +121,7 @@ static void loads(model *m, double h, const double *signal)
     for (int d = 0; d < n; d++) {
         const upper *top = m->top + d;
         if (!top->rigid)
-            m->b[d] += top->constant + top->proportional * signal[d]
+            m->b[d] += top->given + top->proportional * signal[d]
                        + top->integral * (top->error + h / 2 * signal[d]);
     }
     for (int d = 0; d < n; d++) m->b[last * n + d] -= m->bit.force[d + 2 - n];

@@ -13,11 +13,10 @@ import math
 import numpy as np
 from scipy.optimize import brentq
 
-from cosserat_fenicsx.algebra.building import Pointers
 from cosserat_fenicsx.checks import number, positive, refuse
 from cosserat_fenicsx.drilling.chain import chain_of, unresolved, usual_step
-from cosserat_fenicsx.drilling.laws import SOURCES, InC, check_bit
-from cosserat_fenicsx.drilling.protocol import LEDGER, SERIES
+from cosserat_fenicsx.drilling.laws import InC, check_bit
+from cosserat_fenicsx.drilling.protocol import StringModel
 from cosserat_fenicsx.drilling.signals import ScalarSignal, intervals
 from cosserat_fenicsx.drilling.steady_start import (
     check_rock,
@@ -26,9 +25,8 @@ from cosserat_fenicsx.drilling.steady_start import (
     steady_state,
     steady_velocities,
 )
-from cosserat_fenicsx.drilling.top_drive import Sampler
 from cosserat_fenicsx.drilling.wall_friction import law_of
-from cosserat_fenicsx.errors import NotConverged, SceneError
+from cosserat_fenicsx.errors import SceneError
 
 _STATE = ("x", "v", "w", "force")
 _TRIALS = 30
@@ -37,8 +35,8 @@ _SUMS = ("drive", "hook", "bit", "wall", "mud")
 _BIT = ("weight", "torque", "share", "impulse", "slowed", "slowing", "floor", "sinking", "face")
 
 
-class AxialTorsional(Pointers):
-    """A string with axial and torsional motion, or with torsion alone; a `StringModel`.
+class AxialTorsional(StringModel):
+    """A string with axial and torsional motion, or with torsion alone.
 
     A string that starts at rest is in the tension of its weight in mud along the hole, without friction. A bit with a
     weight stands on a rock, rigid or of a stiffness, with the hook lowered until it bears that weight; without one the
@@ -61,11 +59,16 @@ class AxialTorsional(Pointers):
             falling law of friction; a steady start that the drive does not have; torsion alone of a bit that cuts.
     """
 
+    _failure = (
+        "the step at t = {time:g} s does not converge however short it is made: expected a smoother signal, or laws that "
+        "fall less steeply"
+    )
+
     def __init__(self, scene, dt: float | None = None, elements: int | None = None, *, axial: bool = True, end=None):
-        super().__init__(*SOURCES)
+        super().__init__()
         check_bit(scene)
-        self.scene, self._given_end, self.steps = scene, end, 0
-        self._asked, self._axial = elements, axial and not (scene.discs and scene.discs.masses is None)
+        self.scene, self._given_end = scene, end
+        self._axial = axial and not (scene.discs and scene.discs.masses is None)
         self.name = "axial and torsional" if self._axial else "torsion"
         if dt is not None:
             dt = positive("AxialTorsional", "dt", dt, "s")
@@ -74,15 +77,19 @@ class AxialTorsional(Pointers):
             number("AxialTorsional", "elements", elements, expected, lambda x: 2 <= x <= _ELEMENTS and x == int(x))
         self.dt = dt or usual_step(scene, elements, self._axial)
         for _ in range(_TRIALS):
-            self._set(elements)
+            self._set(elements)  # masses of elements depend on the step
             if self._lib.steepest(self._m, self.dt) > 0:
                 break
-            if dt is not None:
-                self._refuse_step()
             self.dt /= 2
-        self._sampler = Sampler(scene.drive, self.dt) if scene.drive.control.sampled else None
+        if dt is not None and self.dt < dt:
+            raise SceneError(
+                f"AxialTorsional.dt = {dt:g} s: expected at most about {self.dt:.3g} s: in longer steps the law of "
+                "friction or of the bit falls more steeply than inertia and string allow, and the speed at the end of "
+                "a step is not determined"
+            )
+        self._set_sampler(scene.drive, self._m.top[self._dofs - 1])
         self._start()
-        self.why = reasons(scene, self.depths, self.dt, axial=self._axial, wall=self._m.pieces > 0)
+        self.why = tuple(self._reasons())
 
     def _set(self, elements):
         """All that C needs."""
@@ -167,7 +174,7 @@ class AxialTorsional(Pointers):
         self._kept["mass"][0, -1] += drive.inertia
         if not drive.control.sampled:
             gains = drive.control.gains(segments and segments[0].torsional_impedance)
-            top.rigid, top.constant, top.proportional, top.integral = gains
+            top.rigid, top.given, top.proportional, top.integral = gains
         return drive.signal()
 
     # -- the start -----------------------------------------------------------------------------------------------------
@@ -223,84 +230,32 @@ class AxialTorsional(Pointers):
             if not top.rigid and top.integral:
                 top.error = force / top.integral
 
-    # -- words ---------------------------------------------------------------------------------------------------------
-
-    def _refuse_step(self):
-        asked = self.dt
-        for _ in range(_TRIALS):
-            self.dt /= 2
-            self._set(self._asked)  # masses of elements depend on the step
-            if self._lib.steepest(self._m, self.dt) > 0:
-                break
-        raise SceneError(
-            f"AxialTorsional.dt = {asked:g} s: expected at most about {self.dt:.3g} s: in longer steps the law of "
-            "friction or of the bit falls more steeply than inertia and string allow, and the speed at the end of a "
-            "step is not determined"
-        )
-
     # -- the protocol of string models ---------------------------------------------------------------------------------
-
-    @property
-    def time(self) -> float:
-        """s."""
-        return self.steps * self.dt
 
     @property
     def counts(self) -> dict[str, int]:
         """Steps that were halved, iterations of Newton's method, and most of them in a step."""
         return {"halved": self._m.halved, "iterations": self._m.iterations, "most_iterations": self._m.most}
 
-    def advance(self, steps: int) -> np.ndarray:
-        """See `StringModel.advance`."""
-        records = np.full((steps, len(SERIES) + len(LEDGER)), np.nan)
-        start, sampler, failed = self.steps, self._sampler, False
-        while self.steps < start + steps and not failed:
-            chunk = start + steps - self.steps
-            if sampler:
-                if self.steps % sampler.every == 0:
-                    top, kept = self._m.top[self._dofs - 1], self._kept
-                    now = kept["v"][0, -1], kept["x"][0, -1], top.force
-                    top.constant = sampler.torque(self.time, *map(float, now))
-                chunk = min(chunk, sampler.left(self.steps))
-            failed = self._do(chunk, records[self.steps - start :])
-        times = np.arange(start + 1, self.steps + 1) * self.dt
-        found = np.column_stack([times, records[: len(times)]])
-        for law in self._laws:
-            law.raise_failure()
-        if failed:
-            problem = NotConverged(
-                f"{self.name}: the step at t = {self.time:g} s does not converge however short it is made: expected a "
-                "smoother signal, or laws that fall less steeply"
-            )
-            problem.rows = found
-            raise problem
-        return found
+    def _at_drive(self):
+        return self._kept["v"][0, -1], self._kept["x"][0, -1], self._top.force
 
-    def _do(self, steps, records):
-        """Do so many steps; returns whether one failed."""
-        rows = intervals(self._signals, (self.steps, self.steps + steps), self.dt)
+    def _record(self, steps, records):
+        rows, start = intervals(self._signals, (self.steps, self.steps + steps), self.dt), self.steps
         if self._axial:
             rows[:, [1, 3]] *= -1  # the hook's speed is positive upwards
-        start = self.steps
-        done = self._advance(rows, records) if self.end is None else self._advance_with_end(rows, records)
-        self.steps = start + int(rows[:done, -1].sum())
-        return done < len(rows)
-
-    def _advance(self, rows, records):
-        cast = self._ffi.cast
-        return self._lib.advance_elements(
-            self._m, len(rows), cast("double *", rows.ctypes.data), cast("double *", records.ctypes.data)
-        )
-
-    def _advance_with_end(self, rows, records):
-        start = self.steps
-        for i, row in enumerate(rows):
-            self._take(self.end.begin(self, row[0]))
-            if self._advance(row[None], records[self.steps - start :]) == 0:
-                return i
-            self.steps += int(row[-1])
-            self.end.commit(self, row[0])
-        return len(rows)
+        for part in [rows] if self.end is None else rows[:, None]:
+            if self.end is not None:
+                self._take(self.end.begin(self, part[0, 0]))
+            cast, out = self._ffi.cast, records[self.steps - start :]
+            done = self._lib.advance_elements(
+                self._m, len(part), cast("double *", part.ctypes.data), cast("double *", out.ctypes.data)
+            )
+            self.steps += int(part[:done, -1].sum())
+            if done < len(part):
+                return
+            if self.end is not None:
+                self.end.commit(self, part[0, 0])
 
     def _take(self, given):
         """The `EndForce` of the coming step."""
@@ -324,7 +279,7 @@ class AxialTorsional(Pointers):
         return self._m.bit.told[0]
 
     def profile(self) -> np.ndarray:
-        """See `StringModel.profile`. The node of the bit sticks where the rock holds it."""
+        # the node of the bit sticks where the rock holds it
         m, n, kept = self._m, self._dofs, self._kept
         x, v = kept["x"], kept["v" if m.at_end else "w"]
         forces = np.diff(x, axis=0) * kept["spring"]
@@ -340,21 +295,18 @@ class AxialTorsional(Pointers):
         return np.array([x[:, 1], v[:, 1], torque, x[:, 0], v[:, 0], tension, sticking])
 
     def memory(self) -> dict:
-        """See `StringModel.memory`."""
         m = self._m
-        found = {name: self._kept[name].copy() for name in (*_STATE, "held")}
+        found = super().memory() | {name: self._kept[name].copy() for name in (*_STATE, "held")}
         found["sums"] = np.array([getattr(m.sums, name) for name in _SUMS])
         found["ends"] = np.array([*((m.top[i].error, m.top[i].force) for i in (0, 1))]).ravel()
         found["bit"] = np.array([*(getattr(m.bit, name) for name in _BIT), *m.bit.told])
         found["counts"] = np.array([self.steps, m.halved, m.iterations, m.most])
         if self.end is not None:
             found["end"] = self.end.memory()
-        if self._sampler:
-            found["control"], found["given"] = self._sampler.state.copy(), m.top[self._dofs - 1].constant
         return found
 
     def recall(self, memory: dict) -> None:
-        """See `StringModel.recall`."""
+        super().recall(memory)
         m = self._m
         for name in (*_STATE, "held"):
             self._kept[name][:] = memory[name]
@@ -368,32 +320,28 @@ class AxialTorsional(Pointers):
         self.steps, m.halved, m.iterations, m.most = (int(x) for x in memory["counts"])
         if self.end is not None:
             self.end.recall(memory["end"])
-        if self._sampler:
-            self._sampler.state, m.top[self._dofs - 1].constant = memory["control"].copy(), float(memory["given"])
 
-
-def reasons(scene, depths, dt, *, axial, wall):
-    """Sentences on nodes at so many depths (m) and steps of dt (s), with axial motion or without, with a wall or
-    without."""
-    told = [f"{len(depths) - 1} elements, steps of {dt:.3g} s"]
-    if axial:
+    def _reasons(self):
+        """Sentences on mesh, step, start and approximations."""
+        scene, bit, wall = self.scene, self.scene.bit, self._m.pieces > 0
+        yield f"{len(self.depths) - 1} elements, steps of {self.dt:.3g} s"
+        if not self._axial:
+            if wall:
+                yield "friction at the wall by the tension at rest"
+            return
         if wall:
-            told.append("friction at the wall against axial and rotary slip together, normal force by the soft string "
-                        "from the tension of the step before")  # fmt: skip
-        bit = scene.bit
+            yield ("friction at the wall against axial and rotary slip together, normal force by the soft string from "
+                   "the tension of the step before")  # fmt: skip
         if scene.start == "steady":
-            told.append("starts in steady motion, all of it at the speeds of drive and hook")
+            yield "starts in steady motion, all of it at the speeds of drive and hook"
         elif bit is not None and bit.weight is not None:
-            told.append(f"starts with {bit.weight:g} N on bit, without friction")
+            yield f"starts with {bit.weight:g} N on bit, without friction"
         else:
-            told.append("starts hanging off bottom, without friction")
+            yield "starts hanging off bottom, without friction"
         if bit is not None and bit.weight is not None and not bit.law.drills:
-            told += _of_rock(scene, depths, dt)
+            yield from _of_rock(scene, self.depths, self.dt)
         if follows_the_bit(scene):
-            told.append("without a Hook its load stays the same: the string follows the bit that drills")
-    elif wall:
-        told.append("friction at the wall by the tension at rest")
-    return tuple(told)
+            yield "without a Hook its load stays the same: the string follows the bit that drills"
 
 
 def _of_rock(scene, depths, dt):

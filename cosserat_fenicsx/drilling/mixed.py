@@ -10,7 +10,7 @@ from cosserat_fenicsx.checks import instance, number, refuse, store
 from cosserat_fenicsx.drilling.bit_laws import BitLaw
 from cosserat_fenicsx.drilling.pipe_above import PipeAbove
 from cosserat_fenicsx.drilling.scene import Drilling
-from cosserat_fenicsx.drilling.wall_friction import law_of
+from cosserat_fenicsx.drilling.wall_friction import law_of, static_weight
 from cosserat_fenicsx.scene.action import PointAction
 from cosserat_fenicsx.scene.curves import Line
 from cosserat_fenicsx.scene.loads import Force, LineForce
@@ -80,7 +80,7 @@ def mixed_scene(drilling: Drilling, depth: float | None = None) -> MixedScene:
     rod = Rod(Line(start, end), sections[0] if len(sections) == 1 else [*zip(ends, sections, strict=True)],
               name="lower part", damping=_damping(drilling))  # fmt: skip
     weights = [(x, (0.0, 0.0, part[3].weight)) for x, part in zip(ends, below, strict=True)]
-    on_bit = 0.0 if drilling.bit is None else drilling.bit.weight or 0.0
+    on_bit = static_weight(drilling)
     hanging = math.fsum((bottom - upper) * x.weight for upper, bottom, _, x in below) * t[2] - on_bit
     pipe = PipeAbove(rod.start, tuple(above), drilling.drive, drilling.hook, hanging, drilling.drag)
     loads = [LineForce(rod, AlongPieces(weights) if len(weights) > 1 else weights[0][1]), pipe]

@@ -1,25 +1,30 @@
-"""What a model of a string in motion offers to the time loop, and the names of what it tells.
+"""Interface between string models and the time loop, names of the recorded series, and what models in C share.
 
 x runs along the string from the top drive down. Angles and rotation are positive in the sense of drilling, the torque M
 (N m) is positive where it drives what is below. Displacements u and velocities v are positive downwards, from the
-hanging equilibrium; tension is positive. Models of torsion alone give NaN for what is axial.
+hanging equilibrium; tension is positive. Models of torsion alone record NaN for axial quantities.
 """
 
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
-#: What is recorded at the end of every step. drive_speed, bit_speed: rad/s; drive_angle, bit_angle: rad;
-#: surface_torque: M at the top, torque_on_bit: against the rotation of the bit, N m; hook_load, weight_on_bit: N;
-#: bit_velocity: m/s, bit_advance: m, downwards; impulse_on_bit: of all impacts on rigid rock since the start, N s,
-#: which weight_on_bit leaves out.
+from cosserat_fenicsx.algebra.building import Pointers
+from cosserat_fenicsx.drilling.laws import SOURCES
+from cosserat_fenicsx.drilling.top_drive import Sampler
+from cosserat_fenicsx.errors import NotConverged
+
+#: Recorded at the end of every step. drive_speed, bit_speed: rad/s; drive_angle, bit_angle: rad; surface_torque: M at
+#: the top, torque_on_bit: against the rotation of the bit, N m; hook_load, weight_on_bit: N; bit_velocity: m/s,
+#: bit_advance: m, downwards; impulse_on_bit: sum of all impacts on rigid rock since the start, N s, not contained in
+#: weight_on_bit.
 SERIES = (
     "drive_speed", "drive_angle", "surface_torque", "bit_speed", "bit_angle", "torque_on_bit", "hook_load",
     "bit_velocity", "bit_advance", "weight_on_bit", "impulse_on_bit",
 )  # fmt: skip
-#: Energies and, since the start, works and losses, J. Those of the string above the rock, with drive and bit: kinetic +
-#: strain = work_of_drive + work_of_hook + work_of_weight - lost_at_bit - lost_at_wall - lost_in_mud, but for what the
-#: scheme itself loses. work_of_drive is that of the torque asked for by the control.
+#: Energies and, since the start, works and losses, J, of the string above the rock with drive and bit. Up to the loss
+#: of the scheme: kinetic + strain = work_of_drive + work_of_hook + work_of_weight - lost_at_bit - lost_at_wall -
+#: lost_in_mud. work_of_drive is done by the torque that the control asks for.
 LEDGER = (
     "kinetic", "strain", "work_of_drive", "work_of_hook", "work_of_weight", "lost_at_bit", "lost_at_wall",
     "lost_in_mud",
@@ -29,22 +34,37 @@ LEDGER = (
 PROFILE = ("angle", "speed", "torque", "displacement", "velocity", "tension", "sticking")
 
 
-class StringModel(Protocol):
-    """A string in motion. It is at rest at the time 0 and advances by steps of `dt`.
+class StringModel(Pointers):
+    """Base of string models in C. A model starts at the time 0 and advances by steps of `dt`.
 
     Attributes:
-        name: of the model, such as "torsion". why: sentences on the choice and on what is approximate.
-        dt: s. time: s. steps: done. depths: (m,) measured depths of the places of profiles, m.
-        counts: dict of counters: steps that were halved, iterations of Newton's method.
+        name: of the model, such as "torsion". why: sentences on the choice and on approximations.
+        dt: s. steps: done. depths: (m,) measured depths of the nodes, m. counts: dict of counters: halved steps,
+            iterations of Newton's method.
     """
 
     name: str
     why: tuple[str, ...]
     dt: float
-    time: float
-    steps: int
     depths: np.ndarray
     counts: dict[str, int]
+    # Message of a step that fails, with {time}.
+    _failure: str
+
+    def __init__(self):
+        super().__init__(*SOURCES)
+        self.steps, self._laws, self._sampler, self._top = 0, [], None, None
+
+    def _set_sampler(self, drive, top):
+        """Take the samples of a `SampledControl`; `top`: C's record that holds the torque `given` by the drive."""
+        self._top = top
+        if drive.control.sampled:
+            self._sampler = Sampler(drive, self.dt)
+
+    @property
+    def time(self) -> float:
+        """s."""
+        return self.steps * self.dt
 
     def advance(self, steps: int) -> np.ndarray:
         """Do up to so many steps.
@@ -53,14 +73,46 @@ class StringModel(Protocol):
             (n, 1 + len(SERIES) + len(LEDGER)): the time and the values of SERIES and LEDGER at the end of each.
 
         Raises:
-            NotConverged: a step fails however short it is; `rows` of the exception holds those up to there.
+            NotConverged: a step fails however short it is; `rows` of the exception holds the steps before.
         """
+        start, last, sampler = self.steps, self.steps + steps, self._sampler
+        records = np.full((steps, len(SERIES) + len(LEDGER)), np.nan)
+        failed = False
+        while self.steps < last and not failed:
+            end = last
+            if sampler:
+                if self.steps % sampler.every == 0:
+                    self._top.given = sampler.torque(self.time, *map(float, self._at_drive()))
+                end = min(last, self.steps + sampler.left(self.steps))
+            self._record(end - self.steps, records[self.steps - start :])
+            failed = self.steps < end
+        times = np.arange(start + 1, self.steps + 1) * self.dt
+        rows = np.column_stack([times, records[: len(times)]])
+        for law in self._laws:
+            law.raise_failure()
+        if failed:
+            problem = NotConverged(f"{self.name}: {self._failure.format(time=self.time)}")
+            problem.rows = rows
+            raise problem
+        return rows
+
+    def _at_drive(self):
+        """Speed (rad/s) and angle (rad) of the drive, and the torque (N m) that it hands down."""
+        raise NotImplementedError
+
+    def _record(self, steps, records):
+        """Do up to so many steps, with their `records` (n, len(SERIES) + len(LEDGER)), and count them."""
+        raise NotImplementedError
 
     def profile(self) -> np.ndarray:
         """(len(PROFILE), m) along the string, now."""
+        raise NotImplementedError
 
     def memory(self) -> dict[str, Any]:
         """All that later steps depend on, arrays and numbers, such that `recall` leads to the same digits."""
+        return {"control": self._sampler.state.copy(), "given": self._top.given} if self._sampler else {}
 
     def recall(self, memory: dict[str, Any]) -> None:
-        """Restore what `memory` returned."""
+        """Restore the result of `memory`."""
+        if self._sampler:
+            self._sampler.state, self._top.given = memory["control"].copy(), float(memory["given"])

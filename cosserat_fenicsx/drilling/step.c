@@ -179,7 +179,7 @@ static void commit(model *m, double h, const double *signal)
         if (top->rigid)
             top->force = -missing(m, 0, d);
         else {
-            top->force = top->constant + top->proportional * (signal[d] - w) + top->integral * stretched;
+            top->force = top->given + top->proportional * (signal[d] - w) + top->integral * stretched;
             top->error += h * (signal[d] - w);
         }
         /* a hook's spring keeps what it takes; of a drive the torque itself does the work */

@@ -56,7 +56,7 @@ typedef struct {
 /* What moves the uppermost node in one of its unknowns, by a velocity that is asked for, the signal. */
 typedef struct {
     int rigid;                      /* the node has the velocity of the signal; otherwise it feels the force */
-    double constant, proportional, integral; /* constant + proportional (signal - w) + integral error */
+    double given, proportional, integral; /* given + proportional (signal - w) + integral error */
     double error;                   /* the integral of signal - w over time */
     double inertia;                 /* of the drive alone; it is a part of the node's mass */
     double force;                   /* on the node, of the last step */
@@ -117,8 +117,7 @@ typedef struct {
     long long inner;                /* iterations for the slips that belong to forces */
 } model;
 
-int advance_waves(waves *w, int steps, const double *speeds, double first, int width, double *rows);
-void energies(const waves *w, double *kinetic, double *strain);
+int advance_waves(waves *w, int steps, const double *speeds, double *record);
 int advance_elements(model *m, int intervals, const double *interval, double *record);
 void limits(model *m);
 int build(model *m, double h);

@@ -9,7 +9,7 @@ a node the waves P from above and Q from below meet what acts there, with the me
 which is one equation with one answer where the slope of T is nowhere steeper than the impedances; drive and bit have
 inertias, by the implicit midpoint rule. Waves, inertias and works fulfil the balance of energy to rounding. Cells are
 exact; drag and friction are gathered at nodes, of the second order in dt where nothing begins to stick or to slip.
-Waves of even and of odd steps meet at inertias alone: speeds and torques that are told are means over two steps.
+Waves of even and of odd steps meet at inertias alone: recorded speeds and torques are means over two steps.
 
 The cells: every one is passed by waves in the same time, a step. A uniform part of the travel time t and the impedance
 Z has the inertia Z t and the compliance t/Z. Parts that are too short for a cell are joined with a piece of their
@@ -21,53 +21,33 @@ time is at most 0.16 dt (omega dt)^2.
 
 import math
 from collections import namedtuple
-from dataclasses import dataclass
 
 import numpy as np
 
-from cosserat_fenicsx.algebra.building import Pointers
 from cosserat_fenicsx.checks import instance, positive, refuse
-from cosserat_fenicsx.drilling.laws import SOURCES, InC, check_bit
-from cosserat_fenicsx.drilling.protocol import LEDGER, PROFILE, SERIES
+from cosserat_fenicsx.drilling.laws import InC, check_bit
+from cosserat_fenicsx.drilling.protocol import PROFILE, StringModel
 from cosserat_fenicsx.drilling.scene import Drilling
 from cosserat_fenicsx.drilling.signals import MeanSpeeds
 from cosserat_fenicsx.drilling.steady_start import check_steady, steady_velocities
-from cosserat_fenicsx.drilling.top_drive import Gains, Sampler
+from cosserat_fenicsx.drilling.top_drive import Gains
 from cosserat_fenicsx.drilling.wall_friction import law_of, wall_of
-from cosserat_fenicsx.errors import NotConverged
 from cosserat_fenicsx.well.components import DrillString
 
 
-@dataclass(frozen=True)
-class _Settings:
-    """Settings of cells and steps.
-
-    Attributes:
-        exact: travel times nearer to a whole number of steps are one, steps. misfit: larger differences are told.
-        shortest: travel time of a part that has its own cells, steps. step: the shortest step that is tried so that
-            travel times fit, over the one asked for. narrower: step over the longest one for which a law of friction
-            has one answer.
-        cells: their number without a step that is asked for, of at least `length` (m) each, but at least `fewest`.
-        most: cells.
-    """
-
-    exact: float = 1e-9
-    misfit: float = 0.01
-    shortest: float = 1.5
-    step: float = 0.75
-    narrower: float = 0.9
-    cells: int = 300
-    length: float = 5.0
-    fewest: int = 40
-    most: float = 1e5
-
-
-_SETTINGS = _Settings()
+# Travel times nearer than this to a whole number of steps are whole, steps; larger misfits than the second are reported.
+_EXACT, _MISFIT = 1e-9, 0.01
+# Shortest travel time of a part with its own cells, steps.
+_SHORTEST = 1.5
+# Shortest step tried so that travel times fit, over the one asked for; step over the longest one for which a law of
+# friction has one answer.
+_LEAST_STEP, _NARROWER = 0.75, 0.9
+# Cells without a step: their usual and least number, and least length (m); their largest number in any case.
+_CELLS, _FEWEST, _LENGTH, _MOST = 300, 40, 5.0, 1e5
 #: A uniform part: travel time (s), impedance (N m s/rad), measured depths of its ends (m).
 Part = namedtuple("Part", "time impedance top bottom")
 #: dt: s. depths: (n + 1,) of the nodes, m. impedance, time: (n,) of the cells. turn: (n,) coefficients of the filters,
-#: 0 where there is none. joined: parts that were too short. unfit: the largest distance of a travel time from a whole
-#: number of steps, in steps.
+#: 0 where there is none. joined: number of parts that were too short. unfit: largest misfit of a travel time, steps.
 Cells = namedtuple("Cells", "dt depths impedance time turn joined unfit")
 
 
@@ -102,9 +82,9 @@ def cells_of(segments, dt):
 def _delays(steps):
     """Travel times of the cells of a part, in steps, and the coefficient of the filter of the longest one."""
     whole = round(steps)
-    if abs(steps - whole) <= _SETTINGS.exact * max(1.0, steps):
+    if abs(steps - whole) <= _EXACT * max(1.0, steps):
         return np.ones(whole), 0.0
-    short = math.floor(steps - _SETTINGS.shortest)
+    short = math.floor(steps - _SHORTEST)
     delays, extra = np.ones(short + 1), steps - short - 1
     delays[short // 2] += extra
     return delays, (1 - extra) / (1 + extra)
@@ -112,19 +92,19 @@ def _delays(steps):
 
 def _step(times, dt):
     """The step from 0.75 dt to dt for which travel times of so many seconds are nearest to whole numbers of steps."""
-    times = np.array([time for time in times if time >= _SETTINGS.shortest * dt])
+    times = np.array([time for time in times if time >= _SHORTEST * dt])
     tried = [dt]
     for time in times:
-        tried.append(time / np.arange(math.ceil(time / dt * (1 - 1e-12)), math.floor(time / (_SETTINGS.step * dt)) + 1))
+        tried.append(time / np.arange(math.ceil(time / dt * (1 - 1e-12)), math.floor(time / (_LEAST_STEP * dt)) + 1))
     tried = np.unique(np.concatenate([np.atleast_1d(x) for x in tried]))[::-1]
     steps = times[:, None] / tried
     off = np.abs(steps - np.round(steps)).max(axis=0, initial=0.0)  # of none where all are short
-    return float(tried[np.argmax(off <= max(off.min(), _SETTINGS.exact) * (1 + 1e-6))])
+    return float(tried[np.argmax(off <= max(off.min(), _EXACT) * (1 + 1e-6))])
 
 
 def _fits(part, dt):
     steps = part.time / dt
-    return steps >= _SETTINGS.shortest or abs(steps - 1) <= _SETTINGS.exact
+    return steps >= _SHORTEST or abs(steps - 1) <= _EXACT
 
 
 def _joined(a, b):
@@ -161,24 +141,23 @@ def _long_enough(parts, dt):
     return parts, short
 
 
-_WIDTH = 1 + len(SERIES) + len(LEDGER)
 # Numbers and arrays of C that change in a step.
 _NUMBERS = ("drive_speed", "integral", "bit_speed", "last_on_bit", "work", "at_bit", "at_wall", "in_mud", "iterations")
 _CHANGING = ("down", "up", "down_kept", "up_kept", "speed", "angle", "torque", "moment", "last_speed", "last_moment")
 
 
-class TorsionWaves(Pointers):
-    """Torsion alone of a `Drilling`, a `StringModel`.
+class TorsionWaves(StringModel):
+    """Torsion alone of a `Drilling`.
 
-    Speeds and torques that are told are means over the last two steps, but for speeds of drives and bits with inertia.
+    Recorded speeds and torques are means over the last two steps, except speeds of drives and bits with inertia.
 
     Args:
         scene: a `Drilling` with a `DrillString`; the bit's law one of the torque over the speed; of `Lobes` it takes
             the torque.
-        dt: longest step, s; None for 300 cells. The step is the longest, from three quarters of it on, for which the
-            travel times of the parts are nearest to whole numbers of steps; shorter where a law of friction needs it.
+        dt: longest step, s; None for 300 cells. From three quarters of it on, the step is used for which the travel
+            times of the parts are nearest to whole numbers of steps; a shorter one where a law of friction needs it.
         elements: least number of cells, or None.
-        normal_force: wall force per length (N/m) for an array of measured depths (m), in place of that of the soft
+        normal_force: function of measured depths (m) that gives the wall force per length (N/m), in place of the soft
             string without axial motion.
 
     Raises:
@@ -186,12 +165,12 @@ class TorsionWaves(Pointers):
             string where the bit has no inertia.
     """
 
-    name = "torsion"
+    name, _failure = "torsion", "a number was not finite at t = {time:.6g} s"
 
     def __init__(self, scene, dt=None, elements=None, *, normal_force=None):
-        super().__init__(*SOURCES)
+        super().__init__()
         _check(scene)
-        self.scene, self.normal_force, self.steps = scene, normal_force, 0
+        self.scene, self.normal_force = scene, normal_force
         self._law = None if scene.bit is None else scene.bit.law.resistance(scene.bit.weight)
         self._wall = law_of(scene.friction)[0]
         drag = 0.0 if scene.drag is None else scene.drag.torsion
@@ -200,27 +179,25 @@ class TorsionWaves(Pointers):
             dt = positive("TorsionWaves", "dt", dt, "s")
         if elements is not None:
             dt = min(time / positive("TorsionWaves", "elements", elements, "cells"), dt or math.inf)
-        asked = dt = dt or time / min(max(scene.bit_depth / _SETTINGS.length, _SETTINGS.fewest), _SETTINGS.cells)
-        most = _SETTINGS.most
-        if time / dt > most:
-            refuse("TorsionWaves", "dt", dt, f"at least {1 / most:g} of the travel time of the string, {time:.4g} s")
+        asked = dt = dt or time / min(max(scene.bit_depth / _LENGTH, _FEWEST), _CELLS)
+        if time / dt > _MOST:
+            refuse("TorsionWaves", "dt", dt, f"at least {1 / _MOST:g} of the travel time of the string, {time:.4g} s")
         factor, at_bit = 1.0, False
         while factor >= 1:
-            if time / dt > most:
+            if time / dt > _MOST:
                 if at_bit:
                     refuse("BitOnRock", "law", scene.bit.law, "a torque that falls more slowly with the speed, or a "
-                           f"larger inertia of the bit than {scene.bit.inertia:g} kg m^2: with {most:g} cells the "
+                           f"larger inertia of the bit than {scene.bit.inertia:g} kg m^2: with {_MOST:g} cells the "
                            "speed of the bit is not determined")  # fmt: skip
                 refuse("Drilling", "friction", scene.friction, "a friction that decays more slowly with the "
-                       f"speed: with {most:g} cells the speed at every place is not determined")  # fmt: skip
+                       f"speed: with {_MOST:g} cells the speed at every place is not determined")  # fmt: skip
             self.cells = cells = cells_of(scene.segments, dt)
             self._set_nodes(drag)
             factor, at_bit = self._steepness()
-            dt = cells.dt * min(_SETTINGS.narrower / factor if factor else 1.0, _SETTINGS.narrower)
+            dt = cells.dt * min(_NARROWER / factor if factor else 1.0, _NARROWER)
         self.dt, self.depths = cells.dt, cells.depths
         self.signal = MeanSpeeds(scene.drive.signal(), self.dt)
         self.why = tuple(self._reasons(asked))
-        self._sampler = Sampler(scene.drive, self.dt) if scene.drive.control.sampled else None
         self._allocate()
         if scene.start == "steady":
             check_steady(scene)
@@ -261,7 +238,7 @@ class TorsionWaves(Pointers):
                 f"{cells.joined} part{' is' if cells.joined == 1 else 's are'} shorter than 1.5 cells, and joined with "
                 "pieces of the neighbours, with the same inertia and compliance"
             )
-        if cells.unfit > _SETTINGS.misfit:
+        if cells.unfit > _MISFIT:
             yield (
                 f"travel times of parts differ from whole numbers of steps by up to {cells.unfit:.2g} steps: the rest "
                 "is made up by filters that are exact for slow waves; jumps are smeared over some steps"
@@ -291,6 +268,7 @@ class TorsionWaves(Pointers):
             setattr(c, name, self.doubles(array))
         drive, bit = scene.drive, scene.bit
         c.bit, c.drive_inertia = bit is not None, drive.inertia
+        self._set_sampler(drive, c)
         gains = Gains() if self._sampler else drive.control.gains(scene.segments[0].torsional_impedance)
         c.stiff, c.given, c.Kp, c.Ki = gains
         c.bit_inertia = 0.0 if bit is None else bit.inertia
@@ -321,45 +299,20 @@ class TorsionWaves(Pointers):
         c.integral = above[0] / c.Ki if c.Ki else 0.0
 
     @property
-    def time(self):
-        """s."""
-        return self.steps * self.dt
-
-    @property
     def counts(self):
         """Iterations of Newton's method, of all nodes together; no step is ever halved."""
         return {"halved": 0, "iterations": int(self.c.iterations)}
 
-    def advance(self, steps: int) -> np.ndarray:
-        """See `StringModel`."""
-        rows = np.empty((steps, _WIDTH))
-        done, sampler = 0, self._sampler
-        while done < steps:
-            chunk = steps - done
-            if sampler:
-                if self.steps % sampler.every == 0:
-                    now = self.c.drive_speed, self._changing["angle"][0], self._changing["moment"][0]
-                    self.c.given = sampler.torque(self.time, *map(float, now))
-                chunk = min(chunk, sampler.left(self.steps))
-            did = self._advance(self.signal(self.steps, chunk), rows[done : done + chunk])
-            done, self.steps = done + did, self.steps + did
-            if did < chunk:
-                break
-        for law in self._laws:
-            law.raise_failure()
-        if done < steps:
-            problem = NotConverged(f"torsion: a number was not finite at t = {self.time:.6g} s")
-            problem.rows = rows[:done]
-            raise problem
-        return rows
+    def _at_drive(self):
+        return self.c.drive_speed, self._changing["angle"][0], self._changing["moment"][0]
 
-    def _advance(self, speeds, rows):
-        buffer = self._ffi.from_buffer
-        return self._lib.advance_waves(self.c, len(rows), buffer("double[]", speeds), self.steps, _WIDTH,
-                                       buffer("double[]", rows, require_writable=True))  # fmt: skip
+    def _record(self, steps, records):
+        speeds, buffer = self.signal(self.steps, steps), self._ffi.from_buffer
+        records = buffer("double[]", records, require_writable=True)
+        self.steps += self._lib.advance_waves(self.c, steps, buffer("double[]", speeds), records)
 
     def profile(self) -> np.ndarray:
-        """See `StringModel`; speeds and torques are means over the last two steps; a bit that sticks counts, too."""
+        # speeds and torques are means over the last two steps; a bit that sticks counts, too
         found = np.full((len(PROFILE), len(self.depths)), np.nan)
         now = self._changing
         speed, torque = ((now[f"last_{name}"] + now[name]) / 2 for name in ("speed", "moment"))
@@ -369,22 +322,17 @@ class TorsionWaves(Pointers):
         return found
 
     def memory(self) -> dict:
-        """See `StringModel`."""
-        found = {
-            "steps": self.steps, **{name: getattr(self.c, name) for name in _NUMBERS},
-            **{name: array.copy() for name, array in self._changing.items()},
-        }  # fmt: skip
-        return found | ({"control": self._sampler.state.copy(), "given": self.c.given} if self._sampler else {})
+        numbers = {name: getattr(self.c, name) for name in _NUMBERS}
+        arrays = {name: array.copy() for name, array in self._changing.items()}
+        return {"steps": self.steps} | numbers | arrays | super().memory()
 
     def recall(self, memory: dict) -> None:
-        """See `StringModel`."""
+        super().recall(memory)
         for name, array in self._changing.items():
             array[:] = memory[name]
         for name in _NUMBERS:
             setattr(self.c, name, memory[name])
         self.steps = int(memory["steps"])
-        if self._sampler:
-            self._sampler.state, self.c.given = memory["control"].copy(), float(memory["given"])
 
 
 def _check(scene):

@@ -13,6 +13,7 @@ from cosserat_fenicsx.parts import Friction, Kind, Number, Part, Rate, positive
 from cosserat_fenicsx.well.hole import Mud
 from cosserat_fenicsx.well.operations import RotaryDrilling, RotateOffBottom
 from cosserat_fenicsx.well.pieces import pieces_of
+from cosserat_fenicsx.well.softstring import chain_of
 
 
 class FrictionLaw(Part, family="law of friction at the wall"):
@@ -89,8 +90,7 @@ class WallFriction(FrictionLaw):
 
 
 def law_of(friction: FrictionLaw | None) -> tuple[Resistance, bool, bool]:
-    """The `Resistance`, and whether it is one over the rotation, and a factor on the friction of the hole's sections;
-    that friction itself, the same at rest and in motion, without a friction of the scene."""
+    """(resistance, of_rotation, of_hole) of a `FrictionLaw`; for None the friction of the hole, at rest and in motion."""
     if friction is None:
         return Resistance(1.0, 1.0), False, True
     return friction.resistance, friction.of_rotation, friction.of_hole
@@ -111,63 +111,57 @@ class ViscousDrag(Part):
     axial: Rate = 0.0
 
 
-#: Of the nodes, (n,) each. grip: torque of a coefficient of friction of 1, N m. reach: what the law of friction depends
-#: on, slip or rotation, over the speed of rotation, m or 1.
+#: (n,) over nodes. grip: torque of a coefficient of friction of 1, N m. reach: argument of the law of friction (slip or
+#: rotation) over the speed of rotation, m or 1.
 Wall = namedtuple("Wall", "grip reach")
 _RULE = gauss(4)
 
 
+def static_weight(scene) -> float:
+    """The static weight on bit of a `Drilling`, N; 0 without one."""
+    return 0.0 if scene.bit is None else scene.bit.weight or 0.0
+
+
 def scene_pieces(scene):
     """The `Pieces` of the string of a `Drilling` with a hole, rotating at its depth."""
-    weight = 0.0 if scene.bit is None else scene.bit.weight or 0.0
+    weight = static_weight(scene)
     operation = RotaryDrilling(weight, 0.0) if weight else RotateOffBottom()
     mud = Mud(0.0) if scene.mud is None else scene.mud
     return pieces_of(scene.hole, scene.string, operation, mud, scene.bit_depth)[0]
 
 
 def soft_string_force(pieces, weight, md):
-    """Wall force per length of a soft string that rotates and does not move along the hole, |T k n + w (e - (e.t) t)|.
+    """Wall force per length (N/m) at measured depths (m) of a soft string that rotates without axial motion.
 
-    Args:
-        pieces: the `Pieces` of the string. weight: on bit, N. md: (...) measured depths, m.
-
-    Returns:
-        (...) N/m. T is the effective tension, k and n curvature and normal of the hole, t its tangent, w the weight in
-        mud, e downwards (softstring.py); friction acts across t alone, and T is that of the weight.
+    |T k n + w (e - (e.t) t)|, see `well.softstring`: friction acts across t alone, and T is the tension of the weight
+    in mud less the weight on bit (N).
     """
+    chain = chain_of(pieces)
+    below = np.cumsum(np.append(-weight, chain.weight * chain.height(chain.length)))
     i = np.minimum(np.searchsorted(pieces.bottom, md), len(pieces.bottom) - 1)
-    below = np.cumsum(_heavy(pieces, pieces.top, slice(None))[::-1])[::-1]
-    below = np.append(below[1:], 0.0) - weight
-    t, n, b, k, w = (x[i] for x in (pieces.t, pieces.n, pieces.b, pieces.curvature, pieces.weight))
     u = pieces.bottom[i] - md
-    across = w * (n * np.cos(k * u) + t * np.sin(k * u))
-    return np.hypot(k * (below[i] + _heavy(pieces, md, i)) + across, w * b)
-
-
-def _heavy(pieces, md, i):
-    """Weight along the hole of the pieces i below measured depths, N."""
-    t, n, k, w = (x[i] for x in (pieces.t, pieces.n, pieces.curvature, pieces.weight))
-    u = pieces.bottom[i] - md
-    return w * (t * u * np.sinc(k * u / np.pi) - n * k * u**2 / 2 * np.sinc(k * u / 2 / np.pi) ** 2)
+    i = len(pieces.bottom) - 1 - i  # a chain runs from the bit up
+    here = type(chain)(*(x[i] for x in chain))
+    tension = below[i] + here.weight * here.height(u)
+    return np.hypot(here.curvature * tension + here.weight * here.down(u)[1], here.weight * here.b)
 
 
 def wall_of(scene, depths, normal_force=None):
-    """The `Wall` of a `Drilling`, at nodes of so many measured depths (m), each with half of its cells.
+    """The `Wall` of a `Drilling` at nodes (measured depths, m), each with half of the cells beside it.
 
     Args:
-        normal_force: N/m for an array of measured depths, in place of that of the soft string.
+        normal_force: function of measured depths that gives N/m, in place of the soft string.
     """
     size = len(depths)
     if scene.hole is None:
         return Wall(np.zeros(size), np.ones(size))
     pieces = scene_pieces(scene)
-    weight = 0.0 if scene.bit is None else scene.bit.weight or 0.0
     middles = (depths[1:] + depths[:-1]) / 2
     inside = pieces.bottom[pieces.bottom < depths[-1]]
     cuts = np.unique(np.concatenate([depths, middles, inside]))
     half = np.diff(cuts)[:, None] / 2
     md = cuts[:-1, None] + half * (1 + _RULE.points)
-    force = soft_string_force(pieces, weight, md) if normal_force is None else normal_force(md)
+    force = soft_string_force(pieces, static_weight(scene), md) if normal_force is None else normal_force(md)
     middle = md.mean(axis=1)
     at = np.minimum(np.searchsorted(pieces.bottom, middle), len(pieces.bottom) - 1)
     load = (force * _RULE.weights).sum(axis=1) * half[:, 0]

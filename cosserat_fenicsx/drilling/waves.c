@@ -83,9 +83,9 @@ static void drive(waves *w, double asked)
     book(w, 0, om, torque);
 }
 
-void energies(const waves *w, double *kinetic, double *strain)
+static void energies(const waves *w, double *kinetic, double *strain)
 {
-    double moving = 0.0, held = 0.0, kept = 0.0;
+    double moving = 0.0, held = 0.0;
     for (int c = 0; c < w->cells; c++) {
         double P = w->down[c], Q = w->up[c], share = w->share[c];
         moving += share * (P - Q) * (P - Q);
@@ -147,13 +147,12 @@ static void pass(double turn, double root, double *wave, double *kept)
     *kept = root * x - turn * s;
 }
 
-/* Do so many steps, the first of them number `first` from 0. Returns how many were done: fewer where a number is not
-   finite. */
-int advance_waves(waves *w, int steps, const double *speeds, double first, int width, double *rows)
+/* Do so many steps, with a record of each. Returns how many were done: fewer where a number is not finite. */
+int advance_waves(waves *w, int steps, const double *speeds, double *record)
 {
-    int n = w->cells;
+    const int n = w->cells;
     for (int k = 0; k < steps; k++) {
-        double P = w->down[0];
+        double P = w->down[0], kinetic, strain;
         drive(w, speeds[k]);
         w->down[0] = w->up[0] + 2 * w->below[0] * w->speed[0];
         end(w, between(w, P));
@@ -163,22 +162,15 @@ int advance_waves(waves *w, int steps, const double *speeds, double first, int w
             pass(turn, root, w->down + c, w->down_kept + f);
             pass(turn, root, w->up + c, w->up_kept + f);
         }
-        double *row = rows + (long long)k * width;
-        row[0] = (first + k + 1) * w->dt;
-        row[1] = w->stiff || w->drive_inertia > 0 ? w->drive_speed : (w->last_speed[0] + w->speed[0]) / 2;
-        row[2] = w->angle[0];
-        row[3] = (w->last_moment[0] + w->moment[0]) / 2;
-        row[4] = w->bit_inertia > 0 ? w->bit_speed : (w->last_speed[n] + w->speed[n]) / 2;
-        row[5] = w->angle[n];
-        row[6] = w->bit ? (w->last_on_bit + w->torque[n]) / 2 : 0.0;
-        for (int i = 7; i < 12; i++) row[i] = NAN;
-        energies(w, row + 12, row + 13);
-        row[14] = w->work;
-        row[15] = row[16] = 0.0;
-        row[17] = w->at_bit;
-        row[18] = w->at_wall;
-        row[19] = w->in_mud;
-        if (!isfinite(row[12] + row[13])) return k;
+        energies(w, &kinetic, &strain);
+        const double series[] = {
+            w->stiff || w->drive_inertia > 0 ? w->drive_speed : (w->last_speed[0] + w->speed[0]) / 2, w->angle[0],
+            (w->last_moment[0] + w->moment[0]) / 2,
+            w->bit_inertia > 0 ? w->bit_speed : (w->last_speed[n] + w->speed[n]) / 2, w->angle[n],
+            w->bit ? (w->last_on_bit + w->torque[n]) / 2 : 0, NAN, NAN, NAN, NAN, NAN, kinetic, strain, w->work, 0, 0,
+            w->at_bit, w->at_wall, w->in_mud};
+        memcpy(record + 19 * (size_t)k, series, sizeof series);
+        if (!isfinite(kinetic + strain)) return k;
     }
     return steps;
 }
