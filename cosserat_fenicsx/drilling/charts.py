@@ -1,12 +1,12 @@
-"""Charts of a drill-string in motion, maps over time and depth, and charts of its stability, by matplotlib; films."""
+"""Charts, maps and films of a drill-string in motion, and charts of its stability, by matplotlib."""
 
+import functools
 import math
 from dataclasses import replace
 
 import numpy as np
 
 from cosserat_fenicsx.checks import finite_array, number, positive, refuse
-from cosserat_fenicsx.drilling.segments import Discs
 from cosserat_fenicsx.drilling.stick_slip import AT_REST
 from cosserat_fenicsx.drilling.tables import advance_unit, alias, turns
 from cosserat_fenicsx.drilling.top_drive import PI
@@ -48,11 +48,21 @@ DRIVE, BIT = "tab:blue", "tab:red"
 _BANDS = 400
 
 
+def _drawn(figure):
+    """Turn a function (answer, ...) that returns a Figure into one (answer, file, ..., **look), see `draw_chart`."""
+
+    @functools.wraps(figure)
+    def draw(answer, file, *arguments, **look):
+        return draw_chart(lambda: figure(answer, *arguments), file, world(), **look)
+
+    return draw
+
+
 def times_between(where, times, between):
-    """A slice of ascending times (s) from which to which is shown.
+    """The slice of ascending times (s) between two of them; all for None.
 
     Raises:
-        SceneError: fewer than two of them, or no two ascending times.
+        SceneError: fewer than two times in it, or `between` is not two ascending times.
     """
     if len(times) < 2:
         raise SceneError(f"{where}: expected a motion with at least two times, this one has {len(times)}")
@@ -68,8 +78,8 @@ def times_between(where, times, between):
 
 
 def bands(times, *lines):
-    """(middles, [(least, largest)]) of lines over time between the limits of equal numbers of rows, for charts of long
-    runs, whose oscillations would become a block of one colour."""
+    """(middles, [(least, largest)]) of lines in intervals of time with equal numbers of rows: oscillations of a long run
+    would fill a chart with one colour."""
     edges = np.linspace(0, len(times), _BANDS + 1).astype(int)[:-1]
     ends = np.append(edges[1:], len(times)) - 1
     extremes = [(np.minimum.reduceat(line, edges), np.maximum.reduceat(line, edges)) for line in lines]
@@ -83,26 +93,17 @@ def swings(values):
 
 
 def title_of(history):
-    """What moves and how, for titles."""
-    drive = history.scene.drive
+    """Model, drive and bit, for titles; the gain of a PI control over the impedance: 1 of SoftTorque, 4 of SoftSpeed."""
+    scene, drive, bit = history.scene, history.scene.drive, history.scene.bit
     control = type(drive.control).__name__
     if isinstance(drive.control, PI):
-        control = f"{_impedances(history)} drive"
-    else:
-        control += " drive"
+        Kp = drive.control.Kp
+        impedance = None if scene.discs else scene.segments[0].torsional_impedance
+        control = f"PI (Kp = {Kp / impedance:.3g} impedances)" if impedance else f"PI (Kp = {Kp:.4g} N m s/rad)"
     asked = f" at {drive.signal()(0.0) / rpm:.4g} rpm" if drive.signal().constant and drive.speed is not None else ""
-    bit = history.scene.bit
     at = "bit off bottom" if bit is None else f"{type(bit.law).__name__} bit"
     weight = f", {bit.weight / 1e3:.4g} kN on bit" if bit is not None and bit.weight else ""
-    return f"{history.model}: {control}{asked}, {at}{weight}"
-
-
-def _impedances(history):
-    """A PI control by its gain over the impedance of the string: 1 of SoftTorque, 4 of SoftSpeed."""
-    scene, Kp = history.scene, history.scene.drive.control.Kp
-    if isinstance(scene.string, Discs):
-        return f"PI (Kp = {Kp:.4g} N m s/rad)"
-    return f"PI (Kp = {Kp / scene.segments[0].torsional_impedance:.3g} impedances)"
+    return f"{history.model}: {control} drive{asked}, {at}{weight}"
 
 
 #: Panels over time: (quantity, ((attribute, label, colour), ...)).
@@ -128,13 +129,10 @@ _LEDGER = (
 _SWINGS = 80
 
 
-def draw_over_time(history, file, between=None, **look):
+@_drawn
+def draw_over_time(history, between=None):
     """See `DrillingHistory.plot`."""
     rows = times_between("plot", history.times, between)
-    return draw_chart(lambda: _over_time(history, rows), file, world(), **look)
-
-
-def _over_time(history, rows):
     t = history.times[rows]
     panels = [(quantity, [(getattr(history, name)[rows], *style) for name, *style in lines])
               for quantity, lines in _PANELS]  # fmt: skip
@@ -173,17 +171,14 @@ def _shade_rest(panel, t, bit, drive, label):
                            zorder=0, label=label)  # fmt: skip
 
 
-def draw_phase(history, file, since=None, **look):
+@_drawn
+def draw_phase(history, since=None):
     """See `DrillingHistory.plot_phase`."""
     times_between("plot_phase", history.times, None)
     last = float(history.times[-1])
     since = last / 2 if since is None else since
     if not isinstance(since, int | float) or (history.times >= since).sum() < 2:
         refuse("plot_phase", "since", since, f"a time (s) before the end, {last:g} s")
-    return draw_chart(lambda: _phase(history, since), file, world(), **look)
-
-
-def _phase(history, since):
     rows = history.times >= since
     twist = history.drive_angle[rows] - history.bit_angle[rows]
     figure = empty_figure(6.5, 5.5)
@@ -193,18 +188,18 @@ def _phase(history, since):
     panel.axhline(float(history.drive_speed[rows].mean()) / size, color=DRIVE, label="drive, mean speed")
     panel.set(xlabel="twist between drive and bit (rad)", ylabel=f"bit {heading}")
     legend(panel)
-    figure.suptitle(f"{title_of(history)}\nfrom {since:.4g} to {history.times[-1]:.4g} s")
+    figure.suptitle(f"{title_of(history)}\nfrom {since:.4g} to {last:.4g} s")
     return figure
 
 
-def draw_energy(history, file, **look):
+@_drawn
+def draw_energy(history):
     """See `DrillingHistory.plot_energy`."""
     times_between("plot_energy", history.times, None)
     curves = [(label, np.nan_to_num(getattr(history, name)), *style) for name, label, *style in _LEDGER]
     axial = not np.isnan(history.hook_load).all()
     about = "; strain: less the energy of the string as it hangs at rest" if axial else ""
-    title = f"{title_of(history)}: energy"
-    return draw_chart(lambda: ledger(history.times, curves, history.balance, title, about), file, world(), **look)
+    return ledger(history.times, curves, history.balance, f"{title_of(history)}: energy", about)
 
 
 # At most so many depths are drawn; the colour of places that stick.
@@ -213,7 +208,8 @@ _DEPTHS, _STICKS = 500, "0.8"
 _BIT = 0.03
 
 
-def draw_map(history, file, what=None, between=None, **look):
+@_drawn
+def draw_map(history, what=None, between=None):
     """See `DrillingHistory.plot_map`."""
     if what is None:
         what = "speed" if turns(history) else "velocity"
@@ -224,10 +220,6 @@ def draw_map(history, file, what=None, between=None, **look):
         raise SceneError(
             f"plot_map.what = {what!r}: the {history.model} model has none: expected model='axial and torsional'"
         )
-    return draw_chart(lambda: _map(history, rows, what), file, world(), **look)
-
-
-def _map(history, rows, what):
     quantity, signed = _MAPPED[what]
     places = np.unique(np.linspace(0, len(history.depths) - 1, _DEPTHS).astype(int))
     along, length = scale(_DEPTH)
@@ -267,24 +259,15 @@ def _map(history, rows, what):
 _MAPS, _LINES = 6, 8
 
 
-def draw_stability(answer, file, mode, **look):
+@_drawn
+def draw_stability(answer, mode=None):
     """See `Stability.plot`."""
     grid = len(answer.weights) > 1 and len(answer.speeds) > 1
-    return draw_chart(lambda: (_maps if grid else _lines)(answer, _modes(answer, mode)), file, world(), **look)
-
-
-def draw_campbell(answer, file, **look):
-    """See `Campbell.plot`."""
-    return draw_chart(lambda: _campbell(answer), file, world(), **look)
-
-
-def draw_bounce(answer, file, **look):
-    """See `BitBounce.plot`."""
-    return draw_chart(lambda: _bounce(answer), file, world(), **look)
+    return (_maps if grid else _lines)(answer, _modes(answer, mode))
 
 
 def _modes(answer, mode):
-    """Which modes are drawn, by frequency: one, those that grow fastest, or the least damped one where none grows."""
+    """The modes to draw, by frequency: the given one, those that grow fastest, or the least damped where none grows."""
     if mode is not None:
         return [mode]
     fastest = np.nanmax(answer.growth, axis=(0, 1))
@@ -345,7 +328,9 @@ def _lines(answer, modes):
     return figure
 
 
-def _campbell(answer):
+@_drawn
+def draw_campbell(answer):
+    """See `Campbell.plot`."""
     figure = empty_figure(7.0, 5.0)
     panel = figure.subplots()
     heading, size = scale(_SPEED)
@@ -367,7 +352,9 @@ def _campbell(answer):
     return figure
 
 
-def _bounce(answer):
+@_drawn
+def draw_bounce(answer):
+    """See `BitBounce.plot`."""
     figure = empty_figure(7.0, 4.2)
     panel = figure.subplots()
     order, weight = np.argsort(answer.speeds), answer.scene.bit.weight
@@ -410,10 +397,9 @@ class _Stage:
     def __init__(self, history, speed):
         self._history, self._speed = history, speed
         with styled():
-            self._figure = self._prepared(history)
+            self._figure = self._constant_parts(history)
 
-    def _prepared(self, history):
-        """The Figure with what is constant."""
+    def _constant_parts(self, history):
         figure = empty_figure(9.6, 6.0)
         figure.set_dpi(_DPI)
         string, along, over = figure.subplots(1, 3, width_ratios=(0.35, 1.0, 2.0))
