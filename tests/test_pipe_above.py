@@ -237,10 +237,10 @@ def test_refusals():
         ((rod.start, (), drive), "pipe = .*at least one part"),
         ((rod.start, "pipe", drive), "pipe = .*parts of the pipe"),
         ((rod.start, cf.well.DrillPipe(**steel), drive), "length = None: expected a positive number"),
-        ((rod.start, PIPE, 1.0), "drive = 1.0: expected a TopDrive"),
-        ((rod.start, PIPE, drive, 5e6), "hook = .*a Hook"),
+        ((rod.start, PIPE, 1.0), "drive = 1.0: expected TopDrive"),
+        ((rod.start, PIPE, drive, 5e6), "hook = .*Hook"),
         ((rod.start, PIPE, drive, None, math.inf), "tension = inf: expected a finite number"),
-        ((rod.start, PIPE, drive, None, 0.0, 0.3), "drag = 0.3: expected a ViscousDrag"),
+        ((rod.start, PIPE, drive, None, 0.0, 0.3), "drag = 0.3: expected ViscousDrag"),
     ):
         with pytest.raises(cf.SceneError, match=words):
             cf.drilling.PipeAbove(*arguments)

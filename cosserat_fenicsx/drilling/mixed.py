@@ -2,15 +2,17 @@
 
 import math
 from dataclasses import dataclass, replace
+from typing import Annotated
 
 import numpy as np
 
 from cosserat_fenicsx.actions.walls import HoleWall, TubeWall
-from cosserat_fenicsx.checks import instance, number, refuse, store
+from cosserat_fenicsx.checks import instance, number, refuse
 from cosserat_fenicsx.drilling.bit_laws import BitLaw
 from cosserat_fenicsx.drilling.pipe_above import PipeAbove
 from cosserat_fenicsx.drilling.scene import Drilling
 from cosserat_fenicsx.drilling.wall_friction import law_of, static_weight
+from cosserat_fenicsx.parts import ForceSize, Inertia, at_least
 from cosserat_fenicsx.scene.action import PointAction
 from cosserat_fenicsx.scene.curves import Line
 from cosserat_fenicsx.scene.loads import Force, LineForce
@@ -20,9 +22,9 @@ from cosserat_fenicsx.scene.signals import AlongPieces
 from cosserat_fenicsx.scene.supports import Roller
 from cosserat_fenicsx.well.components import DrillPipe
 
-# Of a straight section: largest curvature times length, rad. Lengths below this are none, m.
+# Largest curvature times length (rad) of a straight section; length (m) below which a part is absent.
 _STRAIGHT, _NOTHING = 1e-9, 1e-9
-# Wall of a hole that has no stiffness, N/m^2.
+# Default stiffness of the wall, N/m^2.
 _WALL = 1e8
 
 
@@ -127,15 +129,15 @@ def _damping(drilling):
 
 
 def _bit(drilling, rod):
-    if drilling.bit is None:
+    bit = drilling.bit
+    if bit is None:
         return []
-    law = drilling.bit.law
-    _check_law("mixed_scene", "drilling.bit.law", law)
-    return [BitTorque(rod.end, law, drilling.bit.weight or 0.0, drilling.bit.inertia)]
+    _check_law("mixed_scene", "drilling.bit.law", bit.law)
+    return [BitTorque(rod.end, bit.law, bit.weight or 0.0, bit.inertia)]
 
 
 def _walls(drilling, rod, top, radii):
-    """Walls for equilibria and for motions."""
+    """The walls for equilibria and for motions."""
     hole = drilling.hole
     if hole is None:
         return []
@@ -187,27 +189,20 @@ class BitTorque(PointAction):
 
     station: StationOrName
     law: BitLaw
-    weight: float = 0.0
-    inertia_of_bit: float = 0.0
+    weight: Annotated[ForceSize, at_least(0)] = 0.0
+    inertia_of_bit: Inertia = 0.0
 
     work, scaled = None, False
     traits = {"dead": True, "known_force": True, "rates": False, "turns": True, "flat": False}
 
-    def __post_init__(self):
+    def validate(self):
         is_known(self, "station", Station)
-        instance(self, "law", self.law, BitLaw, "a Stribeck(...), or another BitLaw of the torque over the speed")
         _check_law(self, "law", self.law)
-        for field, unit in (("weight", "N"), ("inertia_of_bit", "kg m^2")):
-            value = number(
-                self, field, getattr(self, field), f"a number from 0 on ({unit})", lambda x: 0 <= x < math.inf
-            )
-            store(self, **{field: value})
 
     def inertia(self, rod):
         return (0.0, np.array([0.0, 0.0, self.inertia_of_bit])) if self.inertia_of_bit else None
 
     def resists(self, speed):
-        """See `Action`."""
         law = self.law.resistance(self.weight)
         if speed == 0:
             return law.still, 0.0

@@ -11,16 +11,18 @@ four of them, which amplifies no wave where steps are even (Laakso et al., IEEE 
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 import ufl
 
-from cosserat_fenicsx.checks import instance, number, positive, refuse, store
+from cosserat_fenicsx.checks import positive, refuse, store
 from cosserat_fenicsx.drilling.segments import Segment, segment_of
 from cosserat_fenicsx.drilling.signals import MeanSpeeds
 from cosserat_fenicsx.drilling.top_drive import Hook, TopDrive
 from cosserat_fenicsx.drilling.wall_friction import ViscousDrag
+from cosserat_fenicsx.parts import ForceSize
 from cosserat_fenicsx.scene.action import PointAction, scalar, vector
 from cosserat_fenicsx.scene.rod import Station, StationOrName, is_known
 from cosserat_fenicsx.well.components import Laid
@@ -60,31 +62,26 @@ class PipeAbove(PointAction):
     pipe: object
     drive: TopDrive
     hook: Hook | None = None
-    tension: float = 0.0
+    tension: ForceSize = 0.0
     drag: ViscousDrag | None = None
 
     scaled = False
 
-    def __post_init__(self):
+    def validate(self):
         if is_known(self, "station", Station) and self.station.s not in (0.0, self.station.rod.length):
             refuse(self, "station", self.station, "an end of the rod, rod.start or rod.end")
         given = self.pipe if isinstance(self.pipe, list | tuple) else (self.pipe,)
         if not given:
             refuse(self, "pipe", self.pipe, "at least one part")
-        store(self, pipe=tuple(given))
         for part in given:
             if not isinstance(part, Segment) and not all(hasattr(part, x) for x in ("length", "stiffness", "mass")):
                 refuse(self, "pipe", part, "parts of the pipe: DrillPipe, HeavyWeight, ..., or Segment")
             positive(part, "length", part.length, "m, of the pipe")
-        instance(self, "drive", self.drive, TopDrive, "a TopDrive(...)")
-        for field, kind in (("hook", Hook), ("drag", ViscousDrag)):
-            if getattr(self, field) is not None:
-                instance(self, field, getattr(self, field), kind, f"a {kind.__name__}(...) or None")
-        store(self, tension=number(self, "tension", self.tension, "a finite number (N)", math.isfinite))
+        store(self, pipe=tuple(given))
         store(self, _numbers=self._found_numbers())
 
     def _found_numbers(self):
-        """What else a motion depends on, for the fingerprint of a scene: functions of time by some values."""
+        """Further numbers that the motion depends on, for the fingerprint of a scene; functions of time by samples."""
         hook, drag = self.hook or Hook(), self.drag or ViscousDrag()
         found = [x for part in self.segments for x in (part.length, part.GJ, part.rhoJ, part.EA, part.rhoA)]
         found += [
@@ -129,14 +126,12 @@ class PipeAbove(PointAction):
 
     @staticmethod
     def work(point, test, down, thrust, torque, b, d, k, c):
-        """See `Action`."""
         axis = point.R * down
         along = thrust - b * ufl.dot(point.r_t, down) - k * ufl.dot(point.u, down)
         about = torque - d * ufl.dot(point.omega, axis) - c * ufl.dot(point.theta, down)
         return along * ufl.dot(down, test.phi_r) + about * ufl.dot(axis, test.phi)
 
     def delayed(self):
-        """See `Action`."""
         return _InMotion(self)
 
 
@@ -156,8 +151,7 @@ class _InMotion:
         self.longest = min(line.longest for line in self._lines)
 
     def begin(self, motion):
-        """See `Action.delayed`: where the pipe starts from is the equilibrium of its springs, in the motion of its
-        end."""
+        # the pipe starts in the equilibrium of its springs, with the motion of its end
         k, c = self._pipe._springs
         axial, torsional = self._lines
         axial.begin(motion.velocity @ self._down, -k * (motion.displacement @ self._down))
@@ -167,27 +161,21 @@ class _InMotion:
         return motion.angular_velocity @ (motion.R @ self._down)
 
     def at(self, t):
-        """See `Action.delayed`."""
         thrust, torque = (line.arriving(t) for line in self._lines)
         return {"acting": ((thrust - self._pipe.tension, torque), self._damping)}
 
     def accept(self, t, h, motion):
-        """See `Action.delayed`."""
         for line, speed in zip(self._lines, (motion.velocity @ self._down, self._about(motion)), strict=True):
             line.advance(t, h, speed)
 
     def undo(self):
-        """See `Action.delayed`."""
         for line in self._lines:
             line.undo()
 
     def memory(self):
-        """See `Action.delayed`."""
-        axial, torsional = self._lines
-        return {"axial": axial.memory(), "torsional": torsional.memory()}
+        return {name: line.memory() for name, line in zip(("axial", "torsional"), self._lines, strict=True)}
 
     def recall(self, memory):
-        """See `Action.delayed`."""
         for line, name in zip(self._lines, ("axial", "torsional"), strict=True):
             line.recall(memory[name])
 
@@ -205,10 +193,8 @@ def _lines(parts, rate, end):
 
 
 def _hook_end(hook):
-    means = MeanSpeeds(hook.signal(), None)
-    if math.isinf(hook.stiffness):
-        return TopEnd(lambda start, end: -means.between(start, end), stiff=True)
-    return TopEnd(lambda start, end: -means.between(start, end), Ki=hook.stiffness)
+    mean, rigid = MeanSpeeds(hook.signal(), None).between, math.isinf(hook.stiffness)
+    return TopEnd(lambda start, end: -mean(start, end), stiff=rigid, Ki=0.0 if rigid else hook.stiffness)
 
 
 def _drive_end(drive, impedance):
@@ -217,71 +203,71 @@ def _drive_end(drive, impedance):
     return TopEnd(mean, stiff=rigid, inertia=drive.inertia, Kp=Kp, Ki=Ki, given=given)
 
 
-# Samples of an interpolation; the travel time of a part over the longest step, so that all of them are known.
+# Samples of an interpolation; least travel time of a part over the step, so that all of them are known.
 _SAMPLES, _LEAST = 4, 2.0
 _EACH, _DIAGONAL = np.arange(_SAMPLES), np.eye(_SAMPLES)[:, :, None]
 # Samples kept beyond those that may be read.
 _SPARE = 512
 
 
+@dataclass(frozen=True)
 class TopEnd:
-    """What is fixed to the top: I om' = Kp (Om - om) + Ki phi + M0 - M, phi' = Om - om; or om = Om where stiff.
+    """The upper end: I om' = Kp (Om - om) + Ki phi + M0 - M, phi' = Om - om; or om = Om where stiff.
 
     Args:
-        mean: a function (start, end) of times (s): the mean of the speed Om asked for. The others: the coefficients.
+        mean: function (start, end) of times (s) that gives the mean of the speed Om asked for. inertia: I. given: M0.
     """
 
-    def __init__(self, mean, *, stiff=False, inertia=0.0, Kp=0.0, Ki=0.0, given=0.0):
-        self._mean, self._stiff, self._inertia = mean, stiff, inertia
-        self._Kp, self._Ki, self._given = Kp, Ki, given
+    mean: Callable[[float, float], float]
+    stiff: bool = False
+    inertia: float = 0.0
+    Kp: float = 0.0
+    Ki: float = 0.0
+    given: float = 0.0
 
     def rest(self, speed, force):
-        """(om, phi) at the beginning of a motion in which the end has a speed and hands down a force; phi is the one
-        that holds the force without a difference of speeds, where there is one."""
-        held = (force - self._given) / self._Ki if self._Ki else 0.0
-        return speed, held
+        """(om, phi) at the beginning of a motion, for a speed and a force handed down; phi balances that force without
+        a difference of speeds, where there is one."""
+        return speed, (force - self.given) / self.Ki if self.Ki else 0.0
 
     def step(self, state, start, end, impedance, wave):
-        """A step, by the implicit midpoint rule.
+        """The mean speed in a step from start to end (s), and the new state, by the implicit midpoint rule.
 
         Args:
-            state: (om, phi); start, end: s; impedance: of the string, with its drag; wave: M - Z om that arrives.
-
-        Returns:
-            the mean speed, and the new state.
+            state: (om, phi). impedance: of the string, with its drag. wave: M - Z om that arrives.
         """
-        asked, h, (om, phi) = self._mean(start, end), end - start, state
-        if self._stiff:
+        asked, h, (om, phi) = self.mean(start, end), end - start, state
+        if self.stiff:
             return asked, (asked, 0.0)
-        inert, turned = 2 * self._inertia / h, self._Ki * h / 2
-        push = inert * om + self._Ki * phi + self._given - wave + (self._Kp + turned) * asked
-        mean = push / (inert + self._Kp + turned + impedance)
+        inert, turned = 2 * self.inertia / h, self.Ki * h / 2
+        push = inert * om + self.Ki * phi + self.given - wave + (self.Kp + turned) * asked
+        mean = push / (inert + self.Kp + turned + impedance)
         return mean, (2 * mean - om, phi + h * (asked - mean))
 
 
 class DelayLines:
-    """The waves of one kind, torsional or axial, in parts from the top down.
+    """The torsional or the axial waves in parts from the top down.
 
     Args:
-        impedance, time: (n,) of the parts, and their travel times, s. drag: (n + 1,) force over speed at the nodes,
-            from the top down. top: a `TopEnd`.
+        impedance, time: (n,) impedances and travel times (s) of the parts. drag: (n + 1,) force over speed at the
+            nodes. top: a `TopEnd`.
     """
 
     def __init__(self, impedance, time, drag, top):
         self._Z, self._time, self._drag = (np.array(x, dtype=float) for x in (impedance, time, drag))
         self._top, self._parts = top, len(self._Z)
-        self._delays = np.concatenate([self._time, self._time])
+        self._delays = np.tile(self._time, 2)
         #: longest step, s
         self.longest = self._time.min() / _LEAST
         self.begin(0.0, 0.0)
 
     @property
     def dashpot(self):
-        """The factor of the speed of the lower end in the force there: the impedance of the lowest part, and drag."""
+        """Force over speed at the lower end: the impedance of the lowest part, and drag."""
         return self._Z[-1] + self._drag[-1]
 
     def begin(self, speed, force):
-        """Begin at the time 0, after a steady motion: all turn at a speed and hand down a force."""
+        """Begin at the time 0, after a steady motion with a speed and a force handed down."""
         down, up = force + self._Z * speed, force - self._Z * speed
         self._first = np.concatenate([down, up])
         self._state = self._top.rest(speed, force)
@@ -342,13 +328,11 @@ class DelayLines:
     def memory(self):
         """All that later steps depend on."""
         n = self._count
-        return {
-            "times": self._times[:n].copy(), "values": self._values[:n].copy(), "first": self._first.copy(),
-            "state": np.array(self._state), "before": np.array(self._before),
-        }  # fmt: skip
+        arrays = {"times": self._times[:n], "values": self._values[:n], "first": self._first}
+        return {name: np.array(x) for name, x in (arrays | {"state": self._state, "before": self._before}).items()}
 
     def recall(self, memory):
-        """Restore what `memory` returned."""
+        """Restore the result of `memory`."""
         self._take(memory["times"], memory["values"])
         self._first = memory["first"].copy()
         self._state, self._before = (tuple(memory[name].tolist()) for name in ("state", "before"))

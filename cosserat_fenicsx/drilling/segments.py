@@ -1,12 +1,11 @@
-"""The uniform parts of a string, as a guide of axial and torsional waves; or `Discs`, a few rigid bodies on springs."""
+"""The uniform parts of a string, waveguides of axial and torsional waves; or `Discs`, a few rigid bodies on springs."""
 
 import math
 from dataclasses import dataclass
+from typing import Annotated
 
-import numpy as np
-
-from cosserat_fenicsx.checks import finite_array, refuse, store
-from cosserat_fenicsx.parts import Part
+from cosserat_fenicsx.checks import refuse, store
+from cosserat_fenicsx.parts import Damping, Inertia, Mass, Number, Part, TorsionalDamping, TorsionalStiffness, positive
 
 
 @dataclass(frozen=True)
@@ -49,7 +48,7 @@ class Segment:
 
 
 def segment_of(place, weight):
-    """The `Segment` of a component in its place (`Laid`), of a weight in mud (N/m).
+    """The `Segment` of a component in its place (`Laid`) with a weight in mud (N/m).
 
     Raises:
         SceneError: a component without stiffness, mass or inertia.
@@ -80,44 +79,36 @@ class Discs(Part):
         inertias: (n,) kg m^2. stiffnesses: (n - 1,) N m/rad between neighbours.
         dampings: (n - 1,) N m s/rad between neighbours; None for none.
         drags: (n,) N m s/rad between a disc and the hole; None for none.
-        masses: (n,) kg; None where discs turn alone. Their weight is left out: tensions are those beside it.
-        axial_stiffnesses, axial_dampings, axial_drags: as the others, N/m, N s/m, N s/m.
+        masses: (n,) kg; None where discs turn alone. Their weight is left out, in tensions too.
+        axial_stiffnesses, axial_dampings, axial_drags: as in torsion, N/m, N s/m, N s/m.
 
     Raises:
         SceneError: numbers that are not positive, or lists whose lengths do not fit.
     """
 
-    inertias: tuple[float, ...]
-    stiffnesses: tuple[float, ...]
-    dampings: tuple[float, ...] | None = None
-    drags: tuple[float, ...] | None = None
-    masses: tuple[float, ...] | None = None
-    axial_stiffnesses: tuple[float, ...] | None = None
-    axial_dampings: tuple[float, ...] | None = None
-    axial_drags: tuple[float, ...] | None = None
+    inertias: tuple[Annotated[Inertia, positive()], ...]
+    stiffnesses: tuple[Annotated[TorsionalStiffness, positive()], ...]
+    dampings: tuple[TorsionalDamping, ...] | None = None
+    drags: tuple[TorsionalDamping, ...] | None = None
+    masses: tuple[Annotated[Mass, positive()], ...] | None = None
+    axial_stiffnesses: tuple[Annotated[float, Number("stiffness", positive())], ...] | None = None
+    axial_dampings: tuple[Damping, ...] | None = None
+    axial_drags: tuple[Damping, ...] | None = None
 
-    def __post_init__(self):
-        n = finite_array(self, "inertias", self.inertias, "at least two positive numbers (kg m^2)").size
+    def validate(self):
+        n = len(self.inertias)
         if n < 2:
             refuse(self, "inertias", self.inertias, "at least two (kg m^2)")
-        self._check(
-            {"inertias": n, "stiffnesses": n - 1, "dampings": n - 1, "drags": n}, ("kg m^2", "N m/rad", "N m s/rad")
-        )
-        axial = {"masses": n, "axial_stiffnesses": n - 1, "axial_dampings": n - 1, "axial_drags": n}
-        if self.masses is not None:
-            self._check(axial, ("kg", "N/m", "N s/m"))
-        for field in axial:
-            if self.masses is None and getattr(self, field) is not None:
-                refuse(self, field, getattr(self, field), "None for discs without masses")
-
-    def _check(self, sizes, units):
-        for (field, size), unit in zip(sizes.items(), (*units, units[-1]), strict=True):
+        sizes = {"stiffnesses": n - 1, "dampings": n - 1, "drags": n}
+        axial = {"masses": n} | {f"axial_{name}": size for name, size in sizes.items()}
+        for field, size in (sizes | axial).items():
             given = getattr(self, field)
-            least = 0.0 if field.endswith(("dampings", "drags")) else math.ulp(0.0)
-            if given is None and least == 0.0:
-                given = np.zeros(size)
-            expected = f"{size} numbers ({unit}), {'not negative' if least == 0.0 else 'positive'}"
-            array = finite_array(self, field, given, expected)
-            if array.shape != (size,) or (array < least).any():
-                refuse(self, field, given, expected)
-            store(self, **{field: tuple(array.tolist())})
+            if field in axial and self.masses is None:
+                if given is not None:
+                    refuse(self, field, given, "None for discs without masses")
+                continue
+            if given is None and field.endswith(("dampings", "drags")):
+                given = (0.0,) * size
+            if given is None or len(given) != size:
+                refuse(self, field, given, f"{size} numbers, with {n} discs")
+            store(self, **{field: given})
