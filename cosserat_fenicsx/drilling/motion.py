@@ -1,4 +1,4 @@
-"""A drill-string in motion, `drilling.simulate`; it is read from its folder, and gone on with."""
+"""`drilling.simulate`, and the motion of a drill-string read from its folder and continued."""
 
 import math
 import numbers
@@ -16,12 +16,12 @@ from cosserat_fenicsx.drilling.time_loop import TimeLoop
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.storage.store import Kind, Nowhere, Store
 
-#: More steps, and rows of a history, are refused as a mistake; so many profiles where nothing else is asked for.
+#: Largest numbers of steps, and of rows of a history; default number of profiles.
 MOST_STEPS, MOST_ROWS, PROFILES = 1e8, 2e7, 400
-# Relative differences below this are rounding, as by another machine.
+# Relative differences below this are rounding, as on another machine.
 _ROUNDING = 1e-9
-# Largest rotation in a step, rad, at three times the speed of the drive, as a bit that slips may have; and the largest
-# part of the angle between two blades or lobes.
+# Largest rotation in a step, rad, at three times the speed of the drive, as a bit that slips may have; largest share of
+# the angle between two blades or lobes.
 _TURN, _FASTER, _OF_BLADES = 1.0, 3.0, 0.25
 KIND = Kind(
     what="motion of a drill-string", home="drilling.motion", call="drilling.simulate",
@@ -117,21 +117,15 @@ def go_on(store, scene, duration, progress):
 
 
 def _running(store, scene):
-    """The model of a motion that is gone on with.
+    """The model of a motion that is continued.
 
     Raises:
-        SceneError: it is not the one that the rows are of.
+        SceneError: it differs from the model of the stored rows.
     """
     asked, told = store.head["asked"], store.head
     running = model_of(scene, asked["model"], asked["dt"], asked["elements"])
-    alike = {
-        "model": running.name == told["model"],
-        "dt": math.isclose(running.dt, told["dt"], rel_tol=_ROUNDING),
-        "depths": len(running.depths) == len(told["depths"])
-        and np.allclose(running.depths, told["depths"], rtol=_ROUNDING, atol=0),
-    }
-    for name, same in alike.items():
-        if not same:
+    for name, value in (("model", running.name), ("dt", running.dt), ("depths", running.depths)):
+        if value != told[name] if name == "model" else not _alike(value, told[name]):
             raise SceneError(
                 f"{store.place}: the {name} of its motion is another one than that of this release: expected a "
                 "new motion by drilling.simulate"
@@ -139,10 +133,14 @@ def _running(store, scene):
     return running
 
 
+def _alike(numbers, others):
+    return np.shape(numbers) == np.shape(others) and np.allclose(numbers, others, rtol=_ROUNDING, atol=0)
+
+
 def read(store, scene):
     """The motion of a drill-string that is stored so far."""
     scene, tables = _scene(store, scene, store.head["duration"]), _tables(store)
-    store.check_rows(_times_of)
+    store.check_rows(lambda rows: rows[:, 0])
     return _history(store, scene, [np.array(table.rows) for table in tables])
 
 
@@ -153,16 +151,11 @@ def _scene(store, scene, until):
 
 
 def _tables(store):
+    def table(name, width):
+        return store.table(name, lambda dtype, shape: dtype.str == "<f8" and shape == (width,))
+
     widths = len(COLUMNS), 1 + len(PROFILE) * len(store.head["depths"])
-    return [store.table(name, partial(_are_rows, width)) for name, width in zip(KIND.tables, widths, strict=True)]
-
-
-def _are_rows(width, dtype, shape):
-    return dtype.str == "<f8" and shape == (width,)
-
-
-def _times_of(rows):
-    return rows[:, 0]
+    return list(map(table, KIND.tables, widths))
 
 
 def _history(store, scene, rows):
@@ -218,7 +211,7 @@ def check_step(scene, dt, duration, save_every=None):
 
 
 def _largest_turn(scene):
-    """The largest rotation of the bit in a step, rad, and words on it where blades or lobes decide for it."""
+    """The largest rotation of the bit in a step, rad, and words where blades or lobes limit it."""
     repeats = scene.bit.law.repeats if scene.bit is not None else None
     if repeats is None:
         return _TURN, ""
@@ -227,7 +220,7 @@ def _largest_turn(scene):
 
 
 def _turn_to_watch(scene):
-    """The largest rotation in a step where it is not known before the motion, below a motor; else infinite."""
+    """The largest rotation in a step (rad) of a bit below a motor, checked during the motion; else infinity."""
     watched = scene.bit is not None and scene.drive.speed is None
     return _largest_turn(scene)[0] if watched else math.inf
 

@@ -1,4 +1,4 @@
-"""What rotation excites: the Campbell diagram, and the bounce of a bit on lobes of the rock."""
+"""Excitation by rotation: the Campbell diagram, and the bounce of a bit on lobes of the rock."""
 
 import math
 from dataclasses import dataclass
@@ -17,8 +17,30 @@ from cosserat_fenicsx.quantities import Quantity
 from cosserat_fenicsx.results.result import Result, by_name
 
 
+class _Drawn(Result):
+    """A result with one chart, drawn by the function of `drilling.charts` of the name `_chart`."""
+
+    _chart = ""
+
+    def plot(self, file: File | None = None, *, units: Any = "SI", width: int | None = None):
+        """Draw the chart: of `Campbell` natural frequencies as lines and excitations as rays, of `BitBounce` the
+        amplitude over speed beside the static weight. With a file it is written, otherwise the Figure is returned.
+
+        Args:
+            file: .png, .pdf or another format of matplotlib (rank 0 writes).
+            units: "SI", "field" or a dict of units by dimensions. width: of the picture, pixels, or None.
+
+        Raises:
+            SceneError: matplotlib is missing, or the file's ending is unknown.
+            OSError: the file cannot be written.
+        """
+        from cosserat_fenicsx.drilling import charts
+
+        return getattr(charts, self._chart)(self, file, units=units, width=width)
+
+
 @dataclass(frozen=True, eq=False, repr=False)
-class Campbell(Result):
+class Campbell(_Drawn):
     """Result of `campbell`.
 
     Attributes:
@@ -40,33 +62,18 @@ class Campbell(Result):
                 found[kind, name] = speeds[speeds <= self.fastest]
         return found
 
-    def plot(self, file: File | None = None, *, units: Any = "SI", width: int | None = None):
-        """Frequencies as lines, excitations as rays. With a file it is written, otherwise the Figure is returned.
-
-        Args:
-            file: .png, .pdf or another format of matplotlib (rank 0 writes).
-            units: "SI", "field" or a dict of units by dimensions. width: of the picture, pixels, or None.
-
-        Raises:
-            SceneError: matplotlib is missing, or the file's ending is unknown.
-            OSError: the file cannot be written.
-        """
-        from cosserat_fenicsx.drilling.charts import draw_campbell
-
-        return draw_campbell(self, file, units=units, width=width)
-
     def __repr__(self):
         found = ", ".join(f"{len(x)} {kind}" for kind, x in self.frequencies.items())
         return f"<Campbell: {found} frequencies up to {self.up_to:.4g} Hz; {', '.join(self.excitations)}>"
 
+    _chart = "draw_campbell"
     axis = _rows_axis = "critical speed"
-    _quantities = by_name(*(
-        Quantity(name, label, unit, axes=("critical speed",), shown=shown,
-                 getter=lambda x, k=k: np.array([row[k] for row in x._rows]))
-        for k, (name, label, unit, shown) in enumerate((
-            ("motion", "kind", "1", ""), ("excitation", "", "1", ""), ("critical_speed", "", "rad/s", "rpm"),
-            ("frequency", "", "Hz", "")))
-    ))  # fmt: skip
+    _quantities = by_name(
+        Quantity("motion", "kind", axes=("critical speed",), getter=lambda x: x._column(0)),
+        Quantity("excitation", axes=("critical speed",), getter=lambda x: x._column(1)),
+        Quantity("critical_speed", unit="rad/s", axes=("critical speed",), getter=lambda x: x._column(2), shown="rpm"),
+        Quantity("frequency", unit="Hz", axes=("critical speed",), getter=lambda x: x._column(3)),
+    )
 
     def __len__(self) -> int:
         return len(self._rows)
@@ -79,6 +86,9 @@ class Campbell(Result):
             for (kind, name), speeds in self.critical_speeds().items()
             for speed in speeds
         ]
+
+    def _column(self, k):
+        return np.array([row[k] for row in self._rows])
 
     def _answer(self, units):
         found = " and ".join(f"{len(x)} of {kind}" for kind, x in self.frequencies.items())
@@ -108,7 +118,8 @@ def campbell(
     fastest = positive("campbell", "fastest", fastest, "rad/s")
     up_to = positive("campbell", "up_to", up_to, "Hz")
     if excitations is None:
-        excitations = {"1 x": 1.0} | _of_the_bit(scene)
+        repeats = scene.bit.law.repeats if scene.bit else None
+        excitations = {"1 x": 1.0} | ({f"{repeats[0]} x ({repeats[1]})": float(repeats[0])} if repeats else {})
     for name, times in excitations.items():
         number("campbell", f"excitations[{name!r}]", times, "a positive number", lambda x: 0 < x < math.inf)
     kinds = {"torsion": torsion} | ({} if scene.discs else {"axial": axial})
@@ -117,11 +128,6 @@ def campbell(
             refuse("campbell", kind, end, "'free' or 'fixed'")
     frequencies = {kind: _up_to(scene, kind, end, up_to) for kind, end in kinds.items()}
     return Campbell(fastest, frequencies, dict(excitations), up_to)
-
-
-def _of_the_bit(scene):
-    repeats = scene.bit.law.repeats if scene.bit else None
-    return {f"{repeats[0]} x ({repeats[1]})": float(repeats[0])} if repeats else {}
 
 
 def _up_to(scene, kind, end, up_to):
@@ -134,7 +140,7 @@ def _up_to(scene, kind, end, up_to):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class BitBounce(Result):
+class BitBounce(_Drawn):
     """Result of `bit_bounce`.
 
     Attributes:
@@ -167,27 +173,13 @@ class BitBounce(Result):
         changes = np.flatnonzero(above[1:] != above[:-1])
         return np.array([brentq(excess, speeds[k], speeds[k + 1], xtol=1e-12) for k in changes])
 
-    def plot(self, file: File | None = None, *, units: Any = "SI", width: int | None = None):
-        """Amplitude over speed beside the static weight. With a file it is written, otherwise the Figure is returned.
-
-        Args:
-            file: .png, .pdf or another format of matplotlib (rank 0 writes).
-            units: "SI", "field" or a dict of units by dimensions. width: of the picture, pixels, or None.
-
-        Raises:
-            SceneError: matplotlib is missing, or the file's ending is unknown.
-            OSError: the file cannot be written.
-        """
-        from cosserat_fenicsx.drilling.charts import draw_bounce
-
-        return draw_bounce(self, file, units=units, width=width)
-
     def __repr__(self):
         lifted = self.speeds[self.lifts_off]
         rpm = lifted * 30 / math.pi
         told = f"the bit lifts off at {len(lifted)} of {len(self.speeds)} speeds"
         return f"<BitBounce: {told}" + (f", from {rpm.min():.4g} to {rpm.max():.4g} rpm>" if len(lifted) else ">")
 
+    _chart = "draw_bounce"
     axis = _rows_axis = "speed"
     _quantities = by_name(
         Quantity("speed", unit="rad/s", axes=("speed",), getter="speeds", shown="rpm"),

@@ -1,4 +1,4 @@
-"""Which modes of a string that drills steadily grow, at which speeds and weights; their shapes, and other drives."""
+"""Growth of the modes of a string that drills steadily, over speed and weight; their shapes, and other drives."""
 
 import math
 from dataclasses import dataclass, replace
@@ -16,11 +16,9 @@ from cosserat_fenicsx.drilling.top_drive import Matched, Stiff, TopDrive
 from cosserat_fenicsx.quantities import Quantity
 from cosserat_fenicsx.results.result import Result, by_name
 
-#: A growth below this share of the root is rounding: a mode without losses.
+# Growth below this share of the root is rounding: a mode without losses.
 _NEUTRAL = 1e-11
-
-
-#: Points of Gauss in a part, beside those for its waves.
+# Gauss points in a part, beside those for its waves.
 _POINTS = 8
 
 
@@ -45,25 +43,21 @@ class ModeShape:
 
     @property
     def where(self) -> str:
-        """Where it moves, in words."""
-        return where(self.shares, self.lengths)
-
-
-def where(shares, lengths):
-    """The largest shares of the kinetic energy up to nine tenths; and the part where it is densest, with its length."""
-    words, covered = [], 0.0
-    for name, share in sorted(shares.items(), key=lambda item: -item[1]):
-        words.append(f"{name} {100 * share:.0f} %")
-        covered += share
-        if covered > 0.9 or len(words) == 3:
-            break
-    text, whole = ", ".join(words), sum(lengths.values())
-    parts = {name: shares.get(name, 0.0) / (length / whole) for name, length in lengths.items()}
-    densest = max(parts, key=parts.get, default=None)
-    if densest is None or parts[densest] < 2:
-        return text
-    share, length = 100 * shares[densest], 100 * lengths[densest] / whole
-    return f"{text}; densest in the {densest}: {share:.0f} % on {length:.0f} % of the length"
+        """The largest shares of the kinetic energy up to nine tenths, and the part where it is densest, in words."""
+        shares, lengths = self.shares, self.lengths
+        words, covered = [], 0.0
+        for name, share in sorted(shares.items(), key=lambda item: -item[1]):
+            words.append(f"{name} {100 * share:.0f} %")
+            covered += share
+            if covered > 0.9 or len(words) == 3:
+                break
+        text, whole = ", ".join(words), sum(lengths.values())
+        parts = {name: shares.get(name, 0.0) / (length / whole) for name, length in lengths.items()}
+        densest = max(parts, key=parts.get, default=None)
+        if densest is None or parts[densest] < 2:
+            return text
+        share, length = 100 * shares[densest], 100 * lengths[densest] / whole
+        return f"{text}; densest in the {densest}: {share:.0f} % on {length:.0f} % of the length"
 
 
 def shape_of(equation, s, points=200):
@@ -108,8 +102,8 @@ def _along(guide, s, points):
 
 
 def usual_drives(scene):
-    """{name: TopDrive} to compare with: others than that of the scene, those with an inertia where that has one; and
-    where `SoftTorque` or `SoftSpeed` chose its gains, the drive of the scene itself by the name of that rule."""
+    """{name: TopDrive} for comparison: drives other than the scene's, with an inertia where the scene's has one; and the
+    scene's own drive where `SoftTorque` or `SoftSpeed` chose its gains, by the name of that rule."""
     inertia, own = scene.drive.inertia, scene.drive.control
     drives = {} if own == Stiff() else {"stiff": TopDrive(0.0)}
     if scene.discs:
@@ -122,24 +116,6 @@ def usual_drives(scene):
     if own != Matched():
         drives["matched"] = TopDrive(0.0, control=Matched())
     return drives
-
-
-def growth_with(answer, i, j, drives=None):
-    """See `Stability.with_drives`."""
-    own, scene = answer.roots[i, j], answer.scene
-    case = answer.speeds[i], or_none(answer.weights[j])
-    found = {}
-    for name, drive in (usual_drives(scene) if drives is None else drives).items():
-        if (drive.control, drive.inertia) == (scene.drive.control, scene.drive.inertia):  # the modes as they are
-            found[name] = own.real.copy()
-            continue
-        steady = Steady(replace(scene, drive=drive))
-        f = steady.equation(steady.parameters(*case))
-        roots, _ = all_roots(f, box_up_to(steady, 2 * np.pi * answer.up_to)(f), f.spacing)
-        nearest = np.abs(roots.imag[:, None] - np.where(np.isfinite(own), own.imag, np.inf)[None, :]).argmin(axis=1)
-        growth = [roots.real[nearest == k].max(initial=-np.inf) for k in range(len(own))]
-        found[name] = np.where(np.isneginf(growth), np.nan, growth)
-    return found
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -174,7 +150,7 @@ class Stability(Result):
 
     @property
     def _found(self):
-        """Indices (speeds, weights, modes) of all roots that are known."""
+        """Indices (speeds, weights, modes) of all known roots."""
         return np.nonzero(np.isfinite(self.growth))
 
     def _about(self):
@@ -245,7 +221,7 @@ class Stability(Result):
         root = self.roots[i, j, k]
         if not np.isfinite(root):
             refuse("Stability", "shape", (k, i, j), "a case in which the mode is listed: its root is not NaN")
-        return shape_of(self._equation(i, j), root)
+        return shape_of(self._steady(i, j, self.scene)[1], root)
 
     def with_drives(self, i: int, j: int = 0, drives: dict | None = None) -> dict[str, np.ndarray]:
         """Growth of each mode at one speed and weight with other drives.
@@ -260,7 +236,17 @@ class Stability(Result):
             {name: (k,)}: 1/s, the largest growth of those modes whose frequency is nearest to that of mode k; NaN where
             the drive leaves none within the limits of the list.
         """
-        return growth_with(self, i, j, drives)
+        own, scene, found = self.roots[i, j], self.scene, {}
+        for name, drive in (usual_drives(scene) if drives is None else drives).items():
+            if (drive.control, drive.inertia) == (scene.drive.control, scene.drive.inertia):  # the modes as they are
+                found[name] = own.real.copy()
+                continue
+            steady, f = self._steady(i, j, replace(scene, drive=drive))
+            roots, _ = all_roots(f, box_up_to(steady, 2 * np.pi * self.up_to)(f), f.spacing)
+            nearest = np.abs(roots.imag[:, None] - np.where(np.isfinite(own), own.imag, np.inf)).argmin(axis=1)
+            growth = [roots.real[nearest == k].max(initial=-np.inf) for k in range(len(own))]
+            found[name] = np.where(np.isneginf(growth), np.nan, growth)
+        return found
 
     def plot(self, file: File | None = None, mode: int | None = None, *, units: Any = "SI", width: int | None = None):
         """Maps of the growth over speed and weight, of each mode that grows somewhere, or of one; over the speed alone
@@ -289,9 +275,10 @@ class Stability(Result):
         if not 0 <= k < self.roots.shape[2]:
             refuse("Stability", "mode", k, f"a number from 0 to {self.roots.shape[2] - 1}")
 
-    def _equation(self, i, j):
-        steady = Steady(self.scene)
-        return steady.equation(steady.parameters(self.speeds[i], or_none(self.weights[j])))
+    def _steady(self, i, j, scene):
+        """The `Steady` of a scene, and its equation in a case."""
+        steady = Steady(scene)
+        return steady, steady.equation(steady.parameters(self.speeds[i], or_none(self.weights[j])))
 
 
 def stability(
@@ -357,7 +344,7 @@ def highest(scene, modes, up_to):
 
 
 def _heights(found, cuts):
-    """What modes are numbered by: frequency without the bit's slope, later ones last; or that of the middle case."""
+    """Sort keys of modes: frequency without the bit's slope, later modes last; or the median frequency of all cases."""
     if cuts:
         return [float(np.median(column[np.isfinite(column)].imag)) for column in found.T]
     return np.where(np.isfinite(found[0]), found[0].imag, np.inf)
