@@ -1,4 +1,4 @@
-"""Numbers of a periodic motion of a bit: starts and stops, period and peaks, and their errors by the time step."""
+"""Starts, stops, period and peaks of the motion of a bit, and their errors by the time step."""
 
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -8,10 +8,9 @@ import numpy as np
 from cosserat_fenicsx.drilling.protocol import SERIES
 from cosserat_fenicsx.errors import NotConverged, SceneError
 
-#: The laws hold a bit at zero exactly: one whose speed is below this share of the drive's mean speed is at rest.
-AT_REST = 1e-6
-#: A bit that has started reaches this share of it.
-FAST = 0.5
+#: A bit below this share of the drive's mean speed is at rest (the laws hold it at zero exactly); a bit that has started
+#: reaches the share `FAST`.
+AT_REST, FAST = 1e-6, 0.5
 
 
 @dataclass(frozen=True)
@@ -66,16 +65,10 @@ class StickSlip:
 
 
 def crossings(times, speed, level, fast):
-    """Times (s) where a bit starts from rest, and where it comes to rest, interpolated.
+    """(starts, stops): interpolated times (s) at which a bit starts from rest, and comes to rest.
 
-    It rests up to the speed `level`. A start is the last rise above it before the speed `fast` is reached; between two
-    starts it comes to rest: where it creeps, or rises and falls back, there is no start.
-
-    Args:
-        times: (n,) s; speed: (n,) rad/s; level, fast: rad/s, positive.
-
-    Returns:
-        (starts, stops). What begins above the level has no start there.
+    It rests up to the speed `level` (rad/s). A start is the last rise above it before the speed `fast` (rad/s) is
+    reached: creep, or a rise that falls back, is no start, nor is the first of `times` (n,) above the level.
     """
     size = np.abs(speed)
     above = size > level
@@ -118,7 +111,7 @@ def _mean(values, lengths):
 
 
 _BIT, _DRIVE, _TORQUE = (1 + SERIES.index(name) for name in ("bit_speed", "drive_speed", "surface_torque"))
-# A step is longer than another one from so many times that on.
+# Least ratio of a longer step to the step of the motion.
 _LONGER = 1.499
 
 
@@ -156,20 +149,16 @@ def cycle_of(rows, since=0.0):
 
 
 def step_errors(dt, other_model, rows, since=0.0):
-    """Errors of the `Cycle` of a motion by its step, from a run with twice the step, which takes a quarter to a half
-    of the time.
+    """A `Cycle` of errors of a motion by its step, from a run with twice the step, in a quarter to half of the time.
 
-    Twice the difference of the two runs is returned: twice the error of the finer one where that is of the first order
-    in the step, six times where it is of the second. A motion that is not periodic, or a bit that sticks just so, may
-    depend on any step. Where a law of friction, or a mesh that is as coarse as it can be, allows no run with 1.5 times
-    the step, the other run is one with half of it, and takes two to four times the time.
+    The errors are twice the difference of the two runs: twice the error of the finer one where it is of first order in
+    the step, six times where it is of second order. A motion that is not periodic, or a bit that barely sticks, may
+    depend on any step. Where a law of friction or the coarsest mesh allows no run with 1.5 times the step, the other
+    run has half of it, and takes two to four times as long. NaN where no other run is possible.
 
     Args:
-        dt: step of the motion, s. other_model: function that returns a `StringModel` of it at rest, with so many times
-            that step. rows: of the motion, see `StringModel.advance`. since: see `cycle_of`.
-
-    Returns:
-        A `Cycle` of errors, all NaN where no other run was possible.
+        dt: step of the motion, s. other_model: function of the ratio of steps that returns a `StringModel` at rest.
+        rows: of the motion, see `StringModel.advance`. since: see `cycle_of`.
     """
     for factor in (2.0, 0.5):
         try:

@@ -11,7 +11,7 @@ Where the bit cuts, at the rotation Om and the rate of penetration V, with n bla
 which is s Za Zt + E (ka Zt - kt rho Za) = 0, Za and Zt with the mass and the inertia of the bit, ka and kt weight and
 torque per depth of cut. Both are written without denominators, as entire functions of s.
 
-`Steady` makes them of a scene; `box_up_to` is the part of the complex plane that is searched.
+`Steady` makes them from a scene; `box_up_to` is the searched part of the complex plane.
 """
 
 import math
@@ -151,11 +151,11 @@ class Regenerative:
         return self.torsion, self.axial
 
     def motion(self, s):
-        """Relative motion of the bit in each guide: rotation and axial velocity, (2,)."""
+        """Relative rotation and axial velocity of the bit, (2,)."""
         at = np.array([s], dtype=complex)
         (om, T, *_), (v, A, *_), (e, _, q) = self.torsion.bit(at), self.axial.bit(at), self._memory(at)
         rho = self.penetration / self.speed
-        # per unit of rotation, from the equation that is the better conditioned one of both
+        # per unit of rotation, from the better conditioned one of both equations
         axial, torsional = q * A / v + self.ka * e, q * T / om - self.kt * rho * e
         if abs(axial[0]) > abs(self.ka * e[0]) * 1e-6:
             return 1.0 + 0j, complex(self.ka * e[0] * rho / axial[0])
@@ -172,18 +172,18 @@ class Steady:
         SceneError: discs with a bit that cuts.
     """
 
-    def __init__(self, scene, drive=None):
+    def __init__(self, scene):
         self.scene = scene
         self.law = scene.bit.law if scene.bit else None
-        self.torsion = torsional(scene, drive)
+        self.torsion = torsional(scene)
         self.cuts = self.law is not None and self.law.drills
         self.axial = axial(scene) if self.cuts else None
 
     def parameters(self, speed, weight):
-        """What the equation depends on: (kappa,) or (rotation, rate of penetration), for a weight (N) or None.
+        """Parameters of the equation: (kappa,) or (rotation, rate of penetration), for a weight (N) or None.
 
         Raises:
-            SceneError: a weight that the bit lacks or does not reach; or a torque that falls too fast.
+            SceneError: a weight that is missing, or borne by wear flats; or a torque that falls too fast.
         """
         if self.cuts:
             return np.array([speed, self._penetration(speed, weight)])
@@ -201,7 +201,7 @@ class Steady:
         return np.array([kappa])
 
     def _penetration(self, speed, weight):
-        """V from the weight on bit, less that on wear flats; or from the speed of the hook."""
+        """V from the weight on bit less the load of wear flats; or from the speed of the hook."""
         if weight is None:
             hook = self.scene.hook
             rate = -hook.signal()(0.0) if hook is not None and hook.signal().constant else 0.0
@@ -247,7 +247,7 @@ def or_none(weight):
     return None if math.isnan(weight) else float(weight)
 
 
-#: How fast the modes that are listed may decay at most: by exp(-this) while a wave goes down the string once.
+# Modes that decay by more than exp(-this) while a wave goes down the string once are not listed.
 _DECAY = 4.0
 
 

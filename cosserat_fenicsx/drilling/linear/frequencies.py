@@ -6,11 +6,10 @@ At the lower end psi less the angle that its condition asks for grows with w, as
 frequency is where that is k pi. Each is enclosed by itself, so that the count is exact for any number of parts: the
 phase is the integer of Wittrick & Williams, Q. J. Mech. Appl. Math. 24 (1971) 263, doi:10.1093/qjmam/24.3.263.
 
-Gains of a speed control that swallows torsional waves. A drive of the gains Kp and Ki and the inertia I meets the
-string with the impedance I s + Kp + Ki/s. At the frequency sqrt(Ki/I) it is Kp alone, and what comes up the string is
-reflected by (Z - Kp)/(Z + Kp). So Ki = I w1^2 makes it a pure resistance in the first mode of the string that hangs
-from a drive at rest, and Kp chooses how much it swallows there; at higher frequencies the inertia takes over, and waves
-are reflected as by a drive that stands still.
+Gains of a speed control that absorbs torsional waves. A drive with the gains Kp and Ki and the inertia I has the
+impedance I s + Kp + Ki/s. At the frequency sqrt(Ki/I) it is Kp alone, and waves from below are reflected by (Z - Kp)/(Z
++ Kp). So Ki = I w1^2 makes it a pure resistance in the first mode of the string below a drive at rest, and Kp sets how
+much it absorbs there; at higher frequencies the inertia dominates, and waves are reflected as by a drive at rest.
 
 Both names stand for rules of choice, not for the settings of any product. A rule has one answer for a string: the mode
 is that of the string alone, whether a `DrillString` or a whole `Drilling` is given.
@@ -59,15 +58,13 @@ def natural_frequencies(scene: Drilling, count: int, bit: str = "free", kind: st
     if kind == "torsion" and scene.discs:
         return _of_discs(scene, bit)[:count]
     guide, top = (axial(scene), _hook(scene)) if kind == "axial" else (torsional(scene), _drive(scene))
-    found = _circular(guide, count, bit == "fixed", top) / (2 * math.pi)
-    return found
+    return _circular(guide, count, bit == "fixed", top) / (2 * math.pi)
 
 
 def _drive(scene):
     """tan psi at the top as (numerator, denominator) of w and the impedance."""
-    if scene.drive.speed is None:
-        return lambda w, Z: (Z, -scene.drive.inertia * w)
-    return lambda w, Z: (0.0, 1.0)
+    inertia = scene.drive.inertia
+    return (lambda w, Z: (Z, -inertia * w)) if scene.drive.speed is None else (lambda w, Z: (0.0, 1.0))
 
 
 def _hook(scene):
@@ -76,7 +73,7 @@ def _hook(scene):
 
 
 def phase(guide: Guide, w: float, fixed: bool, top) -> float:
-    """The angle at the lower end less the one that its condition asks for, rad; in a mode a multiple of pi."""
+    """The angle at the lower end less the angle of its condition, rad; a multiple of pi in a mode."""
     first = guide.parts[0].impedance
     psi = math.atan2(*top(w, first))
     for part, following in zip(guide.parts, (*guide.parts[1:], None), strict=True):
@@ -108,7 +105,7 @@ def _circular(guide, count, fixed, top):
 
 
 def _of_discs(scene, bit):
-    """Hz, of rotations that are not those of the whole string."""
+    """Hz, without the rotation of the whole string."""
     string = scene.string
     inertias = np.array(string.inertias)
     inertias[0] += scene.drive.inertia
@@ -126,7 +123,7 @@ def _of_discs(scene, bit):
 def SoftTorque(
     string: DrillString | Drilling | Any, inertia: float, depth: float | None = None, *, bit_inertia: float = 0.0
 ) -> PI:
-    """A control that takes all of the first mode: Kp = Z, Ki = I w1^2.
+    """A control that absorbs the first mode completely: Kp = Z, Ki = I w1^2.
 
     Usage: `TopDrive(speed, inertia=2900.0, control=SoftTorque(string, inertia=2900.0))`.
 
@@ -162,9 +159,8 @@ def SoftSpeed(
 
 def _matched(name, string, inertia, depth, bit_inertia):
     inertia = positive(name, "inertia", inertia, "kg m^2")
-    bit_inertia = number(
-        name, "bit_inertia", bit_inertia, "a number (kg m^2), not negative", lambda x: 0 <= x < math.inf
-    )
+    expected = "a number (kg m^2), not negative"
+    bit_inertia = number(name, "bit_inertia", bit_inertia, expected, lambda x: 0 <= x < math.inf)
     if isinstance(string, Drilling):
         string, depth = string.string, None if string.discs else string.bit_depth
     if isinstance(string, Discs):
@@ -183,5 +179,5 @@ def own_rule(scene):
 
 
 def with_rule(control: PI, rule: str) -> PI:
-    """The control of a rule, tuned to the same mode of the same string as one that has a rule, which may be itself."""
+    """The control of a rule for the string and the mode of another control that has a rule."""
     return control if rule == control.rule else PI(control.Kp * RULES[rule] / RULES[control.rule], control.Ki, rule)

@@ -42,8 +42,16 @@ class State:
         return self.times(1 / np.hypot(np.abs(impedance * self.w), np.abs(self.P)))
 
 
+class _Section:
+    """A part of a string between two sections, with `through`, `impedance` and `travel`."""
+
+    def down(self, s, state):
+        """The state at the lower end."""
+        return self.through(s, state).scaled(self.impedance)
+
+
 @dataclass(frozen=True)
-class Uniform:
+class Uniform(_Section):
     """A uniform part: length (m), stiffness (N m^2 or N), inertia (kg m or kg/m), drag (1/s), name."""
 
     length: float
@@ -62,12 +70,9 @@ class Uniform:
         """Time that a wave takes, s."""
         return self.length * np.sqrt(self.inertia / self.stiffness)
 
-    def down(self, s, state):
-        """The state at the lower end."""
-        return self.through(s, state, self.length).scaled(self.impedance)
-
-    def through(self, s, state, length):
-        """The state at a length (m) below the upper end, times exp(-Re(g length))."""
+    def through(self, s, state, length=None):
+        """The state at a length (m) below the upper end, by default the lower end, times exp(-Re(g length))."""
+        length = self.length if length is None else length
         square = self.inertia / self.stiffness * s * (s + self.drag)
         C, S, dC, dS = _hyperbolic(square, length)
         turn = self.inertia / self.stiffness * (2 * s + self.drag)  # derivative of the square
@@ -87,7 +92,7 @@ class Uniform:
         x = np.concatenate([self.length * (1 + nodes) / 2, np.linspace(0.0, self.length, places)])
         here = self.through(s, state, x).w * np.exp(self._decay(s, x))
         twice = self.inertia * self.length / 2 * float(weights @ np.abs(here[:points]) ** 2)
-        below = self.through(s, state, self.length).times(np.exp(self._decay(s, self.length)))
+        below = self.through(s, state).times(np.exp(self._decay(s, self.length)))
         return x[points:], here[points:], twice, below
 
     def _decay(self, s, length):
@@ -110,7 +115,7 @@ def _hyperbolic(square, length):
 
 
 @dataclass(frozen=True)
-class Disc:
+class Disc(_Section):
     """A disc (inertia, drag: N m s/rad) and the spring below it (N m/rad, N m s/rad; None below the last one)."""
 
     inertia: float
@@ -128,19 +133,14 @@ class Disc:
 
     @property
     def travel(self):
-        """The time that stands for that of a wave, s."""
+        """In place of the time of a wave, s."""
         return np.sqrt(self.inertia / self.spring) if self.spring else 0.0
 
-    def down(self, s, state):
-        """The state at the next disc, above it."""
-        return self.through(s, state).scaled(self.impedance)
-
     def along(self, s, state, points, places):
-        """See `Uniform.along`."""
         return np.zeros(1), state.w, self.inertia * abs(state.w[0]) ** 2, self.through(s, state)
 
     def through(self, s, state):
-        """The same in its own size."""
+        """The state above the next disc."""
         own = self.inertia * s + self.drag
         P, dP = state.P - own * state.w, state.dP - own * state.dw - self.inertia * state.w
         if self.spring is None:
@@ -156,12 +156,11 @@ class Disc:
 
 @dataclass(frozen=True)
 class Guide:
-    """A string for one kind of waves, with what holds its top and what inertia its lower end carries.
+    """A string as a waveguide, with the condition at its top and the inertia at its lower end.
 
     Attributes:
-        kind: "torsion" or "axial". parts: `Uniform` parts or `Disc`s from the top down. inertia: at the lower end
-        beyond that of the parts, kg m^2 or kg. top: function of s that gives (w, P) there and their derivatives.
-        top_inertia: kg m^2, of the drive.
+        kind: "torsion" or "axial". parts: `Uniform` parts or `Disc`s from the top down. inertia: of the bit, kg m^2 or
+        kg. top: function of s that gives (w, P) there and their derivatives. top_inertia: kg m^2, of the drive.
     """
 
     kind: str
@@ -193,7 +192,7 @@ class Guide:
         return state
 
     def bit(self, s):
-        """w at the bit and what must act on it, B = (Z + J s) w, with derivatives: (w, B, dw, dB)."""
+        """w at the bit, the action on it B = (Z + J s) w, and their derivatives: (w, B, dw, dB)."""
         end = self.bottom(s)
         return end.w, self.inertia * s * end.w - end.P, end.dw, self.inertia * (s * end.dw + end.w) - end.dP
 
@@ -212,7 +211,7 @@ def _free(s):
 
 
 def _drive_top(drive, impedance):
-    """What the drive does: (om, M) at the top and their derivatives, free of poles."""
+    """The condition of the drive: (om, M) at the top and their derivatives, free of poles."""
     (rigid, _, Kp, Ki), inertia = drive.control.gains(impedance), drive.inertia
     if rigid:
         return _held
@@ -221,11 +220,9 @@ def _drive_top(drive, impedance):
     return lambda s: (1.0, -(inertia * s + Kp), 0.0, -inertia)
 
 
-def torsional(scene, drive=None) -> Guide:
-    """The guide of torsional waves of a `Drilling` scene, with its drive or another one."""
-    drive = drive or scene.drive
-    bit = scene.bit.inertia if scene.bit else 0.0
-    string = scene.discs
+def torsional(scene) -> Guide:
+    """Torsional waveguide of a `Drilling` scene."""
+    drive, string, bit = scene.drive, scene.discs, scene.bit.inertia if scene.bit else 0.0
     if string:
         lower = zip((*string.stiffnesses, None), (*string.dampings, 0.0), strict=True)
         parts = tuple(
@@ -239,7 +236,7 @@ def torsional(scene, drive=None) -> Guide:
 
 
 def axial(scene) -> Guide:
-    """The guide of axial waves of a `Drilling` scene below its hook.
+    """Axial waveguide of a `Drilling` scene below its hook.
 
     Raises:
         SceneError: the string is made of discs, which turn alone.

@@ -13,14 +13,14 @@ from cosserat_fenicsx.drilling.linear.roots import all_roots
 from cosserat_fenicsx.drilling.scene import Drilling
 from cosserat_fenicsx.errors import NotConverged
 
-#: Degree of the polynomials that a piece of the imaginary axis is interpolated by, and how well they must do.
+# Degree of the polynomials on pieces of the imaginary axis; their largest relative error.
 _DEGREE, _RESOLVED = 24, 1e-11
 
 
 def critical_slopes(scene: Drilling, up_to: float = 10.0) -> tuple[np.ndarray, np.ndarray]:
     """All slopes of the bit's torque at which some mode neither grows nor decays.
 
-    Those of falling torque and of rising torque, where Im(Jb s + Z(s)) = 0 at s = i w: kappa = -Re Z.
+    Falling and rising torques, where Im(Jb s + Z(s)) = 0 at s = i w: kappa = -Re Z.
 
     Args:
         scene: a `Drilling`; its bit gives the inertia alone.
@@ -55,7 +55,7 @@ def critical_slopes(scene: Drilling, up_to: float = 10.0) -> tuple[np.ndarray, n
 
 
 def _real_roots(f, a, b, depth=0):
-    """All real roots of a smooth function in [a, b), as those of a polynomial that interpolates it."""
+    """All real roots of a smooth function in [a, b), by an interpolating polynomial."""
     series = chebyshev.chebinterpolate(lambda x: f((a + b) / 2 + (b - a) / 2 * x), _DEGREE)
     size = np.abs(series).max()
     if size == 0.0:
@@ -71,18 +71,18 @@ def _real_roots(f, a, b, depth=0):
     for x in roots:
         w, h = (a + b) / 2 + (b - a) / 2 * x, 1e-6 * (b - a)
         low, high = f(np.array([w - h, w + h]))
-        polished = brentq(lambda z: float(f(np.array([z]))[0]), w - h, w + h, xtol=1e-15 * b, rtol=1e-15) if (
-            low * high < 0) else w  # fmt: skip
-        if not found or polished - found[-1] > 1e-12 * b:
-            found.append(polished)
+        if low * high < 0:
+            w = brentq(lambda z: float(f(np.array([z]))[0]), w - h, w + h, xtol=1e-15 * b, rtol=1e-15)
+        if not found or w - found[-1] > 1e-12 * b:
+            found.append(w)
     return found
 
 
 def critical_slope(scene: Drilling, up_to: float = 10.0) -> tuple[float, float]:
     """(kappa, w): the largest critical slope (N m s/rad) and its circular frequency (rad/s), see `critical_slopes`.
 
-    A law whose torque falls less steeply leaves all modes up to that frequency decaying. Minus infinity where no slope
-    is critical up to there.
+    With a torque that falls less steeply all modes up to that frequency decay. Minus infinity where no slope is
+    critical.
     """
     frequencies, slopes = critical_slopes(scene, up_to)
     if not len(slopes):  # nothing to lose in so narrow a band
@@ -146,10 +146,7 @@ def limit_speed(
     up_to = positive("limit_speed", "up_to", up_to, "Hz")
     if scene.bit is None:
         refuse(scene, "bit", None, "a BitOnRock with a law")
-    if weight is None:
-        weight = scene.bit.weight
-    else:
-        weight = positive("limit_speed", "weight", weight, "N")
+    weight = scene.bit.weight if weight is None else positive("limit_speed", "weight", weight, "N")
     steady = Steady(scene)
     if steady.cuts:
         return _limit_of_cutting(steady, weight, up_to, between, points)

@@ -65,10 +65,7 @@ class LumpedCutting(Part):
         reach += math.sqrt(2 * n * self.psi) + math.sqrt(2 * n * rho) + 1
         up_to = reach if up_to is None else positive("LumpedCutting", "up_to", up_to, "number")
         spacing = min(1.0, n * rotation)
-        return self._sorted(*all_roots(self._equation(rotation), Box(-1.0, reach, 0.0, up_to), spacing))
-
-    @staticmethod
-    def _sorted(roots, _):
+        roots, _ = all_roots(self._equation(rotation), Box(-1.0, reach, 0.0, up_to), spacing)
         roots = roots[np.abs(roots) > 1e-9]
         return roots[np.argsort(-roots.real, kind="stable")]
 
@@ -84,6 +81,11 @@ class LumpedCutting(Part):
         low, high = positive("LumpedCutting", "low", low, "number"), positive("LumpedCutting", "high", high, "number")
         if low >= high:
             refuse("LumpedCutting", "high", high, f"more than low, {low:g}")
+
+        def growth(rotation, nth):
+            roots = self.roots(rotation)
+            return float(roots.real[nth]) if nth < len(roots) else -1.0
+
         rotations = np.geomspace(low, high, points)
         spectra = [self.roots(x) for x in rotations]
         found = []
@@ -91,12 +93,8 @@ class LumpedCutting(Part):
             before, after = (int((s.real > 0).sum()) for s in spectra[k : k + 2])
             if before != after:
                 nth = min(before, after)  # in the order of growth
-                found.append(brentq(lambda x, nth=nth: self._growth(x, nth), *rotations[k : k + 2], xtol=1e-13))
+                found.append(brentq(growth, *rotations[k : k + 2], (nth,), xtol=1e-13))
         return np.array(found)
-
-    def _growth(self, rotation, nth):
-        roots = self.roots(rotation)
-        return float(roots.real[nth]) if nth < len(roots) else -1.0
 
     def _equation(self, rotation):
         n, psi, rho, tau = self.blades, self.psi, self.penetration / rotation, 2 * math.pi / (self.blades * rotation)

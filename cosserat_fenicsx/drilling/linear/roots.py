@@ -4,7 +4,7 @@ Functions are real on the real axis: their roots are real or pairs, of which tho
 take s (n,) and return (f, f') scaled by any positive factors (n,): phases and f'/f are what is used. Where they grow
 like exp(a s) to the left and exp(b s) to the right, they say so by an attribute `exponents` = (a, b), s.
 
-`follow` follows them from one case to the next, each in a column of its own, with all roots of every case counted.
+`follow` continues them from one case to the next, each in a column of its own, with all roots of every case counted.
 """
 
 import math
@@ -15,33 +15,14 @@ import numpy as np
 from cosserat_fenicsx.errors import NotConverged
 
 
-@dataclass(frozen=True)
-class _Settings:
-    """Settings of the search for roots.
-
-    Attributes:
-        turn: largest change of phase from point to point of a contour, rad. mismatch: from that foretold by the
-            derivatives, rad. reach: largest step, over the distance of a single root with the same derivative.
-        near: a contour that comes as near to a root as this share of its size is moved.
-        steps: of Newton's method at most. settled: relative step at which it stops. rounding: the same where steps no
-            longer fall.
-        far: share of the distance of roots beyond which one is followed in smaller steps, halved `halvings` times.
-        same: roots nearer to each other than this share of their size are one.
-    """
-
-    turn: float = 1.0
-    mismatch: float = 0.3
-    reach: float = 1.5
-    near: float = 1e-9
-    steps: int = 60
-    settled: float = 1e-14
-    rounding: float = 1e-11
-    far: float = 0.25
-    halvings: int = 7
-    same: float = 1e-8
-
-
-_SETTINGS = _Settings()
+# Contours: largest change of phase between points, rad; its largest misfit to the derivatives, rad; largest step over the
+# distance of a single root with the same derivative; distance of a root, over their size, at which they are moved.
+_TURN, _MISMATCH, _REACH, _NEAR = 1.0, 0.3, 1.5, 1e-9
+# Newton's method: most steps, relative step at which it stops, and where steps no longer fall.
+_STEPS, _SETTLED, _ROUNDING = 60, 1e-14, 1e-11
+# Roots that move by more than this share of their distance are followed in halved steps, so often at most; roots nearer
+# to each other than the last share of their size are one.
+_FAR, _HALVINGS, _SAME = 0.25, 7, 1e-8
 
 
 @dataclass(frozen=True)
@@ -62,7 +43,7 @@ class Box:
         return (s.real > self.left) & (s.real < self.right) & (s.imag >= self.bottom) & (s.imag < self.top)
 
     def near(self, s, margin):
-        """Whether a root is inside, or not farther outside than a margin."""
+        """Whether a root is inside, or outside by less than a margin."""
         return (self.left - margin < s.real < self.right + margin) and s.imag < self.top + margin
 
     def halves(self, share):
@@ -81,7 +62,7 @@ class OnContour(Exception):
 def turns(f, corners, spacing):
     """Change of the phase of f along straight lines from corner to corner, rad.
 
-    Intervals are halved until the phase turns by less than a limit in each, as the derivatives at both ends foretell,
+    Intervals are halved until the phase turns by less than a limit in each, as the derivatives at both ends predict,
     and until no root can be as near as the interval is long.
 
     Raises:
@@ -91,19 +72,19 @@ def turns(f, corners, spacing):
     for a, b in zip(corners[:-1], corners[1:], strict=True):
         s = a + (b - a) * _shares(a, b, spacing)
         value, derivative = f(s)
-        least = _SETTINGS.near * max(abs(x - y) for x in corners for y in corners)
+        least = _NEAR * max(abs(x - y) for x in corners for y in corners)
         while True:
             if not np.all(value != 0):
                 raise OnContour
             change = np.angle(value[1:] / value[:-1])
             log = derivative / value
             step = np.diff(s)
-            foretold = ((log[1:] + log[:-1]) / 2 * step).imag
+            predicted = ((log[1:] + log[:-1]) / 2 * step).imag
             # beside two roots that are close to each other the phase turns by 2 pi, of which nothing is seen at points
             # on both sides: the size of the logarithmic derivative says how near roots are
             near = np.abs(log - _rate(f, s))
-            rough = (np.abs(change) > _SETTINGS.turn) | (np.abs(change - foretold) > _SETTINGS.mismatch)
-            rough |= np.maximum(near[1:], near[:-1]) * np.abs(step) > _SETTINGS.reach
+            rough = (np.abs(change) > _TURN) | (np.abs(change - predicted) > _MISMATCH)
+            rough |= np.maximum(near[1:], near[:-1]) * np.abs(step) > _REACH
             if not rough.any():
                 break
             where = np.flatnonzero(rough)
@@ -118,7 +99,7 @@ def turns(f, corners, spacing):
 
 
 def _shares(a, b, spacing):
-    """Where a straight contour begins to be sampled, from 0 to 1: evenly, but coarser far from the imaginary axis."""
+    """Initial samples of a straight contour, from 0 to 1: even, but coarser far from the imaginary axis."""
     if a.imag != b.imag or max(abs(a.real), abs(b.real)) < 20 * spacing:
         return np.linspace(0.0, 1.0, 2 + math.ceil(abs(b - a) / spacing))
     low, high = np.arcsinh(np.array([a.real, b.real]) / (10 * spacing))
@@ -152,7 +133,7 @@ def each(f, starts, stride):
     """
     s = np.array(starts, dtype=complex)
     size, open_ = np.full(len(s), np.inf), np.arange(len(s))
-    for _ in range(_SETTINGS.steps):
+    for _ in range(_STEPS):
         if not open_.size:
             break
         here = s[open_]
@@ -165,13 +146,13 @@ def each(f, starts, stride):
         s[open_] = here + step * np.minimum(1.0, longest / np.maximum(length, 1e-300))
         size[open_] = length
         scale = np.maximum(np.abs(here), stride * 1e-3)
-        done = (length <= _SETTINGS.settled * scale) | ((length <= _SETTINGS.rounding * scale) & (length >= before / 4))
+        done = (length <= _SETTLED * scale) | ((length <= _ROUNDING * scale) & (length >= before / 4))
         open_ = open_[~done]
-    return np.where(size <= _SETTINGS.rounding * np.maximum(np.abs(s), stride * 1e-3), s, np.nan)
+    return np.where(size <= _ROUNDING * np.maximum(np.abs(s), stride * 1e-3), s, np.nan)
 
 
 def _rate(f, s):
-    """The rate at which f grows like exp(rate s) on either side, which Newton's method is relieved of."""
+    """The rate of the exponential growth of f on either side, which Newton's method divides out."""
     left, right = getattr(f, "exponents", (0.0, 0.0))
     rate = np.where(s.real < 0, left, right)
     return rate * np.tanh(np.abs(s.real * rate))
@@ -278,12 +259,9 @@ def follow(equation, points, parents, box, spacing):
     """The roots of a family of functions at many points, each mode in a column of its own.
 
     Args:
-        equation: function of the parameters (d,) that returns a characteristic function.
-        points: (n, d).
-        parents: for each point the indices of those before it from which modes are followed to it, the first one first;
-            none for the first point.
-        box: function of a characteristic function that gives the `Box`.
-        spacing: typical distance of roots, rad/s.
+        equation: function of the parameters (d,) that returns a characteristic function. points: (n, d) parameters.
+        parents: for each point, in order of preference, the indices of earlier points from which modes are followed.
+        box: function of a characteristic function that gives the `Box`. spacing: typical distance of roots, rad/s.
 
     Returns:
         (n, m) complex; NaN where a mode is outside the box. Modes that come into the box add columns.
@@ -313,7 +291,7 @@ def follow(equation, points, parents, box, spacing):
 
 
 def _moved(equation, start, end, roots, spacing, depth=0):
-    """Roots by name, followed by Newton's method from one point to another, without those that are lost."""
+    """Roots by name, followed by Newton's method from one point to another, without lost ones."""
     names = list(roots)
     if not names:
         return {}
@@ -321,21 +299,21 @@ def _moved(equation, start, end, roots, spacing, depth=0):
     new = each(equation(end), old, spacing / 2)
     new = np.where(new.imag < 0, new.conj(), new)
     apart = np.abs(new[:, None] - new[None, :]) + np.diag(np.full(len(new), np.inf))
-    safe = np.isfinite(new) & (np.abs(new - old) < _SETTINGS.far * np.maximum(spacing, np.abs(old.real)))
-    safe &= ~(apart < _SETTINGS.same * np.abs(new)[:, None]).any(axis=1)
+    safe = np.isfinite(new) & (np.abs(new - old) < _FAR * np.maximum(spacing, np.abs(old.real)))
+    safe &= ~(apart < _SAME * np.abs(new)[:, None]).any(axis=1)
     moved = {name: s for name, s, good in zip(names, new, safe, strict=True) if good}
     rest = {name: roots[name] for name in names if name not in moved}
-    if rest and depth < _SETTINGS.halvings:
+    if rest and depth < _HALVINGS:
         middle = (start + end) / 2
         half = _moved(equation, start, middle, rest, spacing, depth + 1)
         for name, s in _moved(equation, middle, end, half, spacing, depth + 1).items():
-            if all(abs(s - other) > _SETTINGS.same * abs(s) for other in moved.values()):
+            if all(abs(s - other) > _SAME * abs(s) for other in moved.values()):
                 moved[name] = s
     return moved
 
 
 def _named(found, here, lost, spacing, following):
-    """The roots of a case by name: those that were followed, then those near where one was lost, then new ones."""
+    """The roots of a case by name: followed ones, then those near a lost one, then new ones."""
     row, free = {}, list(range(len(found)))
     for name, s in here.items():
         near = [k for k in free if abs(found[k] - s) < 1e-7 * max(abs(s), 1e-3)]

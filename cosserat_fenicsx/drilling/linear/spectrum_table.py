@@ -1,4 +1,4 @@
-"""A `Stability` as a table for the screen."""
+"""The table of a `Stability` on the screen, and sentences on it."""
 
 import math
 
@@ -7,7 +7,7 @@ from rich.table import Table
 
 from cosserat_fenicsx.drilling.linear.frequencies import own_rule
 
-#: Modes that are listed with their places and drives, the fastest ones.
+# Number of the fastest modes that are listed with their places and drives.
 _LISTED = 12
 _DRIVES = {
     "stiff": "it turns at the speed asked for",
@@ -18,11 +18,10 @@ _DRIVES = {
 
 
 class Growing:
-    """The modes of a `Stability` that grow: where they move, in how many cases, and what other drives make of them."""
+    """The growing modes of a `Stability`: where they move, in how many cases, and their growth with other drives."""
 
     def __init__(self, answer):
         self.answer, self.rows, known = answer, [], {}
-        self.count = 0
         grows = [k for k in range(answer.roots.shape[2]) if (answer.growth[:, :, k] > 0).any()]
         grows.sort(key=lambda k: -np.nanmax(answer.growth[:, :, k]))
         self.count = len(grows)
@@ -34,7 +33,7 @@ class Growing:
         self.names, self.own = list(self.rows[0][3]) if self.rows else [], own_rule(answer.scene)
 
     def in_words(self):
-        """Sentences: what was looked for, whether a mode grows, and what each drive calms."""
+        """Sentences: the cases, whether a mode grows, and the effect of each drive."""
         answer = self.answer
         yield f"{_range(answer)}, all modes up to {answer.up_to:.4g} Hz."
         yield from (f"{caution}." for caution in answer.cautions)
@@ -49,7 +48,7 @@ class Growing:
 
     @property
     def more(self):
-        """Sentences of `details`: what the columns mean, and where the modes move."""
+        """Sentences of `details`: the meaning of the columns, and where the modes move."""
         if not self.rows:
             return
         drive = self.own or type(self.answer.scene.drive.control).__name__
@@ -82,7 +81,7 @@ class Growing:
 
 
 def _words(names):
-    """What other drives are, and why some are missing."""
+    """Descriptions of other drives, and why some are missing."""
     told = [f"{name}, {_DRIVES[name]}" for name in names if name in _DRIVES]
     if "SoftTorque" not in names and "SoftSpeed" not in names:
         told.append("SoftTorque and SoftSpeed are compared where the drive has an inertia")
@@ -90,14 +89,14 @@ def _words(names):
 
 
 def _middle(answer, k):
-    """(i, j) of the middle one, by growth, of the cases in which a mode grows."""
+    """(i, j) of the case of median growth among those in which a mode grows."""
     i, j = np.nonzero(answer.growth[:, :, k] > 0)
     middle = np.argsort(answer.growth[i, j, k])[len(i) // 2]
     return int(i[middle]), int(j[middle])
 
 
 def _advice(answer, rows, names):
-    """What each drive calms and what it leaves."""
+    """Sentences on the modes that each drive damps, and those that still grow."""
     for name in names:
         calmed = [row for row in rows if not row[3][name] > 0]
         left = [row for row in rows if row[3][name] > 0]
