@@ -5,7 +5,7 @@ import pytest
 from fake_string import scene, use
 
 import cosserat_fenicsx as cf
-from cosserat_fenicsx.drilling.tables import advance_unit
+from cosserat_fenicsx.drilling.charts import advance_unit
 
 pytest.importorskip("matplotlib")
 pytestmark = [pytest.mark.serial, pytest.mark.once]

@@ -16,7 +16,7 @@ from cosserat_fenicsx.drilling.choose import chosen, model_of
 from cosserat_fenicsx.drilling.motion import KIND, check_arguments
 from cosserat_fenicsx.drilling.scenefile import SimulateDrilling
 from cosserat_fenicsx.drilling.segments import Discs
-from cosserat_fenicsx.drilling.tables import turns
+from cosserat_fenicsx.drilling.stick_slip import turns
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.storage.store import Store, holds
 

@@ -7,8 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from cosserat_fenicsx.checks import finite_array, number, positive, refuse
-from cosserat_fenicsx.drilling.stick_slip import AT_REST
-from cosserat_fenicsx.drilling.tables import advance_unit, alias, turns
+from cosserat_fenicsx.drilling.stick_slip import AT_REST, alias, turns
 from cosserat_fenicsx.drilling.top_drive import PI
 from cosserat_fenicsx.errors import SceneError, nearest
 from cosserat_fenicsx.pictures.animation import MOST_FRAMES, check_name, record
@@ -84,6 +83,11 @@ def bands(times, *lines):
     ends = np.append(edges[1:], len(times)) - 1
     extremes = [(np.minimum.reduceat(line, edges), np.maximum.reduceat(line, edges)) for line in lines]
     return (times[edges] + times[ends]) / 2, extremes
+
+
+def advance_unit(metres):
+    """(unit, factor from m) of a displacement: mm up to a metre."""
+    return ("m", 1.0) if np.nan_to_num(np.abs(metres)).max(initial=0.0) >= 1 else ("mm", 1e3)
 
 
 def swings(values):

@@ -5,19 +5,18 @@ from typing import Any
 import numpy as np
 
 from cosserat_fenicsx.checks import File, number
-from cosserat_fenicsx.drilling import tables
 from cosserat_fenicsx.drilling.protocol import LEDGER, PROFILE, SERIES
 from cosserat_fenicsx.drilling.scene import Drilling
 from cosserat_fenicsx.drilling.segments import Discs
-from cosserat_fenicsx.drilling.stick_slip import StickSlip, stick_slip_of
+from cosserat_fenicsx.drilling.stick_slip import StickSlip, alias, stick_slip_of
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.quantities import Quantity
+from cosserat_fenicsx.results import screen
 from cosserat_fenicsx.results.result import Result, by_name
+from cosserat_fenicsx.units import rpm
 
-#: Columns of the rows that a `StringModel` gives.
+#: Columns of the rows of a `StringModel`.
 COLUMNS = ("times", *SERIES, *LEDGER)
-
-
 _TIME, _ALONG = ("time",), ("profile_time", "depth")
 _QUANTITIES = by_name(
     Quantity("time", unit="s", axes=_TIME, getter="times"),
@@ -46,6 +45,16 @@ _QUANTITIES = by_name(
     Quantity("tension", "tension along the string", "N", axes=_ALONG),
     Quantity("sticking", "1 where the wall holds the string", axes=_ALONG, getter=lambda x: x.sticking.astype(np.int8)),
 )  # fmt: skip
+
+
+# Quantities of the table beside the time; its rows in `details`.
+_SHOWN = ("drive_speed", "bit_speed", "surface_torque", "torque_on_bit", "hook_load", "weight_on_bit", "bit_advance")
+_ROWS = 16
+_CAPTION = (
+    "A row holds for the end of a step, forces and torques in it are means over the step, or of torsion alone over two "
+    "(at the first one, the time before the start counts with zero): history.mean_times. The motion begins at t = 0, "
+    "and ends with the step that reaches its duration."
+)
 
 
 class DrillingHistory(Result):
@@ -116,7 +125,7 @@ class DrillingHistory(Result):
         return self._pieces[0]
 
     def _along(self):
-        """(k, 1 + len(PROFILE) m) all profiles, joined once."""
+        """(k, 1 + len(PROFILE) m) all profiles."""
         if len(self._profiles) > 1:
             self._profiles = [np.concatenate(self._profiles)]
         return self._profiles[0]
@@ -149,12 +158,10 @@ class DrillingHistory(Result):
 
     @property
     def balance(self) -> np.ndarray:
-        """(n,) what the ledger does not account for, J: energies and losses less works, the loss of the scheme with
-        the sign turned; of a motion that starts in steady rotation, less that of the first time, which has the energy
-        that it starts with."""
-        ledger = {name: np.nan_to_num(getattr(self, name)) for name in LEDGER}
-        works = sum(values for name, values in ledger.items() if name.startswith("work"))
-        missing = sum(values for name, values in ledger.items() if not name.startswith("work")) - works
+        """(n,) residual of the ledger, J: energies and losses less works, the negative loss of the scheme. Of a motion
+        that starts in steady rotation, less its first value, the initial energy."""
+        signs = {name: -1 if name.startswith("work") else 1 for name in LEDGER}
+        missing = sum(sign * np.nan_to_num(getattr(self, name)) for name, sign in signs.items())
         return missing - missing[:1] if self.scene.start == "steady" else missing
 
     def stick_slip(self, since: float | None = None) -> StickSlip:
@@ -179,13 +186,45 @@ class DrillingHistory(Result):
         return {"kind": "DrillingHistory", "model": self.model, "why": self.why, "dt": self.dt}
 
     def _answer(self, units):
-        return tables.answer_in_words(self)
+        if len(self) > 5:
+            yield str(self.stick_slip())
+        if self.errors is not None:
+            period, peak, *torques = self.errors
+            first = "" if np.isnan(period) else f"period {period:.2g} s, "
+            yield (
+                f"Estimated errors by the step: {first}peak {peak / rpm:.2g} rpm, surface torque "
+                f"{max(torques) / 1e3:.2g} kN m."
+            )
+        caution = alias(self)
+        if caution:
+            yield f"{caution[0].upper()}{caution[1:]}."
+        yield from self.why[:1]
 
     def _more(self, units):
-        return tables.more_in_words(self)
+        if len(self) > 5:
+            worked = {name: np.nan_to_num(getattr(self, f"work_of_{name}")[-1]) for name in ("drive", "hook", "weight")}
+            done = ", ".join(f"of the {name} {x / 1e3:.5g} kJ" for name, x in worked.items() if x or name == "drive")
+            yield f"Energy: work {done}; the ledger does not account for {self.balance[-1] / 1e3:.3g} kJ."
+        impulse = np.nan_to_num(self.impulse_on_bit)
+        if len(impulse) and impulse[-1]:
+            each = np.diff(impulse, prepend=0.0)
+            yield (
+                f"Impacts of the bit on rigid rock: the largest impulse {each.max():.4g} N s, at t = "
+                f"{self.times[each.argmax()]:.5g} s, together {impulse[-1]:.4g} N s; the weight on bit is without them."
+            )
+        yield from self.why[1:]
 
     def _table(self, units, rows):
-        return tables.over_time(self, units, rows) if len(self) else None
+        if not len(self):
+            return None
+        halved = self.counts.get("halved", 0)
+        parts = f", {halved} times halved where the motion needs it" if halved else ""
+        given = [
+            (self.quantities[name], getattr(self, name)) for name in _SHOWN if not np.isnan(getattr(self, name)).all()
+        ]
+        given = [(self.quantities["time"], self.times), *given]
+        return screen.table(given, units, min(rows, _ROWS), f"{self.model} model, steps of {self.dt:.4g} s{parts}",
+                            _CAPTION if rows == screen.ROWS else None)  # fmt: skip
 
     # -- pictures ----------------------------------------------------------------------------------------------------
 

@@ -1,9 +1,9 @@
-"""Laws of friction, at the wall and at the bit: what resists a slip.
+"""Laws of friction, at the wall and at the bit.
 
-A law resists with anything up to R(0) while nothing slips, and with R(s) against a slip s > 0, a speed. Models ask laws
-for a `Resistance`: the exponential law in closed form, or any other one as a function in Python. C sees it as a small
-record (strings.h), with the function called at one place, such as the bit, or sampled for many, such as the wall. The
-linear theory takes its slope.
+The resistance is anything up to R(0) at rest, and R(s) against a slip speed s > 0. Models ask laws for a `Resistance`:
+the exponential law in closed form, or any other one as a function in Python. C sees it as a small record (strings.h);
+it calls the function at one place, such as the bit, or samples it for many, such as the wall. The linear theory takes
+the slope.
 """
 
 import functools
@@ -20,11 +20,11 @@ from scipy.optimize import brentq
 from cosserat_fenicsx.checks import call, number
 from cosserat_fenicsx.errors import SceneError
 
-#: Of the models of strings in C.
+#: C sources of the models of strings.
 SOURCES = tuple(Path(__file__).with_name(f"{name}.c") for name in ("strings", "waves", "elements", "step"))
 #: Slips at which functions are sampled, 128 a decade: the error of a smooth law is about 1e-9 of it.
 SLIPS = np.geomspace(1e-6, 1e3, 9 * 128 + 1)
-# Relative step of slopes by differences; of a drop, the share of the change between neighbours that stays.
+# Relative step of slopes by differences; share of the change between neighbours that is left of a drop; bisections.
 _STEP, _STAYS, _HALVINGS = 1e-5, 0.5, 45
 
 
@@ -33,8 +33,8 @@ class Resistance:
     """R(s) = slipping + (still - slipping) exp(-s/decay), anything up to `still` at rest; or a function.
 
     Attributes:
-        still: largest resistance at rest, N m or a coefficient of friction. slipping: that of fast slip; of a function
-            that just beyond the rest. decay: speed; 0 where the resistance drops at once, and for a function.
+        still: largest resistance at rest, N m or a coefficient of friction. slipping: resistance to fast slip; of a
+            function just above rest. decay: speed; 0 where the resistance drops at once, and for a function.
         function: R(s) for a number s above 0, m/s or rad/s. fall: its steepest fall where it is continuous. drops:
             whether it drops at some speed.
     """
@@ -63,16 +63,16 @@ class Resistance:
 
     @property
     def kinetic(self) -> float:
-        """That of fast slip; of a function that at 1 m/s, or 1 rad/s."""
+        """Resistance to fast slip; of a function at 1 m/s or 1 rad/s."""
         return self.slipping if self.function is None else self.function(1.0)
 
     @property
     def steepest(self) -> float:
-        """The steepest fall, -dR/ds, of where it does not drop at once."""
+        """The steepest fall, -dR/ds, where it does not drop at once."""
         return (self.still - self.slipping) / self.decay if self.decay > 0 else self.fall
 
     def slowest_with(self, slope: float) -> float:
-        """The slip from which on R falls less steeply than a slope, negative; 0 where it does so everywhere."""
+        """The slip above which R falls less steeply than a (negative) slope; 0 where it does so everywhere."""
         if self.steepest <= -slope:
             return 0.0
         if self.function is None:
@@ -153,14 +153,14 @@ def _steepest_fall(function, values):
 
 
 class InC:
-    """A `Resistance` for C, with what C refers to.
+    """A `Resistance` for C, with the memory that C refers to.
 
     Args:
-        ffi: of the module in C. resistance: see there. function: of slip (a number) and load (N), which C calls for
-            every value; None: the resistance's own function, if it has one, is sampled.
+        ffi: of the module in C. resistance: the `Resistance`. function: of slip (a number) and load (N), which C calls
+            for every value; None to sample the resistance's own function, if it has one.
 
     Attributes:
-        failure: the exception that has ended the last call of the function, if any.
+        failure: the exception that ended the last call of the function, if any.
     """
 
     def __init__(self, ffi, resistance: Resistance, function=None):
@@ -219,16 +219,13 @@ def _answers(ffi):
 def refuse_several_speeds(slope: float, impedance: float, inertia: float, where: str = "") -> None:
     """Refuse a bit whose torque falls faster than the string can follow.
 
-    A wave that arrives at the lower end, where there is no inertia, meets the condition T(om) + Z om = 2 M_in, with the
-    impedance Z of the lowest section, J sqrt(G rho), and the torque M_in of the wave. Where the torque T of the bit
-    falls faster than Z om grows, several speeds satisfy it, and the linear theory has unstable roots at all
-    frequencies.
+    Without inertia at the lower end, a wave with the torque M_in meets T(om) + Z om = 2 M_in, Z the impedance of the
+    lowest section. Where the torque T of the bit falls faster than Z om grows, several speeds satisfy it, and the
+    linear theory has unstable roots at all frequencies.
 
     Args:
-        slope: dT/dom, N m s/rad; only a falling one, negative, can be refused.
-        impedance: of the string at the bit, N m s/rad: J sqrt(G rho) of its lowest section, or that of one time step.
-        inertia: at the bit, kg m^2; with any, the speed is single-valued.
-        where: at which speed and weight, such as " at 3 rad/s".
+        slope: dT/dom, N m s/rad, negative where the torque falls. impedance: Z, J sqrt(G rho), N m s/rad.
+        inertia: at the bit, kg m^2; with any, the speed is single-valued. where: words, such as " at 3 rad/s".
 
     Raises:
         SceneError: -slope is not below the impedance, and there is no inertia.
@@ -242,10 +239,7 @@ def refuse_several_speeds(slope: float, impedance: float, inertia: float, where:
 
 
 def check_bit(scene) -> None:
-    """Refuse the bit of a `Drilling` scene whose law is at its steepest, at slow rotation, too steep for the string.
-
-    A torque that drops at once from the static to the dynamic one passes: there the bit sticks until the static torque
-    is reached, and slips with the dynamic one.
+    """Refuse a bit of a `Drilling` whose law falls too steeply at slow rotation; a torque that drops at once passes.
 
     Raises:
         SceneError: see `refuse_several_speeds`.

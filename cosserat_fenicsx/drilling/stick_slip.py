@@ -110,6 +110,22 @@ def _mean(values, lengths):
     return float((lengths @ (values[1:] + values[:-1])) / 2 / lengths.sum())
 
 
+def alias(history):
+    """A caution where profiles are further apart than half the period of stick-slip; else ""."""
+    if len(history) <= 5 or len(history.profile_times) < 3:
+        return ""
+    apart, period = float(np.diff(history.profile_times).max()), history.stick_slip().period
+    if not apart > period / 2:  # also where there is none
+        return ""
+    return (f"profiles are {apart:.3g} s apart, and the period of stick-slip is {period:.3g} s: maps and films show a "
+            f"pattern that is not there; profile_every = {period / 10:.2g} (s) avoids it")  # fmt: skip
+
+
+def turns(history):
+    """Whether drive or bit turn."""
+    return bool(np.any(history.drive_speed) or np.any(history.bit_speed))
+
+
 _BIT, _DRIVE, _TORQUE = (1 + SERIES.index(name) for name in ("bit_speed", "drive_speed", "surface_torque"))
 # Least ratio of a longer step to the step of the motion.
 _LONGER = 1.499
