@@ -155,54 +155,35 @@ static double threshold(const model *m, int i, int mask, const friction *f)
     return (m->held[i] & mask) == mask && !m->broken[i] ? f->still : f->slipping;
 }
 
-static double wall(model *m, int i)
+/* Linearise the law of friction of a node against its slip: r times its rotation, and with it its axial velocity along
+   the wall (`mask` of both unknowns). Returns the difference to the slip that belongs to tau. */
+static double friction_at(model *m, int i, const friction *law, double r, int mask)
 {
-    const int n = m->dofs;
-    const friction law = law_on_wall(m, i);
-    const double r = m->limit[3 * (size_t)i + 2];
-    const double s[2] = {n == 2 ? m->w[2 * i] : 0, r * m->w[i * n + n - 1]};
-    const double *F = m->force + (size_t)i * n;
-    double rho = m->rho[i * n + n - 1] / (r * r), *d = m->d + 3 * (size_t)i, *c = m->c + (size_t)i * n;
-    if (n == 2) rho = fmin(rho, m->rho[2 * i]);
-    rho *= m->ease;
-    rho = fmax(rho, 2 * fall(&law));
-    const double tau[2] = {n == 2 ? F[0] + rho * s[0] : 0, F[n - 1] + rho * s[1]};
+    const int n = m->dofs, along = mask & AXIAL, j = i * n + n - 1;
+    const double s[2] = {along ? m->w[2 * i] : 0, r * m->w[j]};
+    double rho = m->rho[j] / (r * r), *d = m->d + 3 * (size_t)i;
+    if (along) rho = fmin(rho, m->rho[2 * i]);
+    rho = fmax(m->ease * rho, 2 * fall(law));
+    const double tau[2] = {along ? m->force[2 * i] + rho * s[0] : 0, m->force[j] + rho * s[1]};
     const double size = length(tau[0], tau[1]);
-    const int both = n == 2 ? AXIAL | TURN : TURN;
-    if (size <= threshold(m, i, both, &law)) {
-        m->mask[i] |= both;
+    if (size <= threshold(m, i, mask, law)) {
+        m->mask[i] |= mask;
         return length(s[0], s[1]);
     }
     m->broken[i] = 1;
     double R, falling;
-    const double sigma = slides(&law, rho, size, &R, &falling, &m->inner);
-    const double turning = n == 2 ? R / fmax(sigma, 1e-300) : 0, e[2] = {tau[0] / size, tau[1] / size};
-    d[0] = turning + (falling - turning) * e[0] * e[0];
-    d[1] = (falling - turning) * e[0] * e[1];
-    d[2] = turning + (falling - turning) * e[1] * e[1];
-    if (n == 1) d[2] = falling;
-    if (n == 2) c[0] = e[0] * R - sigma * (d[0] * e[0] + d[1] * e[1]);
-    c[n - 1] = e[1] * R - sigma * (d[1] * e[0] + d[2] * e[1]);
-    d[1] *= r, d[2] *= r * r; /* from here on against w */
-    return length(s[0] - sigma * e[0], s[1] - sigma * e[1]);
-}
-
-/* The torque of the bit, at the last node, where the wall has no friction. */
-static double cut(model *m)
-{
-    const int n = m->dofs, i = m->nodes - 1, j = i * n + n - 1;
-    const friction *law = &m->bit.rubs;
-    const double s = m->w[j], rho = fmax(m->ease * m->rho[j], 2 * fall(law)), tau = m->force[j] + rho * s;
-    if (fabs(tau) <= threshold(m, i, TURN, law)) {
-        m->mask[i] |= TURN;
-        return fabs(s);
+    const double sigma = slides(law, rho, size, &R, &falling, &m->inner);
+    const double turning = along ? R / fmax(sigma, 1e-300) : 0, e[2] = {tau[0] / size, tau[1] / size};
+    d[2] = along ? turning + (falling - turning) * e[1] * e[1] : falling;
+    if (along) {
+        d[0] = turning + (falling - turning) * e[0] * e[0];
+        d[1] = (falling - turning) * e[0] * e[1];
+        m->c[2 * i] = e[0] * R - sigma * (d[0] * e[0] + d[1] * e[1]);
     }
-    m->broken[i] = 1;
-    double R, falling;
-    const double sigma = slides(law, rho, fabs(tau), &R, &falling, &m->inner);
-    m->d[3 * i + 2] = falling;
-    m->c[j] = copysign(R - falling * sigma, tau);
-    return fabs(s - copysign(sigma, tau));
+    m->c[j] = e[1] * R - sigma * ((along ? d[1] * e[0] : 0) + d[2] * e[1]);
+    if (along) d[1] *= r;
+    d[2] *= r * r; /* from here on against w */
+    return length(s[0] - sigma * e[0], s[1] - sigma * e[1]);
 }
 
 /* The weight on bit on a rock, which pushes but does not pull: on a rigid one, or on a spring that is as long at rest
@@ -238,11 +219,11 @@ static double rub(model *m)
     return fabs(m->force[2 * i] - m->c[2 * i]) / m->rho[2 * i];
 }
 
-/* What all laws foretell from the state of the iteration, as masks of held unknowns and as linear laws c + d w.
+/* The prediction of all laws from the state of the iteration, as masks of held unknowns and as linear laws c + d w.
    Returns the largest difference to its slips, m/s or rad/s; the largest slip into *scale. */
-static double foretell(model *m, double h, double *scale)
+static double predict(model *m, double h, double *scale)
 {
-    const int n = m->dofs, last = m->nodes - 1;
+    const int n = m->dofs, last = m->nodes - 1, both = n == 2 ? AXIAL | TURN : TURN;
     double error = 0, largest = 0;
     for (int i = 0; i <= last; i++) {
         const double *limit = m->limit + 3 * (size_t)i;
@@ -250,14 +231,15 @@ static double foretell(model *m, double h, double *scale)
         memset(m->d + 3 * (size_t)i, 0, 3 * sizeof *m->d);
         memset(m->c + (size_t)i * n, 0, n * sizeof *m->c);
         if (limit[0] > 0) {
-            error = fmax(error, wall(m, i));
+            const friction law = law_on_wall(m, i);
+            error = fmax(error, friction_at(m, i, &law, limit[2], both));
             const double s = limit[2] * m->w[i * n + n - 1];
             largest = fmax(largest, fabs(s));
             if (n == 2) largest = fmax(largest, fabs(m->w[2 * i]));
         }
     }
     if (m->bit.law) {
-        error = fmax(error, cut(m));
+        error = fmax(error, friction_at(m, last, &m->bit.rubs, 1, TURN)); /* the wall has no friction there */
         largest = fmax(largest, fabs(m->w[last * n + n - 1]));
     }
     if (m->bit.rock) error = fmax(error, rest(m, h));

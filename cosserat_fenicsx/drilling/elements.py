@@ -17,7 +17,7 @@ from cosserat_fenicsx.checks import number, positive, refuse
 from cosserat_fenicsx.drilling.chain import chain_of, unresolved, usual_step
 from cosserat_fenicsx.drilling.laws import InC, check_bit
 from cosserat_fenicsx.drilling.protocol import StringModel
-from cosserat_fenicsx.drilling.signals import ScalarSignal, intervals
+from cosserat_fenicsx.drilling.signals import intervals
 from cosserat_fenicsx.drilling.steady_start import (
     check_rock,
     check_steady,
@@ -25,7 +25,8 @@ from cosserat_fenicsx.drilling.steady_start import (
     steady_state,
     steady_velocities,
 )
-from cosserat_fenicsx.drilling.wall_friction import law_of
+from cosserat_fenicsx.drilling.top_drive import Hook
+from cosserat_fenicsx.drilling.wall_friction import law_of, static_weight
 from cosserat_fenicsx.errors import SceneError
 
 _STATE = ("x", "v", "w", "force")
@@ -42,8 +43,8 @@ class AxialTorsional(StringModel):
     weight stands on a rock, rigid or of a stiffness, with the hook lowered until it bears that weight; without one the
     string hangs off bottom. The rock pushes the bit but does not pull it; the torque of a bit whose law has a `radius`
     follows the weight on bit of the step before. A bit that comes down on rigid rock is stopped by an impulse, which is
-    told as such: the weight on bit, and the torque by it, leave it out. Speeds, forces and torques that are told are
-    means over the last step, but for speeds of discs, which are those at its end.
+    recorded as such: the weight on bit, and the torque by it, leave it out. Recorded speeds, forces and torques are
+    means over the last step, except speeds of discs, which hold for its end.
 
     Args:
         scene: a `Drilling`.
@@ -52,7 +53,7 @@ class AxialTorsional(StringModel):
         elements: about how many along the string, each component has one at least; None for as many as waves of torsion
             pass in a step, within 40 to 400, or 250 without a step.
         axial: False for torsion alone.
-        end: None for what the law of the bit says; or another `EndCondition`.
+        end: an `EndCondition` in place of the law's own, or None.
 
     Raises:
         SceneError: a bit law steeper than the impedance of the string without inertia at the bit; a step too long for a
@@ -92,7 +93,7 @@ class AxialTorsional(StringModel):
         self.why = tuple(self._reasons())
 
     def _set(self, elements):
-        """All that C needs."""
+        """The record of C for the present step."""
         scene = self.scene
         self._chain = chain_of(scene, self.dt, elements, self._axial)
         self.depths = self._chain.depths
@@ -101,14 +102,14 @@ class AxialTorsional(StringModel):
         self._set_chain()
         self._set_wall(scene.friction)
         self._set_bit(scene.bit)
-        self._signals = [self._set_hook(scene.hook)] if self._axial else []
+        self._signals = [self._set_hook(scene.hook or Hook())] if self._axial else []
         self._signals.append(self._set_drive(scene.drive))
         self._lib.limits(self._m)
         m, held = self._m, self._kept["held"]
         held[self._kept["limit"][:, 0] > 0] = 3 if self._axial else 2
         held[-1] |= 2 * m.bit.law + (m.bit.rock and not m.bit.stiffness)
 
-    # -- what C sees ---------------------------------------------------------------------------------------------------
+    # -- the record of C -----------------------------------------------------------------------------------------------
 
     def _array(self, name, values):
         """Give C an array under a name of its struct."""
@@ -127,9 +128,8 @@ class AxialTorsional(StringModel):
             self._array(name, np.zeros((nodes, n)))
         for name, width in (("limit", 3), ("q", 4), ("d", 3), ("guess", 2 * n)):
             self._array(name, np.zeros((nodes, width)))
-        for name in ("mask", "broken"):
+        for name in ("mask", "broken", "held"):
             self._array(name, np.zeros(nodes, dtype=np.int32))
-        self._array("held", np.zeros(nodes, dtype=np.int32))
 
     def _set_wall(self, friction):
         m, wall = self._m, self._chain.wall
@@ -144,13 +144,11 @@ class AxialTorsional(StringModel):
         m = self._m.bit
         if bit is None:
             return
-        mass = self._kept["mass"][-1]
+        mass, m.weight = self._kept["mass"][-1], static_weight(self.scene)
         mass[-1] += bit.inertia
         if self._axial:
             mass[0] += bit.mass
-            m.mass = mass[0] if self._m.at_end else bit.mass
-            m.hanging = bit.weight or 0.0
-        m.weight = bit.weight or 0.0
+            m.mass, m.hanging = mass[0] if self._m.at_end else bit.mass, m.weight
         m.rock, m.share = self._axial and bit.weight is not None and not bit.law.drills, 1.0
         m.stiffness = bit.rock_stiffness if m.rock and np.isfinite(bit.rock_stiffness) else 0.0
         law = bit.law.resistance(bit.weight)
@@ -162,11 +160,10 @@ class AxialTorsional(StringModel):
             self._laws[1].put(*(self._ffi.addressof(m, name) for name in ("given", "curve")))
 
     def _set_hook(self, hook):
-        top = self._m.top[0]
-        top.rigid = (hook is None or np.isinf(hook.stiffness)) and not follows_the_bit(self.scene)
-        if not top.rigid and hook is not None:
-            top.integral = hook.stiffness
-        return ScalarSignal("Hook", "speed", 0.0, "m/s") if hook is None else hook.signal()
+        top, elastic = self._m.top[0], math.isfinite(hook.stiffness)
+        top.rigid = not elastic and not follows_the_bit(self.scene)
+        top.integral = hook.stiffness if elastic else 0.0
+        return hook.signal()
 
     def _set_drive(self, drive):
         top, segments = self._m.top[self._dofs - 1], None if self.scene.discs else self.scene.segments
@@ -180,7 +177,7 @@ class AxialTorsional(StringModel):
     # -- the start -----------------------------------------------------------------------------------------------------
 
     def _start(self):
-        """The state at the time 0, and what acts on the bit beside a Stribeck law."""
+        """The state at the time 0, and the end condition of the bit."""
         scene, axial, motion = self.scene, self._axial, np.zeros(2)
         self._set_end(motion)
         if scene.start == "steady":
@@ -192,7 +189,7 @@ class AxialTorsional(StringModel):
             self._set_end(motion)
 
     def _set_end(self, motion):
-        """What the law of the bit remembers, from the state now."""
+        """The memory of the bit's law, from the state now."""
         bit, axial = self.scene.bit, self._axial
         self.end = self._given_end
         if self.end is None and bit is not None and axial:
@@ -202,7 +199,7 @@ class AxialTorsional(StringModel):
                    f"alone: {bit.law.lifts}; model='axial and torsional'")  # fmt: skip
 
     def _set_steady(self, motion):
-        """All turns and moves as asked for, see `steady`."""
+        """A steady start, see `steady_start`."""
         m, kept, unknowns = self._m, self._kept, slice(2 - self._dofs, 2)
 
         def limits(x):
@@ -223,7 +220,7 @@ class AxialTorsional(StringModel):
             motion[0] = brentq(lambda down: found(down)[2][0], 1e-9 * most, most * (1 + 1e-9), xtol=1e-15 * most)
         bears, x, above = found(motion[0])
         kept["x"][:], kept["v"][:], kept["w"][:], kept["held"][:] = x, motion[unknowns], motion[unknowns], 0
-        m.bit.weight, m.bit.torque = m.bit.told = bears.tolist()
+        m.bit.weight, m.bit.torque = m.bit.recorded = bears.tolist()
         for i, force in enumerate(above):
             top = m.top[i]
             top.force = force
@@ -276,7 +273,7 @@ class AxialTorsional(StringModel):
     @property
     def weight_on_bit(self) -> float:
         """In the last step, N, without the impulse of an impact on rigid rock."""
-        return self._m.bit.told[0]
+        return self._m.bit.recorded[0]
 
     def profile(self) -> np.ndarray:
         # the node of the bit sticks where the rock holds it
@@ -285,13 +282,13 @@ class AxialTorsional(StringModel):
         forces = np.diff(x, axis=0) * kept["spring"]
         at = np.concatenate([forces[:1], (forces[:-1] + forces[1:]) / 2, forces[-1:]])
         torque, nothing = -at[:, -1], np.full(m.nodes, np.nan)
-        torque[[0, -1]] = m.top[n - 1].force, m.bit.told[1]
+        torque[[0, -1]] = m.top[n - 1].force, m.bit.recorded[1]
         sticking = (kept["held"] & 2) / 2
         if not self._axial:
             return np.array([x[:, -1], v[:, -1], torque, nothing, nothing, nothing, sticking])
         hanging = kept["hanging"]
         tension = at[:, 0] + np.concatenate([hanging[:1], (hanging[:-1] + hanging[1:]) / 2, hanging[-1:]])
-        tension[[0, -1]] = m.hanging_top - m.top[0].force, -m.bit.told[0]
+        tension[[0, -1]] = m.hanging_top - m.top[0].force, -m.bit.recorded[0]
         return np.array([x[:, 1], v[:, 1], torque, x[:, 0], v[:, 0], tension, sticking])
 
     def memory(self) -> dict:
@@ -299,7 +296,7 @@ class AxialTorsional(StringModel):
         found = super().memory() | {name: self._kept[name].copy() for name in (*_STATE, "held")}
         found["sums"] = np.array([getattr(m.sums, name) for name in _SUMS])
         found["ends"] = np.array([*((m.top[i].error, m.top[i].force) for i in (0, 1))]).ravel()
-        found["bit"] = np.array([*(getattr(m.bit, name) for name in _BIT), *m.bit.told])
+        found["bit"] = np.array([*(getattr(m.bit, name) for name in _BIT), *m.bit.recorded])
         found["counts"] = np.array([self.steps, m.halved, m.iterations, m.most])
         if self.end is not None:
             found["end"] = self.end.memory()
@@ -316,7 +313,7 @@ class AxialTorsional(StringModel):
             m.top[i].error, m.top[i].force = error, force
         for name, value in zip(_BIT, memory["bit"], strict=False):
             setattr(m.bit, name, value)
-        m.bit.told = memory["bit"][len(_BIT) :].tolist()
+        m.bit.recorded = memory["bit"][len(_BIT) :].tolist()
         self.steps, m.halved, m.iterations, m.most = (int(x) for x in memory["counts"])
         if self.end is not None:
             self.end.recall(memory["end"])

@@ -50,7 +50,7 @@ from cosserat_fenicsx.well.hole import Borehole, Mud
 
 
 class _Tuned(DriveControl):
-    """Base of controls whose gains follow from the string: a function of the same name makes them."""
+    """Base of controls with gains that a function of the same name chooses for the string."""
 
 
 @dataclass(frozen=True)
@@ -93,7 +93,7 @@ class StabilityMap(Part):
 
 @dataclass(frozen=True)
 class DrillingScene(Part):
-    """A drill-string in motion and what is computed of it, from `read`.
+    """A drill-string in motion and its computations, from `read`.
 
     Args:
         drive: the `TopDrive`.

@@ -1,8 +1,7 @@
-"""The steady motion that a scene may start with: which scenes have one, its velocities, and the twist and compression.
+"""The steady motion that a scene may start with: its conditions and velocities, the twist and the compression.
 
 All of the string turns at the drive's speed and moves at the hook's. The forces of wall, mud and bit at these
-velocities twist and compress the string. The normal force at the wall depends on the tension, so it is found again a
-few times.
+velocities twist and compress the string. The normal force at the wall depends on the tension, so it is iterated.
 """
 
 import math
@@ -33,7 +32,7 @@ def check_rock(scene) -> None:
     """Refuse a hook that moves a string with axial motion whose bit stands on rock that is not drilled.
 
     Raises:
-        SceneError: so it is.
+        SceneError: the hook moves, and the bit stands on such rock.
     """
     bit, (down, _) = scene.bit, steady_velocities(scene)
     if down and bit is not None and bit.weight is not None and not bit.law.drills:
@@ -71,6 +70,7 @@ def penetration(bit, turning) -> float:
     return (bit.weight - idle) / law.axial_stiffness * law.blades * turning / (2 * math.pi)
 
 
+# Most iterations; relative change at which they end.
 _ROUNDS, _SAME = 200, 1e-13
 
 

@@ -72,7 +72,7 @@ static int solve(model *m, double h, const double *signal)
     for (int i = 0;; i++) {
         double scale;
         if (i && i % PATIENCE == 0) m->ease *= 0.5; /* nodes that flip to and fro settle with smaller factors */
-        const double error = foretell(m, h, &scale);
+        const double error = predict(m, h, &scale);
         if (i && error <= 1e-10 * scale + 1e-11) {
             m->iterations += i;
             if (i > m->most) m->most = i;
@@ -145,8 +145,8 @@ static double settle(model *m, int d)
 }
 
 /* The weight on bit of a step from the momentum (N s) that a rigid rock gave the bit in it. A bit that comes down on
-   the rock takes its velocity at once: the impulse of the bit's mass has no duration, and is told as such, not as a force
-   that would be the larger the shorter the step. The half element beside it, which the mesh stops at once, too, is one
+   the rock takes its velocity at once: the impulse of the bit's mass has no duration, and is recorded as such, not as a
+   force that would be the larger the shorter the step. The half element beside it, which the mesh stops at once, too, is one
    that a wave stops by the force Z (change of velocity): as long as that takes. */
 static void weigh(model *m, double h, double momentum, int stood, double before)
 {
@@ -164,8 +164,8 @@ static void weigh(model *m, double h, double momentum, int stood, double before)
     const double wave = fmin(bit->slowed, h * bit->slowing), sum = momentum - impulse + wave;
     bit->slowed -= wave + fmax(-sum, 0);
     bit->weight = momentum / h;
-    bit->told[0] = fmax(sum, 0) / h;
-    bit->share = momentum > 0 ? bit->told[0] / bit->weight : 1;
+    bit->recorded[0] = fmax(sum, 0) / h;
+    bit->share = momentum > 0 ? bit->recorded[0] / bit->weight : 1;
 }
 
 /* Take a step that has converged. */
@@ -211,12 +211,12 @@ static void commit(model *m, double h, const double *signal)
         if (d ? m->bit.law : pushed(m)) force[d] += m->force[last * n + d + n - 2];
         sums->bit += h * force[d] * w[d + n - 2];
     }
-    if (n == 2) m->bit.weight = m->bit.told[0] = force[0];
+    if (n == 2) m->bit.weight = m->bit.recorded[0] = force[0];
     /* of a torque by the weight of the step before, what its impulse makes is one, too */
-    m->bit.torque = m->bit.told[1] = force[1];
+    m->bit.torque = m->bit.recorded[1] = force[1];
     if (m->bit.weighs && m->bit.share < 1) {
         const double most = m->bit.share * m->bit.rubs.still;
-        m->bit.told[1] = slips ? m->bit.share * force[1] : fmax(fmin(force[1], most), -most);
+        m->bit.recorded[1] = slips ? m->bit.share * force[1] : fmax(fmin(force[1], most), -most);
     }
     for (int j = 0; j < m->nodes * n; j++) {
         m->x[j] += h * m->w[j];
@@ -294,8 +294,8 @@ static void write_record(const model *m, double *row)
         strain += m->top[0].integral * error * error / 2 - m->hanging_top * error;
     }
     const double drive = m->top[turn].force, hook = n == 2 ? m->hanging_top - m->top[0].force : NAN;
-    const double series[] = {w[turn], x[turn], drive, w[last * n + turn], x[last * n + turn], m->bit.told[1], hook,
-                             n == 2 ? w[2 * last] : NAN, n == 2 ? x[2 * last] : NAN, n == 2 ? m->bit.told[0] : NAN,
+    const double series[] = {w[turn], x[turn], drive, w[last * n + turn], x[last * n + turn], m->bit.recorded[1], hook,
+                             n == 2 ? w[2 * last] : NAN, n == 2 ? x[2 * last] : NAN, n == 2 ? m->bit.recorded[0] : NAN,
                              n == 2 ? m->bit.impulse : NAN, kinetic, strain, m->sums.drive, m->sums.hook, weight,
                              m->sums.bit, m->sums.wall, m->sums.mud};
     memcpy(row, series, sizeof series);

@@ -1,5 +1,5 @@
-/* What Python sees of the C code of this folder; read by cffi too, so declarations alone. SI units. Arrays belong to
-   numpy. */
+/* The interface of the C code of this folder to Python; read by cffi too, so declarations alone. SI units. Arrays belong
+   to numpy. */
 
 #ifndef COSSERAT_STRINGS_H
 #define COSSERAT_STRINGS_H
@@ -53,7 +53,7 @@ typedef struct {
     long long iterations;
 } waves;
 
-/* What moves the uppermost node in one of its unknowns, by a velocity that is asked for, the signal. */
+/* The condition of one unknown at the uppermost node, with a velocity asked for, the signal. */
 typedef struct {
     int rigid;                      /* the node has the velocity of the signal; otherwise it feels the force */
     double given, proportional, integral; /* given + proportional (signal - w) + integral error */
@@ -73,9 +73,9 @@ typedef struct {
     double force[2], tangent[4];    /* given from Python before a step, for other laws: weight on bit and torque */
     double hanging;                 /* static weight on bit, with which the string hangs */
     double weight, torque;          /* of the last step, with the impulse of an impact on rigid rock */
-    double told[2], share;          /* the same without it; the share of the weight that this leaves */
+    double recorded[2], share;      /* the same without it; its share of the weight */
     double mass;                    /* of the bit, a part of the last node's; of discs all of that */
-    double slowed, slowing;         /* momentum of the last element that the told weight lacks, N s; its force, N */
+    double slowed, slowing;         /* momentum of the last element not yet in the recorded weight, N s; its force, N */
     double impulse;                 /* of all impacts on rigid rock since the start, N s */
     double floor, sinking;          /* place of the rock's face at the end of the step, and its velocity downwards */
     double face, middle;            /* its place at the end and in the middle of the part of a step being done */
@@ -88,7 +88,7 @@ typedef struct {
 
 typedef struct {
     int nodes, dofs, pieces;
-    int at_end;                     /* whether speeds are told at the end of a step; otherwise means over it */
+    int at_end;                     /* whether speeds are recorded at the end of a step, else means over it */
     const double *mass, *mass_off;  /* (nodes, dofs), (nodes - 1, dofs): tridiagonal mass matrix */
     const double *drag, *drag_off;  /* the same of what is proportional to the velocity */
     const double *spring;           /* (nodes - 1, dofs) stiffness of elements */

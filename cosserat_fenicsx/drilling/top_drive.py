@@ -1,11 +1,11 @@
-"""The top drive: its speed, its inertia, and how it is controlled; and the hook.
+"""The top drive: its speed, its inertia and its control; and the hook.
 
 A drive with the speed om and the inertia I hands the torque M down to the string; Om is the speed asked for:
 
     Stiff      om = Om
     PI         I om' = Kp (Om - om) + Ki int (Om - om) dt - M
-    Matched    M = M0 + Z (Om - om): it swallows the waves of a string of the impedance Z
-    Motor      I om' = M0 - c om - M: a torque that is given
+    Matched    M = M0 + Z (Om - om): it absorbs the waves of a string of the impedance Z
+    Motor      I om' = M0 - c om - M: a given torque
 
 `DriveControl` is the family of controls; `SampledControl` is for those of your own, called once a sample.
 """
@@ -32,7 +32,7 @@ from cosserat_fenicsx.parts import (
     positive,
 )
 
-#: Rules that choose the gains of a `PI` control, and its Kp over the impedance of the string: see `linear.tuned`.
+#: Kp over the impedance of the string by the rules for `PI` controls in `linear.frequencies`.
 RULES = {"SoftTorque": 1.0, "SoftSpeed": 4.0}
 _GAINS = "a gain: SoftTorque(pipe), SoftSpeed(string) choose them, or give Kp and Ki"
 
@@ -96,7 +96,6 @@ class SampledControl(DriveControl):
         raise NotImplementedError(f"{type(self).__name__}.torque(state, now) is missing")
 
     def gains(self, impedance):
-        """See `DriveControl`: refused."""
         refuse("TopDrive", "control", self, "Stiff(), PI(Kp, Ki), Matched() or Motor(torque) here: a control that is "
                f"called once a sample acts in drilling.simulate, unless {type(self).__name__} has gains")  # fmt: skip
 
@@ -106,8 +105,8 @@ class SampledControl(DriveControl):
 
 
 class Sample(NamedTuple):
-    """What a `SampledControl` knows: time (s), speed asked for and that of the drive (rad/s), angle of the drive (rad),
-    torque handed down to the string (N m)."""
+    """The input of a `SampledControl`: time (s), speed asked for and speed of the drive (rad/s), angle of the drive
+    (rad), torque handed down to the string (N m)."""
 
     time: float
     asked: float
@@ -250,7 +249,7 @@ class Motor(DriveControl):
 
 @dataclass(frozen=True)
 class TopDrive(Part):
-    """What turns the string.
+    """The top drive, which turns the string.
 
     Args:
         speed: asked for, rad/s (`60 * units.rpm`): a number, from the start on, or a function of time, such as
