@@ -19,7 +19,6 @@ import ufl
 
 from cosserat_fenicsx.checks import positive, refuse, store
 from cosserat_fenicsx.drilling.segments import Segment, segment_of
-from cosserat_fenicsx.drilling.signals import MeanSpeeds
 from cosserat_fenicsx.drilling.top_drive import Hook, TopDrive
 from cosserat_fenicsx.drilling.wall_friction import ViscousDrag
 from cosserat_fenicsx.parts import ForceSize
@@ -193,14 +192,13 @@ def _lines(parts, rate, end):
 
 
 def _hook_end(hook):
-    mean, rigid = MeanSpeeds(hook.signal(), None).between, math.isinf(hook.stiffness)
+    mean, rigid = hook.signal().mean, math.isinf(hook.stiffness)
     return TopEnd(lambda start, end: -mean(start, end), stiff=rigid, Ki=0.0 if rigid else hook.stiffness)
 
 
 def _drive_end(drive, impedance):
     rigid, given, Kp, Ki = drive.control.gains(impedance)
-    mean = MeanSpeeds(drive.signal(), None).between
-    return TopEnd(mean, stiff=rigid, inertia=drive.inertia, Kp=Kp, Ki=Ki, given=given)
+    return TopEnd(drive.signal().mean, stiff=rigid, inertia=drive.inertia, Kp=Kp, Ki=Ki, given=given)
 
 
 # Samples of an interpolation; least travel time of a part over the step, so that all of them are known.

@@ -1,5 +1,6 @@
-"""Speeds of drive and hook that may depend on time: their values, means over steps, and steps cut where they jump."""
+"""Speeds of drive and hook over time: values, means over steps, and steps cut at jumps."""
 
+import itertools
 import math
 import numbers
 
@@ -8,16 +9,12 @@ import numpy as np
 from cosserat_fenicsx import units
 from cosserat_fenicsx.checks import call, number, refuse, warn
 
-# Speeds of rotation (rad/s) above this are revolutions a minute by all appearance: 300 rev/min are 31.4 rad/s.
+# Speeds (rad/s) above this are probably revolutions a minute: 300 rev/min are 31.4 rad/s.
 _FAST = 32.0
 
 
 def doubt_speed(owner: object, field: str, speed: float) -> None:
-    """Warn of a speed of a drive (rad/s) that looks like revolutions a minute.
-
-    Args:
-        owner: whose number it is, or the name of the function.
-    """
+    """Warn of a speed of a drive (rad/s) that looks like revolutions a minute; `owner`: the part or the function's name."""
     if abs(speed) > _FAST:
         name = owner if isinstance(owner, str) else type(owner).__name__
         warn(
@@ -61,31 +58,19 @@ class ScalarSignal:
         near = 1e-9 * max(1.0, abs(t))
         return self(t + near) - self(t - near)
 
-
-class MeanSpeeds:
-    """Means of a `ScalarSignal` over the steps from n dt to (n + 1) dt: by Gauss's two points between its jumps, so
-    that a jump within a step has the share that it has in the angle."""
-
-    def __init__(self, signal, dt):
-        self._signal, self._dt = signal, dt
-
-    def __call__(self, first, steps):
-        """(steps,) means over steps from number `first` on."""
-        if self._signal.constant:
-            return np.full(steps, self._signal(0.0))
-        return np.array([self.between(n * self._dt, (n + 1) * self._dt) for n in range(first, first + steps)])
-
-    def between(self, start, end):
-        """Mean from one time to another (s)."""
-        total, cuts = 0.0, [start, *(t for t in self._signal.jumps if start < t < end), end]
-        for a, b in zip(cuts[:-1], cuts[1:], strict=True):
+    def mean(self, start: float, end: float) -> float:
+        """The mean from one time to another, by Gauss's two points between jumps."""
+        if self.constant:
+            return self._value
+        total, cuts = 0.0, [start, *(t for t in self.jumps if start < t < end), end]
+        for a, b in itertools.pairwise(cuts):
             middle, off = (a + b) / 2, (b - a) / (2 * 3**0.5)
-            total += (b - a) * (self._signal(middle - off) + self._signal(middle + off)) / 2
+            total += (b - a) * (self(middle - off) + self(middle + off)) / 2
         return total / (end - start)
 
 
 def intervals(signals, steps, dt):
-    """Rows (h, signals at the begin, signals at the end, 1 where a step ends) of a range of steps.
+    """Rows (length, signals at the begin, signals at the end, 1 where a step ends) of steps, cut at jumps.
 
     Args:
         signals: a list of `ScalarSignal`. steps: (first, last + 1). dt: s.

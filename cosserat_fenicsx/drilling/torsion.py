@@ -28,7 +28,6 @@ from cosserat_fenicsx.checks import instance, positive, refuse
 from cosserat_fenicsx.drilling.laws import InC, check_bit
 from cosserat_fenicsx.drilling.protocol import PROFILE, StringModel
 from cosserat_fenicsx.drilling.scene import Drilling
-from cosserat_fenicsx.drilling.signals import MeanSpeeds
 from cosserat_fenicsx.drilling.steady_start import check_steady, steady_velocities
 from cosserat_fenicsx.drilling.top_drive import Gains
 from cosserat_fenicsx.drilling.wall_friction import law_of, wall_of
@@ -196,7 +195,7 @@ class TorsionWaves(StringModel):
             factor, at_bit = self._steepness()
             dt = cells.dt * min(_NARROWER / factor if factor else 1.0, _NARROWER)
         self.dt, self.depths = cells.dt, cells.depths
-        self.signal = MeanSpeeds(scene.drive.signal(), self.dt)
+        self._signal = scene.drive.signal()
         self.why = tuple(self._reasons(asked))
         self._allocate()
         if scene.start == "steady":
@@ -307,7 +306,11 @@ class TorsionWaves(StringModel):
         return self.c.drive_speed, self._changing["angle"][0], self._changing["moment"][0]
 
     def _record(self, steps, records):
-        speeds, buffer = self.signal(self.steps, steps), self._ffi.from_buffer
+        signal, dt, buffer = self._signal, self.dt, self._ffi.from_buffer
+        if signal.constant:
+            speeds = np.full(steps, signal(0.0))
+        else:
+            speeds = np.array([signal.mean(n * dt, (n + 1) * dt) for n in range(self.steps, self.steps + steps)])
         records = buffer("double[]", records, require_writable=True)
         self.steps += self._lib.advance_waves(self.c, steps, buffer("double[]", speeds), records)
 

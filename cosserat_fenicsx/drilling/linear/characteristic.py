@@ -28,8 +28,21 @@ from cosserat_fenicsx.drilling.signals import doubt_speed
 from cosserat_fenicsx.drilling.steady_start import penetration
 
 
+class Characteristic:
+    """Base of characteristic functions, see roots.py.
+
+    Attributes:
+        guides: the waveguides that move. spacing: typical distance of roots along the imaginary axis, rad/s.
+        exponents: see roots.py. fastest: a growth rate that no root reaches, 1/s.
+    """
+
+    def motion(self, s):
+        """Relative motion of the bit in each guide: rotation, and axial velocity where there is some."""
+        raise NotImplementedError
+
+
 @dataclass(frozen=True)
-class FallingTorque:
+class FallingTorque(Characteristic):
     """The function B + kappa om at the bit; kappa in N m s/rad, negative where the torque falls with the speed."""
 
     torsion: Guide
@@ -41,21 +54,16 @@ class FallingTorque:
 
     @property
     def spacing(self):
-        """Typical distance of roots along the imaginary axis, rad/s."""
         return math.pi / self.torsion.travel
 
     @property
     def exponents(self):
-        """See roots.py."""
         return -self.torsion.travel, self.torsion.travel
 
     @property
     def fastest(self):
-        """A growth rate that no root reaches, 1/s.
-
-        Drive and string only take energy: Re Z > 0 for Re s > 0. So x Jb < -kappa for the growth x; and Re Z is at
-        least Z tanh(x T), Z and T impedance and travel time of the lowest part, whatever is above it.
-        """
+        # drive and string only take energy: Re Z > 0 for Re s > 0. So x Jb < -kappa for the growth x; and Re Z is at
+        # least Z tanh(x T), Z and T impedance and travel time of the lowest part, whatever is above it
         fall, last = max(-self.kappa, 0.0), self.torsion.parts[-1]
         inertia = self.torsion.inertia + (last.inertia if last.travel == 0 else 0.0)
         bounds = [fall / inertia] if inertia else []
@@ -65,16 +73,14 @@ class FallingTorque:
 
     @property
     def guides(self):
-        """Which strings move."""
         return (self.torsion,)
 
     def motion(self, s):
-        """Relative motion of the bit in each guide: (1,)."""
         return (1.0 + 0j,)
 
 
 @dataclass(frozen=True)
-class Regenerative:
+class Regenerative(Characteristic):
     """The function of a bit that cuts: rotation Om (rad/s), rate of penetration V (m/s), see the head of this file.
 
     Attributes:
@@ -118,22 +124,17 @@ class Regenerative:
 
     @property
     def spacing(self):
-        """Typical distance of roots along the imaginary axis, rad/s."""
         return 2 * math.pi / (2 * self.torsion.travel + 2 * self.axial.travel + self.delay)
 
     @property
     def exponents(self):
-        """See roots.py."""
         travel = self.torsion.travel + self.axial.travel
         return -travel - self.delay, travel
 
     @property
     def fastest(self):
-        """A growth rate that no root reaches, 1/s.
-
-        The equation says s = -E (ka/Za - kt rho/Zt), where E is below 2 and Za and Zt, for a growth x, are at least
-        Z tanh(x T) + m x, see `FallingTorque.fastest`.
-        """
+        # s = -E (ka/Za - kt rho/Zt), where E is below 2 and Za and Zt, for a growth x, are at least Z tanh(x T) + m x,
+        # see `FallingTorque.fastest`
         rho = self.penetration / self.speed
 
         def excess(x):
@@ -147,11 +148,9 @@ class Regenerative:
 
     @property
     def guides(self):
-        """Which strings move."""
         return self.torsion, self.axial
 
     def motion(self, s):
-        """Relative rotation and axial velocity of the bit, (2,)."""
         at = np.array([s], dtype=complex)
         (om, T, *_), (v, A, *_), (e, _, q) = self.torsion.bit(at), self.axial.bit(at), self._memory(at)
         rho = self.penetration / self.speed
