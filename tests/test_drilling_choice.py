@@ -64,7 +64,7 @@ def test_the_cheapest_model_that_is_asked_for(changed, model, words):
 def test_what_is_asked_for_is_taken_and_told():
     assert chosen(scene(), BOTH) == (BOTH, ["axial and torsional: as asked"])
     moving = scene(bit=None, hook=cf.drilling.Hook(speed=0.3))
-    assert chosen(moving, TORSION)[1][1].startswith("APPROXIMATE: torsion alone leaves out what moves along the axis")
+    assert chosen(moving, TORSION)[1][1].startswith("APPROXIMATE: torsion alone leaves out the axial motion")
     with pytest.raises(cf.SceneError, match="or 'auto', since with Cutting the torque on bit follows"):
         chosen(scene(bit=cf.drilling.BitOnRock(cf.drilling.Cutting(0.1, 60e6, 0.6, 4))), TORSION)
     with pytest.raises(cf.SceneError, match="expected 'torsion' or 'auto': discs without masses turn alone"):

@@ -20,8 +20,8 @@ at the predicted w, acts against the rotation, and holds a bit at rest up to tha
 bit is above the rock, and free. Wear flats bear all or nothing as the bit moves down or up, and anything between at
 rest.
 
-The face of the rock below a bit on lobes is at u = -amplitude sin(count Phi), downwards positive, at the angle Phi since
-the start that is predicted for the end of the step. The rock is rigid or a spring; it pushes and does not pull.
+The face of the rock below a bit on lobes is at u = -amplitude sin(count Phi), downwards positive, with the angle Phi
+since the start predicted for the end of the step. The rock is rigid or a spring; it pushes and does not pull.
 """
 
 import math
@@ -165,7 +165,7 @@ class Cutting(BitLaw):
 
     d = U(t) - U(t - tau), U the depth of the bit; within the delay tau the bit turns by 2 pi/n. Wear flats add the
     weight a l sigma and the torque gamma mu a/2 times that weight. Rotation of a positive sign
-    cuts; backwards the blades slide over rock that stays, so that a string that is turned so does not drill.
+    cuts; backwards the blades slide over the rock, and the string does not drill.
 
     Args:
         a: radius of the bit, m. epsilon: intrinsic specific energy, Pa. zeta: ratio of vertical to horizontal force.
@@ -260,7 +260,7 @@ class BitOnRock(Part):
     Args:
         law: `Stribeck(...)`, `Cutting(...)`, `Lobes(...)`, or another `BitLaw`.
         weight: static weight on bit, N. None where the law needs none, or where the speed of drilling decides it.
-        inertia: of the bit and what turns with it beyond the string's sections, kg m^2.
+        inertia: of the bit beyond the string's sections, kg m^2.
         mass: the same for axial motion, kg.
         rock_stiffness: of the rock below a bit with a weight, N/m: weight on bit per depth by which the bit presses
             into the rock, which pushes it back but does not pull. Infinite for rigid rock, where a bit that comes down
@@ -301,7 +301,7 @@ class EndForce(NamedTuple):
     Attributes:
         force: (2,) weight on bit (N) and torque on bit (N m) of a bit at rest.
         tangent: (2, 2) their derivatives by the mean velocities of the step, downwards (m/s) and of rotation (rad/s).
-        torque: N m, against the rotation, and anything up to that at rest; None for that of the bit's Stribeck law.
+        torque: N m, against the rotation, and anything up to it at rest; None for the bit's own law of friction.
         flats: N, half of what wear flats bear: their force is flats above the given one where the bit moves down, flats
             below it where it moves up, and anything between at rest.
         rock: None, or place (m below the start) and velocity (m/s, downwards) of the face of a rigid rock at the end of
@@ -384,7 +384,7 @@ class RockSurface:
             self._slopes.append(slope if cuts else old_slope)
             while self._angles[self._first + 1] < angle - self.pitch:
                 self._first += 1
-            if self._first > 4096:  # forget what no blade meets any more, now and then
+            if self._first > 4096:  # forget rock that no blade meets any more, now and then
                 for kept in (self._angles, self._depths, self._slopes):
                     del kept[: self._first]
                 self._first = 0

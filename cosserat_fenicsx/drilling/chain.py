@@ -1,4 +1,4 @@
-"""What a string is for the equations of motion: elements with mass, drag and stiffness, and pieces that touch the wall.
+"""A string discretised: elements with mass, drag and stiffness, and pieces along the wall.
 
 Elements are linear. Their mass matrices are m [[1/2 - s, s], [s, 1/2 - s]] with the share s = 1/12 + (c dt/l)^2/6,
 which makes waves of the speed c exact to fourth order in space and time together under the implicit midpoint rule:
@@ -206,5 +206,5 @@ def unresolved(scene, depths, dt) -> str:
     return (
         f"APPROXIMATE: the rock stops the bit within {impact:.2g} s, which steps of {dt:.2g} s and elements that a "
         f"wave passes in {passing:.2g} s do not resolve: peaks of the weight on bit depend on them; expected a dt of "
-        f"at most {longest:.2g} s{few}, or rock without a stiffness, whose impacts are told as impulses"
+        f"at most {longest:.2g} s{few}, or rock without a stiffness, whose impacts are recorded as impulses"
     )

@@ -77,8 +77,8 @@ def times_between(where, times, between):
 
 
 def bands(times, *lines):
-    """(middles, [(least, largest)]) of lines in intervals of time with equal numbers of rows: oscillations of a long run
-    would fill a chart with one colour."""
+    """(middles, [(least, largest)]) of lines in intervals with equal numbers of rows: oscillations of a long run would
+    fill a chart with one colour."""
     edges = np.linspace(0, len(times), _BANDS + 1).astype(int)[:-1]
     ends = np.append(edges[1:], len(times)) - 1
     extremes = [(np.minimum.reduceat(line, edges), np.maximum.reduceat(line, edges)) for line in lines]
@@ -97,7 +97,7 @@ def swings(values):
 
 
 def title_of(history):
-    """Model, drive and bit, for titles; the gain of a PI control over the impedance: 1 of SoftTorque, 4 of SoftSpeed."""
+    """Model, drive and bit, for titles; gains of a PI control over the impedance: 1 of SoftTorque, 4 of SoftSpeed."""
     scene, drive, bit = history.scene, history.scene.drive, history.scene.bit
     control = type(drive.control).__name__
     if isinstance(drive.control, PI):
@@ -241,21 +241,21 @@ def draw_map(history, what=None, between=None):
     colours = panel.pcolormesh(t, depths, values, shading="nearest", cmap="coolwarm" if signed else "viridis",
                                vmin=limits[0], vmax=limits[1], rasterized=True)  # fmt: skip
     figure.colorbar(colours, ax=panel, label=heading)
-    told = ""
+    text = ""
     if sticks.any():
         from matplotlib.colors import ListedColormap
 
         panel.pcolormesh(t, depths, np.where(sticks, 1.0, np.nan), shading="nearest", cmap=ListedColormap([_STICKS]),
                          rasterized=True)  # fmt: skip
-        told = "; grey: held by friction"
+        text = "; grey: held by friction"
         if sticks[-1].any():  # a row of the map is too thin to be seen
             panel.fill_between(t, 0, _BIT, where=sticks[-1], transform=panel.get_xaxis_transform(), step="mid",
                                color=_STICKS, edgecolor="0.3", linewidth=0.3)  # fmt: skip
-            told += " (at the lower edge: the bit)"
+            text += " (at the lower edge: the bit)"
     panel.set(xlabel="time (s)", ylabel=along, ylim=(depths[-1], depths[0]), xlim=(t[0], t[-1]))
     panel.grid(visible=False)
     caution = alias(history)
-    figure.suptitle(f"{title_of(history)}{told}" + (f"\n{caution}" if caution else ""))
+    figure.suptitle(f"{title_of(history)}{text}" + (f"\n{caution}" if caution else ""))
     return figure
 
 

@@ -42,7 +42,7 @@ def chosen(scene, model="auto"):
         if scene.bit is not None and scene.bit.law.drills:
             raise SceneError(f"simulate.model = '{TORSION}': expected '{BOTH}' or 'auto', since with "
                              f"{type(scene.bit.law).__name__} {scene.bit.law.lifts}")  # fmt: skip
-        why.append(f"APPROXIMATE: torsion alone leaves out what moves along the axis ({'; '.join(asks)})")
+        why.append(f"APPROXIMATE: torsion alone leaves out the axial motion ({'; '.join(asks)})")
     return model, [*why, *_left_out(scene, model)]
 
 
@@ -59,7 +59,7 @@ def _asks_for_axial(scene):
 
 
 def _left_out(scene, name):
-    """Sentences on what a string on the axis of the hole leaves out."""
+    """Sentences on the approximations of a string on the axis of the hole."""
     return _pushed(scene) + (_buckled(scene, name) if scene.hole is not None else [])
 
 

@@ -47,8 +47,8 @@ static inline friction law_on_wall(const model *m, int i)
     return f;
 }
 
-/* The matrix for steps of the length h, and what a node feels as its own inverse compliance, 1/(A^-1)_ii, which is the
-   best factor of proximal steps. 0 where the matrix is not positive. */
+/* The matrix for steps of the length h, and the inverse compliances of the nodes, 1/(A^-1)_ii, the best factors of
+   proximal steps. 0 where the matrix is not positive. */
 int build(model *m, double h)
 {
     const int n = m->dofs, last = m->nodes - 1;
@@ -125,10 +125,10 @@ static void loads(model *m, double h, const double *signal)
                        + top->integral * (top->error + h / 2 * signal[d]);
     }
     for (int d = 0; d < n; d++) m->b[last * n + d] -= m->bit.force[d + 2 - n];
-    if (n == 2) m->b[2 * last] += m->bit.hanging; /* a part of what the bit bears is in the tension at rest */
+    if (n == 2) m->b[2 * last] += m->bit.hanging; /* the tension at rest contains a part of the weight on bit */
 }
 
-/* The force on a node that is missing in its equation without laws: b - A w. */
+/* Residual force of the equation of a node without laws: b - A w. */
 static double missing(const model *m, int i, int d)
 {
     const int n = m->dofs, last = m->nodes - 1, j = i * n + d;
@@ -186,8 +186,8 @@ static double friction_at(model *m, int i, const friction *law, double r, int ma
     return length(s[0] - sigma * e[0], s[1] - sigma * e[1]);
 }
 
-/* The weight on bit on a rock, which pushes but does not pull: on a rigid one, or on a spring that is as long at rest
-   as the static weight compresses it. */
+/* The weight on bit on a rock, which pushes but does not pull: on a rigid one, or on a spring that the
+   static weight compresses at rest. */
 static double rest(model *m, double h)
 {
     const int i = m->nodes - 1;

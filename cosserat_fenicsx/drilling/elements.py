@@ -61,8 +61,8 @@ class AxialTorsional(StringModel):
     """
 
     _failure = (
-        "the step at t = {time:g} s does not converge however short it is made: expected a smoother signal, or laws that "
-        "fall less steeply"
+        "the step at t = {time:g} s does not converge however short it is made: expected a smoother signal, or laws "
+        "that fall less steeply"
     )
 
     def __init__(self, scene, dt: float | None = None, elements: int | None = None, *, axial: bool = True, end=None):
@@ -215,7 +215,9 @@ class AxialTorsional(StringModel):
             extra = (bears - [m.bit.hanging, 0.0])[unknowns]
             return bears, *steady_state(motion[unknowns], self._chain, limits, (self._wall, m.of_rotation), extra)
 
-        if self._axial and follows_the_bit(self.scene):  # what brakes the string takes a part of the weight on bit
+        if self._axial and follows_the_bit(
+            self.scene
+        ):  # friction and drag of the string take a part of the weight on bit
             most = motion[0]
             motion[0] = brentq(lambda down: found(down)[2][0], 1e-9 * most, most * (1 + 1e-9), xtol=1e-15 * most)
         bears, x, above = found(motion[0])

@@ -61,13 +61,12 @@ class DrillingHistory(Result):
     """The motion of a drill-string, from `drilling.simulate`.
 
     SI units, angles in rad. Angles, speeds and torques are positive in the sense of drilling; displacements, velocities
-    and the advance of the bit are positive downwards, tension and hook load where they pull. A model of torsion alone
-    leaves what is axial NaN.
+    and the advance of the bit are positive downwards, tension and hook load where they pull. Axial quantities are NaN
+    in a model of torsion alone.
 
-    A row holds for the end of a step, but for what a model finds as a mean over its last step, or of the torsion of a
-    string over its last two: forces and torques, and speeds along a string but those of a drive or a bit whose inertia
-    the torsion alone turns. These hold for `mean_times`, to the second order in the step; as values for `times` they
-    are late by half a step, or by one.
+    A row holds for the end of a step. Forces, torques and speeds along the string are means over the last step, in a
+    string with torsion alone over the last two, there except the speeds of a drive or a bit with inertia. Means hold
+    for `mean_times`, to second order in the step; as values at `times` they are late by half a step, or by one.
 
     Arrays (n,) over `times`:
 
@@ -82,7 +81,7 @@ class DrillingHistory(Result):
 
     Attributes:
         scene: the `Drilling`.
-        model: "torsion" or "axial and torsional". why: sentences on that choice, and on what the model leaves out.
+        model: "torsion" or "axial and torsional". why: sentences on the choice of the model and its approximations.
         dt: step, s. counts: {name: number} of the solver, such as steps that were halved.
         times: (n,) s, each at the end of a step. mean_times: (n,) s, the middles of those over which means are taken.
         profile_times: (k,) s. depths: (m,) measured depths, m.
@@ -294,7 +293,7 @@ class DrillingHistory(Result):
         return draw_phase(self, file, since, units=units, width=width)
 
     def plot_energy(self, file: File | None = None, *, units: Any = "SI", width: int | None = None):
-        """Draw the ledger of energy, and what it does not account for, over time; for the arguments see `plot`."""
+        """Draw the ledger of energy and its residual over time; for the arguments see `plot`."""
         from cosserat_fenicsx.drilling.charts import draw_energy
 
         return draw_energy(self, file, units=units, width=width)

@@ -92,7 +92,7 @@ def slope_of(function, s):
 
 
 def by_method(owner, name, *more) -> Resistance:
-    """The `Resistance` of a method of an object of the user's, see `checked`; found once for objects that are equal.
+    """The `Resistance` of a method of a user's object, see `checked`; cached for equal objects.
 
     Raises:
         SceneError: its value is 0 at rest and not beyond; see `checked`.
@@ -118,7 +118,7 @@ def _sampled(owner, name, *more):
 
 
 def checked(owner, name, *more):
-    """A method of an object of the user's as a function of a speed s from 0 on, with more arguments.
+    """A method of a user's object as a checked function of a speed s from 0 on, with more arguments.
 
     Raises:
         SceneError: by the function, where the method fails, or its value is no number from 0 on.

@@ -36,7 +36,7 @@ class MixedScene:
         scene: of the rod, its loads, the wall of the hole, and the pipe above. at_rest: the same rod for `solve`, with
             a wall without friction, whose equilibrium at the load factor 1 may be the `start` of the motion.
         rod: from the top down. above: the `PipeAbove`. depth: measured depth of the rod's upper end, m.
-        why: what is left out, sentences.
+        why: sentences on approximations.
     """
 
     scene: Scene
@@ -53,7 +53,7 @@ def mixed_scene(drilling: Drilling, depth: float | None = None) -> MixedScene:
     Components of the axes are north, east, down, as in a `WellPath`; without a hole the string is vertical below the
     origin. Both ends of the rod are held on the axis of the hole, where they may turn and move along. With a hole, the
     rod's nodes touch the wall, with the friction of the hole. The bit's law acts at the lower end (`BitTorque`), under
-    a weight on bit that is constant; the tension of the pipe at the start is that of the equilibrium without friction.
+    a constant weight on bit; the pipe starts with the tension of the equilibrium without friction.
 
     Args:
         drilling: a `Drilling` with a `DrillString`.
@@ -175,13 +175,13 @@ class BitTorque(PointAction):
     """A torque about the rod's axis d3 that falls with the speed of rotation; at rest anything up to the static one.
 
     The law is set-valued: within a step the bit sticks or slips. In `simulate` alone, in the spatial model; at rest it
-    exerts nothing. It is not multiplied by the load factor. What it dissipates counts as such in the energy balance.
+    exerts nothing. It is not multiplied by the load factor. Its dissipation is in the energy balance.
 
     Args:
         station: where.
         law: a `Stribeck`, or another `BitLaw` of the torque over the speed alone.
         weight: on bit, N, constant, for a law by coefficients of friction; the force itself is a load of its own.
-        inertia_of_bit: about the axis, kg m^2. `Damping.drag` of the rod would act on it, too: here that is taken off.
+        inertia_of_bit: about the axis, kg m^2. The `Damping.drag` of the rod does not act on it.
 
     Raises:
         SceneError: not a station, not such a law, or numbers that are negative.

@@ -51,8 +51,8 @@ def simulate(
         duration: s; the motion ends with the first step that reaches it.
         model: "torsion", "axial and torsional", or "auto": axial motion only where something asks for it. The
             history's `why` says what decided, and warns where a string on the axis of the hole leaves something out.
-        dt: step, s; None for that of the model.
-        elements: along the string; None for those of the model.
+        dt: step, s; None for the model's own.
+        elements: along the string; None for the model's own number.
         save_every: s between the rows of the history, rounded to steps; None for every step.
         profile_every: s between profiles along the string; None for 400 of them.
         folder: to write the motion and checkpoints to during the run: whatever ends it, `resume(folder)` continues
@@ -84,9 +84,9 @@ def simulate(
     }
     store = Nowhere()
     if folder is not None:
-        told = {"duration": float(duration), "asked": {"model": name, "dt": dt, "elements": elements}, "apart": apart}
-        told |= {"model": history.model, "why": history.why, "dt": history.dt, "depths": history.depths.tolist()}
-        store = Store(folder, KIND).make(told, scene, float(duration))
+        head = {"duration": float(duration), "asked": {"model": name, "dt": dt, "elements": elements}, "apart": apart}
+        head |= {"model": history.model, "why": history.why, "dt": history.dt, "depths": history.depths.tolist()}
+        store = Store(folder, KIND).make(head, scene, float(duration))
         _tables(store)
         history.folder = store.place
     TimeLoop(running, history, store, **apart, turn=_turn_to_watch(scene)).until(duration, progress)
@@ -122,13 +122,13 @@ def _running(store, scene):
     Raises:
         SceneError: it differs from the model of the stored rows.
     """
-    asked, told = store.head["asked"], store.head
+    asked, head = store.head["asked"], store.head
     running = model_of(scene, asked["model"], asked["dt"], asked["elements"])
     for name, value in (("model", running.name), ("dt", running.dt), ("depths", running.depths)):
-        if value != told[name] if name == "model" else not _alike(value, told[name]):
+        if value != head[name] if name == "model" else not _alike(value, head[name]):
             raise SceneError(
-                f"{store.place}: the {name} of its motion is another one than that of this release: expected a "
-                "new motion by drilling.simulate"
+                f"{store.place}: the {name} of its motion differs from this release: expected a new motion by "
+                "drilling.simulate"
             )
     return running
 
@@ -159,9 +159,9 @@ def _tables(store):
 
 
 def _history(store, scene, rows):
-    told = store.head
+    head = store.head
     series, along = (found if len(found) else None for found in rows)
-    return DrillingHistory(scene, told["model"], told["why"], told["dt"], told["depths"], series, along,
+    return DrillingHistory(scene, head["model"], head["why"], head["dt"], head["depths"], series, along,
                            folder=store.place)  # fmt: skip
 
 
@@ -193,7 +193,7 @@ def check_step(scene, dt, duration, save_every=None):
     """Refuse a step that is too long for the rotation in it, and too many steps or rows.
 
     Raises:
-        SceneError: naming the step and what it may be.
+        SceneError: naming the step and its limit.
     """
     where, speed = "simulate", fastest(scene, duration)
     if duration / dt > MOST_STEPS:

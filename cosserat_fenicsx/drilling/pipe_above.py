@@ -2,12 +2,12 @@
 
 Waves in its uniform parts, by d'Alembert's solution: forces of the past, delayed. In every part, with the torque M and
 the speed om of its sections, M + Z om travels down and M - Z om up without change (axially: the thrust and the velocity
-downwards). So what arrives at the lower end of the parts is known from what left their upper ends one travel time
-before, and the force there is M = arriving - Z om: a dashpot and a known force.
+downwards). So the wave at the lower end of a part is known from the one at its upper end one travel time before, and
+the force there is M = arriving - Z om: a dashpot and a known force.
 
-Parts meet at nodes, where M may drop by a drag; at the uppermost node a `TopEnd` turns waves round. What leaves the
-nodes is stored as its mean over every time step, at the middle of the step, and read by Lagrange's interpolation with
-four of them, which amplifies no wave where steps are even (Laakso et al., IEEE Signal Process. Mag. 13 (1996) 30).
+Parts meet at nodes, where M may drop by a drag; at the uppermost node a `TopEnd` reflects waves. Waves from the nodes
+are stored as means over every time step, at the middle of the step, and read by Lagrange's interpolation with four of
+them, which amplifies no wave where steps are even (Laakso et al., IEEE Signal Process. Mag. 13 (1996) 30).
 """
 
 import math
@@ -273,11 +273,11 @@ class DelayLines:
         self._before = self._state
 
     def arriving(self, t):
-        """What arrives at the lower end at a time (s): the force there is this minus `dashpot` times its speed."""
+        """The wave at the lower end at a time (s): the force there is this minus `dashpot` times its speed."""
         return float(self._delayed(t)[self._parts - 1])
 
     def _delayed(self, t):
-        """(2 n,) what arrives at a time (s): from above at the lower ends of parts, then from below at their tops."""
+        """(2 n,) waves at a time (s): from above at the lower ends of parts, then from below at their upper ends."""
         asked, count = t - self._delays, self._count
         if not count:
             return self._first

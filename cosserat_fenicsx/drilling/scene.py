@@ -17,7 +17,7 @@ from cosserat_fenicsx.well.hole import Borehole, Mud
 
 @dataclass(frozen=True)
 class Drilling(Part):
-    """A drill-string with what turns it, holds it and brakes it.
+    """A drill-string with its drive, hook, bit and friction.
 
     Args:
         string: a `DrillString`, or `Discs`.
@@ -27,11 +27,11 @@ class Drilling(Part):
         hook: a `Hook`; None for a rigid one at rest, or, where the bit has a `Cutting` law and a weight, for one whose
             load stays the same, so that the string follows the bit.
         mud: a `Mud`; None where all components have their weight in mud, or where there is no hole: in air.
-        friction: `WallFriction` or another law; None for that of the hole, the same at rest and in motion.
+        friction: `WallFriction` or another law; None for the friction of the hole, the same at rest and in motion.
         drag: `ViscousDrag`; None for none.
         depth: measured depth of the bit, m; None for the bottom of the hole, or the string's length without one.
         start: "rest": untwisted, hanging in its weight, with the static weight on bit; or "steady": all of it turns at
-            the drive's speed and moves at the hook's, twisted by what brakes it.
+            the drive's speed and moves at the hook's, twisted by friction, drag and bit.
 
     Raises:
         SceneError: parts that are missing or do not fit each other.

@@ -14,7 +14,7 @@ _FAST = 32.0
 
 
 def doubt_speed(owner: object, field: str, speed: float) -> None:
-    """Warn of a speed of a drive (rad/s) that looks like revolutions a minute; `owner`: the part or the function's name."""
+    """Warn of a speed of a drive (rad/s) that looks like revolutions a minute; `owner`: the part or function's name."""
     if abs(speed) > _FAST:
         name = owner if isinstance(owner, str) else type(owner).__name__
         warn(

@@ -29,7 +29,7 @@ def check_steady(scene) -> None:
 
 
 def check_rock(scene) -> None:
-    """Refuse a hook that moves a string with axial motion whose bit stands on rock that is not drilled.
+    """Refuse a hook that moves a string with axial motion whose bit stands on rock without drilling.
 
     Raises:
         SceneError: the hook moves, and the bit stands on such rock.

@@ -99,9 +99,9 @@ static double set_velocity(model *m, int i, int d, double v)
     return added;
 }
 
-/* Velocities of held nodes in one of the unknowns become 0, that of a bit on a rock the rock's, by impulses on these
-   nodes alone: others go along so that their momentum stays, which loses energy and never brings any. Returns the
-   impulse on the last node. */
+/* Velocities of held nodes in one of the unknowns become 0, the velocity of a bit on a rock the rock's, by impulses on
+   these nodes alone. Other nodes keep their momentum, which dissipates energy and never adds any. Returns the impulse
+   on the last node. */
 static double settle(model *m, int d)
 {
     const int n = m->dofs, last = m->nodes - 1, rigid = m->top[d].rigid, mask = bit_of(m, d);
@@ -146,8 +146,8 @@ static double settle(model *m, int d)
 
 /* The weight on bit of a step from the momentum (N s) that a rigid rock gave the bit in it. A bit that comes down on
    the rock takes its velocity at once: the impulse of the bit's mass has no duration, and is recorded as such, not as a
-   force that would be the larger the shorter the step. The half element beside it, which the mesh stops at once, too, is one
-   that a wave stops by the force Z (change of velocity): as long as that takes. */
+   force that would be the larger the shorter the step. The half element beside it, which the mesh stops at once, too,
+   is stopped by a wave with the force Z (change of velocity), for as long as that takes. */
 static void weigh(model *m, double h, double momentum, int stood, double before)
 {
     lower *bit = &m->bit;
@@ -182,7 +182,7 @@ static void commit(model *m, double h, const double *signal)
             top->force = top->given + top->proportional * (signal[d] - w) + top->integral * stretched;
             top->error += h * (signal[d] - w);
         }
-        /* a hook's spring keeps what it takes; of a drive the torque itself does the work */
+        /* the work on a hook includes its spring; on a drive it is the work of the torque */
         if (d == turn)
             sums->drive += h * top->force * w;
         else
@@ -212,7 +212,7 @@ static void commit(model *m, double h, const double *signal)
         sums->bit += h * force[d] * w[d + n - 2];
     }
     if (n == 2) m->bit.weight = m->bit.recorded[0] = force[0];
-    /* of a torque by the weight of the step before, what its impulse makes is one, too */
+    /* a torque by the weight of the step before contains the impulse of that weight */
     m->bit.torque = m->bit.recorded[1] = force[1];
     if (m->bit.weighs && m->bit.share < 1) {
         const double most = m->bit.share * m->bit.rubs.still;
@@ -223,7 +223,7 @@ static void commit(model *m, double h, const double *signal)
         m->v[j] = 2 * m->w[j] - m->v[j];
     }
     for (int i = 0; i <= last; i++) m->held[i] = m->mask[i];
-    /* what is held in a step ends it at rest, or with the rock */
+    /* held unknowns end the step at rest, or with the rock */
     double given = 0;
     for (int d = 0; d < n; d++) {
         const double impulse = settle(m, d);

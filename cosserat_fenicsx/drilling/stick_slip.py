@@ -8,9 +8,10 @@ import numpy as np
 from cosserat_fenicsx.drilling.protocol import SERIES
 from cosserat_fenicsx.errors import NotConverged, SceneError
 
-#: A bit below this share of the drive's mean speed is at rest (the laws hold it at zero exactly); a bit that has started
-#: reaches the share `FAST`.
-AT_REST, FAST = 1e-6, 0.5
+#: A bit below this share of the drive's mean speed is at rest (the laws hold it at zero exactly).
+AT_REST = 1e-6
+# A bit that has started reaches this share.
+_FAST = 0.5
 
 
 @dataclass(frozen=True)
@@ -89,9 +90,9 @@ def stick_slip_of(history, since):
     drive = history.drive_speed[rows]
     usual = max(float(np.abs(drive).mean()), 1e-3)
     level = AT_REST * usual
-    # a bit that swings back passes through rest between two samples: what turns against the drive has stopped, too
+    # a bit that swings back passes through rest between two samples: a bit that turns against the drive has stopped
     forth = np.maximum(np.sign(drive.mean()) * bit, 0.0) if abs(drive.mean()) > usual / 2 else bit
-    starts, stops = crossings(t, forth, level, FAST * usual)
+    starts, stops = crossings(t, forth, level, _FAST * usual)
     periods = np.diff(starts)
     whole = (t[1:] > starts[0]) & (t[1:] <= starts[-1]) if len(periods) else np.full(len(lengths), True)
     mean_drive, mean = (_mean(values, lengths * whole) for values in (drive, bit))

@@ -13,9 +13,9 @@ typedef struct {
     double fall, drop;              /* its steepest fall where it is continuous; infinite, if it drops somewhere */
 } curve;
 
-/* A law of friction R against a slip s: anything up to `still` at rest; slipping + (still - slipping) exp(-s/decay) from
-   there on, with decay = 0 if it drops at once. Or scale times a curve of reach s, `slipping` then being R just
-   beyond the rest, and decay 0. */
+/* A law of friction R against a slip s: anything up to `still` at rest; above that slipping + (still - slipping)
+   exp(-s/decay), with decay = 0 if it drops at once. Or scale times a curve of reach s, then with `slipping` R just
+   above rest, and decay 0. */
 typedef struct {
     double still, slipping, decay;
     const curve *other;             /* or NULL */
@@ -98,7 +98,7 @@ typedef struct {
     double *force;                  /* (nodes, dofs) of friction against the slip; of the bit its torque */
     int *held;                      /* (nodes,) bits of unknowns that are held: by wall or rock */
     /* pieces of the string along the wall: element, nodes that take the friction of its two ends, share of the second,
-       length, curvature, weight along normal and binormal, tension at rest, factor on the coefficients of friction, contact radius */
+       length, curvature, weight along normal and binormal, tension at rest, factor on friction, contact radius */
     const int *element, *first, *second;
     const double *share, *length, *curvature, *across, *aside, *tension, *factor, *radius;
     friction wall;                  /* coefficients of friction over the slip, m/s, or over the rotation, rad/s */

@@ -8,10 +8,10 @@ from cosserat_fenicsx.interrupts import obey
 from cosserat_fenicsx.progress import Progress
 from cosserat_fenicsx.ranks import world
 
-#: Steps that are done before it is looked whether a stop was asked for.
+#: Steps between checks for an interrupt.
 CHUNK = 256
 _BIT_SPEED = COLUMNS.index("bit_speed")
-# Part of a step by which the end may be missed.
+# Tolerance of the end, in steps.
 _NOTHING = 1e-6
 
 
@@ -33,7 +33,7 @@ class TimeLoop:
         """Advance to a time (s), and return the history.
 
         Raises:
-            NotConverged, Interrupted, NotStored: with what is done so far as `.path`.
+            NotConverged, Interrupted, NotStored: with the history so far as `.path`.
         """
         model, history = self.model, self.history
         end = duration - _NOTHING * model.dt

@@ -75,7 +75,7 @@ class DriveControl(Part, family="control of a drive"):
 
 
 class SampledControl(DriveControl):
-    """Base of controls of your own that are called once a sample: I om' = T - M, with a torque T that stays in between.
+    """Base of controls of your own that are called once a sample: I om' = T - M, with a constant torque T in between.
 
     Derive a frozen dataclass from it, and write `torque`. Samples take whole steps. Such controls act in
     `simulate`; where a scene has other uses for the drive, such as `stability`, they are refused, unless the
@@ -203,7 +203,7 @@ class Matched(DriveControl):
     """A drive that reflects no waves: M = torque + impedance (Om - om), without inertia.
 
     Args:
-        impedance: N m s/rad; None for that of the uppermost section of the string, J sqrt(G rho).
+        impedance: N m s/rad; None for the uppermost section of the string, J sqrt(G rho).
         torque: M0, N m, that it hands down at the speed asked for.
 
     Raises:

@@ -2,7 +2,8 @@
 
 In a uniform part with the impedance Z the waves P = M + Z om and Q = M - Z om travel unchanged, P down and Q up (M
 torque, om speed of rotation). All cells take one step dt, in which every wave is constant: a cell holds one of each. At
-a node the waves P from above and Q from below meet what acts there, with the mean speed om over the step:
+a node the waves P from above and Q from below meet its drag, friction and inertia, with the mean speed om over the
+step:
 
     P - Q - (Z_above + Z_below) om = drag om + T(om) + I om',    T(om) the law of friction of wall or bit
 
@@ -34,7 +35,7 @@ from cosserat_fenicsx.drilling.wall_friction import law_of, wall_of
 from cosserat_fenicsx.well.components import DrillString
 
 
-# Travel times nearer than this to a whole number of steps are whole, steps; larger misfits than the second are reported.
+# Misfits of travel times to whole numbers of steps that are rounding, and that are reported, steps.
 _EXACT, _MISFIT = 1e-9, 0.01
 # Shortest travel time of a part with its own cells, steps.
 _SHORTEST = 1.5
@@ -203,7 +204,7 @@ class TorsionWaves(StringModel):
             self._set_steady(float(steady_velocities(scene)[1]))
 
     def _set_nodes(self, drag):
-        """Impedances beside nodes, and what acts at nodes."""
+        """Impedances beside nodes, drag and friction at nodes."""
         Z, half = self.cells.impedance, self.cells.impedance * self.cells.time / 2
         self._above, self._below = np.concatenate([[0.0], Z]), np.concatenate([Z, [0.0]])
         self._drag = drag * (np.concatenate([[0.0], half]) + np.concatenate([half, [0.0]]))
@@ -247,7 +248,7 @@ class TorsionWaves(StringModel):
         if scene.start == "steady":
             yield "starts in steady rotation at the speed of the drive"
         if scene.hole is not None and self.normal_force is None:
-            yield "wall force of the soft string without axial motion: tension is that of the weight"
+            yield "wall force of the soft string without axial motion: tension by the weight alone"
         if scene.hook is not None and (scene.hook.speed != 0 or math.isfinite(scene.hook.stiffness)):
             yield "the hook is left out: torsion alone knows no axial motion"
 
@@ -279,7 +280,7 @@ class TorsionWaves(StringModel):
             c.load = bit.weight or 0.0
 
     def _set_steady(self, speed):
-        """All turns at the drive's speed (rad/s), twisted by what brakes it."""
+        """A steady start at the drive's speed (rad/s), twisted by friction and drag."""
         cells, now, c = self.cells, self._changing, self.c
         law = np.where(self._hold > 0, self._grip * self._wall(speed * self._reach), 0.0)
         if self._law is not None:

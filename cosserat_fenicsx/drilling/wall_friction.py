@@ -24,7 +24,7 @@ class FrictionLaw(Part, family="law of friction at the wall"):
 
     Attributes:
         of_rotation: the slip that `coefficient` gets is the speed of rotation, rad/s.
-        of_hole: what it returns is a factor on the friction of the sections of the hole.
+        of_hole: `coefficient` is a factor on the friction of the sections of the hole.
     """
 
     of_rotation, of_hole = False, False
@@ -90,7 +90,7 @@ class WallFriction(FrictionLaw):
 
 
 def law_of(friction: FrictionLaw | None) -> tuple[Resistance, bool, bool]:
-    """(resistance, of_rotation, of_hole) of a `FrictionLaw`; for None the friction of the hole, at rest and in motion."""
+    """(resistance, of_rotation, of_hole) of a law; for None the friction of the hole, at rest and in motion."""
     if friction is None:
         return Resistance(1.0, 1.0), False, True
     return friction.resistance, friction.of_rotation, friction.of_hole

@@ -176,8 +176,8 @@ class BitBounce(_Drawn):
     def __repr__(self):
         lifted = self.speeds[self.lifts_off]
         rpm = lifted * 30 / math.pi
-        told = f"the bit lifts off at {len(lifted)} of {len(self.speeds)} speeds"
-        return f"<BitBounce: {told}" + (f", from {rpm.min():.4g} to {rpm.max():.4g} rpm>" if len(lifted) else ">")
+        text = f"the bit lifts off at {len(lifted)} of {len(self.speeds)} speeds"
+        return f"<BitBounce: {text}" + (f", from {rpm.min():.4g} to {rpm.max():.4g} rpm>" if len(lifted) else ">")
 
     _chart = "draw_bounce"
     axis = _rows_axis = "speed"

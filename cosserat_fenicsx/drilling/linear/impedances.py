@@ -20,7 +20,7 @@ from cosserat_fenicsx.checks import refuse
 from cosserat_fenicsx.drilling.steady_start import follows_the_bit
 from cosserat_fenicsx.drilling.top_drive import Hook
 
-#: |g L|^2 below which sinh(g L)/g and its derivative are taken from their series, of which 1e-16 is left out.
+#: |g L|^2 below which sinh(g L)/g and its derivative are computed by series, truncated at 1e-16.
 _SMALL = 1e-2
 
 
@@ -176,7 +176,7 @@ class Guide:
 
     @property
     def impedance(self):
-        """Of the lowest part: what a sudden motion of the bit meets, N m s/rad or N s/m."""
+        """Of the lowest part, N m s/rad or N s/m: it resists sudden motions of the bit."""
         return float(self.parts[-1].impedance)
 
     def start(self, s):

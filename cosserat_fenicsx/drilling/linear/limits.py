@@ -88,7 +88,7 @@ def critical_slope(scene: Drilling, up_to: float = 10.0) -> tuple[float, float]:
     if not len(slopes):  # nothing to lose in so narrow a band
         return -math.inf, math.nan
     first = int(slopes.argmax())
-    # a string without losses: what is left of 0 is rounding
+    # a string without losses: the slope is 0 up to rounding
     lost = abs(slopes[first]) < _RESOLVED * torsional(scene).impedance
     return 0.0 if lost else float(slopes[first]), float(frequencies[first])
 
@@ -132,8 +132,8 @@ def limit_speed(
     Args:
         scene: a `Drilling`. weight: on bit, N; None for that of the scene.
         up_to: highest frequency of modes, Hz.
-        between, points: with a bit that cuts, the speeds (rad/s) between which it is looked for, and at how many; a
-            range of growth that lies between two of them is missed.
+        between, points: range (rad/s) and number of the speeds searched for a bit that cuts; a range of growth between
+            two of them is missed.
 
     Returns:
         rad/s; 0 where all modes decay at every speed, infinite where the string has no losses. With a bit that cuts:

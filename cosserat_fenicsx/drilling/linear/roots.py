@@ -1,8 +1,8 @@
 """All roots of an analytic function in a box of the complex plane, counted by the argument principle.
 
 Functions are real on the real axis: their roots are real or pairs, of which those with Im s >= 0 are returned. They
-take s (n,) and return (f, f') scaled by any positive factors (n,): phases and f'/f are what is used. Where they grow
-like exp(a s) to the left and exp(b s) to the right, they say so by an attribute `exponents` = (a, b), s.
+take s (n,) and return (f, f') scaled by any positive factors (n,): only phases and f'/f are used. An attribute
+`exponents` = (a, b), s, says that they grow like exp(a s) to the left and exp(b s) to the right.
 
 `follow` continues them from one case to the next, each in a column of its own, with all roots of every case counted.
 """
@@ -15,8 +15,8 @@ import numpy as np
 from cosserat_fenicsx.errors import NotConverged
 
 
-# Contours: largest change of phase between points, rad; its largest misfit to the derivatives, rad; largest step over the
-# distance of a single root with the same derivative; distance of a root, over their size, at which they are moved.
+# Contours: largest change of phase between points, rad; its largest misfit to the derivatives, rad; largest step over
+# the distance of a single root with the same derivative; distance of a root, over their size, at which they are moved.
 _TURN, _MISMATCH, _REACH, _NEAR = 1.0, 0.3, 1.5, 1e-9
 # Newton's method: most steps, relative step at which it stops, and where steps no longer fall.
 _STEPS, _SETTLED, _ROUNDING = 60, 1e-14, 1e-11
@@ -80,8 +80,8 @@ def turns(f, corners, spacing):
             log = derivative / value
             step = np.diff(s)
             predicted = ((log[1:] + log[:-1]) / 2 * step).imag
-            # beside two roots that are close to each other the phase turns by 2 pi, of which nothing is seen at points
-            # on both sides: the size of the logarithmic derivative says how near roots are
+            # beside two close roots the phase turns by 2 pi, which is not visible at points on both sides: the size of
+            # the logarithmic derivative says how near roots are
             near = np.abs(log - _rate(f, s))
             rough = (np.abs(change) > _TURN) | (np.abs(change - predicted) > _MISMATCH)
             rough |= np.maximum(near[1:], near[:-1]) * np.abs(step) > _REACH
@@ -177,7 +177,7 @@ def distinct(roots):
 
 
 def number_of(roots, box):
-    """How many roots those of Im s >= 0 stand for."""
+    """The number of roots with conjugates, from those of Im s >= 0."""
     return len(roots) + (int((roots.imag > 0).sum()) if box.bottom == 0 else 0)
 
 

@@ -74,18 +74,18 @@ class Growing:
             table.add_column(heading, justify="right", overflow="fold")
         for k, i, j, drives in self.rows[:rows]:
             share = f"{int((answer.growth[:, :, k] > 0).sum())} of {cases}"
-            told = [share, f"{np.nanmax(answer.growth[:, :, k]):.3g}", *_numbers(answer, i, j)]
+            cells = [share, f"{np.nanmax(answer.growth[:, :, k]):.3g}", *_numbers(answer, i, j)]
             here = f"{answer.frequency[i, j, k]:.4f}", f"{answer.growth[i, j, k]:.3g}"
-            table.add_row(str(k), *told, *here, *("gone" if math.isnan(x) else f"{x:.3g}" for x in drives.values()))
+            table.add_row(str(k), *cells, *here, *("gone" if math.isnan(x) else f"{x:.3g}" for x in drives.values()))
         return table
 
 
 def _words(names):
     """Descriptions of other drives, and why some are missing."""
-    told = [f"{name}, {_DRIVES[name]}" for name in names if name in _DRIVES]
+    found = [f"{name}, {_DRIVES[name]}" for name in names if name in _DRIVES]
     if "SoftTorque" not in names and "SoftSpeed" not in names:
-        told.append("SoftTorque and SoftSpeed are compared where the drive has an inertia")
-    return "; ".join(told)
+        found.append("SoftTorque and SoftSpeed are compared where the drive has an inertia")
+    return "; ".join(found)
 
 
 def _middle(answer, k):
@@ -101,8 +101,8 @@ def _advice(answer, rows, names):
         calmed = [row for row in rows if not row[3][name] > 0]
         left = [row for row in rows if row[3][name] > 0]
         if calmed:
-            told = f"{name} calms {_frequencies(answer, calmed)}"
-            yield told + (f" and leaves {_frequencies(answer, left)} growing" if left else "")
+            text = f"{name} calms {_frequencies(answer, calmed)}"
+            yield text + (f" and leaves {_frequencies(answer, left)} growing" if left else "")
         else:
             yield f"{name} calms none of them"
 
@@ -124,10 +124,10 @@ def _case(answer, i, j):
 
 def _range(answer):
     rpm = answer.speeds * 30 / math.pi
-    told = f"{len(rpm)} speeds from {rpm.min():.4g} to {rpm.max():.4g} rpm"
+    text = f"{len(rpm)} speeds from {rpm.min():.4g} to {rpm.max():.4g} rpm"
     if np.isnan(answer.weights).all():
-        return told
+        return text
     kN = answer.weights / 1e3
     if len(kN) == 1:
-        return f"{told}, {kN[0]:.4g} kN on bit"
-    return f"{told}, {len(kN)} weights on bit from {kN.min():.4g} to {kN.max():.4g} kN"
+        return f"{text}, {kN[0]:.4g} kN on bit"
+    return f"{text}, {len(kN)} weights on bit from {kN.min():.4g} to {kN.max():.4g} kN"

@@ -102,15 +102,15 @@ def _along(guide, s, points):
 
 
 def usual_drives(scene):
-    """{name: TopDrive} for comparison: drives other than the scene's, with an inertia where the scene's has one; and the
-    scene's own drive where `SoftTorque` or `SoftSpeed` chose its gains, by the name of that rule."""
+    """{name: TopDrive} for comparison: drives other than the scene's, with an inertia where the scene's has one; and
+    the scene's own drive where `SoftTorque` or `SoftSpeed` chose its gains, by the name of that rule."""
     inertia, own = scene.drive.inertia, scene.drive.control
     drives = {} if own == Stiff() else {"stiff": TopDrive(0.0)}
     if scene.discs:
         return drives
     if inertia:
         for name, choose in (("SoftTorque", SoftTorque), ("SoftSpeed", SoftSpeed)):
-            # one tuning: that of the scene, where it has one
+            # the tuning of the scene, where it has one
             control = with_rule(own, name) if own_rule(scene) else choose(scene, inertia)
             drives[name] = TopDrive(0.0, inertia, control)
     if own != Matched():
@@ -183,7 +183,7 @@ class Stability(Result):
 
     @property
     def cautions(self) -> list[str]:
-        """What the result leaves out, in sentences."""
+        """Sentences on approximations."""
         friction, hole, left_out = self.scene.friction, self.scene.hole, []
         if friction is not None and friction.decays:
             left_out.append(
@@ -291,11 +291,11 @@ def stability(
 ) -> Stability:
     """Growth rates and frequencies of all modes of steady rotations.
 
-    The string rotates at the speed that is asked for, and drills; its small motions about that grow or decay like
-    exp(s t). Where the law of the bit is a torque against speed, they are torsional, with the slope of the torque at
-    the speed and weight of the case, and with the string's distributed drag. Where the bit cuts (`Cutting`), torsion
-    and axial motion are coupled by the depth of cut with its delay, and the weight sets the rate of penetration;
-    without a weight the speed of the hook does. All roots of the transcendental equation up to a frequency are found;
+    The string rotates at the speed asked for, and drills; small motions about this state grow or decay like exp(s t).
+    Where the law of the bit is a torque against speed, they are torsional, with the slope of the torque at the speed
+    and weight of the case, and with the string's distributed drag. Where the bit cuts (`Cutting`), torsion and axial
+    motion are coupled by the depth of cut with its delay, and the weight sets the rate of penetration; without a weight
+    the speed of the hook does. All roots of the transcendental equation up to a frequency are found;
     their number is that of the argument principle. Friction at the wall is left out, see `Stability.cautions`.
 
     Args:
@@ -320,7 +320,7 @@ def stability(
     n = len(speeds)
     if steady.cuts:  # from the next higher speed, and from the same speed at the weight before
         parents = [[k - 1] * (k % n > 0) + [k - n] * (k >= n) for k in range(len(order))]
-    else:  # the slope alone decides; modes are counted from that of a torque that does not fall
+    else:  # the slope alone decides; modes are counted with a constant torque
         by_slope = np.argsort(-points[:, 0], kind="stable")
         order, points = [order[k] for k in by_slope], np.concatenate([np.zeros((1, 1)), points[by_slope]])
         parents = [[k - 1] * (k > 0) for k in range(len(points))]
