@@ -108,7 +108,7 @@ def test_laws_inside_laws(tmp_path):
     ("old", "new", "words"),
     [
         ("[drive]", "[drives]", r"unknown key 'drives', did you mean 'drive'"),
-        ("inertia = 2900.0\n", "", r"TopDrive.inertia = 0.0: expected that of the drive .* SoftSpeed chooses"),
+        ("inertia = 2900.0\n", "", r"TopDrive.inertia = 0.0: expected the drive's own .* for SoftSpeed"),
         ('"SoftSpeed"', '"SoftSpeeds"', r"drive.control.type = 'SoftSpeeds': did you mean 'SoftSpeed'"),
         ('{ type = "SoftSpeed" }', '{ type = "PI", Kp = 3.0 }', r"drive.control: PI.Ki = None: expected a gain: SoftT"),
         ('static = "6 kN m"', 'static = "6 kN"', r"bit.law: Stribeck.static = '6 kN': kN is a unit of force"),

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from cosserat_fenicsx.checks import finite_array, number, positive, refuse
+from cosserat_fenicsx.drilling.protocol import LEDGER
 from cosserat_fenicsx.drilling.stick_slip import AT_REST, alias, turns
 from cosserat_fenicsx.drilling.top_drive import PI
 from cosserat_fenicsx.errors import SceneError, nearest
@@ -118,17 +119,9 @@ _PANELS = (
     (Quantity("impulse", unit="N s"), (("impulse_on_bit", "impacts on rigid rock, their sum", BIT),)),
     (Quantity("bit advance", unit="m"), (("bit_advance", "bit advance", BIT),)),
 )
-#: (attribute, label, colour, style) of the ledger.
-_LEDGER = (
-    ("kinetic", "kinetic", "tab:blue", "-"),
-    ("strain", "strain", "tab:orange", "-"),
-    ("work_of_drive", "work of the drive", "tab:green", "--"),
-    ("work_of_hook", "work of the hook", "tab:olive", "--"),
-    ("work_of_weight", "work of the weight", "tab:cyan", "--"),
-    ("lost_at_bit", "lost at the bit", "tab:red", ":"),
-    ("lost_at_wall", "lost at the wall", "tab:brown", ":"),
-    ("lost_in_mud", "lost in the mud", "tab:purple", ":"),
-)
+#: Colours of the ledger; styles by the beginnings of its names.
+_COLOURS = ("tab:blue", "tab:orange", "tab:green", "tab:olive", "tab:cyan", "tab:red", "tab:brown", "tab:purple")
+_STYLES = {"work": "--", "lost": ":"}
 # A chart with more oscillations of the bit than this shows the bands between their extremes.
 _SWINGS = 80
 
@@ -200,7 +193,10 @@ def draw_phase(history, since=None):
 def draw_energy(history):
     """See `DrillingHistory.plot_energy`."""
     times_between("plot_energy", history.times, None)
-    curves = [(label, np.nan_to_num(getattr(history, name)), *style) for name, label, *style in _LEDGER]
+    curves = []
+    for name, colour in zip(LEDGER, _COLOURS, strict=True):
+        label, style = name.replace("_", " ", 1).replace("_", " the "), _STYLES.get(name[:4], "-")
+        curves.append((label, np.nan_to_num(getattr(history, name)), colour, style))
     axial = not np.isnan(history.hook_load).all()
     about = "; strain: less the energy of the string as it hangs at rest" if axial else ""
     return ledger(history.times, curves, history.balance, f"{title_of(history)}: energy", about)

@@ -31,7 +31,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Annotated, Any, Literal
 
-from cosserat_fenicsx.checks import refuse, store
+from cosserat_fenicsx.checks import store
 from cosserat_fenicsx.drilling.bit_laws import BitOnRock
 from cosserat_fenicsx.drilling.choose import chosen
 from cosserat_fenicsx.drilling.history import DrillingHistory
@@ -51,6 +51,10 @@ from cosserat_fenicsx.well.hole import Borehole, Mud
 
 class _Tuned(DriveControl):
     """Base of controls with gains that a function of the same name chooses for the string."""
+
+    @property
+    def _needs_inertia(self):
+        return type(self).__name__
 
 
 @dataclass(frozen=True)
@@ -132,9 +136,6 @@ class DrillingScene(Part):
         string, drive = self.string or self.discs, self.drive
         if isinstance(drive.control, _Tuned):
             name = type(drive.control).__name__
-            if drive.inertia == 0:
-                refuse(drive, "inertia", 0.0, "that of the drive (kg m^2), about 2000 to 4000: "
-                       f"{name} chooses its gains by it")  # fmt: skip
             standing = Drilling(string, TopDrive(0.0), **parts)
             drive = replace(drive, control=getattr(frequencies, name)(standing, drive.inertia))
         store(self, scene=Drilling(string, drive, **parts))

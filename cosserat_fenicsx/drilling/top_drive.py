@@ -55,6 +55,8 @@ class DriveControl(Part, family="control of a drive"):
     """
 
     sampled = False
+    # In words, a control that needs a drive with an inertia.
+    _needs_inertia = ""
 
     def gains(self, impedance: float | None) -> Gains:
         """The control's `Gains` above a string of the impedance (N m s/rad) of its uppermost section, None for discs.
@@ -70,7 +72,9 @@ class DriveControl(Part, family="control of a drive"):
         Raises:
             SceneError: so it is.
         """
-        if drive.speed is None:
+        if self._needs_inertia and drive.inertia == 0:
+            refuse(drive, "inertia", 0.0, f"the drive's own (kg m^2), about 2000 to 4000, for {self._needs_inertia}")
+        if drive.speed is None and not self.sampled:
             refuse(drive, "speed", None, "the speed asked for (rad/s), such as 60 * units.rpm")
 
 
@@ -85,7 +89,7 @@ class SampledControl(DriveControl):
         sample: s from sample to sample; also as a field of the dataclass.
     """
 
-    sample, sampled = 0.01, True
+    sample, sampled, _needs_inertia = 0.01, True, "a sampled control"
 
     def begin(self) -> tuple[float, ...]:
         """The state of the control at the start, numbers; checkpoints hold it. Nothing unless you write another."""
@@ -98,10 +102,6 @@ class SampledControl(DriveControl):
     def gains(self, impedance):
         refuse("TopDrive", "control", self, "Stiff(), PI(Kp, Ki), Matched() or Motor(torque) here: a control that is "
                f"called once a sample acts in drilling.simulate, unless {type(self).__name__} has gains")  # fmt: skip
-
-    def check(self, drive):
-        if drive.inertia == 0:
-            refuse(drive, "inertia", 0.0, "that of the drive (kg m^2), about 2000 to 4000, for a sampled control")
 
 
 class Sample(NamedTuple):
@@ -178,6 +178,8 @@ class PI(DriveControl):
     Ki: Annotated[float, Number("torsional stiffness", at_least(0, _GAINS))] | None = None
     rule: Literal["SoftTorque", "SoftSpeed"] | None = field(default=None, compare=False)
 
+    _needs_inertia = "a PI control"
+
     def validate(self):
         for name, unit in (("Kp", "N m s/rad"), ("Ki", "N m/rad")):
             if getattr(self, name) is None:
@@ -187,11 +189,6 @@ class PI(DriveControl):
 
     def gains(self, impedance):
         return Gains(Kp=self.Kp, Ki=self.Ki)
-
-    def check(self, drive):
-        if drive.inertia == 0:
-            refuse(drive, "inertia", 0.0, "that of the drive (kg m^2), about 2000 to 4000, for a PI control")
-        super().check(drive)
 
     def __repr__(self):
         rule = f", rule={self.rule!r}" if self.rule else ""

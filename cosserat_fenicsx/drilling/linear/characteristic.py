@@ -20,12 +20,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.optimize import brentq
 
-from cosserat_fenicsx.checks import finite_array, positive, refuse
+from cosserat_fenicsx.checks import refuse
 from cosserat_fenicsx.drilling.laws import refuse_several_speeds
 from cosserat_fenicsx.drilling.linear.impedances import Guide, axial, torsional
 from cosserat_fenicsx.drilling.linear.roots import Box
 from cosserat_fenicsx.drilling.signals import doubt_speed
 from cosserat_fenicsx.drilling.steady_start import penetration
+from cosserat_fenicsx.parts import Number, Values, positive
 
 
 class Characteristic:
@@ -224,21 +225,20 @@ def speeds_and_weights(owner, scene, speeds, weights):
     Raises:
         SceneError: speeds or weights that are not positive, or weights without a bit.
     """
-    speeds = np.atleast_1d(finite_array(owner, "speeds", speeds, "positive numbers (rad/s)"))
-    if speeds.ndim != 1 or not speeds.size or (speeds <= 0).any():
-        refuse(owner, "speeds", speeds.tolist(), "positive numbers (rad/s)")
+    speeds = _numbers(owner, "speeds", speeds, "angular velocity")
     doubt_speed(owner, "speeds", float(speeds.max()))
     if weights is None:
         own = scene.bit.weight if scene.bit else None
         return speeds, np.array([np.nan if own is None else own])
     if scene.bit is None:
         refuse(scene, "bit", None, "a BitOnRock, whose weight is to change")
-    weights = np.atleast_1d(finite_array(owner, "weights", weights, "positive numbers (N)"))
-    for weight in weights.ravel():
-        positive(owner, "weights", float(weight), "N")
-    if weights.ndim != 1 or not weights.size:
-        refuse(owner, "weights", weights.tolist(), "positive numbers (N)")
-    return speeds, weights
+    return speeds, _numbers(owner, "weights", weights, "force")
+
+
+def _numbers(owner, field, values, dimension):
+    """(n,) positive numbers, given as one or several."""
+    several = Values(Number(dimension, positive()))
+    return np.array(several.check(owner, field, values if np.ndim(values) else [values]))
 
 
 def or_none(weight):

@@ -6,6 +6,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from rich.table import Table
 
 from cosserat_fenicsx.checks import File, Numbers, instance, number, positive, refuse
 from cosserat_fenicsx.drilling.linear.characteristic import Steady, box_up_to, or_none, speeds_and_weights
@@ -20,6 +21,14 @@ from cosserat_fenicsx.results.result import Result, by_name
 _NEUTRAL = 1e-11
 # Gauss points in a part, beside those for its waves.
 _POINTS = 8
+# Number of the fastest modes that are listed with their places and drives.
+_LISTED = 12
+_DRIVES = {
+    "stiff": "it turns at the speed asked for",
+    "matched": "it reflects no waves",
+    "SoftTorque": "PI control of the string's impedance at its first mode",
+    "SoftSpeed": "the same with four times the impedance",
+}
 
 
 @dataclass(frozen=True)
@@ -158,18 +167,68 @@ class Stability(Result):
 
     @cached_property
     def _growing(self):
-        from cosserat_fenicsx.drilling.linear.spectrum_table import Growing
-
-        return Growing(self)
+        """(mode, i, j, {drive: growth}) of the fastest modes that grow, in the case of median growth; their number."""
+        grows = [k for k in range(self.roots.shape[2]) if (self.growth[:, :, k] > 0).any()]
+        grows.sort(key=lambda k: -np.nanmax(self.growth[:, :, k]))
+        rows, known = [], {}
+        for k in grows[:_LISTED]:
+            i, j = np.nonzero(self.growth[:, :, k] > 0)
+            middle = np.argsort(self.growth[i, j, k])[len(i) // 2]
+            case = int(i[middle]), int(j[middle])
+            if case not in known:
+                known[case] = self.with_drives(*case)
+            rows.append((k, *case, {name: growth[k] for name, growth in known[case].items()}))
+        return rows, len(grows)
 
     def _answer(self, units):
-        return self._growing.in_words()
+        yield f"{_range(self)}, all modes up to {self.up_to:.4g} Hz."
+        yield from (f"{caution}." for caution in self.cautions)
+        rows, count = self._growing
+        if not rows:
+            k = int(np.nanargmax(np.nanmax(self.growth, axis=(0, 1))))
+            i, j = self.worst(k)
+            least = f"{self.frequency[i, j, k]:.4g} Hz, which decays by {-self.growth[i, j, k]:.3g} 1/s"
+            speed, weight = _case(self, i, j)
+            yield f"No mode grows. Least damped: {least} at {speed} rpm{weight and f', {weight} kN'}."
+            return
+        yield f"{count} modes grow."
+        yield from (
+            f"{text}." for text in _advice(self, rows, [name for name in rows[0][3] if name != own_rule(self.scene)])
+        )
 
     def _more(self, units):
-        return self._growing.more
+        rows, count = self._growing
+        if not rows:
+            return
+        own = own_rule(self.scene)
+        drive = own or type(self.scene.drive.control).__name__
+        yield (
+            "growth: in 1/s. fastest: the largest of all cases. at: the middle one of those in which the mode grows, "
+            f"its frequency and growth there, with the drive of the scene, {drive}. mode: counted from 0 by frequency "
+            f"there. To the right the growth with {'each drive' if own else 'other drives'}: "
+            f"{_words(rows[0][3])}. gone: with that drive no mode is near."
+        )
+        for k, i, j, _ in rows:
+            yield f"{self.frequency[i, j, k]:.4g} Hz moves: {self.shape(k, i, j).where}"
+        if count > _LISTED:
+            yield f"{count - _LISTED} more modes grow: to_dataframe() has all."
 
     def _table(self, units, rows):
-        return self._growing.table(rows)
+        growing, _ = self._growing
+        if not growing:
+            return None
+        own, cases, table = own_rule(self.scene), self.growth[:, :, 0].size, Table()
+        headings = [f"{name} (own)" if name == own else name for name in growing[0][3]]
+        for heading in ("mode", "grows in", "fastest", "at rpm", "kN", "frequency (Hz)", "growth", *headings):
+            table.add_column(heading, justify="right", overflow="fold")
+        for k, i, j, drives in growing[:rows]:
+            growth = self.growth[:, :, k]
+            table.add_row(
+                str(k), f"{int((growth > 0).sum())} of {cases}", f"{np.nanmax(growth):.3g}", *_case(self, i, j),
+                f"{self.frequency[i, j, k]:.4f}", f"{growth[i, j]:.3g}",
+                *("gone" if math.isnan(x) else f"{x:.3g}" for x in drives.values()),
+            )  # fmt: skip
+        return table
 
     @property
     def growth(self) -> np.ndarray:
@@ -348,3 +407,44 @@ def _heights(found, cuts):
     if cuts:
         return [float(np.median(column[np.isfinite(column)].imag)) for column in found.T]
     return np.where(np.isfinite(found[0]), found[0].imag, np.inf)
+
+
+def _words(names):
+    """Descriptions of other drives, and why some are missing."""
+    found = [f"{name}, {_DRIVES[name]}" for name in names if name in _DRIVES]
+    if "SoftTorque" not in names and "SoftSpeed" not in names:
+        found.append("SoftTorque and SoftSpeed are compared where the drive has an inertia")
+    return "; ".join(found)
+
+
+def _advice(answer, rows, names):
+    """Sentences on the modes that each drive damps, and those that still grow."""
+    for name in names:
+        calmed = [row for row in rows if not row[3][name] > 0]
+        left = [row for row in rows if row[3][name] > 0]
+        if calmed:
+            text = f"{name} calms {_frequencies(answer, calmed)}"
+            yield text + (f" and leaves {_frequencies(answer, left)} growing" if left else "")
+        else:
+            yield f"{name} calms none of them"
+
+
+def _frequencies(answer, rows):
+    return ", ".join(f"{answer.frequency[i, j, k]:.3g}" for k, i, j, _ in sorted(rows)) + " Hz"
+
+
+def _case(answer, i, j):
+    """Speed in rpm and weight in kN of a case, "" without one."""
+    weight = answer.weights[j]
+    return f"{answer.speeds[i] * 30 / math.pi:.4g}", "" if math.isnan(weight) else f"{weight / 1e3:.4g}"
+
+
+def _range(answer):
+    rpm = answer.speeds * 30 / math.pi
+    text = f"{len(rpm)} speeds from {rpm.min():.4g} to {rpm.max():.4g} rpm"
+    if np.isnan(answer.weights).all():
+        return text
+    kN = answer.weights / 1e3
+    if len(kN) == 1:
+        return f"{text}, {kN[0]:.4g} kN on bit"
+    return f"{text}, {len(kN)} weights on bit from {kN.min():.4g} to {kN.max():.4g} kN"
