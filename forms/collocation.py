@@ -8,7 +8,6 @@ length of the step.
 import ufl
 from cosserat_fenicsx.forms import equilibrium, law
 from cosserat_fenicsx.forms.equilibrium import balance, frame
-from cosserat_fenicsx.forms.inertia import lateral
 from cosserat_fenicsx.forms.rotation import conjugate_product
 
 # Where tan(|theta|/2)^2 is below this, the series is exact to rounding.
@@ -22,19 +21,6 @@ def rotation_vector(q0, q1):
     large = ufl.sqrt(ufl.max_value(y, _SMALL))
     series = 1 - y / 3 + y**2 / 5 - y**3 / 7
     return 2 * ufl.conditional(ufl.lt(y, _SMALL), series, ufl.atan(large) / large) * t
-
-
-def rate_of_momentum(r_tt, Om, Om_t, R, inertia, test):
-    """Virtual work of rho A r'' and of the rate of the angular momentum kappa, per unit length."""
-    turned = inertia.I_R * Om_t + ufl.cross(Om, inertia.I_R * Om)
-    both = inertia.mass * ufl.dot(r_tt, test.phi_r) + ufl.dot(R * turned, test.phi)
-    return both + lateral(inertia.lateral, r_tt, test.phi_r)
-
-
-def momentum(r_t, Om, R, inertia, test):
-    """Linear and angular momentum times the test functions, per unit length."""
-    both = inertia.mass * ufl.dot(r_t, test.phi_r) + ufl.dot(R * (inertia.I_R * Om), test.phi)
-    return both + lateral(inertia.lateral, r_t, test.phi_r)
 
 
 def strains(motion, section):

@@ -27,11 +27,11 @@ def arm_rate(q, q_t, inertia):
 
 
 def momentum(r_t, z, z_t, kappa, inertia, test):
-    """Momenta times test functions, per unit length: p . phi_r + (z x p + kappa) . phi."""
+    """Momenta times test functions, per unit length: p . phi_r + (z x p + kappa) . phi. From r_tt, z_tt and the
+    rate of kappa instead: the virtual work of inertia."""
     p = inertia.mass * (r_t + z_t)
-    return (
-        ufl.dot(p, test.phi_r) + ufl.dot(ufl.cross(z, p) + kappa, test.phi) + lateral(inertia.lateral, r_t, test.phi_r)
-    )
+    both = ufl.dot(p, test.phi_r) + ufl.dot(ufl.cross(z, p) + kappa, test.phi)
+    return both + lateral(inertia.lateral, r_t, test.phi_r)
 
 
 def of_moving_axis(r_t, z_t, inertia, test):
@@ -43,12 +43,3 @@ def kinetic_energy(r_t, z_t, Om, inertia):
     """Kinetic energy per unit length."""
     y_t = r_t + z_t
     return (inertia.mass * ufl.dot(y_t, y_t) + ufl.dot(Om, inertia.I_R * Om) + lateral(inertia.lateral, r_t, r_t)) / 2
-
-
-def rate_of_momentum(r_tt, Om, Om_t, R, inertia, test):
-    """Virtual work of rho A y'' at the mass centre and of the rate of kappa, per unit length; see forms/collocation."""
-    a, turned_I = inertia.offset, inertia.I_R * Om_t + ufl.cross(Om, inertia.I_R * Om)
-    z, z_tt = R * a, R * (ufl.cross(Om_t, a) + ufl.cross(Om, ufl.cross(Om, a)))
-    p_t = inertia.mass * (r_tt + z_tt)
-    both = ufl.dot(p_t, test.phi_r) + ufl.dot(ufl.cross(z, p_t) + R * turned_I, test.phi)
-    return both + lateral(inertia.lateral, r_tt, test.phi_r)

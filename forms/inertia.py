@@ -39,11 +39,16 @@ def angular_momentum(q, q_t, inertia):
     return directors(q) * (inertia.I_R * angular_velocity(q, q_t))
 
 
+def rate_of_angular_momentum(R, Om, Om_t, inertia):
+    """The rate of kappa = R I_R Om per length, inertial."""
+    return R * (inertia.I_R * Om_t + ufl.cross(Om, inertia.I_R * Om))
+
+
 def momentum(r_t, kappa, inertia, test):
-    """Momenta times test functions, per unit length: rho A r_t . phi_r + kappa . phi."""
-    return (
-        inertia.mass * ufl.dot(r_t, test.phi_r) + ufl.dot(kappa, test.phi) + lateral(inertia.lateral, r_t, test.phi_r)
-    )
+    """Momenta times test functions, per unit length: rho A r_t . phi_r + kappa . phi. From r_tt and the rate of kappa
+    instead: the virtual work of inertia."""
+    both = inertia.mass * ufl.dot(r_t, test.phi_r) + ufl.dot(kappa, test.phi)
+    return both + lateral(inertia.lateral, r_t, test.phi_r)
 
 
 def kinetic_energy(r_t, Om, inertia):

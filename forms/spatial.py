@@ -28,6 +28,11 @@ def unit_quaternion(state, test):
     return (ufl.dot(state.q_node, state.q_node) - 1) * test.phi_qa
 
 
+def parts_of(w):
+    """(r, q) of seven components, and of the first seven where a multiplier follows; (r, theta) of six."""
+    return ufl.as_vector([w[i] for i in range(3)]), ufl.as_vector([w[i] for i in range(3, min(len(w), 7))])
+
+
 def multiplier(lam, lam_test, q, phi):
     """First variation of lambda (|q|^2 - 1) along phi, to be integrated at the nodes of r, q and lambda.
 
@@ -35,33 +40,30 @@ def multiplier(lam, lam_test, q, phi):
     Gauss points for that energy this is a regular saddle-point problem of order 2p without locking; more points cause
     locking. Where q is prescribed, so is lambda.
     """
-    return 2 * lam * ufl.dot(q, _last(phi)) + (ufl.dot(q, q) - 1) * lam_test
+    return 2 * lam * ufl.dot(q, parts_of(phi)[1]) + (ufl.dot(q, q) - 1) * lam_test
 
 
 def tests_of(phi, phi_s):
     """The test functions of eq. (1) from the seven components (phi_r, phi_qa, phi_qb, phi_qc, phi_qd)."""
-    return VirtualMotion(_first(phi), vector_part(_last(phi)), _first(phi_s), vector_part(_last(phi_s)), phi[3])
+    (phi_r, phi_q), (phi_r_s, phi_q_s) = parts_of(phi), parts_of(phi_s)
+    return VirtualMotion(phi_r, vector_part(phi_q), phi_r_s, vector_part(phi_q_s), phi[3])
 
 
 def rotation_tests_of(psi, psi_s):
     """Test functions of a symmetric tangent: (phi_r, phi), without the constraint."""
-    return VirtualMotion(
-        _first(psi),
-        ufl.as_vector([psi[3], psi[4], psi[5]]),
-        _first(psi_s),
-        ufl.as_vector([psi_s[3], psi_s[4], psi_s[5]]),
-    )
+    return VirtualMotion(*parts_of(psi), *parts_of(psi_s))
 
 
 def variations_of(w, w_s, q, q_s):
     """The `VirtualMotion` of a change w = (delta r, delta q) of (r, q)."""
-    dq = _last(w)
-    return VirtualMotion(_first(w), small_rotation(dq, q), _first(w_s), small_rotation_s(dq, _last(w_s), q, q_s))
+    (dr, dq), (dr_s, dq_s) = parts_of(w), parts_of(w_s)
+    return VirtualMotion(dr, small_rotation(dq, q), dr_s, small_rotation_s(dq, dq_s, q, q_s))
 
 
 def state_of(U, U_s, U_node):
     """The motion of the seven components (r, q)."""
-    return motion_of(_first(U_s), _last(U), _last(U_s), _last(U_node))
+    r_s, q_s = parts_of(U_s)
+    return motion_of(r_s, parts_of(U)[1], q_s, parts_of(U_node)[1])
 
 
 def motion_of(r_s, q, q_s, q_node):
@@ -71,20 +73,11 @@ def motion_of(r_s, q, q_s, q_node):
 
 def point_of(U, U_s, *, rest, frame, r_t=NONE, omega=NONE):
     """The `Point` of the seven components (r, q); arguments as in `Point`."""
-    q = _last(U)
-    return Point(
-        _first(U), _first(U_s), rotation_matrix(q), rotation_vector(q), rest=rest, frame=frame, r_t=r_t, omega=omega
-    )
+    (r, q), (r_s, _) = parts_of(U), parts_of(U_s)
+    return Point(r, r_s, rotation_matrix(q), rotation_vector(q), rest=rest, frame=frame, r_t=r_t, omega=omega)
 
 
 def velocities(U, U_t):
     """Velocity and angular velocity, inertial, of the seven components (r, q) with the rates U_t."""
-    return _first(U_t), small_rotation(_last(U_t), _last(U))
-
-
-def _first(w):
-    return ufl.as_vector([w[0], w[1], w[2]])
-
-
-def _last(w):
-    return ufl.as_vector([w[3], w[4], w[5], w[6]])
+    r_t, q_t = parts_of(U_t)
+    return r_t, small_rotation(q_t, parts_of(U)[1])

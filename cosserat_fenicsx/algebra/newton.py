@@ -341,7 +341,7 @@ class LimitedNewton:
         self._factor()
         if not problem.solve(problem.b, self._change):
             return None
-        moved, turned = self._size(self._change.array_r)
+        moved, turned = problem.model.sizes(self._change.array_r)
         if not math.isfinite(moved + turned):
             return None
         share = min(share, self._longest / moved if moved else 1.0, self._widest / turned if turned else 1.0)
@@ -362,8 +362,7 @@ class LimitedNewton:
         """The largest residual force of a node at the state, in the model's unit of force."""
         model = self._problem.model
         self._residual()
-        forces = model.motion_in(self._problem.b.array_r).reshape(-1, model.components - model.multipliers)
-        local = np.abs(forces[:, : model.moves]).max(initial=0.0)
+        local = np.abs(model.motion_in(self._problem.b.array_r)[:, : model.moves]).max(initial=0.0)
         return float(model.comm.allreduce(local, op=MPI.MAX)) if model.comm.size > 1 else float(local)
 
     def _factor(self):
@@ -377,13 +376,3 @@ class LimitedNewton:
 
     def _residual(self):
         self._problem.function(self._problem.x, self._problem.b)
-
-    def _size(self, change):
-        """Largest displacement and rotation of a node in a change of the unknowns, over all ranks."""
-        model = self._problem.model
-        squares = np.square(model.motion_in(change).reshape(-1, model.components - model.multipliers))
-        parts = (squares[:, : model.moves], model.turn**2 * squares[:, model.moves :])
-        local = np.sqrt([part.sum(axis=1).max(initial=0.0) for part in parts])
-        if model.comm.size > 1:
-            model.comm.Allreduce(MPI.IN_PLACE, local, op=MPI.MAX)
-        return float(local[0]), float(local[1])

@@ -16,7 +16,7 @@ from cosserat_fenicsx.dynamics.start import equilibrium, put_start, starts_in
 from cosserat_fenicsx.dynamics.time_loop import TimeLoop, marks_of
 from cosserat_fenicsx.errors import NotConverged, SceneError, nearest
 from cosserat_fenicsx.models.choose import not_flat
-from cosserat_fenicsx.models.collocated import CollocatedEccentric, CollocatedPlanar, CollocatedSpatial
+from cosserat_fenicsx.models.collocated import CollocatedPlanar, CollocatedSpatial
 from cosserat_fenicsx.models.directors import ConservingSpatial, EccentricSpatial
 from cosserat_fenicsx.models.moving import MovingSpatial
 from cosserat_fenicsx.models.moving_planar import MovingPlanar
@@ -225,7 +225,6 @@ _MODELS = {
     ("momentum", "planar"): MovingPlanar,
     ("energy", "spatial"): ConservingSpatial,
     ("collocation", "spatial"): CollocatedSpatial,
-    ("collocation", "eccentric"): CollocatedEccentric,
     ("collocation", "planar"): CollocatedPlanar,
 }
 

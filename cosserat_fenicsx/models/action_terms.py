@@ -298,7 +298,7 @@ class Term:
             for action, rod, rows, *_ in self._where:
                 function.x.array.reshape(-1, action.memory[k].size)[rows] = self._scaled(action.memory[k], rod)
         if self._rest is not None:
-            self._rest.x.array.reshape(-1, 3)[numbers] = self._interpolated(model.positions_at_rest()) @ model.axes.T
+            self._rest.x.array.reshape(-1, 3)[numbers] = self._interpolated(model.reference[model.slots]) @ model.axes.T
         if self._frame is not None:
             for i, rod in enumerate(scene.rods):
                 here = in_turn[bounds[i] : bounds[i + 1]]

@@ -52,49 +52,13 @@ class Scales:
         return self.force**force * self.length**length * time**times
 
 
-class Snapshots:
-    """Mixin of `RodModel`: copies of a state for results, of the nodes' unknowns and of fields at the Gauss points."""
-
-    def snapshot(self):
-        """The input of `expansion`: the nodes' unknowns (N, components), and the fields at the Gauss points (cells,
-        points, k) or None; in the scene's order, on all ranks, dimensionless."""
-        nodal = self._gather_nodes(self.state.x.array[self.nodal[: self.owned_nodes]])
-        if self.forms.fields is None:
-            return nodal, None
-        return nodal, self.gathered(self.forms.fields, len(self.forms.gauss), self.forms.fields_size)
-
-    def snapshots(self, x, fields):
-        """`snapshot` at several states of one process: from its unknowns (k, unknowns), and the values of the fields
-        (k, elements, n) or None."""
-        numbering = self.numbering
-        state = np.tile(self._rest_state, (len(x), 1))
-        state[:, numbering.free] = x[:, numbering.of_free]
-        nodal = np.empty((len(x), *self.nodal.shape))
-        nodal[:, self.slots] = state[:, self.nodal]
-        if fields is None:
-            return nodal, None
-        values = fields.reshape(*fields.shape[:2], len(self.forms.gauss), -1).copy()
-        values[:, self.rods.reversed] = values[:, self.rods.reversed][:, :, ::-1]
-        found = np.empty_like(values)
-        found[:, self.rods.cells] = values
-        return nodal, found
-
-    def gathered(self, expression, points, size):
-        """(elements, points, size) values of a compiled expression, in the scene's order, on all ranks."""
-        owned = len(self._owned_cells)
-        values = compat.evaluate(expression, self.mesh, self._owned_cells).reshape(owned, points, size)
-        reverse = self.rods.reversed[:owned]
-        values[reverse] = values[reverse][:, ::-1]
-        return self._gather_cells(values.reshape(owned, points * size)).reshape(-1, points, size)
-
-
 #: One part of the second variation, decoupled from the others: its compiled form, its `Numbering`, the local degrees of
 #: freedom of every element of this rank, the rows of the tied nodes (see `RodModel.rows_of_tied`), the inertial
 #: (displacement, rotation) of each component, (block, 6); and whether they leave the plane of a planar model.
 SecondVariation = namedtuple("SecondVariation", "form numbering cell_dofs tied axes sideways")
 
 
-class RodModel(Snapshots):
+class RodModel:
     """Spaces, data and forms of one `Signature`; `load` fills in the data of a scene. Subclasses are the models.
 
     Attributes:
@@ -129,9 +93,9 @@ class RodModel(Snapshots):
     name, components, moves, turn, multipliers = "", 0, 0, 1.0, 0
     #: components per Gauss point of the reference frame, of the reference strain and of the contact force.
     frame_size, strain_size, force_size = 9, 3, 3
-    #: components of a node in each second variation, and whether these leave the plane; and of each a function from
-    #: these components to the `VirtualMotion`, None for the variation that is the tangent.
-    variations = small_motions = ()
+    #: of each second variation: the components of a node, whether they leave the plane, and the function from them to
+    #: the `VirtualMotion`, None for the variation that is the tangent.
+    variations = ()
     #: factor of the law in the second variation, see `SpatialModel.stress_alone`.
     stiffness = 1
     #: whether the map from reactions to a node's residual rows depends on the node's unknowns
@@ -203,10 +167,6 @@ class RodModel(Snapshots):
         """(n, 3) positions of the local nodes, inertial, from the origin of their structure."""
         raise NotImplementedError
 
-    def positions_at_rest(self):
-        """The same in the reference configuration."""
-        return self.reference[self.slots]
-
     def tied_motion(self, values):
         """(r, q), (nodes, 7), inertial, from the unknowns of tied nodes, (nodes, components)."""
         raise NotImplementedError
@@ -248,7 +208,7 @@ class RodModel(Snapshots):
             self.space = compat.function_space(self.mesh, compat.mixed(element, *others))
             self.force_nodes = compat.element_nodes(compat.function_space(self.mesh, others[0]))
         spaces = self.variation_spaces = [
-            compat.function_space(self.mesh, compat.lagrange(self.mesh, p, size)) for size, _ in self.variations
+            compat.function_space(self.mesh, compat.lagrange(self.mesh, p, size)) for size, *_ in self.variations
         ]
         self.state, self.before, self.step = (fem.Function(self.space) for _ in range(3))
         self.load_factor, self.permanent_factor = (fem.Constant(self.mesh, np.float64(x)) for x in (0, 1))
@@ -307,11 +267,11 @@ class RodModel(Snapshots):
     def _prepare_variations(self, spaces):
         self._variations = []
         owned = len(self._owned_cells)
-        for form, space, (size, sideways) in zip(self.forms.second_variations, spaces, self.variations, strict=True):
+        for form, space, (size, sideways, _) in zip(self.forms.second_variations, spaces, self.variations, strict=True):
             dofs = np.arange(size * len(self.slots)).reshape(-1, size)
             numbering = Numbering(self.comm, space, dofs, self.owned_nodes, *self._held)
             cell_dofs = dofs[self.cell_nodes[:owned]].reshape(owned, size * (self.signature.degree + 1))
-            tied = self._rows_of_tied(numbering, dofs)
+            tied = self._rows_everywhere(numbering, dofs)[self.tied_slots]
             self._variations.append(SecondVariation(form, numbering, cell_dofs, tied, None, sideways))
 
     @property
@@ -324,7 +284,7 @@ class RodModel(Snapshots):
     def rows_of_tied(self):
         """(tied nodes, components) rows in the solver's vector of the nodes in constraint equations, on all ranks; -1
         where clamped."""
-        return self._rows_of_tied(self.numbering, self.nodal)
+        return self._rows_everywhere(self.numbering, self.nodal)[self.tied_slots]
 
     @property
     def rows_of_nodes(self):
@@ -332,19 +292,14 @@ class RodModel(Snapshots):
         ranks; -1 where clamped."""
         (part,) = self._variations
         dofs = np.arange(part.numbering.block * len(self.slots)).reshape(-1, part.numbering.block)
-        rows = np.empty((self._gather_nodes.total, part.numbering.block), dtype=np.int64)
-        for slots, numbers in self.comm.allgather((self.slots, part.numbering.rows[dofs])):
+        return self._rows_everywhere(part.numbering, dofs)
+
+    def _rows_everywhere(self, numbering, dofs):
+        """`rows_of_nodes` for any numbering; dofs: (local nodes, block) local degrees of freedom."""
+        rows = np.empty((self._gather_nodes.total, numbering.block), dtype=np.int64)
+        for slots, numbers in self.comm.allgather((self.slots, numbering.rows[dofs])):
             rows[slots] = numbers
         return rows
-
-    def _rows_of_tied(self, numbering, dofs):
-        here = {
-            int(self.slots[i]): numbering.rows[dofs[i]] for i in np.flatnonzero(np.isin(self.slots, self.tied_slots))
-        }
-        everywhere = {}
-        for part in self.comm.allgather(here):
-            everywhere.update(part)
-        return np.array([everywhere[s] for s in self.tied_slots.tolist()], dtype=np.int64).reshape(-1, numbering.block)
 
     # -- the numbers of a scene --------------------------------------------------------------------------------------
 
@@ -415,25 +370,64 @@ class RodModel(Snapshots):
         """All Constants of the forms."""
         return [value for value in vars(self).values() if isinstance(value, fem.Constant)]
 
+    def sizes(self, change):
+        """Largest displacement (rod lengths) and rotation (rad) of a node over all ranks, in a change of the solver's
+        vector."""
+        return self._largest_in(self.motion_in(change))
+
+    def _largest_in(self, nodal):
+        """`sizes` of changes of the nodes' unknowns (nodes, components)."""
+        moved, turned = (np.square(x).sum(axis=1).max(initial=0.0) for x in np.split(nodal, [self.moves], axis=1))
+        found = np.sqrt([moved, self.turn**2 * turned])
+        if self.comm.size > 1:
+            self.comm.Allreduce(MPI.IN_PLACE, found, op=MPI.MAX)
+        return found.tolist()
+
     def largest(self, change):
-        """Largest displacement (rod lengths) or rotation (rad) over all ranks, in a change of the solver's vector."""
-        squares, moves = np.square(self.motion_in(change).reshape(-1, self.components - self.multipliers)), self.moves
-        turned = squares[:, moves:].sum(axis=1).max(initial=0)
-        moved = squares[:, :moves].sum(axis=1).max(initial=0) if moves else 0.0
-        local = math.sqrt(max(moved, self.turn**2 * turned))
-        return self.comm.allreduce(local, op=MPI.MAX) if self.comm.size > 1 else local
+        """The larger of the two `sizes`."""
+        return max(self.sizes(change))
 
     def inner(self, a, b):
         """Inner product of two changes of the nodes' unknowns over all nodes and ranks."""
-        local = float(self.motion_in(a) @ self.motion_in(b))
+        local = float(np.vdot(self.motion_in(a), self.motion_in(b)))
         return self.comm.allreduce(local) if self.comm.size > 1 else local
 
     def motion_in(self, change):
-        """The unknowns without multipliers of this rank's nodes, node by node, from its part of the solver's vector."""
-        nodal = change[: self.components * self.numbering.nodes]
-        if self.multipliers:
-            nodal = nodal.reshape(-1, self.components)[:, : -self.multipliers].ravel()
-        return nodal
+        """(nodes, n) the unknowns without multipliers of this rank's nodes, from its part of the solver's vector."""
+        nodal = change[: self.components * self.numbering.nodes].reshape(-1, self.components)
+        return nodal[:, : self.components - self.multipliers]
+
+    def snapshot(self):
+        """The input of `expansion`: the nodes' unknowns (N, components), and the fields at the Gauss points (cells,
+        points, k) or None; in the scene's order, on all ranks, dimensionless."""
+        nodal = self._gather_nodes(self.state.x.array[self.nodal[: self.owned_nodes]])
+        if self.forms.fields is None:
+            return nodal, None
+        return nodal, self.gathered(self.forms.fields, len(self.forms.gauss), self.forms.fields_size)
+
+    def snapshots(self, x, fields):
+        """`snapshot` at several states of one process: from its unknowns (k, unknowns), and the values of the fields
+        (k, elements, n) or None."""
+        numbering = self.numbering
+        state = np.tile(self._rest_state, (len(x), 1))
+        state[:, numbering.free] = x[:, numbering.of_free]
+        nodal = np.empty((len(x), *self.nodal.shape))
+        nodal[:, self.slots] = state[:, self.nodal]
+        if fields is None:
+            return nodal, None
+        values = fields.reshape(*fields.shape[:2], len(self.forms.gauss), -1).copy()
+        values[:, self.rods.reversed] = values[:, self.rods.reversed][:, :, ::-1]
+        found = np.empty_like(values)
+        found[:, self.rods.cells] = values
+        return nodal, found
+
+    def gathered(self, expression, points, size):
+        """(elements, points, size) values of a compiled expression, in the scene's order, on all ranks."""
+        owned = len(self._owned_cells)
+        values = compat.evaluate(expression, self.mesh, self._owned_cells).reshape(owned, points, size)
+        reverse = self.rods.reversed[:owned]
+        values[reverse] = values[reverse][:, ::-1]
+        return self._gather_cells(values.reshape(owned, points * size)).reshape(-1, points, size)
 
     def bounded_stiffness(self):
         """K in the second variation at the state, (elements, points, 3), in the scene's order, on all ranks."""

@@ -5,11 +5,11 @@ import ufl
 from dolfinx import fem
 
 from cosserat_fenicsx import compat
-from cosserat_fenicsx.forms import collocation, eccentric, spatial
+from cosserat_fenicsx.forms import collocation, eccentric, inertia, spatial
 from cosserat_fenicsx.forms.rotation import rotation_matrix
+from cosserat_fenicsx.forms.spatial import parts_of
 from cosserat_fenicsx.models.compiled import along
-from cosserat_fenicsx.models.directors import EccentricMomenta
-from cosserat_fenicsx.models.moving import MovingSpatial, SpatialStep, parts_of, virtual_work_of_step
+from cosserat_fenicsx.models.moving import MovingSpatial, SpatialStep, virtual_work_of_step
 from cosserat_fenicsx.models.moving_planar import MovingPlanar, PlanarStep
 from cosserat_fenicsx.models.rod_data import gauss_function
 from cosserat_fenicsx.numerics import conjugate_product
@@ -25,33 +25,30 @@ class SpatialCollocation(SpatialStep):
 
     def rate_of_momentum(self, v, a):
         """Virtual work of inertia per unit length, from velocities and accelerations at the end of the step."""
-        (_, Om), (r_tt, Om_t) = _halves(v), _halves(a)
-        R = rotation_matrix(parts_of(self.nodal)[1])
-        return collocation.rate_of_momentum(r_tt, Om, Om_t, R, self.body, self.test)
+        (_, Om), (r_tt, Om_t), b = parts_of(v), parts_of(a), self.body.offset
+        R = self._rotation()
+        turned = inertia.rate_of_angular_momentum(R, Om, Om_t, self.body)
+        z_tt = None if b is None else R * (ufl.cross(Om_t, b) + ufl.cross(Om, ufl.cross(Om, b)))
+        return self._momentum(r_tt, turned, R, z_tt)
 
     def momentum_by(self, v):
         """Momenta times test functions per unit length, from velocities at the end of the step."""
-        return collocation.momentum(*_halves(v), rotation_matrix(parts_of(self.nodal)[1]), self.body, self.test)
+        (r_t, Om), R, b = parts_of(v), self._rotation(), self.body.offset
+        return self._momentum(r_t, R * (self.body.I_R * Om), R, None if b is None else R * ufl.cross(Om, b))
+
+    def _momentum(self, r_t, kappa, R, z_t):
+        if z_t is None:
+            return inertia.momentum(r_t, kappa, self.body, self.test)
+        return eccentric.momentum(r_t, R * self.body.offset, z_t, kappa, self.body, self.test)
+
+    def _rotation(self):
+        return rotation_matrix(parts_of(self.nodal)[1])
 
     def point_with(self, w, v, rest, frame):
         """The `Point` with unknowns w and velocities v."""
-        r_t, Om = _halves(v)
+        r_t, Om = parts_of(v)
         omega = rotation_matrix(parts_of(w)[1]) * Om
         return spatial.point_of(w, along(w), rest=rest, frame=frame, r_t=r_t, omega=omega)
-
-
-class EccentricCollocation(EccentricMomenta, SpatialCollocation):
-    """A `SpatialCollocation` with mass centres off the axis."""
-
-    def rate_of_momentum(self, v, a):
-        (_, Om), (r_tt, Om_t) = _halves(v), _halves(a)
-        R = rotation_matrix(parts_of(self.nodal)[1])
-        return eccentric.rate_of_momentum(r_tt, Om, Om_t, R, self.body, self.test)
-
-    def momentum_by(self, v):
-        (r_t, Om), R, body = _halves(v), rotation_matrix(parts_of(self.nodal)[1]), self.body
-        z, z_t = R * body.offset, R * ufl.cross(Om, body.offset)
-        return eccentric.momentum(r_t, z, z_t, R * (body.I_R * Om), body, self.test)
 
 
 class PlanarCollocation(PlanarStep):
@@ -70,17 +67,11 @@ class PlanarCollocation(PlanarStep):
         return self.model.point_of(w, v, rest=rest, frame=frame)
 
 
-def _halves(a):
-    return ufl.as_vector([a[0], a[1], a[2]]), ufl.as_vector([a[3], a[4], a[5]])
-
-
 def compile_collocated(step):
     """The `MotionForms` at the end of a step, the changes of the six strains over it, and their rates at its end."""
     model, dx = step.model, step.dx
-    increment, strains = (
-        step.increment(step.nodal, step.nodal0),
-        [collocation.strains(motion, step.section) for motion in (step.before, step.after)],
-    )
+    increment = step.increment(step.nodal, step.nodal0)
+    strains = [collocation.strains(motion, step.section) for motion in (step.before, step.after)]
     v = model.by_velocity * increment + model.known_velocity
     a = model.by_acceleration * increment + model.known_acceleration
     rates = model.by_velocity * (strains[1] - strains[0]) + model.known_strain_rate
@@ -237,12 +228,6 @@ class CollocatedSpatial(Collocated, MovingSpatial):
         rates[nodal[:, :3]] = v[:, :3]
         rates[nodal[:, 3]] = -np.einsum("ni,ni->n", q[:, 1:], Om) / 2
         rates[nodal[:, 4:]] = (q[:, :1] * Om + np.cross(q[:, 1:], Om)) / 2
-
-
-class CollocatedEccentric(CollocatedSpatial):
-    """The same with mass centres off the axis."""
-
-    step_forms = EccentricCollocation
 
 
 class CollocatedPlanar(Collocated, MovingPlanar):

@@ -117,7 +117,7 @@ def compile_static(model, spaces, displacements=None):
         forces = action_work(model, dx, VirtualMotion(ufl.TestFunction(displacements), NONE), point_at, ())
 
     seconds, variations = [], []  # in small displacements and rotations, which satisfy |q| = 1 by construction
-    for space, small_motion in zip(spaces, model.small_motions, strict=True):
+    for space, (_, _, small_motion) in zip(spaces, model.variations, strict=True):
         if small_motion is None:
             second, pair = tangent, None
         else:

@@ -175,8 +175,7 @@ class DeterminateInPlane(_KnownForce, PlaneModel):
     """Theta alone."""
 
     components, moves, turn = 1, 0, 1.0
-    variations = ((1, False), (2, True))
-    small_motions = None, lambda w: eq.tests_of(planar.in_plane(w), planar.in_plane(along(w)))
+    variations = ((1, False, None), (2, True, lambda w: eq.tests_of(planar.in_plane(w), planar.in_plane(along(w)))))
 
     def motion_of(self, w, nodal):
         return planar.motion_of((0, 0), w[0], along(w)[0])
@@ -228,7 +227,7 @@ class DeterminateInSpace(_KnownForce):
     """The quaternion q alone."""
 
     components, moves, turn = 4, 0, 2.0
-    variations, small_motions = ((3, False),), (lambda w: eq.tests_of(w, along(w)),)
+    variations = ((3, False, lambda w: eq.tests_of(w, along(w))),)
 
     def cross_section(self):
         return Section(self.data.law, as_matrix(self.data.R_R), self.data.v_R)

@@ -8,16 +8,9 @@ from dolfinx import fem
 from cosserat_fenicsx import compat, numerics
 from cosserat_fenicsx.forms import eccentric, energy, inertia
 from cosserat_fenicsx.forms.rotation import directors
+from cosserat_fenicsx.forms.spatial import parts_of
 from cosserat_fenicsx.models.compiled import along
-from cosserat_fenicsx.models.moving import (
-    MovingSpatial,
-    SpatialStep,
-    compile_motion,
-    parts_of,
-    spun,
-    turned_by,
-    virtual_work_of_step,
-)
+from cosserat_fenicsx.models.moving import MovingSpatial, SpatialStep, spun, turned_by, virtual_work_of_step
 from cosserat_fenicsx.models.rod_data import as_matrix
 
 
@@ -58,30 +51,7 @@ class Turning:
         W[:] = 2 / h * (R - before) - W
 
 
-class EccentricMomenta:
-    """Mixin of a `SpatialStep`, first among the bases: the momenta of forms/eccentric.py."""
-
-    def momentum(self, w, w_t):
-        (_, q), (_, q_t) = parts_of(w), parts_of(w_t)
-        return self.momentum_with(w, w_t, eccentric.arm_rate(q, q_t, self.body))
-
-    def kinetic(self, w, w_t):
-        (_, q), (_, q_t) = parts_of(w), parts_of(w_t)
-        return self.kinetic_with(w, w_t, eccentric.arm_rate(q, q_t, self.body))
-
-    def momentum_with(self, w, w_t, z_t):
-        """`momentum` with the rate z_t of the mass centre about the axis."""
-        (_, q), (r_t, q_t), body = parts_of(w), parts_of(w_t), self.body
-        kappa = inertia.angular_momentum(q, q_t, body)
-        return eccentric.momentum(r_t, eccentric.arm(q, body), z_t, kappa, body, self.test)
-
-    def kinetic_with(self, w, w_t, z_t):
-        """`kinetic` likewise."""
-        (_, q), (r_t, q_t) = parts_of(w), parts_of(w_t)
-        return eccentric.kinetic_energy(r_t, z_t, inertia.angular_velocity(q, q_t), self.body)
-
-
-class EccentricStep(EccentricMomenta, SpatialStep):
+class EccentricStep(SpatialStep):
     """See `StepForms`: with the rates of the directors of `Turning`."""
 
     def __init__(self, model):
@@ -89,13 +59,13 @@ class EccentricStep(EccentricMomenta, SpatialStep):
         self.turned = as_matrix(model.turning) * self.body.offset
 
     def momentum_before(self):
-        return self.momentum_with(self.nodal, self.rates, self.turned)
+        return self.momentum(self.nodal, self.rates, self.turned)
 
     def kinetic_before(self):
-        return self.kinetic_with(self.nodal, self.rates, self.turned)
+        return self.kinetic(self.nodal, self.rates, self.turned)
 
     def momentum_after(self):
-        return self.momentum_with(self.nodal, 2 * self.passed - self.rates, 2 * self._arm_passed() - self.turned)
+        return self.momentum(self.nodal, 2 * self.passed - self.rates, 2 * self._arm_passed() - self.turned)
 
     def of_moving_axis(self):
         return eccentric.of_moving_axis(parts_of(self.passed)[0], self._arm_passed(), self.body, self.test)
@@ -121,60 +91,78 @@ class EccentricSpatial(Turning, MovingSpatial):
         self.turning.x.array[:] = (W + np.cross(change[:, :, None], numerics.directors(q), axis=1)).ravel()
 
 
-def compile_conserving(step):
-    """The `MotionForms` of the energy-conserving scheme of a moving spatial model, from its `SpatialStep`.
+class ConservingStep(SpatialStep):
+    """See `StepForms`: energies and momenta of the directors' rates; test functions are changes of (r, q).
 
-    Test functions are changes of (r, q). The residual has all terms of the step except loads, and no equation |q| = 1.
+    Attributes:
+        spin: rates of the directors at the beginning of the step; moved, turned: mean rates of r and of the directors
+            over it.
+        lines: `energy.Configuration`s of its two ends.
     """
-    model, dx, section, viscosity, body = step.model, step.dx, step.section, step.viscosity, step.body
-    h, phi = model.h, step.phi
-    turning = compat.alias(model.turning) if model.signature.degree == 1 else model.turning
 
-    def line(w):
+    def __init__(self, model):
+        super().__init__(model)
+        self.spin = as_matrix(compat.alias(model.turning) if model.signature.degree == 1 else model.turning)
+        (r0, q0), (r1, q1) = parts_of(self.nodal0), parts_of(self.nodal)
+        self.moved, self.turned = (r1 - r0) / model.h, (directors(q1) - directors(q0)) / model.h
+        self.lines = [self._line(w) for w in (self.start, self.state)]
+
+    @staticmethod
+    def _line(w):
         (_, q), (r_s, q_s) = parts_of(w), parts_of(along(w))
         return energy.Configuration(r_s, q, q_s)
 
-    before, after = line(step.start), line(step.state)
-    test = energy.Variation(*parts_of(phi), *parts_of(along(phi)))
+    def stress_work(self, test):
+        """Virtual work of the stress on an `energy.Variation`."""
+        return energy.stress_work(*self.lines, self.section, self.viscosity, self.model.h, test)
 
-    (r0, q0), (r1, q1), (r_t, _) = parts_of(step.nodal0), parts_of(step.nodal), parts_of(step.rates)
-    spin = as_matrix(turning)
-    moved, turned = (r1 - r0) / h, (energy.directors(q1) - energy.directors(q0)) / h
-    half = (q0 + q1) / 2
-    residual = energy.rate_work(2 * (moved - r_t) / h, 2 * (turned - spin) / h, half, body, test) * dx.nodes
-    residual += model.drag[0] * energy.rate_work(moved, turned, half, body, test) * dx.nodes
-    residual += energy.stress_work(before, after, section, viscosity, h, test) * dx.gauss
+    def momentum_before(self):
+        (_, q), (r_t, _), body = parts_of(self.nodal), parts_of(self.rates), self.body
+        kappa = energy.angular_momentum(q, self.spin, body)
+        if body.offset is None:
+            return inertia.momentum(r_t, kappa, body, self.test)
+        return eccentric.momentum(r_t, eccentric.arm(q, body), self.spin * body.offset, kappa, body, self.test)
+
+    def kinetic_before(self):
+        return energy.kinetic_energy(parts_of(self.rates)[0], self.spin, self.body)
+
+    def kinetic_passed(self):
+        return energy.kinetic_energy(self.moved, self.turned, self.body)
+
+    def strain(self):
+        return energy.strain_energy(self.lines[1], self.section)
+
+    def viscous_loss(self):
+        return energy.viscous_loss(*self.lines, self.section, self.viscosity, self.model.h)
+
+
+def compile_conserving(step):
+    """The `MotionForms` of the energy-conserving scheme, from a `ConservingStep`.
+
+    The residual has all terms of the step except loads, and no equation |q| = 1.
+    """
+    model, dx, body, h = step.model, step.dx, step.body, step.model.h
+    q_m = (parts_of(step.nodal0)[1] + parts_of(step.nodal)[1]) / 2
+    test = energy.Variation(*parts_of(step.phi), *parts_of(along(step.phi)))
+    rates = 2 * (step.moved - parts_of(step.rates)[0]) / h, 2 * (step.turned - step.spin) / h
+    residual = energy.rate_work(*rates, q_m, body, test) * dx.nodes
+    residual += model.drag[0] * energy.rate_work(step.moved, step.turned, q_m, body, test) * dx.nodes
+    residual += step.stress_work(test) * dx.gauss
 
     def of_stress(test):
         """At a clamped point delta q = phi/2: q is (1, 0, 0, 0) there."""
         q, q_s = (ufl.as_vector([0, *(a[i] / 2 for i in range(3))]) for a in (test.phi, test.phi_s))
-        varied = energy.Variation(test.phi_r, q, test.phi_r_s, q_s)
-        return energy.stress_work(before, after, section, viscosity, h, varied)
+        return step.stress_work(energy.Variation(test.phi_r, q, test.phi_r_s, q_s))
 
     of_step = virtual_work_of_step(model, of_stress, step.halfway_point)
     acting = step.actions(step.halfway_point)
-    n, m = inertia.contact(step.after, section, viscosity, lambda a: ufl.derivative(a, step.state, step.velocity))
-    kappa = energy.angular_momentum(q1, spin, body)
-    if body.offset is None:
-        momentum = inertia.momentum(r_t, kappa, body, step.test)
-    else:
-        momentum = eccentric.momentum(r_t, eccentric.arm(q1, body), spin * body.offset, kappa, body, step.test)
-    lost = energy.viscous_loss(before, after, section, viscosity, h) * dx.gauss
-    lost += 2 * h * model.drag[0] * energy.kinetic_energy(moved, turned, body) * dx.nodes
-    others = {
-        "momentum": momentum * dx.nodes,
-        "kinetic": energy.kinetic_energy(r_t, spin, body) * dx.nodes,
-        "strain": energy.strain_energy(after, section) * dx.gauss,
-        "dissipated": lost,
-    }
-    fields, dead = model.fields_of(n, m, step.after.r_s), acting._replace(live=[])
-    return compile_motion(model, residual, dead, step.derivative, fields, others, of_step, acting, turned=True)
+    return step.compiled(residual, acting._replace(live=[]), acting, of_step, turned=True)
 
 
 class ConservingSpatial(Turning, MovingSpatial):
     """See `MovingSpatial`; angular velocities are those of the directors' rates."""
 
-    scheme = staticmethod(compile_conserving)
+    step_forms, scheme = ConservingStep, staticmethod(compile_conserving)
 
     def accept(self, h):
         super().accept(h)

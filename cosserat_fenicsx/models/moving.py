@@ -10,9 +10,10 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from cosserat_fenicsx import compat
-from cosserat_fenicsx.forms import inertia
+from cosserat_fenicsx.forms import eccentric, inertia
 from cosserat_fenicsx.forms.equilibrium import VirtualMotion
 from cosserat_fenicsx.forms.point import AXES, NONE
+from cosserat_fenicsx.forms.spatial import parts_of
 from cosserat_fenicsx.models.action_terms import Delays
 from cosserat_fenicsx.models.base import Scales
 from cosserat_fenicsx.models.compiled import (
@@ -68,11 +69,6 @@ class MotionForms(CompiledForms):
     of_step_at_nodes: object = None
 
 
-def parts_of(w):
-    """r and q of seven components."""
-    return ufl.as_vector([w[i] for i in range(3)]), ufl.as_vector([w[i] for i in range(3, 7)])
-
-
 class StepForms:
     """The UFL expressions of a time step. Subclasses define what depends on the unknowns of a model.
 
@@ -106,6 +102,18 @@ class StepForms:
     def kinetic(self, w, w_t):
         """Kinetic energy per length."""
         raise NotImplementedError
+
+    def strain(self):
+        """Strain energy per length of the state."""
+        return inertia.strain_energy(self.after, self.section)
+
+    def viscous_loss(self):
+        """Energy per length that the viscous law dissipates in the step."""
+        return inertia.viscous_loss(self.before, self.after, self.section, self.viscosity, self.model.h)
+
+    def kinetic_passed(self):
+        """`kinetic` halfway, with the mean velocities of the step."""
+        return self.kinetic(self.halfway, self.passed)
 
     def momentum_before(self):
         """`momentum` at the state with `velocity`, before it is the start of a step."""
@@ -144,27 +152,44 @@ class StepForms:
         held = self.model.constraint(self.model.motion_of(self.state, self.nodal), self.test, self.nodal, self.phi)
         return 0 if held is None else held * self.dx.nodes
 
-    def compiled(self, residual, acting, working, of_step):
-        """`MotionForms` of a residual without loads.
+    def compiled(self, residual, acting, working, of_step, *, turned=False):
+        """`MotionForms` of a residual without actions.
 
         Args:
+            acting: `ActionWork` in the residual; working: in the energy balance, at the middle of the step, or None for
+                the same.
             of_step: see `virtual_work_of_step`.
-            acting: `ActionWork` in the residual; working: that in the energy balance, at the middle of the step, or
-                None for the same.
+            turned: whether the live part of `working` has a tangent of its own.
         """
-        model, dx, section, viscosity, h = self.model, self.dx, self.section, self.viscosity, self.model.h
-        n, m = inertia.contact(self.after, section, viscosity, lambda a: ufl.derivative(a, self.state, self.velocity))
-        lost = inertia.viscous_loss(self.before, self.after, section, viscosity, h) * dx.gauss
-        lost += 2 * h * model.drag[0] * self.kinetic(self.halfway, self.passed) * dx.nodes
+        model, dx, derivative = self.model, self.dx, self.derivative
+        n, m = inertia.contact(
+            self.after, self.section, self.viscosity, lambda a: ufl.derivative(a, self.state, self.velocity)
+        )
+        by_drag = 2 * model.h * model.drag[0] * self.kinetic_passed() * dx.nodes
         others = {
             "momentum": self.momentum_before() * dx.nodes,
             "kinetic": self.kinetic_before() * dx.nodes,
-            "strain": inertia.strain_energy(self.after, section) * dx.gauss,
-            "dissipated": lost,
+            "strain": self.strain() * dx.gauss,
+            "dissipated": self.viscous_loss() * dx.gauss + by_drag,
         }
-        return compile_motion(
-            model, residual, acting, self.derivative, model.fields_of(n, m, self.after.r_s), others, of_step, working
+        booked = {} if working is None else {live.number: _booked(live, derivative, turned) for live in working.live}
+        lives = {live.number: live_parts(live, derivative, ()) for live in acting.live}
+        core, fields = [residual, derivative(residual)], model.fields_of(n, m, self.after.r_s)
+        found, of_others, of_lives = compile_parts(
+            model, core, lives, acting, fields, others=list(others.values()), of_terms=booked
         )
+        live, live_tangent = (tuple(pair[i] for pair in of_lives if pair[i]) for i in range(2))
+        step, step_at_nodes = compat.expressions(model.mesh, zip(of_step, (found.gauss, model.nodes), strict=True))
+        return MotionForms(
+            **vars(found), **dict(zip(others, of_others, strict=True)), of_step=step, of_step_at_nodes=step_at_nodes,
+            live=found.residual[1:] if working is None else live, live_tangent=live_tangent,
+        )  # fmt: skip
+
+
+def _booked(live, derivative, turned):
+    """[form, its derivative or None] of a `Live` of the energy balance."""
+    change = nonzero(derivative(live.form)) if turned else None
+    return [-live.factor * live.form, None if change is None else -live.factor * change]
 
 
 def compile_momentum(step, stress=inertia.averaged_stress):
@@ -223,42 +248,21 @@ class SpatialStep(StepForms):
         self.body = inertia.Inertia(model.mass[0], I_R, model.offset, model.lateral)
         super().__init__(model)
 
-    def momentum(self, w, w_t):
-        (_, q), (r_t, q_t) = parts_of(w), parts_of(w_t)
-        return inertia.momentum(r_t, inertia.angular_momentum(q, q_t, self.body), self.body, self.test)
+    def momentum(self, w, w_t, z_t=None):
+        """See `StepForms`; z_t: rate of the mass centre about the axis, where it is not that of q."""
+        (_, q), (r_t, q_t), body = parts_of(w), parts_of(w_t), self.body
+        kappa = inertia.angular_momentum(q, q_t, body)
+        if body.offset is None:
+            return inertia.momentum(r_t, kappa, body, self.test)
+        z_t = eccentric.arm_rate(q, q_t, body) if z_t is None else z_t
+        return eccentric.momentum(r_t, eccentric.arm(q, body), z_t, kappa, body, self.test)
 
-    def kinetic(self, w, w_t):
-        (_, q), (r_t, q_t) = parts_of(w), parts_of(w_t)
-        return inertia.kinetic_energy(r_t, inertia.angular_velocity(q, q_t), self.body)
-
-
-def compile_motion(model, residual, acting, derivative, fields, others, of_step, working=None, *, turned=False):
-    """`MotionForms` of UFL forms; see `compile_parts`.
-
-    Args:
-        residual: without actions; acting: the `ActionWork` in it; derivative: see `compile_all`.
-        others: {name in `MotionForms`: form}.
-        working: the `ActionWork` in the energy balance, where it is another one.
-        turned: whether the live part of `working` has a tangent of its own.
-    """
-    booked = {} if working is None else {live.number: _booked(live, derivative, turned) for live in working.live}
-    lives = {live.number: live_parts(live, derivative, ()) for live in acting.live}
-    core = [residual, derivative(residual)]
-    steady, of_others, of_lives = compile_parts(
-        model, core, lives, acting, fields, others=list(others.values()), of_terms=booked
-    )
-    live, live_tangent = (tuple(pair[i] for pair in of_lives if pair[i]) for i in range(2))
-    step, step_at_nodes = compat.expressions(model.mesh, zip(of_step, (steady.gauss, model.nodes), strict=True))
-    return MotionForms(
-        **vars(steady), **dict(zip(others, of_others, strict=True)), of_step=step, of_step_at_nodes=step_at_nodes,
-        live=steady.residual[1:] if working is None else live, live_tangent=live_tangent,
-    )  # fmt: skip
-
-
-def _booked(live, derivative, turned):
-    """[form, its derivative or None] of a `Live` of the energy balance."""
-    change = nonzero(derivative(live.form)) if turned else None
-    return [-live.factor * live.form, None if change is None else -live.factor * change]
+    def kinetic(self, w, w_t, z_t=None):
+        (_, q), (r_t, q_t), body = parts_of(w), parts_of(w_t), self.body
+        Om = inertia.angular_velocity(q, q_t)
+        if body.offset is None:
+            return inertia.kinetic_energy(r_t, Om, body)
+        return eccentric.kinetic_energy(r_t, eccentric.arm_rate(q, q_t, body) if z_t is None else z_t, Om, body)
 
 
 class Moving:
@@ -279,7 +283,7 @@ class Moving:
         delays: the `Delays` of its actions.
     """
 
-    variations = small_motions = ()
+    variations = ()
     #: the `StepForms` of the model, and the function that compiles them
     step_forms, scheme = None, staticmethod(compile_momentum)
     #: independent components of a section's rotational inertia
@@ -409,10 +413,8 @@ class Moving:
 
     def largest_of(self, change, turns):
         """Largest displacement (lengths), or rotation (rad) times `turns`, in a change of the state, over all ranks."""
-        nodal = change[self.nodal]
-        moved, turned = (np.square(x).sum(axis=1).max(initial=0.0) for x in np.split(nodal, [self.moves], axis=1))
-        local = math.sqrt(max(moved, (turns * self.turn) ** 2 * turned))
-        return self.comm.allreduce(local, op=MPI.MAX) if self.comm.size > 1 else local
+        moved, turned = self._largest_in(change[self.nodal])
+        return max(moved, turns * turned)
 
     def turned_over(self):
         """Whether a node of any rank rotated by half a turn or more in the step: the solution is then spurious."""

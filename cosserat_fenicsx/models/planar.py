@@ -75,8 +75,10 @@ class PlanarModel(PlaneModel):
     """The model for scenes in a plane."""
 
     name, components, moves, turn = "planar", 3, 2, 1.0
-    variations = ((3, False), (3, True))
-    small_motions = lambda w: eq.tests_of(w, along(w)), lambda w: eq.sideways_tests_of(w, along(w))
+    variations = (
+        (3, False, lambda w: eq.tests_of(w, along(w))),
+        (3, True, lambda w: eq.sideways_tests_of(w, along(w))),
+    )
 
     def _compile(self, spaces):
         return compile_static(self, spaces)

@@ -37,7 +37,7 @@ class SpatialModel(RodModel):
     """The model for any scene."""
 
     name, moves, turn = "spatial", 3, 2.0
-    variations, small_motions = ((6, False),), (small_motion_of,)
+    variations = ((6, False, small_motion_of),)
 
     def __init__(self, comm, signature):
         formulation = signature.formulation
