@@ -427,6 +427,12 @@ def cell_nodes(space):
     return cells.array.reshape(cells.num_nodes, space.dofmap.dof_layout.num_dofs)
 
 
+def cell_dofs(space):
+    """(local elements, n) local degrees of freedom of every element of a space, node by node."""
+    block, nodes = space.dofmap.index_map_bs, np.asarray(cell_nodes(space))
+    return (nodes[:, :, None] * block + np.arange(block)).reshape(len(nodes), nodes.shape[1] * block)
+
+
 def version():
     """Versions of dolfinx, PETSc, numpy and Python, for reports."""
     petsc = ".".join(map(str, PETSc.Sys.getVersion()))

@@ -45,7 +45,7 @@ def test_gradient_and_tangent():
         AngleTie(1, 2, vector(), vector()),
     ]  # fmt: skip
     known, multipliers = Ties(ties, TiePattern(NODES, 3), rng.normal(size=(3, 3)), 2.0), rng.normal(size=len(ties))
-    gradient = known.on_nodes(known.evaluate(rq, ETA)[1])
+    gradient = known.pattern.on_nodes(known.evaluate(rq, ETA)[1])
     tangent = known.pattern.full(known.change(rq, ETA, multipliers)).reshape(3, 6, 3, 6)
     for node in range(3):
         for direction in range(6):

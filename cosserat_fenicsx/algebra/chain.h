@@ -112,24 +112,24 @@ typedef struct {
     double *force, *law;            /* (nodes, 6) force and moment; (nodes, 3) normal force, friction round and along */
 } contact;
 
-/* Functions of PETSc. */
+/* PETSc's functions of these names, found by Python. */
 typedef struct {
-    int (*get_read)(void *, const double **);
-    int (*restore_read)(void *, const double **);
-    int (*get)(void *, double **);
-    int (*restore)(void *, double **);
-    int (*set_function)(void *, void *, void *, void *);
-    int (*set_jacobian)(void *, void *, void *, void *, void *);
-    int (*set_test)(void *, void *, void *, void *);
-    int (*set_update)(void *, void *);
-    int (*set_context)(void *, void *);
-    int (*get_context)(void *, void *);
-    int (*set_apply)(void *, void *);
-    int (*set_shell)(void *, void *);
-    int (*get_shell)(void *, void *);
-    int (*get_update)(void *, void **);
-    int (*solve)(void *, void *, void *);
-    int (*get_reason)(void *, int *);
+    int (*VecGetArrayRead)(void *, const double **);
+    int (*VecRestoreArrayRead)(void *, const double **);
+    int (*VecGetArray)(void *, double **);
+    int (*VecRestoreArray)(void *, double **);
+    int (*SNESSetFunction)(void *, void *, void *, void *);
+    int (*SNESSetJacobian)(void *, void *, void *, void *, void *);
+    int (*SNESSetConvergenceTest)(void *, void *, void *, void *);
+    int (*SNESSetUpdate)(void *, void *);
+    int (*SNESSetApplicationContext)(void *, void *);
+    int (*SNESGetApplicationContext)(void *, void *);
+    int (*PCShellSetApply)(void *, void *);
+    int (*PCShellSetContext)(void *, void *);
+    int (*PCShellGetContext)(void *, void *);
+    int (*SNESGetSolutionUpdate)(void *, void **);
+    int (*SNESSolve)(void *, void *, void *);
+    int (*SNESGetConvergedReason)(void *, int *);
 } petsc;
 
 /* The second variation, in parts that are decoupled. */
@@ -158,7 +158,7 @@ enum { DONE, LEFT, LATER, FULL };
 
 /* A continuation in the load factor, see statics/path/load_control.py. */
 typedef struct {
-    petsc *with;
+    petsc *library;
     newton *newton;
     second_variation *stability;
     step_control *control;

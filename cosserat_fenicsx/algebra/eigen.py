@@ -87,12 +87,9 @@ def largest_of_pencil(A, B, count, least):
 
 def _above(A, B, least):
     """How many eigenvalues of the symmetric pencil A x = nu B x are above `least` > 0."""
-    matrix, pc = A.copy(), PETSc.PC().create(A.comm)
+    matrix = A.copy()
     matrix.aypx(-1 / least, B)  # B - A/least
-    matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
-    pc.setOperators(matrix)
-    factor_constrained(pc, matrix)
-    pc.setUp()
+    pc = constrained_factors(matrix)
     negative = pc.getFactorMatrix().getInertia()[0]
     pc.destroy()
     return negative
@@ -234,20 +231,36 @@ def factor_second_variation(pc, K):
         pc.setType("cholesky")
         pc.setFactorOrdering("nd")
     else:
-        factor_constrained(pc, K)
+        _factor_constrained(pc, K)
 
 
-def factor_constrained(pc, K, null=0.0):
-    """As `factor_second_variation`, for a matrix whose diagonal may be zero because of constraint equations.
+def constrained_factors(matrix, null=0.0):
+    """A PC with the factors of a symmetric matrix whose diagonal may be zero because of constraint equations.
 
     Args:
+        matrix: of PETSc, or of scipy (csr, on this rank alone).
         null: pivots below this count as zero; 0.0 for a threshold of rounding, relative to the largest row.
     """
+    A = matrix
+    if not isinstance(matrix, PETSc.Mat):
+        parts = matrix.indptr.astype(PETSc.IntType), matrix.indices.astype(PETSc.IntType), matrix.data
+        A = PETSc.Mat().createAIJ(matrix.shape, csr=parts, comm=PETSc.COMM_SELF)
+    A.setOption(PETSc.Mat.Option.SYMMETRIC, True)
+    pc = PETSc.PC().create(A.comm)
+    _factor_constrained(pc, A, null)
+    pc.setUp()
+    if A is not matrix:
+        A.destroy()  # the PC keeps it
+    return pc
+
+
+def _factor_constrained(pc, K, null=0.0):
     pc.setType("cholesky")
     factor = _mumps(pc, K)
     factor.setMumpsIcntl(13, 1)  # root front not distributed: otherwise some negative pivots are not counted
     factor.setMumpsIcntl(6, 0)  # no search for a large diagonal, which gives up where a row is zero
     factor.setMumpsIcntl(24, 1)  # null pivots are counted separately
+    factor.setMumpsIcntl(33, 1)  # the determinant
     factor.setMumpsCntl(3, -null)
 
 

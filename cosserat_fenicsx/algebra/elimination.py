@@ -9,7 +9,6 @@ import contextlib
 import math
 
 import numpy as np
-from petsc4py import PETSc
 
 from cosserat_fenicsx.algebra import eigen
 from cosserat_fenicsx.algebra.building import Pointers
@@ -342,18 +341,11 @@ def _inertia(matrix):
     """(negative, zero) numbers of eigenvalues of a symmetric scipy matrix, by factors with pivots of two rows too, and
     the logarithm of the absolute value of its determinant, NaN where it is singular."""
     matrix.sort_indices()
-    parts = matrix.indptr.astype(PETSc.IntType), matrix.indices.astype(PETSc.IntType), matrix.data
-    A, pc = PETSc.Mat().createAIJ(matrix.shape, csr=parts, comm=PETSc.COMM_SELF), PETSc.PC().create(PETSc.COMM_SELF)
-    A.setOption(PETSc.Mat.Option.SYMMETRIC, True)
-    pc.setOperators(A)
-    eigen.factor_constrained(pc, A, _ROUNDING)
-    pc.getFactorMatrix().setMumpsIcntl(33, 1)  # the determinant, RINFOG(12) times 2 to the power INFOG(34)
-    pc.setUp()
+    pc = eigen.constrained_factors(matrix, _ROUNDING)
     factor = pc.getFactorMatrix()
     negative, zero, _ = factor.getInertia()
-    part, power = abs(factor.getMumpsRinfog(12)), factor.getMumpsInfog(34)
+    part, power = abs(factor.getMumpsRinfog(12)), factor.getMumpsInfog(34)  # the determinant: part times 2^power
     pc.destroy()
-    A.destroy()
     return negative, zero, math.log(part) + power * math.log(2) if part and not zero else math.nan
 
 

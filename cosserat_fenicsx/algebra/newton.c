@@ -163,9 +163,9 @@ static int snes_function(void *snes, void *x, void *b, void *context)
     const double *from;
     double *to;
     (void)snes;
-    if (with->get_read(x, &from) || with->get(b, &to)) return FAILED;
+    if (with->VecGetArrayRead(x, &from) || with->VecGetArray(b, &to)) return FAILED;
     const int failed = residual(n->problem, from, to);
-    return with->restore_read(x, &from) || with->restore(b, &to) || failed;
+    return with->VecRestoreArrayRead(x, &from) || with->VecRestoreArray(b, &to) || failed;
 }
 
 static int snes_jacobian(void *snes, void *x, void *A, void *P, void *context)
@@ -179,15 +179,15 @@ static int apply(void *pc, void *b, void *x)
     newton *n;
     const double *from;
     double *to;
-    if (with->get_shell(pc, &n) || with->get_read(b, &from) || with->get(x, &to)) return FAILED;
+    if (with->PCShellGetContext(pc, &n) || with->VecGetArrayRead(b, &from) || with->VecGetArray(x, &to)) return FAILED;
     const int failed = solve(n->problem, from, to);
-    return with->restore_read(b, &from) || with->restore(x, &to) || failed;
+    return with->VecRestoreArrayRead(b, &from) || with->VecRestoreArray(x, &to) || failed;
 }
 
 static int update(void *snes, PetscInt iteration)
 {
     newton *n;
-    if (with->get_context(snes, &n)) return FAILED;
+    if (with->SNESGetApplicationContext(snes, &n)) return FAILED;
     if (iteration > 0) advance(n->problem);
     return 0;
 }
@@ -214,10 +214,10 @@ static int motion(const newton *n, void *snes, double *size)
     void *change;
     const double *x;
     double sum = 0;
-    if (with->get_update(snes, &change) || with->get_read(change, &x)) return FAILED;
+    if (with->SNESGetSolutionUpdate(snes, &change) || with->VecGetArrayRead(change, &x)) return FAILED;
     for (int i = 0; i < n->nodes; i++)
         for (int j = 0; j < n->motion; j++) sum += x[i * n->block + j] * x[i * n->block + j];
-    if (with->restore_read(change, &x) || hook(n->problem, SUM, &sum, 0)) return FAILED;
+    if (with->VecRestoreArrayRead(change, &x) || hook(n->problem, SUM, &sum, 0)) return FAILED;
     *size = sqrt(sum) / n->root;
     return 0;
 }
@@ -253,8 +253,8 @@ void begin(newton *n)
 int attach(petsc *functions, newton *n, void *snes, void *vector, void *matrix, void *pc)
 {
     with = functions;
-    return with->set_function(snes, vector, snes_function, n)
-        || with->set_jacobian(snes, matrix, matrix, snes_jacobian, n) || with->set_test(snes, test, n, 0)
-        || with->set_context(snes, n) || with->set_update(snes, update)
-        || (pc && (with->set_shell(pc, n) || with->set_apply(pc, apply)));
+    return with->SNESSetFunction(snes, vector, snes_function, n)
+        || with->SNESSetJacobian(snes, matrix, matrix, snes_jacobian, n) || with->SNESSetConvergenceTest(snes, test, n, 0)
+        || with->SNESSetApplicationContext(snes, n) || with->SNESSetUpdate(snes, update)
+        || (pc && (with->PCShellSetContext(pc, n) || with->PCShellSetApply(pc, apply)));
 }

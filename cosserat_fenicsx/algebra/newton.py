@@ -34,25 +34,14 @@ WORDS = (
     "Newton's iterations ran out",
 )  # fmt: skip
 
-
-_FUNCTIONS = {
-    "get_read": "VecGetArrayRead", "restore_read": "VecRestoreArrayRead", "get": "VecGetArray",
-    "restore": "VecRestoreArray", "set_function": "SNESSetFunction", "set_jacobian": "SNESSetJacobian",
-    "set_test": "SNESSetConvergenceTest", "set_update": "SNESSetUpdate", "set_context": "SNESSetApplicationContext",
-    "get_context": "SNESGetApplicationContext", "set_apply": "PCShellSetApply", "set_shell": "PCShellSetContext",
-    "get_shell": "PCShellGetContext", "get_update": "SNESGetSolutionUpdate", "solve": "SNESSolve",
-    "get_reason": "SNESGetConvergedReason",
-}  # fmt: skip
-
-
 @cache
 def petsc():
     """The functions of PETSc that newton.c calls: those of the library that petsc4py has loaded."""
     ffi, _ = module()
     library, table = ctypes.CDLL(PETSc.__file__), ffi.new("petsc *")
-    for field, name in _FUNCTIONS.items():
+    for name, field in ffi.typeof("petsc").fields:
         address = ctypes.cast(getattr(library, name), ctypes.c_void_p).value
-        setattr(table, field, ffi.cast(ffi.typeof(getattr(table, field)), address))
+        setattr(table, name, ffi.cast(field.type, address))
     return table
 
 

@@ -55,7 +55,7 @@ class Packed(_Kernel):
         self._others = Packed(tuple(others), moving, constants) if others else None
         self._form = compat.kernel(form)
         spaces, elements = self._form.function_spaces, self._form.mesh.topology.index_map(1).size_local
-        of_spaces = [_dofs(space)[:elements] for space in spaces]
+        of_spaces = [compat.cell_dofs(space)[:elements] for space in spaces]
         self._shape = [dofs.shape[1] for dofs in of_spaces]
         size = int(np.prod(self._shape))
         super().__init__(form, compat.kernel_address(form), self._form.mesh, elements, size)
@@ -138,15 +138,8 @@ class PackedExpression(_Kernel):
         super().__init__(expression, address, mesh, elements, size)
         sources, column = [], 0
         for function in functions:
-            which = _dofs(function.function_space)[:elements]
+            which = compat.cell_dofs(function.function_space)[:elements]
             sources.append((function.x.array, which, column))
             column += which.shape[1]
         slots = [(constant.value, slot) for slot, constant in enumerate(constants)]
         self._set(np.zeros((elements, column)), np.zeros(len(constants)), sources, slots)
-
-
-def _dofs(space):
-    """(local elements, n) local degrees of freedom of every element of a space."""
-    block = space.dofmap.index_map_bs
-    nodes = np.asarray(compat.cell_nodes(space))
-    return (nodes[:, :, None] * block + np.arange(block)).reshape(len(nodes), nodes.shape[1] * block)

@@ -1,7 +1,6 @@
 """The lowest eigenvalues of K x = lambda M x with held x = 0, with their multiplicity; every rank solves all of it."""
 
 import numpy as np
-from petsc4py import PETSc
 from scipy import sparse
 
 from cosserat_fenicsx.algebra import eigen
@@ -159,14 +158,8 @@ class _Factored:
     0]]; its eigenvalues are 1/(lambda - shift)."""
 
     def __init__(self, matrix, L, size):
-        self._L, self._size = L, size
-        A = PETSc.Mat().createAIJ(matrix.shape, csr=(matrix.indptr, matrix.indices, matrix.data), comm=PETSc.COMM_SELF)
-        A.setOption(PETSc.Mat.Option.SYMMETRIC, True)
-        self._pc = PETSc.PC().create(PETSc.COMM_SELF)
-        self._pc.setOperators(A)
-        eigen.factor_constrained(self._pc, A, _NO_PIVOT)
-        self._pc.setUp()
-        self._force, self._moved = A.createVecs()
+        self._L, self._size, self._pc = L, size, eigen.constrained_factors(matrix, _NO_PIVOT)
+        self._force, self._moved = self._pc.getOperators()[0].createVecs()
 
     @property
     def negative(self):

@@ -139,9 +139,9 @@ static int put(const sweep *s, const double *numbers, double load_factor)
     const problem *p = s->newton->problem;
     double *x;
     *s->load_factor = load_factor;
-    if (s->with->get(s->x, &x)) return 1;
+    if (s->library->VecGetArray(s->x, &x)) return 1;
     memcpy(x, numbers, p->size * sizeof *x);
-    if (s->with->restore(s->x, &x)) return 1;
+    if (s->library->VecRestoreArray(s->x, &x)) return 1;
     memcpy(p->carried, numbers + p->size, p->carries * sizeof *x);
     return take_state(s->newton->problem, numbers);
 }
@@ -150,10 +150,10 @@ static int take(const sweep *s, double *numbers)
 {
     const problem *p = s->newton->problem;
     const double *x;
-    if (s->with->get_read(s->x, &x)) return 1;
+    if (s->library->VecGetArrayRead(s->x, &x)) return 1;
     memcpy(numbers, x, p->size * sizeof *x);
     memcpy(numbers + p->size, p->carried, p->carries * sizeof *x);
-    return s->with->restore_read(s->x, &x);
+    return s->library->VecRestoreArrayRead(s->x, &x);
 }
 
 /* dx/d eta at numbers, where the state is; see `Problem.load_derivative`. */
@@ -212,7 +212,7 @@ static int attempt(sweep *s, double goal)
     if (!predict(s, goal, guess) || put(s, guess, goal)) return UNSURE;
     n->loads = fabs(goal) * s->loads;
     begin(n);
-    if (s->with->solve(s->snes, 0, s->x) || s->with->get_reason(s->snes, &reason)) return UNSURE;
+    if (s->library->SNESSolve(s->snes, 0, s->x) || s->library->SNESGetConvergedReason(s->snes, &reason)) return UNSURE;
     s->iterations += n->iterations;
     if (reason <= 0 || n->verdict != CONVERGED) return REJECTED;
     advance(n->problem);

@@ -108,7 +108,7 @@ class TieRows:
 
     def gradients(self):
         """(ties, tied nodes, 6) gradients of all equations by (displacement, rotation), on all ranks."""
-        return self.ties.on_nodes(self._evaluate(0.0)[1])
+        return self._pattern.on_nodes(self._evaluate(0.0)[1])
 
     @np.errstate(**_WILD)
     def residual_blocks(self, load_factor):

@@ -170,7 +170,7 @@ def _off(model, rq, rates, t=0.0):
     load_factor, now, held = float(model.load_factor.value), rates[model.tied_slots], rq[model.tied_slots]
     c, gradients = model.ties_at(t).evaluate(held, load_factor)
     later, _ = model.ties_at(t + _DIFFERENCE * model.time).evaluate(held, load_factor)
-    driven, gradient = (later - c) / _DIFFERENCE, model.ties.on_nodes(gradients)
+    driven, gradient = (later - c) / _DIFFERENCE, model.ties.pattern.on_nodes(gradients)
     return np.einsum("ikb,kb->i", gradient, now) + driven, gradient, driven
 
 

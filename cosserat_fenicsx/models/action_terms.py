@@ -258,7 +258,7 @@ class Term:
         self._model, self._time = model, time
         scene, layout, rods, x = model.scene, model.layout, self._rods, self._dof_places
         numbers = compat.cell_nodes(self.weight.function_space)  # the same for all Functions of this term
-        first, cells = layout.first_cells, rods.cells
+        first, cells = rods.first_cells, rods.cells
         begin, size = np.concatenate([b[:-1] for b in layout.breaks]), layout.sizes(scene)
         lengths = np.array([rod.length for rod in scene.rods])
         along = np.where(rods.reversed[:, None], 1 - x, x)

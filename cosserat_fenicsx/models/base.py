@@ -219,9 +219,7 @@ class RodModel:
         self.actions, self.evolving, self.densities = ActionTerms(self.rods, signature, self.nodes), [], Densities()
         self.carried = (gauss_function(self.mesh, signature.points, self.force_size),) if force.carried else ()
         for function in self.carried:
-            nodes = compat.cell_nodes(function.function_space)
-            numbers = nodes[:, :, None] * self.force_size + np.arange(self.force_size)
-            self.carried_dofs = numbers.reshape(len(nodes), nodes.shape[1] * self.force_size)
+            self.carried_dofs = compat.cell_dofs(function.function_space)
         self.carries_force, self.force_is_unknown = not force.of_motion, force.unknown
         self.forms = self._compile(spaces)
         evolutions = compat.expressions(self.mesh, [term.evolution(point) for term, point in self.evolving])
@@ -236,33 +234,31 @@ class RodModel:
         V, size = self.nodal_space, self.components
         self.nodes = np.sort(compat.element_nodes(V))
         self.slots = slots = rods.slots(V, p)
-        nodal = np.arange(size * len(slots)).reshape(-1, size)  # node, component -> index into state.x.array
         #: (local elements, p + 1) local nodes in dolfinx's order, and the position of each along its element
-        self.cell_nodes = cell_nodes = compat.cell_nodes(V)
+        self.cell_nodes = compat.cell_nodes(V)
         self.node_order = np.argsort(np.argsort(compat.element_nodes(V)))
-        if self.space is not V:
-            nodal[cell_nodes] = compat.cell_nodes(self.space)[:, : size * (p + 1)].reshape(-1, p + 1, size)
-        self.nodal, self.owned_nodes = nodal, V.dofmap.index_map.size_local
+        dofs = compat.cell_dofs(self.space)  # those of the nodes come first, node by node
+        self.nodal, self.owned_nodes = np.empty((len(slots), size), dtype=np.int64), V.dofmap.index_map.size_local
+        self.nodal[self.cell_nodes] = dofs[:, : size * (p + 1)].reshape(-1, p + 1, size)
         owned_cells = self.mesh.topology.index_map(1).size_local
+        self.cell_dofs = dofs[:owned_cells]
         self._owned_cells = np.arange(owned_cells, dtype=np.int32)
         self._local_cells = np.arange(len(rods.cells), dtype=np.int32)
         cells = sum(rods.counts)
         self._gather_nodes = Gather(self.comm, slots[: self.owned_nodes], cells * p + len(rods.counts))
         self._gather_cells = Gather(self.comm, rods.cells[:owned_cells], cells)
-        first = np.concatenate([[0], np.cumsum(np.asarray(rods.counts) * p + 1)])
-
-        def slot(vertex):
-            return int(first[vertex[0]] + vertex[1] * p)
-
-        clamped = {slot(x) for x in links.clamped}
-        leaders = {slot(a): slot(b) for a, b in links.leaders}
-        self._held = slots, clamped, leaders
+        slot = self.slot
+        self._held = slots, {slot(x) for x in links.clamped}, {slot(a): slot(b) for a, b in links.leaders}
         self.tied_slots = np.array([slot(x) for x in links.tied], dtype=np.int64)
-        self.numbering = Numbering(self.comm, self.space, nodal, self.owned_nodes, *self._held, len(links.equations))
-        others = compat.cell_nodes(self.space)[:owned_cells, size * (p + 1) :] if self.space is not V else None
-        of_nodes = nodal[cell_nodes[:owned_cells]].reshape(owned_cells, size * (p + 1))
-        self.cell_dofs = of_nodes if others is None else np.concatenate([of_nodes, others], axis=1)
+        self.numbering = Numbering(
+            self.comm, self.space, self.nodal, self.owned_nodes, *self._held, len(links.equations)
+        )
         self.unknowns = self.numbering.total
+
+    def slot(self, vertex):
+        """The scene's number of the node at a vertex (rod index, element end)."""
+        rod, end = vertex
+        return int(self.rods.first_nodes(self.signature.degree)[rod] + end * self.signature.degree)
 
     def _prepare_variations(self, spaces):
         self._variations = []
@@ -270,7 +266,7 @@ class RodModel:
         for form, space, (size, sideways, _) in zip(self.forms.second_variations, spaces, self.variations, strict=True):
             dofs = np.arange(size * len(self.slots)).reshape(-1, size)
             numbering = Numbering(self.comm, space, dofs, self.owned_nodes, *self._held)
-            cell_dofs = dofs[self.cell_nodes[:owned]].reshape(owned, size * (self.signature.degree + 1))
+            cell_dofs = compat.cell_dofs(space)[:owned]
             tied = self._rows_everywhere(numbering, dofs)[self.tied_slots]
             self._variations.append(SecondVariation(form, numbering, cell_dofs, tied, None, sideways))
 

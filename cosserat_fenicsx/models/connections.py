@@ -232,10 +232,6 @@ class Ties:
         self._add_values(self._rows, found)
         return found[:, 0], found[:, 1:].reshape(-1, 2, 6)
 
-    def on_nodes(self, gradients):
-        """(ties, tied nodes, 6) from gradients (ties, 2, 6)."""
-        return self.pattern.on_nodes(gradients)
-
     def reactions(self, gradients, multipliers):
         """(tied nodes, 6) forces and moments, sums over the ties, from gradients (ties, 2, 6)."""
         return self.pattern.by_nodes(multipliers[:, None, None] * gradients)
@@ -280,7 +276,7 @@ class Clamps:
         """Find this rank's elements at clamped points: their local numbers, the end (0 or 1) and the point of each."""
         model, found = self._model, []
         rods, counts = model.rods, model.signature.counts
-        first = np.concatenate([[0], np.cumsum(counts)])
+        first = rods.first_cells
         owned = {int(cell): i for i, cell in enumerate(rods.cells[: model.mesh.topology.index_map(1).size_local])}
         for (rod, vertex), point in self._points.items():
             for inner, end in ((vertex - 1, 1), (vertex, 0)):

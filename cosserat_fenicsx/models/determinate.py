@@ -21,17 +21,16 @@ class Tree:
 
     Args:
         signature: a `Signature` whose rods are trees, each with one clamped point and rigid joints alone.
+        rods: the `RodMesh`.
 
     Attributes:
         cell_nodes: (elements, p + 1) nodes of every element, the scene's order.
     """
 
-    def __init__(self, signature):
-        self._p, self._counts = signature.degree, signature.counts
-        p = signature.degree
-        self._first_cell = np.concatenate([[0], np.cumsum(signature.counts)])
-        self._first_node = self._first_cell * p + np.arange(len(signature.counts) + 1)
-        rod = np.repeat(np.arange(len(signature.counts)), signature.counts)
+    def __init__(self, signature, rods):
+        self._p = p = signature.degree
+        self._first_cell, self._first_node = rods.first_cells, rods.first_nodes(p)
+        rod = np.repeat(np.arange(len(rods.counts)), rods.counts)
         self.cell_nodes = (np.arange(self._first_cell[-1]) * p + rod)[:, None] + np.arange(p + 1)
         self._order = self._walk(signature.connections)
 
@@ -125,7 +124,7 @@ class _KnownForce(RodModel):
         self._force = gauss_function(self.mesh, self.signature.points, self.force_size)
         lasting = any(kind.scaled != "load" for kind in self.signature.terms)
         self._permanent = gauss_function(self.mesh, self.signature.points, self.force_size) if lasting else None
-        self._tree = Tree(self.signature)
+        self._tree = Tree(self.signature, self.rods)
         return compile_static(self, spaces, self._displacements)
 
     def known_force(self):

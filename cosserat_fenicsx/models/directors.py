@@ -10,8 +10,9 @@ from cosserat_fenicsx.forms import eccentric, energy, inertia
 from cosserat_fenicsx.forms.rotation import directors
 from cosserat_fenicsx.forms.spatial import parts_of
 from cosserat_fenicsx.models.compiled import along
-from cosserat_fenicsx.models.moving import MovingSpatial, SpatialStep, spun, turned_by, virtual_work_of_step
+from cosserat_fenicsx.models.moving import MovingSpatial, SpatialStep, turned_by, virtual_work_of_step
 from cosserat_fenicsx.models.rod_data import as_matrix
+from cosserat_fenicsx.models.spatial import spun
 
 
 class Turning:

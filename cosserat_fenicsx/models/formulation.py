@@ -56,7 +56,12 @@ class ContactForce:
             derivative: that of a form or expression in the direction of the trial function.
             along_step: that of an expression at `before` along the step.
         """
-        raise NotImplementedError
+        internal = self.internal(n, phi_n, motion, section, test, ds)
+        return WeakForm(n, internal, derivative(internal), None)
+
+    def internal(self, n, phi_n, motion, section, test, ds):
+        """The left side of eq. (1), arguments as in `weak_form`."""
+        return equilibrium.displacement(motion, section, test, ds)
 
     def second_variation(self, n, motion, data, section, test, direction, stiffness):
         """The density of the second variation, see `equilibrium.second_variation`; data: the `RodFields`."""
@@ -65,10 +70,9 @@ class ContactForce:
 
 
 class _OfMotion(ContactForce):
-    def weak_form(self, n, phi_n, motion, before, section, test, ds, derivative, along_step):
-        internal = equilibrium.displacement(motion, section, test, ds)
-        n, _ = equilibrium.contact(motion, section)
-        return WeakForm(n, internal, derivative(internal), None)
+    def weak_form(self, n, phi_n, motion, before, section, *others):
+        found = super().weak_form(n, phi_n, motion, before, section, *others)
+        return found._replace(n=equilibrium.contact(motion, section)[0])
 
 
 class _Carried(ContactForce):
@@ -81,7 +85,7 @@ class _Carried(ContactForce):
 
     def weak_form(self, n, phi_n, motion, before, section, test, ds, derivative, along_step):
         """See `ContactForce`: the residual uses n by the law; the carried n_k enters only the tangent."""
-        internal = equilibrium.displacement(motion, section, test, ds)
+        internal = self.internal(n, phi_n, motion, section, test, ds)
         tangent = equilibrium.carried_force_tangent(n, motion, section, test, ds, derivative)
         return WeakForm(n, internal, tangent, equilibrium.carried_force_update(n, before, section, along_step))
 
@@ -102,18 +106,16 @@ class _Unknown(ContactForce):
             values = np.einsum("jg,cgi->cji", along, n[rods.cells[cells]])
             model.state.x.array[dofs[cells]] = values.reshape(len(cells), model.force_size * p)
 
-    def weak_form(self, n, phi_n, motion, before, section, test, ds, derivative, along_step):
-        internal = equilibrium.mixed(n, motion, section, test, phi_n, ds)
-        return WeakForm(n, internal, derivative(internal), None)
+    def internal(self, n, phi_n, motion, section, test, ds):
+        return equilibrium.mixed(n, motion, section, test, phi_n, ds)
 
 
 class _Known(ContactForce):
     def symbols(self, model, U, phi):
         return model.known_force(), None
 
-    def weak_form(self, n, phi_n, motion, before, section, test, ds, derivative, along_step):
-        internal = determinate.moments(n, motion, section, test, ds)
-        return WeakForm(n, internal, derivative(internal), None)
+    def internal(self, n, phi_n, motion, section, test, ds):
+        return determinate.moments(n, motion, section, test, ds)
 
     def second_variation(self, n, motion, data, section, test, direction, stiffness):
         """See `ContactForce`: that of the energy minimised over r."""

@@ -40,7 +40,7 @@ from cosserat_fenicsx.models.rod_data import (
     rod_data,
     viscous_values,
 )
-from cosserat_fenicsx.models.spatial import SpatialModel
+from cosserat_fenicsx.models.spatial import SpatialModel, spun
 from cosserat_fenicsx.numerics import cross, small_rotations
 from cosserat_fenicsx.scene.rod import Damping
 from cosserat_fenicsx.scene.signals import signals_of
@@ -384,8 +384,7 @@ class Moving:
 
     def slot_of(self, station):
         """The scene's number of the node at a station."""
-        rod, vertex = self.layout.vertex(self.scene, station)
-        return sum(self.layout.counts[:rod]) * self.signature.degree + rod + vertex * self.signature.degree
+        return self.slot(self.layout.vertex(self.scene, station))
 
     @property
     def rate_arrays(self):
@@ -473,13 +472,6 @@ class MovingSpatial(Moving, SpatialModel):
 def six_of(I):
     """(.., 6) components of symmetric matrices (.., 3, 3), row by row from the diagonal on."""
     return I[..., [0, 0, 0, 1, 1, 2], [0, 1, 2, 1, 2, 2]]
-
-
-def spun(q, omega):
-    """(.., 4) the rates omega q/2 of q (.., 4) for angular velocities omega (.., 3)."""
-    v = q[..., 1:]
-    scalar = -np.einsum("...i,...i->...", omega, v)[..., None]
-    return np.concatenate([scalar, q[..., :1] * omega + np.cross(omega, v)], axis=-1) / 2
 
 
 def turned_by(dq, q):

@@ -1,5 +1,7 @@
 """The planar model: r in the plane and theta in P_p, dimensionless."""
 
+import itertools
+
 import numpy as np
 import ufl
 
@@ -39,9 +41,8 @@ class PlaneModel(RodModel):
     def _angles(self, rq):
         """(.., N) theta of (r, q), (.., N, 7): continuous along each rod, beyond full turns too."""
         half = np.arctan2(rq[..., 4:] @ self.axes[2], rq[..., 3])
-        ends = np.cumsum([0, *(cells * self.signature.degree + 1 for cells in self.signature.counts)])
-        rods = [np.unwrap(half[..., a:b]) for a, b in zip(ends[:-1], ends[1:], strict=True)]
-        return 2 * np.concatenate(rods, axis=-1)
+        ends = self.rods.first_nodes(self.signature.degree)
+        return 2 * np.concatenate([np.unwrap(half[..., a:b]) for a, b in itertools.pairwise(ends)], axis=-1)
 
     def _out_of_plane(self):
         """(N, 3) the constant component of the positions along the normal, inertial."""

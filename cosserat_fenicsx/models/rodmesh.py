@@ -115,11 +115,6 @@ class Layout:
         """Elements of each rod."""
         return tuple(len(b) - 1 for b in self.breaks)
 
-    @property
-    def first_cells(self):
-        """Number of the first element of each rod, and the number of all."""
-        return np.concatenate([[0], np.cumsum(self.counts)])
-
     def vertex(self, scene, station):
         """(rod index, element end) of a station of the layout's scene."""
         rod = scene.number(station.rod)
@@ -135,7 +130,7 @@ class Layout:
 
     def node_s(self, nodes):
         """Arc length over rod length of every node of each rod, for reference nodes sorted in [0, 1]."""
-        return [np.append((b[:-1, None] + np.diff(b)[:, None] * nodes[None, :-1]).ravel(), 1.0) for b in self.breaks]
+        return [np.append(x.ravel(), 1.0) for x in self.inside(nodes[:-1])]
 
 
 @per_scene
@@ -201,14 +196,15 @@ class RodMesh:
 
     def __init__(self, comm, counts):
         self.counts = counts
-        first_cell = np.concatenate([[0], np.cumsum(counts)])
-        first_vertex = first_cell[:-1] + np.arange(len(counts))
+        #: (rods + 1,) the scene's number of each rod's first element, and the number of all
+        self.first_cells = np.concatenate([[0], np.cumsum(counts)])
+        first_vertex = self.first_nodes(1)
         rods = np.repeat(np.arange(len(counts)), counts)
-        inner = np.arange(first_cell[-1]) - first_cell[rods]
+        inner = np.arange(self.first_cells[-1]) - self.first_cells[rods]
         v0 = first_vertex[rods] + inner
         if comm.rank == 0:
             cells = np.column_stack([v0, v0 + 1]).astype(np.int64)
-            x = np.arange(first_cell[-1] + len(counts), dtype=float)[:, None]  # placed later, by `place`
+            x = np.arange(first_vertex[-1], dtype=float)[:, None]  # placed later, by `place`
         else:
             cells, x = np.empty((0, 2), dtype=np.int64), np.empty((0, 1))
         self.mesh = compat.create_interval_mesh(comm, cells, x)
@@ -219,13 +215,17 @@ class RodMesh:
         vertices = np.asarray(self.mesh.geometry.input_global_indices, dtype=np.int64)
         #: True where dolfinx orients an element from its end to its start
         self.reversed = vertices[ends[:, 0]] != v0[self.cells]
-        self._vertex_rod = np.searchsorted(first_vertex, vertices, side="right") - 1
+        self._vertex_rod = np.searchsorted(first_vertex[:-1], vertices, side="right") - 1
         self._vertex_inner = vertices - first_vertex[self._vertex_rod]
+
+    def first_nodes(self, degree):
+        """(rods + 1,) the scene's number of each rod's first node, for a degree, and the number of all."""
+        return self.first_cells * degree + np.arange(len(self.first_cells))
 
     def place(self, ends):
         """Move the element ends to the arc lengths `ends`, one (n + 1,) array a rod (dimensionless)."""
-        offsets = np.concatenate([[0], np.cumsum([len(s) for s in ends])])[:-1]
-        self.mesh.geometry.x[:, 0] = np.concatenate(ends)[offsets[self._vertex_rod] + self._vertex_inner]
+        place = self.first_nodes(1)[self._vertex_rod] + self._vertex_inner
+        self.mesh.geometry.x[:, 0] = np.concatenate(ends)[place]
 
     def fill(self, function, values, at_nodes=False):
         """Set a function at the Gauss points, or at the nodes of every element, from values (elements, points, k) in
@@ -240,8 +240,7 @@ class RodMesh:
         """The scene's number of every local node of a degree-`degree` space, and its local number, both (nodes,)."""
         order = np.argsort(np.argsort(compat.element_nodes(space)))
         along = np.where(self.reversed[:, None], degree - order[None, :], order[None, :])
-        first_node = np.concatenate([[0], np.cumsum(np.asarray(self.counts) * degree + 1)])
-        slots = first_node[self.cell_rod][:, None] + self.cell_inner[:, None] * degree + along
+        slots = self.first_nodes(degree)[self.cell_rod][:, None] + self.cell_inner[:, None] * degree + along
         node = compat.cell_nodes(space)[: len(self.cells)]
         local = space.dofmap.index_map
         of_node = np.empty(local.size_local + local.num_ghosts, dtype=np.int64)

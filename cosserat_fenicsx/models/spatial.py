@@ -30,6 +30,13 @@ def small_motion_of(w):
     return eq.rotation_tests_of(w, along(w))
 
 
+def spun(q, omega):
+    """(.., 4) omega q/2: changes of q (.., 4) by small inertial rotations omega (.., 3), or rates by angular velocities."""
+    v = q[..., 1:]
+    scalar = -np.einsum("...i,...i->...", omega, v)[..., None]
+    return np.concatenate([scalar, q[..., :1] * omega + np.cross(omega, v)], axis=-1) / 2
+
+
 _EYE = np.eye(3)
 
 
@@ -127,11 +134,9 @@ class SpatialModel(RodModel):
         state, nodal = self.state.x.array, self.nodal
         moved, change = np.zeros(6 * len(nodal)), np.zeros_like(state)
         self.second_variations[0].numbering.to_local(motion, moved)
-        moved, q = moved.reshape(-1, 6), state[nodal[:, 3:7]]
-        theta = moved[:, 3:]
+        moved = moved.reshape(-1, 6)
         change[nodal[:, :3]] = moved[:, :3]
-        change[nodal[:, 3]] = -np.einsum("ij,ij->i", theta, q[:, 1:]) / 2
-        change[nodal[:, 4:7]] = (q[:, :1] * theta + np.cross(theta, q[:, 1:])) / 2
+        change[nodal[:, 3:7]] = spun(state[nodal[:, 3:7]], moved[:, 3:])
         vector = self.numbering.vector()
         self.numbering.from_local(change, vector)
         return vector.array_r.copy()
@@ -190,4 +195,4 @@ class CirculatoryModel(SpatialModel):
         """Gradients of the constraint equations of supports and joints, (equations, tied nodes, 6)."""
         if not self.ties:
             return np.zeros((0, 0, 6))
-        return self.ties.on_nodes(self.ties.evaluate(rq[self.tied_slots], load_factor)[1])
+        return self.ties.pattern.on_nodes(self.ties.evaluate(rq[self.tied_slots], load_factor)[1])

@@ -112,61 +112,47 @@ def _traits(work, kinds):
         return {c for a in expressions for c in ufl.algorithms.analysis.extract_type(a, ufl.Constant)}
 
     rates = {symbols["r_t"], symbols["omega"]}
-    trials = _Trials(resultant, kinds)
-    turns = trials.turn()
+    turns = all(_turns(resultant, kinds, seed) for seed in range(_TRIED))
     return Traits(
         dead=state.isdisjoint(found(force, moment)),
         known_force=state.isdisjoint(found(force)),
         rates=not rates.isdisjoint(found(force, moment)),
         turns=turns,
-        flat=turns and trials.stay_flat(),
+        flat=turns and all(_stays_flat(resultant, kinds, seed) for seed in range(_TRIED)),
     )
 
 
-class _Trials:
-    """Numerical tests of a virtual work at random states and with random data.
+def _stays_flat(resultant, kinds, seed):
+    """Whether force and moment preserve the plane of the first two axes where a random state and data do."""
+    f, m = np.split(resultant.at(*_random_values(kinds, seed, flat=True)), 2)
+    return max(abs(f[2]), abs(m[0]), abs(m[1])) <= _NOTHING * max(np.abs(f).max(), np.abs(m).max(), 1.0)
 
-    Args:
-        resultant: a `_Resultant`; kinds: (size, whether an axial vector) of the data.
-    """
 
-    def __init__(self, resultant, kinds):
-        self._at, self._kinds = resultant.at, kinds
+def _turns(resultant, kinds, seed):
+    """Whether force and moment rotate with a random state and random data."""
+    state, data = _random_values(kinds, seed)
+    Q = Rotation.random(random_state=seed + 7).as_matrix()
+    turned = {name: Q @ value @ Q.T if name == "R" else Q @ value for name, value in state.items()}
+    found = resultant.at(turned, [Q @ value if np.ndim(value) else value for value in data])
+    expected = (resultant.at(state, data).reshape(2, 3) @ Q.T).ravel()
+    return np.abs(found - expected).max() <= _NOTHING * max(np.abs(expected).max(), 1.0)
 
-    def stay_flat(self):
-        """Whether force and moment preserve the plane of the first two axes where state and data do."""
-        for seed in range(_TRIED):
-            f, m = np.split(self._at(*self._values(seed, flat=True)), 2)
-            if max(abs(f[2]), abs(m[0]), abs(m[1])) > _NOTHING * max(np.abs(f).max(), np.abs(m).max(), 1.0):
-                return False
-        return True
 
-    def turn(self):
-        """Whether force and moment rotate with state and data."""
-        for seed in range(_TRIED):
-            state, data = self._values(seed, flat=False)
-            Q = Rotation.random(random_state=seed + 7).as_matrix()
-            turned = {name: Q @ value @ Q.T if name == "R" else Q @ value for name, value in state.items()}
-            found = self._at(turned, [Q @ value if np.ndim(value) else value for value in data])
-            expected = (self._at(state, data).reshape(2, 3) @ Q.T).ravel()
-            if np.abs(found - expected).max() > _NOTHING * max(np.abs(expected).max(), 1.0):
-                return False
-        return True
+def _random_values(kinds, seed, *, flat=False):
+    """A random state {name: value} and data for a `_Resultant`; kinds: (size, whether an axial vector) of the data."""
+    random = np.random.default_rng(seed)
 
-    def _values(self, seed, *, flat):
-        random = np.random.default_rng(seed)
+    def vector(axial=False):
+        a = random.normal(size=3)
+        return a * ([0, 0, 1] if axial else [1, 1, 0]) if flat else a
 
-        def vector(axial=False):
-            a = random.normal(size=3)
-            return a * ([0, 0, 1] if axial else [1, 1, 0]) if flat else a
-
-        theta, t = vector(axial=True), vector()
-        t, e3 = t / np.linalg.norm(t), np.array([0.0, 0.0, 1.0])
-        across = np.cross(t, e3) / np.linalg.norm(np.cross(t, e3))
-        state = {name: vector(axial=name == "omega") for name in ("r", "r_s", "rest", "r_t", "omega")}
-        state |= {"theta": theta, "R": Rotation.from_rotvec(theta).as_matrix()}
-        state["frame"] = np.column_stack([across, np.cross(t, across), t])
-        return state, [vector(axial) if size == 3 else abs(random.normal()) + 0.1 for size, axial in self._kinds]
+    theta, t = vector(axial=True), vector()
+    t, e3 = t / np.linalg.norm(t), np.array([0.0, 0.0, 1.0])
+    across = np.cross(t, e3) / np.linalg.norm(np.cross(t, e3))
+    state = {name: vector(axial=name == "omega") for name in ("r", "r_s", "rest", "r_t", "omega")}
+    state |= {"theta": theta, "R": Rotation.from_rotvec(theta).as_matrix()}
+    state["frame"] = np.column_stack([across, np.cross(t, across), t])
+    return state, [vector(axial) if size == 3 else abs(random.normal()) + 0.1 for size, axial in kinds]
 
 
 def _nested(value):

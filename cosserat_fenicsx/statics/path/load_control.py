@@ -260,7 +260,7 @@ class Sweep(Pointers):
         problem, model, ffi = track.problem, track.model, self._ffi
         self.c = sweep = ffi.new("sweep *")
         sweep.newton, sweep.stability = track.newton.c, track.stability.c
-        setattr(sweep, "with", petsc())
+        sweep.library = petsc()
         sweep.snes, sweep.x = (ffi.cast("void *", each.handle) for each in (track.newton.snes, problem.x))
         sweep.load_factor = self.doubles(problem.load_factor_array)
         unknowns, numbers = problem.numbering.size, problem.numbering.size + problem.c.carries
