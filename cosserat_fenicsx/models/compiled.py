@@ -4,8 +4,8 @@ FFCx 0.5 modifies the metadata of the integrals that it compiles, which other fo
 that would differ and miss the code cache, which costs a second.
 """
 
-from collections import namedtuple
-from dataclasses import dataclass, replace
+from collections import defaultdict, namedtuple
+from dataclasses import dataclass
 from functools import partial
 
 import basix
@@ -26,9 +26,6 @@ ActionWork = namedtuple("ActionWork", "dead permanent live")
 #: Virtual work that depends on the state: the number of its term, its form, its factor (UFL), its measure, its point,
 #: and its integrand, a function (point, test).
 Live = namedtuple("Live", "number form factor measure point work")
-
-#: What an action adds to the residual, to the tangent and to every second variation: UFL forms, None where nothing.
-LiveParts = namedtuple("LiveParts", "residual tangent seconds")
 
 #: What derivatives by data need, UFL: the forms that are balanced in equilibrium, factors included; n by the law, where
 #: n is carried, or None; the Functions of the unknowns; and the second variations.
@@ -112,7 +109,7 @@ def compile_static(model, spaces, displacements=None):
         return model.tests_of(phi, model.motion_of(at(place), U_node))
 
     acting = action_work(model, dx, test, point_at, (U, U_node), test_at=test_at)
-    forces = None
+    forces = ActionWork({}, {}, [])
     if displacements is not None:
         forces = action_work(model, dx, VirtualMotion(ufl.TestFunction(displacements), NONE), point_at, ())
 
@@ -128,79 +125,72 @@ def compile_static(model, spaces, displacements=None):
     fields = model.fields_of(n, equilibrium.contact_moment(n, motion, section), motion.r_s)
     contact = model.components_of(equilibrium.contact(motion, section)[0]) if model.carried else None
     lives = {live.number: live_parts(live, derivative, variations) for live in acting.live}
-    found, _, _ = compile_parts(
-        model, [residual, tangent, *seconds], lives, acting, fields,
-        advance=None if advance is None else model.components_of(advance),
-        forces=forces, densities=action_densities(model, point_at),
+    found = compile_parts(
+        model, {"residual": residual, "tangent": tangent, **dict(enumerate(seconds))}, lives, fields,
+        advance=None if advance is None else model.components_of(advance), densities=action_densities(model, point_at),
+        dead=acting.dead, permanent=acting.permanent, force=forces.dead, permanent_force=forces.permanent,
     )  # fmt: skip
-    for live in lives.values():
-        residual += live.residual
-        seconds = [a if b is None else a + b for a, b in zip(seconds, live.seconds, strict=True)]
-    return replace(found, symbols=Symbols(_balance(model, residual, acting), contact, (U, U_node), seconds))
+    for parts in lives.values():
+        residual += parts["residual"]
+        seconds = [a if parts[i] is None else a + parts[i] for i, a in enumerate(seconds)]
+    return CompiledForms(**found, symbols=Symbols(_balance(model, residual, acting), contact, (U, U_node), seconds))
 
 
-def compile_parts(
-    model, core, lives, acting, fields, advance=None, forces=None, densities=None, *, others=(), of_terms=None
-):
-    """`CompiledForms` without symbols. What the model needs whatever acts on it is one module, and what a term of the
-    actions adds is another.
+def compile_parts(model, core, terms, fields, *, advance=None, densities=None, **works):
+    """Compile UFL: what the model needs whatever acts on it is one module, and what a term of the actions adds another.
 
     Args:
-        core: [residual, tangent, *second variations], without actions; lives: {number of a term: `LiveParts`}.
-        acting: the `ActionWork`; forces: that of forces on displacements alone, or None.
+        core: {name: form}; terms: {number of a term: {name: form}}; works: for a name {number of a term: form}. Names
+            are those of attributes, or the numbers of second variations; forms may be None.
         fields, advance: see `CompiledForms`; densities: see `action_densities`.
-        others: more forms of the core; of_terms: {number: list of more forms or None}, equally long.
 
     Returns:
-        the `CompiledForms`; the compiled `others`; and a list of those of `of_terms`.
+        The attributes of `CompiledForms`, symbols excepted, and of a subclass; tuples of all forms of a name.
     """
-    forces, densities, of_terms = forces or ActionWork({}, {}, []), densities or {}, of_terms or {}
+    densities = densities or {}
     points, weights = basix.make_quadrature(basix.CellType.interval, 2 * model.signature.points - 1)
     places = {"line": points, "node": model.nodes}
-    loads = acting.dead, acting.permanent, forces.dead, forces.permanent
-    numbers = sorted({*lives, *densities, *of_terms, *(number for works in loads for number in works)})
-    groups = [([*core, *others], [(fields, points), (advance, points)])]
+    groups = [(core, [(fields, points), (advance, points)])]
+    numbers = sorted({*terms, *densities, *(number for forms in works.values() for number in forms)})
     for number in numbers:
-        live, (place, density) = lives.get(number), densities.get(number, ("line", None))
-        parts = [None] * len(core) if live is None else [live.residual, live.tangent, *live.seconds]
-        parts += [works.get(number) for works in loads] + of_terms.get(number, [])
+        parts = terms.get(number, {}) | {name: forms.get(number) for name, forms in works.items()}
+        place, density = densities.get(number, ("line", None))
         groups.append((parts, [(density, places[place])]))
-    for form in (form for parts, _ in groups for form in parts):
+    for form in (form for parts, _ in groups for form in parts.values()):
         if form is not None:
             form.signature()
-    (core_forms, core_fields), *others_there = (compat.together(model.mesh, *group) for group in groups)
-
-    def of_all(i):
-        return tuple(parts[i] for parts, _ in others_there if parts[i])
-
-    n, terms = len(core), list(zip(numbers, others_there, strict=True))
-    density, node_density = (
-        tuple(compiled for number, (_, (compiled,)) in terms if compiled and densities[number][0] == place)
-        for place in ("line", "node")
-    )
-    core_parts = [tuple(filter(None, (form, *of_all(i)))) for i, form in enumerate(core_forms[:n])]
-    dead, permanent, force, permanent_force = (of_all(n + i) for i in range(len(loads)))
-    found = CompiledForms(
-        points[:, 0], weights, *core_parts[:2], dead, permanent, tuple(core_parts[2:]), core_fields[0],
-        0 if fields is None else len(fields), core_fields[1], force, permanent_force, density, node_density,
+    compiled = [compat.together(model.mesh, list(parts.values()), expressions) for parts, expressions in groups]
+    found = defaultdict(tuple)
+    for (parts, _), (forms, _) in zip(groups, compiled, strict=True):
+        for name, form in zip(parts, forms, strict=True):
+            found[name] += (form,) if form else ()
+    for number, (_, (density,)) in zip(numbers, compiled[1:], strict=True):
+        name = "density" if densities.get(number, ("line",))[0] == "line" else "node_density"
+        found[name] += (density,) if density else ()
+    seconds = tuple(found.pop(name) for name in core if isinstance(name, int))
+    _, (fields_there, advance_there) = compiled[0]
+    return dict(
+        found, gauss=points[:, 0], weights=weights, second_variations=seconds, fields=fields_there,
+        fields_size=0 if fields is None else len(fields), advance=advance_there,
     )  # fmt: skip
-    return found, core_forms[n:], [parts[n + len(loads) :] for number, (parts, _) in terms if number in of_terms]
 
 
 def _symmetric(form):
     return 0.5 * (form + ufl.adjoint(form))
 
 
-def live_parts(live, derivative, variations):
-    tangent, seconds = nonzero(derivative(live.form)), []
-    tangent = None if tangent is None else -live.factor * tangent
-    for pair in variations:
-        second = tangent
+def live_parts(live, derivative, variations=()):
+    """What a `Live` adds to the residual, to the tangent and to every second variation, by its number: UFL forms by
+    name, None where nothing; variations: pairs of test and trial `VirtualMotion`, None for the tangent."""
+    tangent = nonzero(derivative(live.form))
+    parts = {"residual": -live.factor * live.form, "tangent": None if tangent is None else -live.factor * tangent}
+    for i, pair in enumerate(variations):
+        second = parts["tangent"]
         if pair is not None:
             change = variation(live.work, live.point, *pair)
             second = None if _is_zero(change) else nonzero(-live.factor * change * live.measure)
-        seconds.append(None if second is None else _symmetric(second))
-    return LiveParts(-live.factor * live.form, tangent, seconds)
+        parts[i] = None if second is None else _symmetric(second)
+    return parts
 
 
 def nonzero(form):
@@ -219,13 +209,6 @@ def _balance(model, residual, acting):
         for form in forms.values():
             residual = residual - factor * form
     return residual
-
-
-def compile_single(model, second):
-    """The `CompiledForms` of a model that has only a second variation, unsymmetric, or None."""
-    points, weights = basix.make_quadrature(basix.CellType.interval, 2 * model.signature.points - 1)
-    seconds = () if second is None else tuple(compat.forms(model.mesh, [second]))
-    return CompiledForms(points[:, 0], weights, second_variations=(seconds,))
 
 
 def measures(model):

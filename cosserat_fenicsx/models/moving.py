@@ -166,30 +166,27 @@ class StepForms:
             self.after, self.section, self.viscosity, lambda a: ufl.derivative(a, self.state, self.velocity)
         )
         by_drag = 2 * model.h * model.drag[0] * self.kinetic_passed() * dx.nodes
-        others = {
+        once = {
             "momentum": self.momentum_before() * dx.nodes,
             "kinetic": self.kinetic_before() * dx.nodes,
             "strain": self.strain() * dx.gauss,
             "dissipated": self.viscous_loss() * dx.gauss + by_drag,
         }
-        booked = {} if working is None else {live.number: _booked(live, derivative, turned) for live in working.live}
-        lives = {live.number: live_parts(live, derivative, ()) for live in acting.live}
-        core, fields = [residual, derivative(residual)], model.fields_of(n, m, self.after.r_s)
-        found, of_others, of_lives = compile_parts(
-            model, core, lives, acting, fields, others=list(others.values()), of_terms=booked
+        terms = {live.number: live_parts(live, derivative) for live in acting.live}
+        for live in () if working is None else working.live:  # after what is in the residual
+            change = nonzero(derivative(live.form)) if turned else None
+            terms.setdefault(live.number, {}).update(
+                live=-live.factor * live.form, live_tangent=None if change is None else -live.factor * change
+            )
+        core = {"residual": residual, "tangent": derivative(residual), **once}
+        found = compile_parts(
+            model, core, terms, model.fields_of(n, m, self.after.r_s), dead=acting.dead, permanent=acting.permanent
         )
-        live, live_tangent = (tuple(pair[i] for pair in of_lives if pair[i]) for i in range(2))
-        step, step_at_nodes = compat.expressions(model.mesh, zip(of_step, (found.gauss, model.nodes), strict=True))
-        return MotionForms(
-            **vars(found), **dict(zip(others, of_others, strict=True)), of_step=step, of_step_at_nodes=step_at_nodes,
-            live=found.residual[1:] if working is None else live, live_tangent=live_tangent,
-        )  # fmt: skip
-
-
-def _booked(live, derivative, turned):
-    """[form, its derivative or None] of a `Live` of the energy balance."""
-    change = nonzero(derivative(live.form)) if turned else None
-    return [-live.factor * live.form, None if change is None else -live.factor * change]
+        found |= {name: found[name][0] for name in once}
+        if working is None:
+            found["live"] = found["residual"][1:]
+        step, step_at_nodes = compat.expressions(model.mesh, zip(of_step, (found["gauss"], model.nodes), strict=True))
+        return MotionForms(**found, of_step=step, of_step_at_nodes=step_at_nodes)
 
 
 def compile_momentum(step, stress=inertia.averaged_stress):

@@ -14,9 +14,10 @@ from cosserat_fenicsx.forms.equilibrium import VirtualMotion
 from cosserat_fenicsx.forms.point import NONE
 from cosserat_fenicsx.models.base import RodModel
 from cosserat_fenicsx.models.compiled import (
+    CompiledForms,
     action_work,
     along,
-    compile_single,
+    compile_parts,
     compile_static,
     measures,
     varied_actions,
@@ -31,7 +32,7 @@ def small_motion_of(w):
 
 
 def spun(q, omega):
-    """(.., 4) omega q/2: changes of q (.., 4) by small inertial rotations omega (.., 3), or rates by angular velocities."""
+    """(.., 4) omega q/2: changes of q (.., 4) by small inertial rotations (.., 3), or rates by angular velocities."""
     v = q[..., 1:]
     scalar = -np.einsum("...i,...i->...", omega, v)[..., None]
     return np.concatenate([scalar, q[..., :1] * omega + np.cross(omega, v)], axis=-1) / 2
@@ -156,7 +157,7 @@ class CirculatoryModel(SpatialModel):
     """
 
     def _compile(self, spaces):
-        return compile_single(self, self._form(*spaces))
+        return CompiledForms(**compile_parts(self, {0: self._form(*spaces)}, {}, None))
 
     def _form(self, rotations):
         """h with d omega(w, psi) = h(w, psi) - h(psi, w): h(w, psi) = D_w omega(psi) + omega(w x psi)/2, because the
