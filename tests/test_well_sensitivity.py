@@ -110,7 +110,7 @@ def test_uncertainty_of_a_hook_load_with_a_fit():
 def test_refusals_in_words():
     here = capstan()
     for name, words in (
-        ("hole.sections[3].friction", "a number from 0 to 0"),
+        ("hole.sections[3].friction", r"hole.sections\[i\].friction with i from 0 to 0"),
         (
             "operation.rpm",
             r"known: friction, weight, operation.weight, operation.torque, hole.sections\[i\].friction "

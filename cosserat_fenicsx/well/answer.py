@@ -380,9 +380,9 @@ class TorqueAndDrag(Differentiated, Result):
         Raises:
             SceneError: matplotlib is missing, or the ending is unknown; depths that the string has not.
         """
-        from cosserat_fenicsx.well.charts import draw_answer
+        from cosserat_fenicsx.well import charts
 
-        return draw_answer(self, file, between, units=units, width=width)
+        return charts.draw_chart(lambda: charts.answer_figure(self, between), file, self._ranks, units=units, width=width)
 
     def plot_from_side(
         self,
@@ -392,8 +392,22 @@ class TorqueAndDrag(Differentiated, Result):
         units: Any = "SI",
         width: int | None = None,
     ):
-        """See `RodInContact.plot_from_side`; a soft string has no shape of its own, and raises a SceneError."""
-        raise SceneError(f"plot_from_side: a {self.words} lies on the axis: expected an answer of model = 'rod'")
+        """Draw the lower end of a rod in contact in its hole from the side, with the forces of the wall; across the
+        hole lengths are enlarged.
+
+        Args:
+            file: .png, .pdf or another format of matplotlib (rank 0 writes); None returns the Figure.
+            length: of the string that is drawn, from its lower end, m; None for all of it.
+            units, width: see `plot`.
+
+        Raises:
+            SceneError: a soft string, which has no shape of its own; matplotlib is missing, or the ending is unknown.
+        """
+        from cosserat_fenicsx.well import charts
+
+        if self.model != "rod":
+            raise SceneError(f"plot_from_side: a {self.words} lies on the axis: expected an answer of model = 'rod'")
+        return charts.draw_chart(lambda: charts.side_figure(self, length), file, self._ranks, units=units, width=width)
 
     def plot_3d(
         self,

@@ -20,21 +20,14 @@ from cosserat_fenicsx.well.softstring import UP_TO, Chain, Solved, soft_string
 
 @dataclass(frozen=True)
 class _Integration:
-    """Settings of the integration up the hole.
+    """Settings of the integration up the hole."""
 
-    Attributes:
-        rtols: pairs of relative tolerances, tried in turn; the difference of the two solutions is the error estimate.
-        rough: relative tolerance where a few digits suffice.
-        least: smallest tolerance of the soft string below.
-        changes: most changes of state within one piece.
-        unbounded: atan(F/F_0) above which F counts as infinite.
-    """
-
+    # Pairs of relative tolerances, tried in turn; the difference of the two solutions is the error estimate.
     rtols: tuple = ((1e-10, 1e-12), (1e-11, 1e-13))
-    rough: float = 1e-6
-    least: float = 1e-12
-    changes: int = 20
-    unbounded: float = math.pi / 2 - 1e-6
+    rough: float = 1e-6  # relative tolerance where a few digits suffice
+    least: float = 1e-12  # smallest tolerance of the soft string below
+    changes: int = 20  # most changes of state within one piece
+    unbounded: float = math.pi / 2 - 1e-6  # atan(F/F_0) above which F counts as infinite
 
 
 _SET = _Integration()

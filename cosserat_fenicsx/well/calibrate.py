@@ -1,9 +1,10 @@
 """Coefficients of friction from measured hook loads and torques."""
 
 import warnings
+from collections import namedtuple
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Annotated, Any
 
 import numpy as np
@@ -23,23 +24,15 @@ from cosserat_fenicsx.well.solve import BUCKLED, SOFT, torque_and_drag
 
 @dataclass(frozen=True)
 class _Fit:
-    """Settings of the fit.
+    """Settings of the fit."""
 
-    Attributes:
-        start, most: first value and upper bound of the coefficients. tol: of the answers that are compared.
-        block: unit of the block's weight in the search, N.
-        bad: misfit above which readings or string are wrong, and factor by which it falls where the cause is found.
-        other_unit: least factor between hook loads in different units.
-        singular: smallest singular value of the sensitivities, over the largest one.
-    """
-
-    start: float = 0.2
-    most: float = 2.0
-    tol: float = 1e-10
-    block: float = 1e5
-    bad: float = 3.0
-    other_unit: float = 50.0
-    singular: float = 1e-6
+    start: float = 0.2  # first value of the coefficients
+    most: float = 2.0  # upper bound of the coefficients
+    tol: float = 1e-10  # of the answers that are compared
+    block: float = 1e5  # unit of the block's weight in the search, N
+    bad: float = 3.0  # misfit above which readings or string are wrong; its fall where the cause is found
+    other_unit: float = 50.0  # least factor between hook loads in different units
+    singular: float = 1e-6  # smallest singular value of the sensitivities, over the largest one
 
 
 _SET = _Fit()
@@ -72,6 +65,18 @@ class RigMeasurement(Part):
         """Refuse a measurement without a reading."""
         if self.hook_load is None and self.torque is None:
             refuse(self, "hook_load", None, "a hook load (N) or a torque (N m)")
+
+
+#: One number that was read: its `RigMeasurement`; the name of what it is in `TorqueAndDrag`; its value and standard
+#: deviation, N or N m.
+Reading = namedtuple("Reading", "at query value sd")
+
+
+def readings_of(measurements):
+    """[`Reading`] of measurements, hook loads before torques."""
+    loads = [Reading(m, "hook_load", m.hook_load, m.hook_load_sd) for m in measurements]
+    torques = [Reading(m, "surface_torque", m.torque, m.torque_sd) for m in measurements]
+    return [x for x in loads + torques if x.value is not None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,9 +121,9 @@ class FrictionFit(Result):
         Raises:
             SceneError: matplotlib is missing, or the ending is unknown.
         """
-        from cosserat_fenicsx.well.charts import draw_fit
+        from cosserat_fenicsx.well import charts
 
-        return draw_fit(self, file, units=units, width=width)
+        return charts.draw_chart(lambda: charts.fit_figure(self), file, self._ranks, units=units, width=width)
 
     _rows_axis = "section"
     _quantities = by_name(
@@ -185,39 +190,31 @@ def calibrate_friction(
     confidence = number("calibrate_friction", "confidence", confidence, "a number between 0 and 1", lambda x: 0 < x < 1)
     settings = {"mud": mud, "model": model, "tol": _SET.tol, "torque_convention": torque_convention}
     unknown_block, sections = block_weight is None, len(hole.sections)
-    hooks = [m for m in measurements if m.hook_load is not None]
-    turns = [m for m in measurements if m.torque is not None]
-    wanted, readings = sections + unknown_block, len(hooks) + len(turns)
-    if readings <= wanted:
-        raise SceneError(f"calibrate_friction: {readings} readings for {wanted} unknowns: expected more")
+    readings, wanted = readings_of(measurements), sections + unknown_block
+    excess = len(readings) - wanted
+    if excess <= 0:
+        raise SceneError(f"calibrate_friction: {len(readings)} readings for {wanted} unknowns: expected more")
+    of_block = np.array([float(x.query == "hook_load") for x in readings])
+    sd = np.array([x.sd for x in readings])
 
     @lru_cache(maxsize=1)
     def answers_of(friction):
         with_friction = hole.with_friction(np.maximum(friction, 0.0))
-        return {id(m): torque_and_drag(with_friction, string, m.operation, depth=m.depth, **settings)
-                for m in measurements}  # fmt: skip
+        answers = {id(m): torque_and_drag(with_friction, string, m.operation, depth=m.depth, **settings)
+                   for m in measurements}  # fmt: skip
+        return [answers[id(x.at)] for x in readings]
 
     def residuals(unknowns):
         block = unknowns[sections] * _SET.block if unknown_block else block_weight
         answers = answers_of(tuple(unknowns[:sections]))
-        return np.array(
-            [(m.hook_load - answers[id(m)].hook_load - block) / m.hook_load_sd for m in hooks]
-            + [(m.torque - answers[id(m)].surface_torque) / m.torque_sd for m in turns]
-        )
+        computed = [getattr(answer, x.query) for answer, x in zip(answers, readings, strict=True)]
+        return ([x.value for x in readings] - np.array(computed) - block * of_block) / sd
 
     def slopes(unknowns):
         answers = answers_of(tuple(unknowns[:sections]))
         names = [f"hole.sections[{i}].friction" for i in range(sections)]
-
-        def row(m, query, sd):
-            found = answers[id(m)].sensitivity(names, query)
-            block = [_SET.block if query == "hook_load" else 0.0] * unknown_block
-            return [-x / sd for x in (*found.values(), *block)]
-
-        return np.array(
-            [row(m, "hook_load", m.hook_load_sd) for m in hooks]
-            + [row(m, "surface_torque", m.torque_sd) for m in turns]
-        )
+        rows = [list(answer.sensitivity(names, x.query).values()) for answer, x in zip(answers, readings, strict=True)]
+        return -np.column_stack([rows, *[_SET.block * of_block] * unknown_block]) / sd[:, None]
 
     free = [np.inf] * unknown_block  # of the block's weight
     bounds = [0.0] * sections + [-x for x in free], [_SET.most] * sections + free
@@ -225,10 +222,10 @@ def calibrate_friction(
     jacobian = slopes if model == SOFT else "2-point"  # of buckled strings no derivative is known
     found = least_squares(residuals, start, jacobian, bounds, xtol=1e-10, ftol=1e-12, gtol=1e-12)
     _check_determined(hole, found.jac, unknown_block)
-    misfit = float(np.sqrt(2 * found.cost / (readings - wanted)))
+    misfit = float(np.sqrt(2 * found.cost / excess))
     covariance = np.linalg.inv(found.jac.T @ found.jac) * misfit**2
     spread = np.sqrt(np.diag(covariance))
-    half = student.ppf((1 + confidence) / 2, readings - wanted) * spread
+    half = student.ppf((1 + confidence) / 2, excess) * spread
     scale = np.array([1.0] * sections + [_SET.block] * unknown_block)
     values, half = found.x * scale, half * scale
     ends = np.stack([values - half, values + half], axis=1)
@@ -238,16 +235,12 @@ def calibrate_friction(
     block = float(values[-1]) if unknown_block else float(block_weight)
     doubts = ()
     if misfit > _SET.bad:
-        computed = [m.hook_load - x * m.hook_load_sd for m, x in zip(hooks, found.fun, strict=False)]
-
-        def with_block():
-            return calibrate_friction(hole, string, measurements, mud=mud, block_weight=None, model=model,
-                                      torque_convention=torque_convention)  # fmt: skip
-
+        with_block = partial(calibrate_friction, hole, string, measurements, mud=mud, block_weight=None, model=model,
+                             torque_convention=torque_convention)  # fmt: skip
         doubts = (
             f"misfit {misfit:.3g} where 1 is as the standard deviations say: neither coefficients nor intervals are to "
             "be relied on",
-            *_causes(hooks, computed, misfit, None if unknown_block else with_block),
+            *_causes(readings, found.fun * sd, misfit, None if unknown_block else with_block),
         )
         warn(f"calibrate_friction: {'; '.join(doubts)}")
     return FrictionFit(
@@ -258,18 +251,19 @@ def calibrate_friction(
     )  # fmt: skip
 
 
-def _causes(hooks, computed, misfit, with_block):
+def _causes(readings, apart, misfit, with_block):
     """Sentences on why readings may not fit.
 
     Args:
-        hooks: measurements of hook loads; computed: these, N, with the block; with_block: fits the block's weight too,
-            None where it was fitted.
+        readings: [`Reading`]; apart: (n,) by how much they exceed what is computed; with_block: fits the block's weight
+            too, None where it was fitted.
     """
-    sizes = [sum(abs(x) for x in values) for values in ([m.hook_load for m in hooks], computed)]
+    hooks = [(x.at, x.value - more) for x, more in zip(readings, apart, strict=True) if x.query == "hook_load"]
+    sizes = sum(abs(m.hook_load) for m, _ in hooks), sum(abs(computed) for _, computed in hooks)
     if hooks and not sizes[1] / _SET.other_unit < sizes[0] < sizes[1] * _SET.other_unit:
         yield f"the hook loads are {sizes[0] / sizes[1]:.1e} times those computed: expected N"
         return
-    out, into = ([m for m in hooks if m.operation.direction(1.0)[0] * sign > 0] for sign in (1, -1))
+    out, into = ([m for m, _ in hooks if m.operation.direction(1.0)[0] * sign > 0] for sign in (1, -1))
     swapped = [up.depth for up in out for down in into if up.depth == down.depth and up.hook_load < down.hook_load]
     if swapped:
         yield f"at the depth {swapped[0]:g} m the hook load out is below that in: are they swapped?"

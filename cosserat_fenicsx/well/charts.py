@@ -18,8 +18,8 @@ from cosserat_fenicsx.pictures.charts import (
 )
 from cosserat_fenicsx.pictures.view import round_step
 from cosserat_fenicsx.quantities import Quantity
-from cosserat_fenicsx.ranks import world
 from cosserat_fenicsx.well import criteria
+from cosserat_fenicsx.well.calibrate import readings_of
 from cosserat_fenicsx.well.components import Bit, Stabiliser
 from cosserat_fenicsx.well.contacts import high_side, name_of_side, stretches
 
@@ -87,16 +87,6 @@ _BIT_DEPTH = Quantity("measured depth of the bit", unit="m", shown="m", dimensio
 _DEPTH = Quantity("measured depth", unit="m", shown="m", dimension="length")
 # Heights of panels over the depth, inches.
 _HEIGHT = 7.5
-
-
-def draw_sweep(sweep, file, **look):
-    """See `DepthSweep.plot`."""
-    return draw_chart(lambda: sweep_figure(sweep), file, world(), **look)
-
-
-def draw_fit(fit, file, **look):
-    """See `FrictionFit.plot`."""
-    return draw_chart(lambda: fit_figure(fit), file, world(), **look)
 
 
 def over_depth(widths, quantity):
@@ -192,23 +182,20 @@ def _without_answer(axes, sweep, i, j, limits, colour):
 
 def fit_figure(fit):
     """Measured loads and those computed with the coefficients found, over the depth of the bit."""
-    loads = [(m, _HOOK, m.hook_load, m.hook_load_sd) for m in fit.measurements if m.hook_load is not None]
-    loads += [(m, _SURFACE, m.torque, m.torque_sd) for m in fit.measurements if m.torque is not None]
-    quantities = [x for x in (_HOOK, _SURFACE) if any(quantity is x for _, quantity, *_ in loads)]
+    rows = list(zip(readings_of(fit.measurements), fit.residuals, strict=True))
+    quantities = {"hook_load": _HOOK, "surface_torque": _SURFACE}
+    queries = list(dict.fromkeys(reading.query for reading, _ in rows))
     operations = list(dict.fromkeys(m.operation for m in fit.measurements))
-    figure, panels, unit, length = over_depth([6.5] * len(quantities), _BIT_DEPTH)
+    figure, panels, unit, length = over_depth([6.5] * len(queries), _BIT_DEPTH)
     weight_unit, weight = unit_of(_HOOK)
-    for panel, quantity in zip(panels, quantities, strict=True):
-        heading, size = scale(quantity)
+    for panel, query in zip(panels, queries, strict=True):
+        heading, size = scale(quantities[query])
         panel.set_xlabel(heading)
         for i, operation in enumerate(operations):
-            rows = sorted(
-                (m.depth, value, sd, value - residual * sd)
-                for (m, what, value, sd), residual in zip(loads, fit.residuals, strict=True)
-                if what is quantity and m.operation == operation
-            )
-            if rows:
-                depth, measured, sd, computed = np.array(rows).T / np.array([[length], [size], [size], [size]])
+            shown = sorted((x.at.depth, x.value, x.sd, x.value - residual * x.sd) for x, residual in rows
+                           if x.query == query and x.at.operation == operation)  # fmt: skip
+            if shown:
+                depth, measured, sd, computed = np.array(shown).T / np.array([[length], [size], [size], [size]])
                 on_bit = f", {operation.weight / weight:.4g} {weight_unit} on bit" if operation.weight else ""
                 colour = COLOURS[i % len(COLOURS)]
                 panel.errorbar(measured, depth, xerr=sd, fmt="o", markersize=5, color=colour,
@@ -242,16 +229,10 @@ _BUCKLED = {criteria.SNAKE: ("gold", "sinusoidal buckling"), criteria.HELIX: ("t
 _PARTS = ("0.55", "0.75")
 
 
-def draw_answer(answer, file, between=None, **look):
-    """See `TorqueAndDrag.plot`."""
-    ends = depths_between("plot", between, answer.depth)
-    return draw_chart(lambda: answer_figure(answer, *ends), file, world(), **look)
-
-
-def answer_figure(answer, top, bottom):
+def answer_figure(answer, between=None):
     """The string in the hole; tension with the loads of buckling; torque where there is some; side force per length,
-    and at points where there are such forces; bending moment where it is known: from one measured depth (m) to another.
-    """
+    and at points where there are such forces; bending moment where it is known; see `TorqueAndDrag.plot`."""
+    top, bottom = depths_between("plot", between, answer.depth)
     points = points_between(answer, top, bottom)
     turns = np.abs(answer.torque).max() > _LITTLE_TORQUE * np.abs(answer.tension).max() * answer.pieces.radius.max()
     bends = np.nanmax(answer.bending_moment, initial=0.0) > 0
@@ -436,15 +417,10 @@ _TOWARDS_HIGH_SIDE = Quantity("from the hole's axis towards its high side", unit
 _LITTLE_FORCE = 0.01
 
 
-def draw_from_side(answer, file, length, **look):
-    """See `RodInContact.plot_from_side`."""
+def side_figure(answer, length=None):
+    """The lower end from the side, see `TorqueAndDrag.plot_from_side`."""
     if length is not None:
         positive("plot_from_side", "length", length, "m")
-    return draw_chart(lambda: side_figure(answer, length), file, world(), **look)
-
-
-def side_figure(answer, length=None):
-    """The Figure."""
     top = max(0.0, answer.depth - (length or answer.depth))
     figure = empty_figure(11, 5.5)
     axes = figure.subplots()

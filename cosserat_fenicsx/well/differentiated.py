@@ -1,7 +1,6 @@
 """Derivatives of a torque and drag answer by friction, weights, mud and loads on the bit, and its uncertainty."""
 
 import math
-import re
 from collections.abc import Iterable, Mapping
 
 import numpy as np
@@ -10,7 +9,6 @@ from cosserat_fenicsx.errors import SceneError, nearest
 from cosserat_fenicsx.results.sensitivity import Sensitivity, Uncertainty
 from cosserat_fenicsx.well.softstring import Change, rates_of
 
-_NUMBERED = re.compile(r"(.*)\[(\d+)\](.*)")
 #: {query: its unit}
 _QUERIES = {"hook_load": "N", "surface_torque": "N m", "tension": "N", "torque": "N m"}
 
@@ -43,7 +41,15 @@ class Differentiated:
         if query not in _QUERIES:
             raise SceneError(f"query = {query!r}: {nearest(query, _QUERIES)}")
         names = [parameters] if isinstance(parameters, str) else list(parameters)
-        found = {name: self._changed_by(name) for name in names}
+        known = self._parameters()
+        for name in names:
+            if name not in known:
+                plain = ", ".join(x for x in known if "[" not in x)
+                raise SceneError(
+                    f"parameter {name!r} of a string: known: {plain}, hole.sections[i].friction with i from 0 to "
+                    f"{len(self.hole.sections) - 1}, string.components[i].weight with i from 0 to {len(self.laid) - 1}"
+                )
+        found = {name: known[name] for name in names}
         rates = {name: self._rate(change, query) for name, (change, _, _) in found.items()}
         zero = {name: np.zeros_like(rate) for name, rate in rates.items()}
         return Sensitivity(
@@ -74,11 +80,11 @@ class Differentiated:
             return self._down(tension if query == "tension" else torque)
         return np.asarray((tension if query == "hook_load" else torque)[-1, -1])
 
-    def _changed_by(self, name):
-        """(`Change`, value, unit) of a parameter."""
+    def _parameters(self):
+        """{name: (`Change`, value, unit)} of all parameters."""
         pieces, operation, mud = self.pieces, self.operation, self.mud
         none, ones = np.zeros(len(pieces.top)), np.ones(len(pieces.top))
-        plain = {
+        found = {
             "friction": (Change(none, ones, 0.0, 0.0), math.nan, "1"),
             "weight": (Change(ones, none, 0.0, 0.0), math.nan, "N/m"),
             "operation.weight": (Change(none, none, -1.0, 0.0), operation.weight, "N"),
@@ -86,28 +92,16 @@ class Differentiated:
         }
         if mud is not None:
             weights = np.array([_by_density(place.component, mud) for place in self.laid])[pieces.component]
-            plain["mud.density"] = Change(weights, none, 0.0, 0.0), mud.density, "kg/m^3"
-        if name in plain:
-            return plain[name]
-        match = _NUMBERED.fullmatch(name) if isinstance(name, str) else None
-        of_all = {
-            "hole.sections[].friction": [section.friction for section in self.hole.sections],
-            "string.components[].weight": [pieces.weight[pieces.component == i] for i in range(len(self.laid))],
-        }
-        kind = f"{match[1]}[]{match[3]}" if match else ""
-        if kind not in of_all:
-            numbered = [f"{x.replace('[]', '[i]')} with i from 0 to {len(y) - 1}" for x, y in of_all.items()]
-            raise SceneError(f"parameter {name!r} of a string: known: {', '.join([*plain, *numbered])}")
-        i, values = int(match[2]), of_all[kind]
-        if i >= len(values):
-            raise SceneError(f"parameter '{name}': expected a number from 0 to {len(values) - 1}")
-        if "friction" in kind:
-            above = np.searchsorted(
-                [section.to for section in self.hole.sections[:-1]], (pieces.top + pieces.bottom) / 2
-            )
-            return Change(none, (above == i).astype(float), 0.0, 0.0), values[i], "1"
-        weight = float(values[i][0]) if len(values[i]) else math.nan
-        return Change((pieces.component == i).astype(float), none, 0.0, 0.0), weight, "N/m"
+            found["mud.density"] = Change(weights, none, 0.0, 0.0), mud.density, "kg/m^3"
+        section = np.searchsorted([x.to for x in self.hole.sections[:-1]], (pieces.top + pieces.bottom) / 2)
+        for i, one in enumerate(self.hole.sections):
+            change = Change(none, (section == i).astype(float), 0.0, 0.0)
+            found[f"hole.sections[{i}].friction"] = change, one.friction, "1"
+        for i in range(len(self.laid)):
+            here = pieces.component == i
+            weight = float(pieces.weight[here][0]) if here.any() else math.nan
+            found[f"string.components[{i}].weight"] = Change(here.astype(float), none, 0.0, 0.0), weight, "N/m"
+        return found
 
 
 def _by_density(component, mud):

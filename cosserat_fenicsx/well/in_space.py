@@ -37,7 +37,7 @@ _AT_POINT = Quantity("force at a point", unit="N", shown="kN")
 _DEPTH = Quantity("depth", unit="m", shown="m", dimension="length")
 
 
-def draw_in_space(answer, file, enlarge=None, between=None, units="SI"):
+def draw_in_space(answer, file, enlarge, between, units):
     """See `TorqueAndDrag.plot_3d`."""
     if enlarge is not None:
         positive("plot_3d", "enlarge", enlarge, "-")

@@ -35,20 +35,14 @@ from cosserat_fenicsx.well.softstring import Chain
 
 @dataclass(frozen=True)
 class _Estimate:
-    """Settings of the estimate.
+    """Settings of the estimate."""
 
-    Attributes:
-        caution: over the effects of the clearance: on 240 random strings the difference from the rod was up to 1.2
-            times their sum of sizes.
-        fine: sample points on a piece in the search for snakes.
-        short: length of components whose own bending stiffness does not count, m.
-        nearest: least distance of a pair of forces, m.
-    """
-
+    # Safety factor of the effects of the clearance: on 240 random strings the difference from the rod was up to 1.2
+    # times their sum of sizes.
     caution: float = 1.25
-    fine: int = 512
-    short: float = 3.0
-    nearest: float = 0.3
+    fine: int = 512  # sample points on a piece in the search for snakes
+    short: float = 3.0  # length of components whose own bending stiffness does not count, m
+    nearest: float = 0.3  # least distance of a pair of forces, m
 
 
 _SET = _Estimate()

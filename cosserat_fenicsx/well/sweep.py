@@ -40,9 +40,6 @@ KIND = Kind(
 )  # fmt: skip
 #: Arguments that are parts; the others are plain, but for the operations.
 _PARTS = {"hole": Borehole, "string": DrillString, "mud": Mud}
-_PLACE = ("operation", "friction", "depth")
-
-
 _CASES = ("operation", "friction", "depth")
 # Columns of the table that `print` shows, beside the depth.
 _COLUMNS = 6
@@ -145,9 +142,9 @@ class DepthSweep(Result):
         Raises:
             SceneError: matplotlib is missing, or the ending is unknown.
         """
-        from cosserat_fenicsx.well.charts import draw_sweep
+        from cosserat_fenicsx.well import charts
 
-        return draw_sweep(self, file, units=units, width=width)
+        return charts.draw_chart(lambda: charts.sweep_figure(self), file, self._ranks, units=units, width=width)
 
     def __repr__(self):
         names = ", ".join(operation.name for operation in self.operations)
@@ -291,7 +288,7 @@ def _mark(about):
 
 
 def _row(place, numbers, note):
-    return {**dict(zip((*_PLACE, *KEPT), (*place, *map(float, numbers)), strict=True)), "note": note}
+    return {**dict(zip((*_CASES, *KEPT), (*place, *map(float, numbers)), strict=True)), "note": note}
 
 
 def _answer_in(row, shape):
@@ -300,7 +297,7 @@ def _answer_in(row, shape):
     Raises:
         ValueError, LookupError, TypeError: it is none of a sweep of this shape.
     """
-    place = tuple(row[name] for name in _PLACE)
+    place = tuple(row[name] for name in _CASES)
     if not all(type(i) is int and 0 <= i < count for i, count in zip(place, shape, strict=True)):
         raise ValueError(f"{place}: expected indices below {shape}")
     return place, [float(row[name]) for name in KEPT], str(row["note"])

@@ -399,22 +399,15 @@ _OF_CHANGE = {"hook_load": 3.0, "surface_torque": 4.0, "wall_force": 6.0}
 
 @dataclass(frozen=True)
 class _Errors:
-    """Settings of the error estimates.
+    """Settings of the error estimates."""
 
-    Attributes:
-        least_load: smallest scale of hook loads, over the string's weight.
-        least_torque: smallest scale of torques, over the torque of the wall's forces at the string's surface.
-        caution: safety factor of the remaining effect of the wall's softness.
-        ratios: bounds of the ratio of changes. unknown: that ratio where it is not known.
-        falls: a change by the mesh below this share of the change before is taken as small by chance: changes fall to a
-            twentieth (the median, from equal elements to others) or a seventh (later).
-    """
-
-    least_load: float = 1e-3
-    least_torque: float = 1e-3
-    caution: float = 2.0
-    ratios: tuple[float, float] = (0.1, 0.9)
-    unknown: float = 0.5
+    least_load: float = 1e-3  # smallest scale of hook loads, over the string's weight
+    least_torque: float = 1e-3  # smallest scale of torques, over the wall's forces times the contact radius
+    caution: float = 2.0  # safety factor of the remaining effect of the wall's softness
+    ratios: tuple[float, float] = (0.1, 0.9)  # bounds of the ratio of changes
+    unknown: float = 0.5  # that ratio where it is not known
+    # A change by the mesh below this share of the change before is taken as small by chance: changes fall to a
+    # twentieth (the median, from equal elements to others) or a seventh (later).
     falls: float = 1 / 32
 
 

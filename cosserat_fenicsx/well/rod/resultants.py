@@ -28,43 +28,27 @@ Contact = namedtuple("Contact", "start end force side error", defaults=(np.nan,)
 
 @dataclass(frozen=True)
 class _Resultants:
-    """Settings by which peaks of the pressure become forces. Lengths are those of the layer in the wall, lam, of the
-    rise behind a peak, g (see the head of the module), or of the part of a contact that holds a peak.
+    """Settings by which peaks of the pressure become forces. Lengths are multiples of the layer in the wall, lam, of
+    the rise behind a peak, g (see the head of the module), or of the part of a contact that holds a peak."""
 
-    Attributes:
-        layers, nodes: least length that holds a peak, in lam, and in nodes of the mesh.
-        roomy, far: where there is room, this multiple of it, and this many lam.
-        beside: length from which the regular pressure beside a peak is taken, over the length that holds the peak.
-        apart, between: largest gap, in lam and in nodes, between contacts that count as one: on coarse meshes nodes
-            touch by turns.
-        rises: g^3 q/(P lam^2). split: length in g that holds a peak behind which the rod rises.
-        excess: force in such a peak beyond P, over q g.
-        rounds, same: most iterations for the length that holds a peak, and the factor to which it is found.
-        shorter: the error of a force is the difference from that by a length shorter or longer by this factor.
-        caution: safety factor of a force's change by other lengths. left: remaining share of its change from the
-            coarser mesh. soft: its change by the wall's softness, over the square of lam over the free span.
-        least: smallest force at an end of a contact, over the regular pressure on the length that holds the peak.
-        peak: smallest force inside a contact, over the regular pressure on lam.
-    """
-
-    layers: float = 4.0
-    nodes: int = 8
-    roomy: float = 2.5
-    far: float = 14.0
-    beside: float = 1.0
-    apart: float = 1.0
-    between: int = 4
-    rises: float = 3.245
-    split: float = 2.0
-    excess: float = 0.75
-    rounds: int = 6
-    same: float = 1.001
-    shorter: float = 0.8
-    caution: float = 2.0
-    left: float = 0.25
-    soft: float = 2.5
-    least: float = 0.05
-    peak: float = 0.2
+    layers: float = 4.0  # least length that holds a peak, in lam
+    nodes: int = 8  # and in nodes of the mesh
+    roomy: float = 2.5  # where there is room, this multiple of it
+    far: float = 14.0  # and this many lam
+    beside: float = 1.0  # length that gives the regular pressure beside a peak, over the length that holds the peak
+    apart: float = 1.0  # largest gap, in lam, between contacts that count as one
+    between: int = 4  # the same in nodes: on coarse meshes nodes touch by turns
+    rises: float = 3.245  # g^3 q/(P lam^2)
+    split: float = 2.0  # length in g that holds a peak behind which the rod rises
+    excess: float = 0.75  # force in such a peak beyond P, over q g
+    rounds: int = 6  # most iterations for the length that holds a peak
+    same: float = 1.001  # factor to which that length is found
+    shorter: float = 0.8  # the error of a force is its difference with a length shorter or longer by this factor
+    caution: float = 2.0  # safety factor of a force's change by other lengths
+    left: float = 0.25  # remaining share of a force's change from the coarser mesh
+    soft: float = 2.5  # a force's change by the wall's softness, over the square of lam over the free span
+    least: float = 0.05  # smallest force at an end of a contact, over the regular pressure on the length of the peak
+    peak: float = 0.2  # smallest force inside a contact, over the regular pressure on lam
 
 
 _SET = _Resultants()

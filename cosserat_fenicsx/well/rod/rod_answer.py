@@ -27,9 +27,9 @@ from cosserat_fenicsx.well.rod.string_scene import energy_of_helix, turns_of_hel
 _VERTICAL = 1e-9
 
 
-def _of_rod(name, doc):
-    """The attribute of the `InHole` with the same name."""
-    return property(attrgetter(f"solved.{name}"), doc=doc)
+def _of_rod(name, doc=""):
+    """The attribute of the `InHole` with the same name; its description is that in `TorqueAndDrag` unless given."""
+    return property(attrgetter(f"solved.{name}"), doc=doc or getattr(TorqueAndDrag, name).__doc__)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -60,14 +60,9 @@ class RodInContact(TorqueAndDrag):
         there |= {name: (flexible.hook_load - hook, flexible.surface_torque - torque)
                   for name, (hook, torque) in flexible.differences.items()}  # fmt: skip
         differences = {name: (here[0] - hook, here[1] - torque) for name, (hook, torque) in there.items()}
-        changed = {
-            "model": "rod",
-            "error": solved.error,
-            "model_error": _of_buckling(flexible, solved, differences),
-            "differences": differences,
-            "solved": solved,
-        }
-        return cls(**{**given, **changed, "why": (*decided, *_found(flexible, solved, differences))})
+        given |= {"model": "rod", "error": solved.error, "differences": differences, "solved": solved}
+        why = (*decided, *_found(flexible, solved, differences))
+        return cls(**{**given, "model_error": _of_buckling(flexible, solved, differences), "why": why})
 
     @property
     def enough(self):
@@ -75,10 +70,10 @@ class RodInContact(TorqueAndDrag):
         return super().enough and self.solved.negative_modes == 0
 
     hook_load = _of_rod("hook_load", "Force along the hole on the held end, N, without block and sheaves.")
-    surface_torque = _of_rod("surface_torque", "N m.")
-    tension = _of_rod("tension", "Effective tension, N.")
-    torque = _of_rod("torque", "N m.")
-    side_force = _of_rod("side_force", "Force of the wall per length, N/m, across the hole and without friction.")
+    surface_torque = _of_rod("surface_torque")
+    tension = _of_rod("tension")
+    torque = _of_rod("torque")
+    side_force = _of_rod("side_force")
     distributed_force = _of_rod(
         "distributed_force",
         "See `TorqueAndDrag`: its integral and the forces at points are the `wall_force` of `solved`.",
@@ -96,7 +91,7 @@ class RodInContact(TorqueAndDrag):
     )
     standoff = _of_rod("standoff", "Distance from the wall over the clearance: 0 in contact, 1 on the axis.")
     offset = _of_rod("offset", "(n, 3) from the hole's axis to the string, m.")
-    position = _of_rod("position", "(n, 3) north, east, down of the string, m.")
+    position = _of_rod("position")
 
     @cached_property
     def _gravity(self):
@@ -126,30 +121,6 @@ class RodInContact(TorqueAndDrag):
         leans = [self.hole.path.inclination_at(ends.mean()) > _VERTICAL for ends in depths]
         return [WallContact(float(a), float(b), x.force, name_of_side(x.side if leaning else np.nan), x.error)
                 for (a, b), x, leaning in zip(depths, self.solved.contacts, leans, strict=True)]  # fmt: skip
-
-    def plot_from_side(
-        self,
-        file: File | None = None,
-        length: float | None = None,
-        *,
-        units: Any = "SI",
-        width: int | None = None,
-    ):
-        """Draw the lower end of the string in its hole from the side, with the forces of the wall; across the hole
-        lengths are enlarged.
-
-        Args:
-            file: .png, .pdf or another format of matplotlib (rank 0 writes); None returns the Figure.
-            length: of the string that is drawn, from its lower end, m; None for all of it.
-            units: "SI", "field", or a dict of units by dimensions, such as {"force": "klbf"}.
-            width: of the picture, pixels, which its fonts and legends are arranged for; None for 150 to the inch.
-
-        Raises:
-            SceneError: matplotlib is missing, or the ending is unknown.
-        """
-        from cosserat_fenicsx.well.charts import draw_from_side
-
-        return draw_from_side(self, file, length, units=units, width=width)
 
     @cached_property
     def helical(self):
@@ -197,8 +168,7 @@ def _found(flexible, solved, differences):
             yield f"this is MORE than was estimated for the {name} string, {flexible.model_error:.1e}: look at both"
     if solved.negative_modes:
         count = solved.negative_modes
-        several = "one negative eigenvalue" if count == 1 else f"{count} negative eigenvalues"
-        modes = "singular" if count < 0 else several
+        modes = {-1: "singular", 1: "one negative eigenvalue"}.get(count, f"{count} negative eigenvalues")
         yield (
             f"NOT STABLE without friction (second variation: {modes}): it would buckle, or buckle otherwise, and what "
             f"it bears then may differ as much as was estimated for the {flexible.model} string"
@@ -223,6 +193,8 @@ def rod_in_contact(flexible, decided, progress=None, exact=True):
     laid = flexible.laid[::-1]  # from the top down
     hole, operation = flexible.hole, flexible.operation
     check_rod(hole, laid, operation, flexible.mud, flexible.torque_convention)
+    above = [0.0, *(section.to for section in hole.sections)]
+    reached = [section for section, top in zip(hole.sections, above, strict=False) if top < flexible.depth]
 
     def solve(helix):
         """The `InHole`, and the `NotAccurate` if it is less accurate than asked, else None."""
@@ -233,8 +205,8 @@ def rod_in_contact(flexible, decided, progress=None, exact=True):
                 [place.component.stiffness for place in laid],
                 [weight_in_mud(place.component, flexible.mud) for place in laid],
                 [place.component.body_radius for place in laid],
-                radius=_along(hole, flexible.depth, lambda section: section.diameter / 2),
-                friction=_along(hole, flexible.depth, lambda section: section.friction),
+                radius=[(section.to, section.diameter / 2) for section in reached],
+                friction=[(section.to, section.friction) for section in reached],
                 slip=[operation.direction(place.component.contact_radius) for place in laid],
                 bottom_tension=-operation.weight,
                 bottom_torque=operation.torque,
@@ -295,34 +267,18 @@ def check_rod(hole, laid, operation, mud, torque_convention):
         refuse("torque_and_drag", "torque_convention", torque_convention,
                "'coulomb', the law that the rod in contact follows")  # fmt: skip
     for place in laid:
-        _check(place, hole, mud)
-
-
-def _check(place, hole, mud):
-    component = place.component
-    if component.stiffness is None:
-        raise SceneError(
-            f"{component.name}: stiffness = None: expected a Stiffness for model = 'rod', the rod in contact"
-        )
-    weight = weight_in_mud(component, mud)
-    if not weight > 0:
-        raise SceneError(
-            f"{component.name}: it weighs {weight:g} N/m in mud: expected a positive weight for model = 'rod'"
-        )
-    inside = [x.to for x in hole.sections if place.top < x.to < place.bottom]
-    narrowest, wide = float(hole.at([*inside, place.bottom], "diameter").min()), 2 * component.body_radius
-    if not wide < narrowest:
-        raise SceneError(
-            f"{component.name}: its body is {wide:g} m wide in a hole of {narrowest:g} m: expected a clearance for "
-            "model = 'rod'"
-        )
-
-
-def _along(hole, depth, value):
-    """[(md_end, value)] of the sections that the string reaches."""
-    above, found = 0.0, []
-    for section in hole.sections:
-        if above < depth:
-            found.append((section.to, value(section)))
-        above = section.to
-    return found
+        component = place.component
+        if component.stiffness is None:
+            raise SceneError(f"{component.name}: stiffness = None: expected a Stiffness for model = 'rod'")
+        weight = weight_in_mud(component, mud)
+        if not weight > 0:
+            raise SceneError(
+                f"{component.name}: it weighs {weight:g} N/m in mud: expected a positive weight for model = 'rod'"
+            )
+        inside = [x.to for x in hole.sections if place.top < x.to < place.bottom]
+        narrowest, wide = float(hole.at([*inside, place.bottom], "diameter").min()), 2 * component.body_radius
+        if not wide < narrowest:
+            raise SceneError(
+                f"{component.name}: its body is {wide:g} m wide in a hole of {narrowest:g} m: expected a clearance for "
+                "model = 'rod'"
+            )

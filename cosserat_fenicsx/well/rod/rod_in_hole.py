@@ -24,56 +24,32 @@ from cosserat_fenicsx.well.rod.string_scene import in_helix, on_axis, string_in
 
 @dataclass(frozen=True)
 class _Meshes:
-    """Settings of the meshes.
+    """Settings of the meshes."""
 
-    Attributes:
-        degree: of the elements where none is asked for; lift-off forces limit the regularity, so that higher degrees
-            gain nothing.
-        first, most: number of elements of the first mesh and of the last, where none is asked for.
-        finer: factor from one mesh to the next.
-        before: where a number of elements is asked for, the factor by which the mesh before it has fewer.
-        per_piece: elements of the first mesh over the pieces of the string, at least.
-        fewest, densest: bounds of the density of elements on a finer mesh, over equal ones.
-        by_wall: below this multiple of the wall-stiffness error, the mesh error is taken as resolved.
-        fine: the first mesh on which a solution must be found: snakes and helices need more elements than others.
-    """
-
-    degree: int = 3
-    first: int = 256
-    most: int = 8192
-    finer: int = 2
-    before: int = 4
-    per_piece: float = 1.5
-    fewest: float = 0.3
+    degree: int = 3  # of the elements by default; lift-off forces limit the regularity, so higher degrees gain nothing
+    first: int = 256  # elements of the first mesh
+    most: int = 8192  # elements of the last mesh
+    finer: int = 2  # factor from one mesh to the next
+    before: int = 4  # a requested number of elements over that of the mesh before
+    per_piece: float = 1.5  # least number of elements of the first mesh over the pieces of the string
+    fewest: float = 0.3  # bounds of the density of elements on a finer mesh, over equal ones
     densest: float = 2.4
-    by_wall: float = 1.25
-    fine: int = 1024
+    by_wall: float = 1.25  # below this multiple of the wall-stiffness error, the mesh error is taken as resolved
+    fine: int = 1024  # the first mesh that must have a solution: snakes and helices need more elements than others
 
 
 @dataclass(frozen=True)
 class _Walls:
-    """Settings of the wall, by which a rigid one is approached, and of the equilibrium in it.
+    """Settings of the walls that approach a rigid one, and of the equilibrium in them."""
 
-    Attributes:
-        first: stiffness of the first wall in place of a rigid one, N/m^2.
-        stiffest: of the stiffest wall, over the first.
-        regular: above this ratio of its changes, the effect of the wall's stiffness is found again on a finer mesh.
-        known: below this share of the tolerance, it is not.
-        too_soft: above this share of the tolerance, the wall is made ten times stiffer.
-        hold: springs that hold a helix, see `settle`.
-        rounding: of the residual of a node, over the rounding of its position times the stiffness of its piece of wall
-            or its ring.
-        unbalanced: largest difference between the reaction and all other forces, over the sum of the wall's forces.
-    """
-
-    first: float = 1e9
-    stiffest: float = 1e3
-    regular: float = 0.3
-    known: float = 0.1
-    too_soft: float = 0.25
-    hold: float = 1e-10
-    rounding: float = 20.0
-    unbalanced: float = 1e-5
+    first: float = 1e9  # stiffness of the first wall, N/m^2
+    stiffest: float = 1e3  # stiffness of the last wall over the first
+    regular: float = 0.3  # ratio of changes above which the effect of the stiffness is found again on a finer mesh
+    known: float = 0.1  # share of the tolerance below which it is not
+    too_soft: float = 0.25  # share of the tolerance above which the wall is made ten times stiffer
+    hold: float = 1e-10  # springs that hold a helix, see `settle`
+    rounding: float = 20.0  # residual of a node over the rounding of its position times its wall or ring stiffness
+    unbalanced: float = 1e-5  # largest imbalance of the reaction and all other forces, over the wall's forces
 
 
 _MESHES, _WALLS = _Meshes(), _Walls()
@@ -83,30 +59,8 @@ _STARTS, _FROM_HELIX = ("fast", "gentle", "relaxed"), ("helix",)
 _SINGULAR = 1 << 30
 
 
-def solve_in_hole(
-    path,
-    lengths,
-    stiffness,
-    weight,
-    contact_radius,
-    *,
-    radius,
-    friction=0.0,
-    slip=(0.0, 0.0),
-    bottom_tension=0.0,
-    bottom_torque=0.0,
-    rings=(),
-    wall_stiffness=None,
-    hinge=None,
-    extensible=False,
-    has_arm=True,
-    helix=False,
-    tol=1e-4,
-    elements=None,
-    degree=_MESHES.degree,
-    progress=None,
-    comm=None,
-):
+def solve_in_hole(path, lengths, stiffness, weight, contact_radius, *, wall_stiffness=None, helix=False, tol=1e-4,
+                  elements=None, degree=_MESHES.degree, progress=None, comm=None, **given):  # fmt: skip
     """The equilibrium of a string in a hole, as an exact rod in contact with the hole's wall.
 
     The string hangs from a clamp at the start of the path, on its axis, and ends at the sum of its lengths. Its weight
@@ -118,24 +72,9 @@ def solve_in_hole(
     the estimated error of the hook load and of the torque is below `tol`.
 
     Args:
-        path: a `WellPath`, m.
-        lengths: (n,) of the string's sections from the top down, m.
-        stiffness: n `Stiffness`, or one for all.
-        weight: (n,) or one, N/m, in the fluid (> 0).
-        contact_radius: (n,) or one, radius of the surface that touches, m.
-        radius: of the hole, m; or pieces [(md_end, radius)].
-        friction: coefficient; or pieces [(md_end, coefficient)].
-        slip: (c_a, c_r), unit direction of slip of the string's surface: (1, 0) up the hole, (-1, 0) down, (0, 1)
-            turning (clockwise seen from above); (0, 0) for no friction; or one for each section, (n, 2).
-        bottom_tension: N, along the hole at the string's end; negative: weight on bit.
-        bottom_torque: torque on bit, N m, against the rotation.
-        rings: [(s, clearance, radius)] of stabilisers and bits: stations (m from the top) that stay within a clearance
-            (m) of the hole's axis; 0 centres the string there.
+        path, lengths, stiffness, weight, contact_radius, given: see `string_in`.
         wall_stiffness: N/m^2; None for a rigid wall, which is approached by stiffer ones until the remaining error is
             small beside `tol`. Errors are from a rigid wall in both cases.
-        hinge: None; or the direction about which the top turns freely, in place of a clamp.
-        extensible: whether the axial stiffness counts in the equilibrium; the lengths are then without stretch.
-        has_arm: whether friction acts on the surface; False: on the centreline.
         helix: whether to begin as a helix along the wall where the string is compressed beyond its buckling load, see
             `in_helix`; False: on the axis. Where there are several equilibria, the start decides which one is found.
         tol: relative accuracy of hook load and torque.
@@ -151,8 +90,7 @@ def solve_in_hole(
         NotConverged: no equilibrium was found, or, as a `NotAccurate`, not as accurately as asked.
     """
     first = _WALLS.first if wall_stiffness is None else wall_stiffness
-    string = string_in(path, lengths, stiffness, weight, contact_radius, radius, friction, slip, bottom_tension,
-                       bottom_torque, rings, first, hinge, extensible, has_arm)  # fmt: skip
+    string = string_in(path, lengths, stiffness, weight, contact_radius, first, **given)
     tol = tolerance("solve_in_hole", tol)
     comm, counts = communicator(comm), _counts(elements, len(Layout.of(string.scene, 1).breaks[0]) - 1)
     with Progress([float(len(stages_from(string.spring)))], progress, comm, "stage") as bar:

@@ -10,7 +10,7 @@ from functools import cached_property
 
 import numpy as np
 
-from cosserat_fenicsx.actions.walls import TubeRing, TubeWall
+from cosserat_fenicsx.actions.walls import TubeRing, TubeWall, value_at
 from cosserat_fenicsx.checks import finite_array, number, refuse
 from cosserat_fenicsx.numerics import directors, product_conjugate
 from cosserat_fenicsx.scene.curves import Line
@@ -25,28 +25,19 @@ from cosserat_fenicsx.well.criteria import snake_load
 
 @dataclass(frozen=True)
 class _Stiffening:
-    """Settings of the rod, its wall and its rings.
+    """Settings of the rod, its wall and its rings."""
 
-    Attributes:
-        torsion: torsional over bending stiffness of round sections: torsion winds a long string up by many
-            turns, which changes nothing else of it, but makes Newton's method fail. The twist is computed from the
-            torque afterwards.
-        of_rings: stiffness of a ring (N/m) over the wall's (N/m^2), since a ring digs in less.
-        per_bending: cap on the stiffness of a ring above the wall's, in EI/L^3, for rounding.
-        most, rounding: cap on ring stiffness (N/m) and on its rounding force (N) during wall stiffening.
-        samples, typical, least: sample count, quantile and floor (over the weight) of the lateral load.
-        safe: the first spring over the softest in which the string does not buckle.
-    """
-
+    # Torsional over bending stiffness of round sections: torsion winds a long string up by many turns, which changes
+    # nothing else of it, but makes Newton's method fail. The twist is computed from the torque afterwards.
     torsion: float = 1e4
-    of_rings: float = 100.0
-    per_bending: float = 1e13
-    most: float = 1e13
-    rounding: float = 1.0
-    samples: int = 257
-    typical: float = 0.9
-    least: float = 0.1
-    safe: float = 3.0
+    of_rings: float = 100.0  # stiffness of a ring (N/m) over the wall's (N/m^2), since a ring digs in less
+    per_bending: float = 1e13  # cap on the stiffness of a ring above the wall's, in EI/L^3, for rounding
+    most: float = 1e13  # cap on ring stiffness (N/m) during wall stiffening
+    rounding: float = 1.0  # cap on a ring's rounding force (N) during wall stiffening
+    samples: int = 257  # of the lateral load
+    typical: float = 0.9  # quantile of the lateral load
+    least: float = 0.1  # floor of the lateral load, over the weight
+    safe: float = 3.0  # the first spring over the softest in which the string does not buckle
 
 
 _SET = _Stiffening()
@@ -137,9 +128,29 @@ class StringScene:
         return [wall.stage for wall in (self.wall, *self.rings)]
 
 
-def string_in(path, lengths, stiffness, weight, contact_radius, radius, friction, slip, bottom_tension, bottom_torque,
-              rings, wall_stiffness, hinge, extensible, has_arm):  # fmt: skip
-    """The `StringScene` of the arguments of `solve_in_hole`.
+def string_in(path, lengths, stiffness, weight, contact_radius, wall_stiffness, *, radius, friction=0.0,
+              slip=(0.0, 0.0), bottom_tension=0.0, bottom_torque=0.0, rings=(), hinge=None, extensible=False,
+              has_arm=True):  # fmt: skip
+    """The `StringScene` of a string in a hole.
+
+    Args:
+        path: a `WellPath`, m.
+        lengths: (n,) of the string's sections from the top down, m.
+        stiffness: n `Stiffness`, or one for all.
+        weight: (n,) or one, N/m, in the fluid (> 0).
+        contact_radius: (n,) or one, radius of the surface that touches, m.
+        radius: of the hole, m; or pieces [(md_end, radius)].
+        friction: coefficient; or pieces [(md_end, coefficient)].
+        slip: (c_a, c_r), unit direction of slip of the string's surface: (1, 0) up the hole, (-1, 0) down, (0, 1)
+            turning (clockwise seen from above); (0, 0) for no friction; or one for each section, (n, 2).
+        bottom_tension: N, along the hole at the string's end; negative: weight on bit.
+        bottom_torque: torque on bit, N m, against the rotation.
+        rings: [(s, clearance, radius)] of stabilisers and bits: stations (m from the top) that stay within a clearance
+            (m) of the hole's axis; 0 centres the string there.
+        wall_stiffness: N/m^2.
+        hinge: None; or the direction about which the top turns freely, in place of a clamp.
+        extensible: whether the axial stiffness counts in the equilibrium; the lengths are then without stretch.
+        has_arm: whether friction acts on the surface; False: on the centreline.
 
     Raises:
         SceneError: naming the argument, its value and the expected one.
@@ -178,7 +189,8 @@ def string_in(path, lengths, stiffness, weight, contact_radius, radius, friction
     stiffest = _SET.per_bending * max(bending_of(section) for section in sections) / length**3
     ring_stiffness = min(_SET.of_rings * wall.stiffness, max(wall.stiffness, stiffest))
     around = tuple(
-        TubeRing(rod.at(s), path, clearance, ring_radius, ring_stiffness, *_friction_at(wall, s))
+        TubeRing(rod.at(s), path, clearance, ring_radius, ring_stiffness,
+                 *(value_at(given, [s]).tolist()[0] for given in (wall.friction, wall.slip)))
         for s, clearance, ring_radius in rings
     )
     for ring in around:
@@ -216,11 +228,6 @@ def is_round(section):
 def bending_of(section):
     """The smaller bending stiffness of a section, N m^2."""
     return float(min(section.bending) if section.matrix is None else np.diag(section.matrix)[3:5].min())
-
-
-def _friction_at(wall, s):
-    """Friction coefficient and slip at a station."""
-    return tuple(next(value for end, value in given if s <= end) for given in (wall.friction, wall.slip))
 
 
 def on_axis(rod, path, s):
