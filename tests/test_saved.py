@@ -165,11 +165,18 @@ def test_damaged_and_foreign_files_are_refused(tmp_path):
         lambda store: store.pop("solution/gauss"): "is damaged .*gauss",
         lambda store: store.attrs.update(version=99): "its format is 99, and this release reads up to 1",
         lambda store: store.attrs.update(format="another"): "it is of another program",
-        lambda store: store.attrs.update(kind="History"): "it holds a History: expected read_history",
+        lambda store: store.attrs.update(kind="History"): "it holds a History: expected a Path; read_result reads any",
     }.items():
         with pytest.raises(cf.SceneError, match=f"other.h5.*{expected}"):
             cf.read_path(damaged(change))
-    with pytest.raises(cf.SceneError, match="it holds a Path: expected read_path"):
+    for change, expected in {
+        lambda store: store.attrs.update(version=99): "its format is 99, and this release reads up to 1",
+        lambda store: store.attrs.update(format="another"): "it is of another program",
+        lambda store: store.attrs.update(kind="Nothing"): "is damaged .*Nothing",
+    }.items():
+        with pytest.raises(cf.SceneError, match=f"other.h5.*{expected}"):
+            cf.read_result(damaged(change))
+    with pytest.raises(cf.SceneError, match="it holds a Path: expected a History; read_result reads any"):
         cf.read_history(file)
 
 

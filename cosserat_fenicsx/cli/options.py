@@ -79,7 +79,7 @@ def _output(parser, files):
 def _outputs(parser):
     """Add the options on output files and pictures of a path or a motion."""
     _output(parser, "path.xdmf, path.h5, path.csv, rods.png and rods.html, or of a motion motion.xdmf, .h5, .csv, "
-            "rods.png, rods.html and energy.png, and result.h5, which read_path or read_history of Python reads; of a "
+            "rods.png, rods.html and energy.png, and result.h5, which read_result of Python reads; of a "
             "string in a well a .csv and pictures for each operation and for the depth_sweep; of a drill-string in "
             "motion drilling.csv, charts and stability.csv")  # fmt: skip
     parser.add_argument("--color", metavar="FIELD",

@@ -166,8 +166,8 @@ class Result:
             raise SceneError(f"{file}: expected a name that ends in .csv or .nc")
 
     def save(self, file: File) -> None:
-        """Write all quantities, with their units, to one HDF5 file, from which `read_result` makes a `StoredResult`:
-        tables, charts and data frames of the same digits. An old file is replaced once the new one is complete.
+        """Write all quantities, with their units, to one HDF5 file, from which `read_result` makes a result with the
+        same digits in tables, charts and data frames. An old file is replaced once the new one is complete.
 
         Raises:
             OSError: the file cannot be written; an old one stays.

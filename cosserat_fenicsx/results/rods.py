@@ -503,7 +503,7 @@ class RodResult(Result, Extremes, Reactions, Stresses, States):
     # -- files and pictures ------------------------------------------------------------------------------------------
 
     def save(self, file: File) -> None:
-        """Write all of the result to one HDF5 file, from which `read_path` or `read_history` makes it again.
+        """Write all of the result to one HDF5 file, from which `read_result` makes it again.
 
         Every query then gives the same digits. Other programs find, with units, what belongs to every state in the
         root, and fields along each rod in rods/<name>, see `results.export.saved`. An old file is replaced once the new

@@ -1,15 +1,21 @@
-"""Results that are read from files of quantities."""
+"""Saved results are read: paths and motions as such, of others their quantities."""
 
 import json
+from importlib import import_module
 from typing import Any
 
 import numpy as np
+from mpi4py import MPI
 
 from cosserat_fenicsx.checks import File
-from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.quantities import Quantities, Quantity
 from cosserat_fenicsx.results.export import saved
+from cosserat_fenicsx.results.history import History
+from cosserat_fenicsx.results.path import Path
 from cosserat_fenicsx.results.result import Result
+
+# Functions that read a whole result, with their modules above this room, by the class that its file names.
+_READERS = {"Path": ("statics.path.recorder", "read_path"), "History": ("dynamics.resuming", "read_history")}
 
 
 class StoredResult(Result):
@@ -46,22 +52,26 @@ class StoredResult(Result):
         return f"<StoredResult: {self.kind}, {len(self)} rows, {len(self._stored)} quantities>"
 
 
-def read_result(file: File) -> StoredResult:
-    """The quantities of a result that `save` wrote, with the same digits. No code is stored or run.
+def read_result(file: File, *, comm: MPI.Comm | None = None) -> StoredResult | Path | History:
+    """The result that `save` wrote, with the same digits. No code is stored or run.
 
-    Files of `Path.save` and `History.save` are read by `read_path` and `read_history`.
+    Args:
+        file: its name.
+        comm: MPI communicator of a path or a motion, whose ranks all read the file; default all.
+
+    Returns:
+        A `Path` or a `History` with all its methods; of other results a `StoredResult` of their quantities.
 
     Raises:
         SceneError: it cannot be read, is damaged, holds something else, or is of a newer release.
     """
     with saved.opened(file, "result") as store:
-        if store.attrs.get("format") != saved.QUANTITIES:
-            reader = {"Path": "read_path", "History": "read_history"}.get(store.attrs.get("kind"), "another function")
-            raise SceneError(f"{file}: expected a file that `save` of another result wrote, or {reader} to read it")
-        if store.attrs["version"] > saved.VERSION:
-            raise SceneError(f"{file}: its format is {store.attrs['version']}, and this release reads {saved.VERSION}")
-        head = json.loads(saved.checked(store, "head"))
-        found = StoredResult(head, {said["name"]: saved.checked(store, said["name"]) for said in head["quantities"]})
-        if not found.quantities:
-            raise ValueError("it holds no quantity")
-        return found
+        saved.check_format(file, store.attrs, "result", saved.FORMAT, saved.QUANTITIES)
+        if store.attrs["format"] == saved.QUANTITIES:
+            head = json.loads(saved.checked(store, "head"))
+            values = {said["name"]: saved.checked(store, said["name"]) for said in head["quantities"]}
+            if not values:
+                raise ValueError("it holds no quantity")
+            return StoredResult(head, values)
+        module, reader = _READERS[store.attrs["kind"]]
+    return getattr(import_module(f"cosserat_fenicsx.{module}"), reader)(file, comm=comm)

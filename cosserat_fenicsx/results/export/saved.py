@@ -31,8 +31,9 @@ from cosserat_fenicsx.results.compared import NAMES, stored_criteria
 from cosserat_fenicsx.results.records import Event, Instant, Ledger, Record, Records
 from cosserat_fenicsx.scene.scene import Scene
 
-_FORMAT, VERSION = "result of cosserat_fenicsx", 1
-#: Format of files of quantities alone; what these are, but for functions.
+#: Format of files of paths and motions; version of both formats.
+FORMAT, VERSION = "result of cosserat_fenicsx", 1
+#: Format of files of quantities alone; attributes of a `Quantity` that are stored, which are no functions.
 QUANTITIES = "quantities of cosserat_fenicsx"
 SAID = [x.name for x in fields(Quantity) if x.name not in ("getter", "chart")]
 # Fields of a record by the last dimensions of their arrays, in terms of the mesh: see `_sizes`.
@@ -57,14 +58,10 @@ def save(result, file):
             "need no scene"
         ) from None
     with replaced(file) as fresh, new_hdf5(fresh) as store:
-        store.attrs.update(format=_FORMAT, version=VERSION, written_by=f"cosserat_fenicsx {__version__}",
+        store.attrs.update(format=FORMAT, version=VERSION, written_by=f"cosserat_fenicsx {__version__}",
                            kind=result._kind, title=result.scene.title)  # fmt: skip
-        for name, text in (
-            ("scene", scene),
-            ("settings", json.dumps(_settings(result), default=lambda number: number.item())),
-        ):
-            store[name] = text
-            store[name].attrs["crc32"] = zlib.crc32(text.encode())
+        _put(store, "scene", scene)
+        _put(store, "settings", json.dumps(_settings(result), default=lambda number: number.item()))
         for place, attributes, variables in result.in_groups():
             group = store if place == "/" else store.create_group(f"rods{place}")
             group.attrs.update(attributes)
@@ -72,8 +69,7 @@ def save(result, file):
         solution = store.create_group("solution")
         solution.attrs["units"] = "1: lengths, forces and moments over the scales of the settings, inertial components"
         for name, values in _solution(result).items():
-            solution[name] = values
-            solution[name].attrs["crc32"] = zlib.crc32(np.ascontiguousarray(values))
+            _put(solution, name, values)
 
 
 def save_quantities(result, file):
@@ -99,15 +95,26 @@ def save_quantities(result, file):
     with replaced(file) as fresh, new_hdf5(fresh) as store:
         store.attrs.update(format=QUANTITIES, version=VERSION, written_by=f"cosserat_fenicsx {__version__}",
                            kind=head["kind"])  # fmt: skip
-        store["head"] = text
-        store["head"].attrs["crc32"] = zlib.crc32(text.encode())
+        _put(store, "head", text)
         for name, array in values.items():
-            store[name] = array.astype(object) if array.dtype.kind == "U" else array
-            store[name].attrs.update(units=known[name].unit, long_name=known[name].label, crc32=_check_sum(array))
+            _put(store, name, array, units=known[name].unit, long_name=known[name].label)
+
+
+def _put(place, name, values, **attributes):
+    """Write a text, or an array of numbers or texts, with its check sum."""
+    place[name] = _storable(values)
+    place[name].attrs.update(attributes, crc32=_check_sum(values))
+
+
+def _storable(values):
+    """An array of texts as HDF5 takes it; others as they are."""
+    return values.astype(object) if np.asarray(values).dtype.kind == "U" and np.ndim(values) else values
 
 
 def _check_sum(values):
-    """Of an array of numbers, or of texts."""
+    """The check sum of a text, or of an array of numbers or of texts."""
+    if isinstance(values, str | bytes):
+        return zlib.crc32(values.encode() if isinstance(values, str) else values)
     if values.dtype.kind in "OU":
         return zlib.crc32(json.dumps(values.tolist()).encode())
     return zlib.crc32(np.ascontiguousarray(values))
@@ -115,8 +122,7 @@ def _check_sum(values):
 
 def _write_variables(place, variables):
     for name, variable in variables.items():
-        values = variable.values
-        place[name] = values.astype(object) if values.dtype.kind == "U" else values
+        place[name] = _storable(variable.values)
         place[name].attrs.update(variable.attributes)
         for i, dim in enumerate(variable.dims):
             place[name].dims[i].label = dim
@@ -163,7 +169,9 @@ def read(file, kind, assemble, comm):
         SceneError: it cannot be read, is damaged, holds something else, or is of a newer release.
     """
     with opened(file, kind._kind) as store:
-        _check_kind(file, store.attrs, kind._kind)
+        check_format(file, store.attrs, kind._kind, FORMAT)
+        if (found := store.attrs.get("kind")) != kind._kind:
+            raise SceneError(f"{file}: it holds a {found}: expected a {kind._kind}; read_result reads any result")
         settings, data = (json.loads(checked(store, name)) for name in ("settings", "scene"))
         numbers = {name: checked(store["solution"], name) for name in store["solution"]}
         return _restored(kind, from_data(Scene, data), settings, numbers, assemble, comm)
@@ -193,18 +201,15 @@ def opened(file, kind):
             raise SceneError(f"{file} is damaged ({type(problem).__name__}: {problem})") from None
 
 
-def _check_kind(file, attributes, kind):
-    """Refuse other files than those of a kind of result."""
-    if attributes.get("format") != _FORMAT:
+def check_format(file, attributes, kind, *formats):
+    """Refuse files of other formats, and of newer releases; `kind`: of result that is expected, in words."""
+    if attributes.get("format") not in formats:
         raise SceneError(f"{file}: it is of another program: expected a file that `save` of a {kind} wrote")
     version = attributes.get("version")
     if not isinstance(version, np.integer) or version > VERSION:
         raise SceneError(
             f"{file}: its format is {version}, and this release reads up to {VERSION}: expected a newer one"
         )
-    if attributes.get("kind") != kind:
-        reader = {"Path": "read_path", "History": "read_history"}.get(attributes.get("kind"), "another function")
-        raise SceneError(f"{file}: it holds a {attributes.get('kind')}: expected {reader} to read it, or a {kind}")
 
 
 def checked(place, name):
@@ -216,8 +221,7 @@ def checked(place, name):
     values = stored[()]
     if texts and stored.shape != ():
         values = np.array([x.decode() for x in values.flat], dtype=str).reshape(values.shape)
-    found = zlib.crc32(values) if texts and stored.shape == () else _check_sum(np.asarray(values))
-    if found != stored.attrs["crc32"]:
+    if _check_sum(values if isinstance(values, bytes) else np.asarray(values)) != stored.attrs["crc32"]:
         raise ValueError(f"the check sum of {name} is wrong")
     return values
 
