@@ -12,8 +12,8 @@ import numpy as np
 from cosserat_fenicsx.dimensions import DIMENSIONS
 from cosserat_fenicsx.errors import SceneError, nearest
 
-#: Units with the prefixes that people write, by SI units: on the screen the largest one that gives a number above 1, or
-#: above 10 for mega: a hook load of 1122 kN is not written as 1.122 MN.
+#: SI units with their usual prefixes. On the screen the largest unit is taken that gives a number above 1, or above 10
+#: for mega: a hook load of 1122 kN is not written as 1.122 MN.
 _PREFIXED = {
     "N": {"N": 1.0, "kN": 1e3, "MN": 1e6},
     "N m": {"N m": 1.0, "kN m": 1e3, "MN m": 1e6},
@@ -23,7 +23,7 @@ _PREFIXED = {
     "W": {"W": 1.0, "kW": 1e3, "MW": 1e6},
     "m": {"mm": 1e-3, "m": 1.0},
 }
-# Numbers below this are written without an exponent, all digits before the point.
+# Numbers below this are written without an exponent.
 _PLAIN = 1e7
 #: Lengths (m) are shown in mm only below this.
 _SHORT = 1e-2
@@ -34,14 +34,14 @@ class Quantity:
     """A named quantity of a class of results.
 
     Attributes:
-        name: by which it is asked for; that of an attribute of the result unless there is a `getter`.
+        name: as users ask for it; also the name of the result's attribute unless there is a `getter`.
         label: in words, for headings and charts; by default the name.
         unit: in which the result has it: SI, degrees for some angles, "1" for none.
         parts: names of the components along its last axis, such as "xyz"; "" for a scalar.
         frame: in which the components are, in words; "" for a scalar.
         axes: names of its axes without that of the components, such as ("point",); () for a single number.
         getter: a function of the result that returns the values, or the path of an attribute; None for `name`.
-        shown: unit on the screen, if not that of the result with a prefix (kN, kN m) by its size.
+        shown: unit on the screen; by default the unit of the result with a prefix (kN, kN m) by its size.
         dimension: name in `dimensions.DIMENSIONS`, where several have its unit ("diameter" for inches in field units).
         noise: values up to this, in `unit`, are rounding and shown as 0.
         digits: significant ones in tables on the screen.
@@ -111,7 +111,7 @@ class Units:
 
     Args:
         units: "SI"; "field" (ft, in, klbf, ft-lbf, ppg, rpm, psi); or {dimension or unit: unit}, such as
-            {"force": "klbf", "[length]": "ft", "N m": "kN m"}, where what is not named stays SI.
+            {"force": "klbf", "[length]": "ft", "N m": "kN m"}, with SI for all others.
 
     Raises:
         SceneError: unknown units; a unit of another dimension.
@@ -134,7 +134,7 @@ class Units:
             )
 
     def of(self, quantity: Quantity) -> tuple[str, float]:
-        """The unit of a quantity in files and data frames, and its size in that of the result."""
+        """The unit of a quantity in files and data frames, and its size in the result's unit."""
         for name in _dimensions(quantity.unit, quantity.dimension):
             if name in self._chosen:
                 known = DIMENSIONS[name].units
@@ -142,8 +142,8 @@ class Units:
         return quantity.unit, 1.0
 
     def on_screen(self, quantity: Quantity, values: Any = ()) -> tuple[str, float]:
-        """The unit of a quantity in tables and charts, and its size in that of the result: of SI units with the prefix
-        that suits the values."""
+        """The unit of a quantity in tables and charts, and its size in the result's unit: SI units have the prefix that
+        suits the values."""
         unit, size = self.of(quantity)
         if any(name in self._chosen for name in _dimensions(quantity.unit, quantity.dimension)):
             return unit, size

@@ -11,7 +11,7 @@ from cosserat_fenicsx.drilling.protocol import LEDGER
 from cosserat_fenicsx.drilling.stick_slip import AT_REST, alias, turns
 from cosserat_fenicsx.drilling.top_drive import PI
 from cosserat_fenicsx.errors import SceneError, nearest
-from cosserat_fenicsx.pictures.animation import MOST_FRAMES, check_name, record
+from cosserat_fenicsx.pictures.animation import MOST_FRAMES, check_name, frame_rate, record
 from cosserat_fenicsx.pictures.charts import (
     COLOURS,
     STYLES,
@@ -377,9 +377,7 @@ def film(history, file, speed=None, fps=25, progress=None):
     """See `DrillingHistory.animate`."""
     file = check_name(file)
     times_between("animate", history.profile_times, None)
-    fps = number("animate", "fps", fps, "a number from 1 to 100", lambda x: 1 <= x <= 100)
-    if file.suffix == ".gif":
-        fps = 100 / round(100 / fps)
+    fps = frame_rate(file, fps)
     first, last = history.profile_times[[0, -1]]
     speed = max(1.0, (last - first) / _LONGEST) if speed is None else positive("animate", "speed", speed, "-")
     count = int(np.ceil((last - first) * fps / speed)) + 1

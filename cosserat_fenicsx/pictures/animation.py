@@ -20,7 +20,7 @@ from cosserat_fenicsx.new_files import replaced
 from cosserat_fenicsx.pictures.drawing import (
     add_body,
     add_lines,
-    add_wall,
+    add_tubes,
     at_rest,
     body_of,
     frame,
@@ -40,66 +40,44 @@ FPS, SIZE = 25, (960, 720)
 # Least and largest duration (s) of a film in real time, largest duration (s) of others, and largest number of frames.
 # A frame takes about 0.1 s to draw without a graphics card.
 _SHORTEST_REAL_TIME, _LONGEST_REAL_TIME, _LONGEST, MOST_FRAMES = 2.0, 10.0, 5.0, 10_000
-# Colours of a .gif whose channels are all above this become white: quantisation would give nearly white stains.
+# Colours of a .gif with all channels above this become white, since quantisation leaves nearly white stains.
 _WHITE = 244
 # Segments along a rod; mean width of a letter of the title, pixels.
 _PIECES, _LETTER = 100, 16
 
 
 def film(history, file, *, fps=FPS, speed=None, magnify=1.0, enlarge=1.0, size=SIZE, progress=None):
-    """Write a film of the rods, coloured by bending moment; the camera is fixed and shows the whole motion.
-
-    Frames come at a constant rate, interpolated between the saved times (`between.Between`).
-
-    Args:
-        history: a `History` with at least two times.
-        file: .gif or .mp4 (rank 0 writes). The time between frames of a .gif is rounded to 0.01 s.
-        fps: frames per second, 1 to 100.
-        speed: seconds of the motion per second of the film; None for 1 where the film then takes 2 to 10 s, and
-            otherwise for 1, 2 or 5 times a power of ten.
-        magnify: factor on displacements.
-        enlarge: factor on distances from the axes of the holes that rods are in, and on their clearances.
-        size: (width, height), pixels, even.
-        progress: True, False, or None for a bar on long runs in a terminal.
-
-    Raises:
-        SceneError: fewer than two times, another ending, an argument outside its range, or pyvista, Pillow or ffmpeg is
-            missing: says what to install.
-        OSError: the file cannot be written.
-        KeyboardInterrupt: Ctrl-C; the film ends with the frames drawn so far.
-    """
+    """See `History.animate`."""
     file = check_name(file)
     if len(history) < 2:
         raise SceneError(f"{file}: expected a history with at least two times")
-    fps = number("animate", "fps", fps, "a number from 1 to 100", lambda x: 1 <= x <= 100)
+    fps, size = frame_rate(file, fps), pixels(size)
     positive("animate", "magnify", magnify, "-")
     enlarged = Enlarged(history.scene, enlarge, "animate")
-    width, height = pixels(size)
-    if file.suffix == ".gif":
-        fps = 100 / round(100 / fps)
     duration = history.times[-1] - history.times[0]
     speed = _round_speed(duration) if speed is None else positive("animate", "speed", speed, "-")
     times = _times(history.times[0], duration, speed, fps)
     pace = _pace_in_words(speed)
-    on_first(
-        history.comm,
-        lambda: record(
-            lambda: _Stage(history, times, magnify, enlarged, (width, height), pace), file, times, fps, progress
-        ),
-    )
+
+    def prepared():
+        return _Stage(history, times, magnify, enlarged, size, pace)
+
+    on_first(history.comm, lambda: record(prepared, file, times, fps, progress))
 
 
 def check_name(file):
-    """The name of a film as a Path.
-
-    Raises:
-        SceneError: an ending other than .gif and .mp4, or the program that writes it is missing.
-    """
+    """The name of a film as a Path; a SceneError for another ending, or where the program that writes it is missing."""
     file = Path(file)
     if file.suffix not in _WRITERS:
         raise SceneError(f"{file}: expected a name that ends in .gif or .mp4")
     _WRITERS[file.suffix].check()
     return file
+
+
+def frame_rate(file, fps):
+    """Frames per second of a film, checked; of a .gif such that the time between frames is a multiple of 0.01 s."""
+    fps = number("animate", "fps", fps, "a number from 1 to 100", lambda x: 1 <= x <= 100)
+    return 100 / round(100 / fps) if file.suffix == ".gif" else fps
 
 
 def pixels(size):
@@ -144,10 +122,6 @@ def record(make_stage, file, times, fps, progress):
         make_stage: function that returns the stage: `at(t)` is the picture (height, width, 3) at t, and `close()` frees
             it.
         file: .gif or .mp4, a Path; times: t of each frame; fps: frames per second; progress: as of `film`.
-
-    Raises:
-        OSError: the file cannot be written.
-        KeyboardInterrupt: Ctrl-C; the film ends with the frames drawn so far.
     """
     stage, stopped = make_stage(), None
     try:
@@ -191,8 +165,9 @@ class _Stage:
             add_body(self._plotter, pyvista, body, factor, peak, moving=True)
             for body, factor in zip(bodies[0], self._factors, strict=True)
         ]
-        radii = [factor * body.radius for body, factor in zip(bodies[0], self._factors, strict=True)]
-        enlarged.add_holes(self._plotter, pyvista, radii)
+        drawn = zip(history.scene.rods, bodies[0], self._factors, strict=True)
+        radii = {rod: factor * body.radius for rod, body, factor in drawn}
+        add_tubes(self._plotter, pyvista, history.scene, radii, enlarged.factor)
         add_lines(self._plotter, pyvista, resting, "lightgrey")
         self._head, self._letters = history.scene.title or "Motion", size[0] // _LETTER
         self._notes = self._not_to_scale()
@@ -312,7 +287,7 @@ class _Mp4:
 
 
 def _ffmpeg():
-    """The path of ffmpeg: that of imageio-ffmpeg, else the system's."""
+    """The path of ffmpeg: from imageio-ffmpeg, else the system's."""
     try:
         from imageio_ffmpeg import get_ffmpeg_exe
 
@@ -330,9 +305,8 @@ def _ffmpeg():
 _WRITERS = {".gif": _Gif, ".mp4": _Mp4}
 
 
-# Cubic interpolation is used where the trapezoidal rule on the velocities at both ends of an interval gives the change
-# of position to this relative error (a full turn saved six times does) or to this share of the longest rod, which is
-# invisible.
+# Error of the trapezoidal rule on the velocities of an interval up to which interpolation is cubic: relative to the
+# change of position (a full turn saved six times is within it), or as an invisible share of the longest rod.
 _AGREEMENT, _INVISIBLE = 0.1, 2e-3
 
 
@@ -342,9 +316,6 @@ class Between:
     Between two saved states, positions and quaternions are cubic Hermite polynomials by the values and velocities
     there. Where the velocities do not agree with the change of position, because states were saved too seldom,
     interpolation is linear, and where a section turns by more than half a turn the nearest state is taken.
-
-    Args:
-        history: a `History` with at least two times.
     """
 
     def __init__(self, history):
@@ -412,14 +383,11 @@ def _turning(q, omega):
 
 
 class Enlarged:
-    """What enlarges the clearance of rods in the holes of a scene, for pictures.
+    """Enlarges the clearance of rods in the holes of a scene, for pictures.
 
     Args:
-        scene: the scene; where: the name of the function that is called, for messages.
-        factor: of the distance between the axis of the hole and that of a rod. Rods without a wall stay as they are.
-
-    Raises:
-        SceneError: no positive number; or none of the rods is in a hole, and the factor is not 1.
+        scene: the scene; where: the name of the called function, for messages.
+        factor: of the distance between the axes of the hole and of a rod. Rods without a wall stay as they are.
     """
 
     def __init__(self, scene, factor, where):
@@ -447,14 +415,6 @@ class Enlarged:
         s = np.asarray(x) * rod.length
         axis = wall.path.nearest(body.line, s + wall.begins).position
         return replace(body, line=axis + self.factor * (body.line - axis))
-
-    def add_holes(self, plotter, pyvista, radii):
-        """Draw the walls, translucent, around rods with these radii (m), in the order of the scene."""
-        drawn = dict(zip(self._scene.rods, radii, strict=True))
-        for load in self._scene.loads:
-            if (tube := load.tube()) is not None:
-                rod = load.rod if load.station is None else load.station.rod
-                add_wall(plotter, pyvista, tube[0], self.factor * tube[1] + drawn[rod])
 
     @property
     def note(self):

@@ -1,4 +1,4 @@
-"""What all charts share, by matplotlib: style, sizes in pixels, units, panels, legends, ledgers of energy; and files.
+"""Shared parts of all charts, by matplotlib: style, sizes in pixels, units, panels, legends, ledgers of energy; files.
 
 A chart is drawn for the width that it is shown at: fonts keep a size that can be read, panels, legends, titles and
 labels are arranged in the room that there is.
@@ -9,6 +9,7 @@ import math
 import textwrap
 from contextlib import contextmanager
 from contextvars import ContextVar
+from functools import wraps
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +20,7 @@ from cosserat_fenicsx.new_files import replaced
 from cosserat_fenicsx.quantities import Quantity, Units
 from cosserat_fenicsx.ranks import Alone, on_first
 
-#: Colours and styles of lines, in their order; of what is not the subject.
+#: Colours and styles of lines, in their order; colour of auxiliary lines.
 COLOURS = ("tab:blue", "tab:orange", "tab:green", "tab:red", "tab:purple", "tab:brown", "tab:pink", "tab:gray")
 STYLES = ("-", "--", ":", "-.")
 GREY = "0.45"
@@ -28,18 +29,18 @@ STYLE = {"font.size": 9, "axes.titlesize": 9, "legend.fontsize": 8, "figure.titl
          "grid.alpha": 0.3, "legend.frameon": False, "legend.borderaxespad": 0.2, "lines.linewidth": 1.2,
          "figure.constrained_layout.h_pad": 0.05}  # fmt: skip
 SMALL = 7.5
-# Dots per inch unless a width is asked for, and least ones, at which the smallest font is 9 pixels; widths, pixels.
+# Default dots per inch; minimum, at which the smallest font has 9 pixels; allowed widths, pixels.
 _DPI, _LEAST_DPI, _WIDTHS = 150, 90, (300, 10_000)
-# Panels may be narrower by this factor before they stand in several rows, which are at most so high over their width.
+# Factor by which panels are narrowed before they are set in several rows; maximum height of a row over its width.
 _SQUEEZED, _TALL = 1.3, 1.2
-# Most passes of the arrangement of texts; mean width of a letter over the size of its font.
+# Maximum passes of the arrangement of texts; mean width of a letter over the size of its font.
 _PASSES, _LETTER = 5, 0.55
 _ENERGY, _UNACCOUNTED = Quantity("energy", unit="J"), Quantity("not accounted for", unit="J")
-# Most points of a line that are marked.
+# Lines of up to this many points have markers.
 _FEW = 40
 # Energies below this share of the largest are not drawn.
 _LITTLE = 1e-9
-# What is asked for of the chart that is drawn: its width in pixels, and its units.
+# Requested width in pixels, and units, of the current chart.
 _pixels = ContextVar("_pixels", default=None)
 _units = ContextVar("_units", default="SI")
 
@@ -74,6 +75,22 @@ def draw_chart(make, file=None, comm=Alone, *, width=None, units="SI"):
     return None
 
 
+def chart(check):
+    """Decorator: a function that makes the Figure of a result becomes a function of the result, a file (None returns
+    the Figure; rank 0 writes) and the `width` and `units` of `draw_chart`; `check(result)` refuses what has no chart.
+    """
+
+    def decorate(make):
+        @wraps(make)
+        def draw(result, file=None, **look):
+            check(result)
+            return draw_chart(lambda: make(result), file, result._ranks, **look)
+
+        return draw
+
+    return decorate
+
+
 @contextmanager
 def asked(width=None, units="SI"):
     """Within it, figures have a width in pixels, and charts and pictures these units."""
@@ -96,11 +113,7 @@ def _write(figure, file):
 
 
 def styled():
-    """A context manager in which charts have the `STYLE`.
-
-    Raises:
-        SceneError: matplotlib is missing.
-    """
+    """A context manager in which charts have the `STYLE`; a SceneError where matplotlib is missing."""
     try:
         from matplotlib import rc_context
     except ImportError:
@@ -118,7 +131,7 @@ def unit_of(quantity, *values):
 
 
 def chosen_unit(unit):
-    """(unit, size) in which numbers of an SI unit are asked for, size in that; SI itself where nothing is chosen."""
+    """(unit, size) requested for numbers of an SI unit, size in the SI unit; by default the SI unit itself."""
     return Units(_units.get()).of(Quantity("number", unit=unit))
 
 
@@ -132,12 +145,12 @@ def scale(quantity, *values):
 
 
 def room_for(width):
-    """The inches that there are of a width in inches, in the width that is asked for in pixels."""
+    """A width in inches, limited to the room in the requested width in pixels."""
     return width if _pixels.get() is None else min(width, _pixels.get() / _LEAST_DPI)
 
 
 def empty_figure(width, height):
-    """A Figure (inches) that needs no screen; narrower where the width asked for has no room for its fonts."""
+    """A Figure (inches) that needs no screen; narrower where the requested width has no room for its fonts."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -210,7 +223,7 @@ def ledger(times, curves, balance, title, about=""):
 
     Args:
         times: (n,) s. curves: (label, values (n,) in J, colour, style); those that stay zero are left out.
-        balance: (n,) what is not accounted for, J. about: words after the label of the axis.
+        balance: (n,) unaccounted energy, J. about: words after the label of the axis.
     """
     figure, (above, below) = stacked(10, (3.6, 1.2))
     most = max(np.abs(values).max() for _, values, *_ in curves)
@@ -231,7 +244,7 @@ def draw_quantity(over, shown, title="", file=None, comm=Alone, **look):
     """Draw a quantity over another one: lines, one for each component, or its own `chart`.
 
     Args:
-        over, shown: each a `Quantity` and its values (n,), or (n, components) of what is shown.
+        over, shown: abscissa and ordinate, each a `Quantity` and its values (n,), of `shown` also (n, components).
         file, comm, look: see `draw_chart`.
     """
 
@@ -320,7 +333,7 @@ def _spread(panel):
     for text in panel.texts:
         if not text.get_text():
             continue
-        box = Text.get_window_extent(text)  # that of an annotation holds its arrow, too
+        box = Text.get_window_extent(text)  # the extent of an annotation includes its arrow
         left, over = max(panel.bbox.x0 - box.x0, 0.0), max(box.x1 - panel.bbox.x1, 0.0)
         right = left - over if box.width < panel.bbox.width else 0.0
         box, up = box.translated(right, 0.0), 0.0

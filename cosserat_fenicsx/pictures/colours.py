@@ -1,4 +1,4 @@
-"""What rods are coloured by in pictures: a field of a result as one number per section."""
+"""Colours of rods in pictures: a field of a result as one number per section."""
 
 from dataclasses import dataclass, replace
 
@@ -23,7 +23,7 @@ _VECTORS = {
     "velocity": ("velocity", "m/s", ("xyz",)),
     "angular_velocity": ("angular velocity", "rad/s", ("xyz",)),
 }
-# Those with components along d1, d2, d3 already.
+# Fields whose components are along d1, d2, d3 already.
 _MATERIAL = ("strain", "curvature")
 _SHORT = {"n": "force", "m": "moment"}
 _ALIASES = {"tension": "n.3", "twisting_moment": "m.3"}
@@ -120,14 +120,7 @@ def known(path):
 
 
 def colour_of(name, among=EVERY):
-    """The `Colour` of that name.
-
-    Args:
-        among: those there are, see `known`.
-
-    Raises:
-        SceneError: there is none; lists the names.
-    """
+    """The `Colour` of that name among some; a SceneError with the names where there is none."""
     if isinstance(name, str) and name in among:
         return among[name]
     plain = ", ".join(x for x in among if "." not in x)

@@ -14,23 +14,19 @@ from cosserat_fenicsx.scene.sections import Circle, Material
 
 _PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"), (1e-12, "p"),
              (1e-15, "f"), (1e-18, "a"))  # fmt: skip
-# The first letters of units that take such a prefix, unlike 1/m.
+# First letters of the units that take such a prefix (1/m does not).
 _PREFIXED = ("N", "m", "Pa", "rad")
-# At most this many intervals between the numbers of the colour bar.
+# Maximum intervals between the numbers of the colour bar.
 _BAR = 6
-# Up to so many digits after the point, smaller numbers have a power of ten.
+# Maximum digits after the point; smaller numbers are written with a power of ten.
 _MOST_DIGITS = 3
 _WALL = "peru"
-# Rods whose radius is below this share of the extent of the drawing are drawn thicker, and the picture says so.
+# Minimum drawn radius over the extent of the drawing; the picture says which rods are enlarged.
 _SMALLEST_RADIUS = 1 / 120
 
 
 def load_pyvista():
-    """The module pyvista, ready to draw without a screen.
-
-    Raises:
-        SceneError: pyvista or a system library that it needs is missing.
-    """
+    """The module pyvista, ready to draw without a screen; a SceneError where it or a system library is missing."""
     # EGL draws without a screen; without this VTK would try X first and print warnings.
     if not os.environ.get("DISPLAY"):
         os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
@@ -46,7 +42,7 @@ def load_pyvista():
 
 
 def suited(value, unit="N m"):
-    """(size, name) of the unit that suits a value in an SI unit: the one that is asked for, or with a prefix."""
+    """(size, name) of the unit for a value in an SI unit: the requested unit, or the SI unit with a suitable prefix."""
     chosen, size = chosen_unit(unit)
     if chosen != unit or not unit.startswith(_PREFIXED):
         return size, chosen
@@ -76,7 +72,7 @@ def add_lines(plotter, pyvista, lines, color="grey"):
 
 
 def thicker(factors):
-    """Words that say by which factors sections are enlarged, in a list; none where they are not."""
+    """A list of one note on the factors by which sections are enlarged; empty where none is."""
     told = sorted({f"{float(f'{factor:.2g}'):g}" for factor in factors if factor > 1}, key=float)
     if len(told) > 3:
         told = [f"{told[0]} to {told[-1]}"]
@@ -139,13 +135,9 @@ def _resampled(outline, corners):
 
 
 def thickening(body, size):
-    """The factor that the section of a `Body` is enlarged by in a drawing of extent `size`, m."""
-    return thickness(body.radius, size)
-
-
-def thickness(radius, size):
-    """The factor that a section of a radius, m, is enlarged by in a drawing of extent `size`, m."""
-    return max(1.0, size * _SMALLEST_RADIUS / radius)
+    """The factor by which the sections of a `Body`, or of anything with a `radius` (m), are enlarged in a drawing of
+    extent `size`, m."""
+    return max(1.0, size * _SMALLEST_RADIUS / body.radius)
 
 
 def points_of(body, factor):
@@ -220,19 +212,20 @@ def move(surface, body, factor, name, values):
     surface.GetPointData().GetScalars().Modified()
 
 
-def add_wall(plotter, pyvista, axis, radius):
-    """Draw the wall of a tube, translucent, from points of its axis (n, 3) and its radii (n,), m."""
-    wall = pyvista.MultipleLines(axis)
-    wall["radius"] = radius
-    plotter.add_mesh(wall.tube(scalars="radius", absolute=True, n_sides=24, capping=False), color=_WALL, opacity=0.2)
+def add_tubes(plotter, pyvista, scene, radii, enlarged=1.0):
+    """Draw the tubes that rods are in, translucent.
 
-
-def add_tubes(plotter, pyvista, scene, radii):
-    """Draw the tubes that rods are in, with true clearances around the rods as they are drawn; radii: {rod: m}."""
+    Args:
+        radii: {rod: the radius that it is drawn with, m}; enlarged: factor of the clearances around them.
+    """
     for load in scene.loads:
         if (tube := load.tube()) is not None:
+            axis, clearance = tube
             rod = load.rod if load.station is None else load.station.rod
-            add_wall(plotter, pyvista, tube[0], tube[1] + radii[rod])
+            wall = pyvista.MultipleLines(axis)
+            wall["radius"] = enlarged * clearance + radii[rod]
+            surface = wall.tube(scalars="radius", absolute=True, n_sides=24, capping=False)
+            plotter.add_mesh(surface, color=_WALL, opacity=0.2)
 
 
 def _format(step):
@@ -246,9 +239,9 @@ def frame(plotter, everywhere, panel=False, *, more=None, labels=None, span=None
 
     Args:
         panel: whether it is one of several drawings side by side, without a colour bar.
-        more: further points that the picture shows, such as those of arrows, m.
-        span: (3,) the extents that decide on the view, see `view.view_of`; None for those of the points.
-        labels: a function of the `View` that makes the `Labels` of the drawing; None for those of the axes alone.
+        more: further points of the picture, m, such as arrows.
+        span: (3,) the extents that decide on the view, see `view.view_of`; None for the extents of the points.
+        labels: a function of the `View` that makes the `Labels` of the drawing; None for labels of the axes alone.
 
     Returns:
         The `View` and the `Labels`, which are still to be drawn if they were given.

@@ -34,31 +34,13 @@ from cosserat_fenicsx.ranks import communicator, on_first
 _VISIBLE = 0.01
 # Letters per line of the title; width and height of a picture, pixels; sizes of fonts: of labels, and of the title.
 _TITLE_WIDTH, _WINDOW, _FONT, _TITLE_FONT = 88, (1400, 1000), 20, 12
-# Up to this number of rods are named in the picture of a scene, in smaller letters if there are more than a few.
+# Maximum number of rods that are named in the picture of a scene; maximum number of names in larger letters.
 _NAMED, _FEW = 40, 8
 _AT_REST = "#9db4cc"
 
 
 def rods(path, file=None, points=None, magnify=1.0, color="bending_moment", units="SI"):
-    """The deformed rods at some points of a path, with the reference as a grey line, supports, joints and loads.
-
-    Supports and joints are drawn on the last shape, each load on the last shape where it is not zero.
-
-    Args:
-        path: a `Path` with at least one point.
-        file: where to write a .png (rank 0 writes); None returns the plotter.
-        points: indices of the points to show; None for up to five, evenly spread.
-        magnify: factor on displacements.
-        color: name of the field that colours the rods, see `colours.known`.
-        units: see `quantities.Units`.
-
-    Returns:
-        The pyvista Plotter where `file` is None.
-
-    Raises:
-        SceneError: an empty path, an unknown field, a file that is no .png, or pyvista is missing.
-        OSError: the file cannot be written.
-    """
+    """See `RodResult.plot`."""
     if len(path) == 0:
         raise SceneError("the path has no point to draw")
     positive("plot", "magnify", magnify, "-")
@@ -67,30 +49,12 @@ def rods(path, file=None, points=None, magnify=1.0, color="bending_moment", unit
 
 
 def scene(scene, file=None, units="SI"):
-    """The rods of a scene before anything is solved, with their names, supports, joints and loads.
-
-    Args:
-        scene: a `Scene`.
-        file: where to write a .png (rank 0 writes); None returns the plotter.
-        units: see `quantities.Units`.
-
-    Returns:
-        The pyvista Plotter where `file` is None.
-
-    Raises:
-        SceneError: a file that is no .png, or pyvista is missing.
-        OSError: the file cannot be written.
-    """
+    """See `Scene.plot`."""
     return deliver(communicator(), file, lambda: _draw_scene(scene), units)
 
 
 def deliver(comm, file, draw, units="SI"):
-    """The plotter that `draw()` returns where `file` is None, else a .png of it, written by rank 0; in these units.
-
-    Raises:
-        SceneError: a file that is no .png, unknown units.
-        OSError: the file cannot be written.
-    """
+    """The plotter that `draw()` returns where `file` is None, else a .png of it, written by rank 0; in these units."""
     units = Units(units)
 
     def drawn():
@@ -208,7 +172,7 @@ def _small(path, shown, size, magnify):
 
 
 def _title(path, shown, factors, magnify, small):
-    """The lines of the title: the points shown, and what is not to scale."""
+    """The lines of the title: the points shown, and notes on what is not to scale."""
     some = "" if len(shown) == len(path) else f" (of {len(path)})"
     values = ", ".join(path.label(k) for k in shown)
     title = f"{path.scene.title or 'Deformed rods'}:"

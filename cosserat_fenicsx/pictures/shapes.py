@@ -8,7 +8,7 @@ from functools import lru_cache
 import numpy as np
 
 from cosserat_fenicsx.checks import number, positive, refuse
-from cosserat_fenicsx.pictures.animation import MOST_FRAMES, check_name, pixels, record
+from cosserat_fenicsx.pictures.animation import MOST_FRAMES, check_name, frame_rate, pixels, record
 from cosserat_fenicsx.pictures.drawing import (
     add_lines,
     body_of,
@@ -51,16 +51,13 @@ def film(found, file, k, *, fps, seconds, cycles, amplitude, size, progress):
     """Film of one shape that swings to both sides; see `Shapes.animate`."""
     file = check_name(file)
     found.require_modes(file)
-    k, size = found.number(k), pixels(size)
-    fps = number("animate", "fps", fps, "a number from 1 to 100", lambda x: 1 <= x <= 100)
+    k, size, fps = found.number(k), pixels(size), frame_rate(file, fps)
     number("animate", "seconds", seconds, "a number from 0.2 to 60", lambda x: 0.2 <= x <= 60)
     positive("animate", "amplitude", amplitude, "-")
     repeats = file.suffix == ".gif"
     cycles = (1 if repeats else 3) if cycles is None else cycles
     if isinstance(cycles, bool) or not isinstance(cycles, int) or not 1 <= cycles <= 100:
         refuse("animate", "cycles", cycles, "a whole number from 1 to 100")
-    if repeats:
-        fps = 100 / round(100 / fps)
     frames = 2 * max(2, round(fps * seconds / 2))  # even: the frame in the middle is the opposite of the first
     if frames * cycles > MOST_FRAMES:
         refuse("animate", "cycles", cycles, f"fewer: at most {MOST_FRAMES} frames, not {frames * cycles}")
@@ -166,7 +163,7 @@ def _head(found, width):
 
 
 def _below(shape, bodies, everywhere, width):
-    """The lines under a title: what is not to scale."""
+    """The lines under a title: notes on what is not to scale."""
     extent = float(np.ptp(everywhere, axis=0).max())
     notes = [shape.note, *thicker(thickening(body, extent) for body in bodies)]
     return "\n".join(textwrap.fill(note, width // _LETTER * 2) for note in notes)

@@ -1,5 +1,5 @@
-"""What acts on the rods of a scene and holds them, as plain data (`Mark`), and as signs on the rods at rest, or on the
-rods of a path or a motion.
+"""Supports, joints and loads of a scene as plain data (`Mark`), and as signs on the rods at rest, or on the rods of a
+path or a motion.
 
 Actions are read by the units of their data, whatever their class: a vector in N is a force, one in N/m a force along
 the rod, a number in N/m a spring.
@@ -18,7 +18,7 @@ from cosserat_fenicsx.scene.supports import Hinge, Prescribed, Roller
 
 # Size of a sign over the extent of the drawing; from this number of signs on they are smaller, at least by this share.
 _SIZE, _MANY, _SMALLEST = 0.048, 12, 0.5
-# A plane scene is seen from a corner where a force has this share normal to the plane.
+# Share of a force normal to a plane scene from which on the scene is seen from a corner.
 _OUT_OF_PLANE = 0.1
 
 
@@ -113,8 +113,8 @@ def signs_of(pyvista, scene, shapes, everywhere):
 
 
 def _span(everywhere, marks):
-    """(3,) the extents that decide on the view: those of the points; the largest for all axes where the points lie in a
-    plane, but forces do not, or the normal of a roller."""
+    """(3,) the extents that decide on the view: of the points; the largest for all axes where the points lie in a
+    plane, but forces or the normal of a roller do not."""
     span = np.ptp(everywhere, axis=0)
     normal = np.abs(view_of(span)[0])
     for mark in marks:
@@ -230,7 +230,7 @@ def _size(marks):
 
 
 def _marks(load, scene, factor):
-    if load.tube() is not None:  # drawn as what it is, and its stiffness is none of a spring
+    if load.tube() is not None:  # drawn as a tube; its stiffness is no spring
         return []
     if load.station is not None:
         return _at_station(load, load.station, factor)

@@ -24,11 +24,11 @@ _GROUPS = {
     "line force": "forces", "moment": "moments", "line moment": "moments", "spring": "springs",
     "turning spring": "springs", "dashpot": "springs", "mass": "masses",
 }  # fmt: skip
-# A moment whose axis is this near to the plane of the picture (cosine with the view) is drawn as a double-headed arrow.
+# Moments whose axis has a smaller cosine with the view direction are drawn as double-headed arrows.
 _ASIDE = 0.4
-# Arrows along a rod: one per so many sizes of a sign, and at most this number.
+# Arrows along a rod: spacing over the size of a sign, and maximum number.
 _SPACING, _MOST = 1.3, 16
-# Up to this number of loads, each has its label.
+# Maximum number of loads that have a label each.
 _MOST_TEXTS = 24
 # Lengths over the size of a sign: of an arrow, of the shortest one beside others, of those along rods; of a spring.
 _ARROW, _SHORTEST, _COMB, _SPRING = 1.9, 0.9, 1.0, 1.6
@@ -57,7 +57,7 @@ class Symbols:
 
     Attributes:
         covers: lines (n, 3), m, over what the signs cover. span: as given.
-        texts: (text, point, direction, colour): what the labels of the loads say, and where.
+        texts: (text, point, direction, colour) of the labels of the loads.
     """
 
     def __init__(self, pyvista, span, size, lines):
@@ -90,12 +90,11 @@ class Symbols:
 
     def draw(self, plotter):
         """Put all signs into the drawing."""
-        for words, meshes in self._meshes.items():
-            joined = self._pyvista.merge(meshes) if len(meshes) > 1 else meshes[0]
-            plotter.add_mesh(joined, color=COLOURS[words], ambient=0.45, smooth_shading=False)
-        for words, lines in self._lines.items():
-            joined = self._pyvista.merge(lines) if len(lines) > 1 else lines[0]
-            plotter.add_mesh(joined, color=COLOURS[words], line_width=4)
+        solid, thin = {"ambient": 0.45, "smooth_shading": False}, {"line_width": 4}
+        for drawn, look in ((self._meshes, solid), (self._lines, thin)):
+            for words, meshes in drawn.items():
+                joined = self._pyvista.merge(meshes) if len(meshes) > 1 else meshes[0]
+                plotter.add_mesh(joined, color=COLOURS[words], **look)
 
     # -- supports and joints -----------------------------------------------------------------------------------------
 
@@ -114,8 +113,7 @@ class Symbols:
         if mark.kind == "hinge":
             self._cylinder(mark, pose.place, mark.vector, max(a, 4 * pose.radius), 1.5 * pose.radius + 0.08 * a)
         if mark.kind == "roller":
-            across = np.cross(down, self._view)
-            across = across / np.linalg.norm(across) if np.linalg.norm(across) > 0.1 else self._right
+            across = self._across(down)
             for side in (-0.25, 0.25):
                 self._ball(mark, foot + 0.12 * a * down + side * a * across, 0.12 * a)
             foot = foot + 0.24 * a * down
@@ -137,8 +135,8 @@ class Symbols:
         """An arrow for a force, an arrow around the axis or a double-headed one for a moment, a zigzag for a spring.
 
         Args:
-            share: the size of the load over that of the largest one of its kind.
-            text: what its label says.
+            share: the size of the load over the largest of its kind.
+            text: its label.
         """
         if mark.kind in ("force", "moment"):
             vector = pose.rotation @ mark.vector if mark.turns else mark.vector
@@ -147,11 +145,8 @@ class Symbols:
             if mark.arm is not None:
                 point = pose.place + pose.rotation @ mark.arm
                 self._line(mark, np.array([pose.place, point]))
-            away = (
-                self._force(mark, pose, point, along, length)
-                if mark.kind == "force"
-                else self._moment(mark, pose, along)
-            )
+            force = mark.kind == "force"
+            away = self._force(mark, pose, point, along, length) if force else self._moment(mark, pose, along)
             self.texts.append((text, *away, COLOURS[_GROUPS[mark.kind]]))
         elif mark.kind == "mass":
             self._ball(mark, pose.place, max(0.3 * self._size, 2 * pose.radius))
@@ -210,8 +205,6 @@ class Symbols:
     def _device(self, mark, pose):
         """A zigzag of a spring, a spiral of one against rotations, a piston of a dashpot, and the ground at its end."""
         a, down = self._size, self._below(mark, pose)
-        across = np.cross(down, self._view)
-        across = across / np.linalg.norm(across) if np.linalg.norm(across) > 0.1 else self._right
         if mark.kind == "turning spring":
             angles = np.linspace(0, 5 * np.pi, 80)[:, None]
             spiral = pose.place + (pose.radius + 0.05 * a * angles) * (
@@ -225,7 +218,7 @@ class Symbols:
             y = np.zeros(len(x))
         else:
             y = np.array([0, 0, 1, -1, 1, -1, 0, 0])
-        self._line(mark, pose.place + _SPRING * a * x[:, None] * down + 0.25 * a * y[:, None] * across)
+        self._line(mark, pose.place + _SPRING * a * x[:, None] * down + 0.25 * a * y[:, None] * self._across(down))
         self._add(mark, self._box(pose.place + (_SPRING + 0.05) * a * down, _frame_along(down), (a, a, 0.1 * a)))
 
     def along(self, mark, line, radius, top, text):
@@ -302,6 +295,12 @@ class Symbols:
         if pose.inwards is None and abs(pose.directors[:, 2] @ self._up) > 0.7:
             return self._right
         return -self._up
+
+    def _across(self, down):
+        """A unit vector across a direction, in the plane of the picture; to the right where it is seen end on."""
+        across = np.cross(down, self._view)
+        size = np.linalg.norm(across)
+        return across / size if size > 0.1 else self._right
 
     def _line(self, mark, points):
         self.covers.append(points)

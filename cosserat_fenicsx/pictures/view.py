@@ -9,10 +9,10 @@ import numpy as np
 
 from cosserat_fenicsx.pictures.charts import chosen_unit
 
-# The drawing fills these shares of the width, left of the colour bar, and of the height, between title and lowest axis,
-# and is moved by these shares of the picture's half sizes, to the left and upwards.
+# Shares of the picture's width (left of the colour bar) and height (between title and lowest axis) that the drawing
+# fills; its offsets to the left and upwards, as shares of the picture's half sizes.
 _WHOLE = (0.62, 0.64, 0.12, -0.03)
-# Likewise in one of several drawings side by side, without a colour bar.
+# Likewise for one of several drawings side by side, without a colour bar.
 _PANEL = (0.72, 0.58, -0.06, 0.02)
 
 
@@ -102,8 +102,8 @@ class View:
 
 # Mean width of a letter and height of a line over the font's size; pixels between labels, and to the picture's edge.
 _LETTER, _LINE, _GAP, _EDGE = 0.56, 1.15, 3, 4
-# Distances (pixels) from what a label belongs to, and turns (deg) of its direction, in the order of preference; from
-# the last distances a thin line leads back.
+# Distances (pixels) of a label from its point, and turns (deg) of its direction, in the order of preference; distance
+# from which on a thin line leads back.
 _DISTANCES, _TURNS, _LEADER = (16, 26, 42, 64, 92, 128), (0, 40, -40, 80, -80, 120, -120, 180), 40
 # Pixels between a label and the middle of a rod; size of the cells in which lines are looked up, pixels.
 _CLEAR, _CELL = 10, 4
@@ -158,7 +158,7 @@ class Labels:
 
     @property
     def boxes(self):
-        """The rectangles of the labels and of what is reserved: (left, bottom, right, top), pixels."""
+        """The rectangles of labels and reserved areas: (left, bottom, right, top), pixels."""
         return list(self._placed)
 
     def draw(self, plotter, pyvista):
@@ -224,9 +224,9 @@ def _dense(line):
 
 
 _UNITS = ((2e4, 1e3, "km"), (0.05, 1.0, "m"), (5e-5, 1e-3, "mm"), (5e-8, 1e-6, "µm"), (0.0, 1e-9, "nm"))
-# At most this many intervals between ticks on the longest axis; a flat axis extends by this share of the longest.
+# Maximum intervals between ticks on the longest axis; half length of a flat axis over the longest.
 _INTERVALS, _FLAT = 6, 0.03
-# Pixels: length of a tick, shortest axis that is labelled, distance of the axes from the box, for signs of supports.
+# Pixels: length of a tick, shortest labelled axis, distance of the axes from the box (room for signs of supports).
 _TICK, _SEEN, _ASIDE = 8, 20, 26
 
 

@@ -12,33 +12,27 @@ from scipy.spatial.transform import Rotation
 
 from cosserat_fenicsx.new_files import replaced
 from cosserat_fenicsx.pictures.colours import MAPS, known, peak_of
-from cosserat_fenicsx.pictures.drawing import at_rest, outlines, thicker, thickness
+from cosserat_fenicsx.pictures.drawing import at_rest, outlines, thickening, thicker
 from cosserat_fenicsx.pictures.view import axes_of, view_of
 
 #: Fields that can be chosen in the file, where the result has them; the first is shown at first.
 FIELDS = ("bending_moment", "twisting_moment", "tension", "shear_force", "displacement", "von_mises")
-# Stands for "no value", which is drawn grey.
+# Stands for a missing value, drawn grey.
 _NONE = 1e30
-# Largest number of states, of sections of a rod (per element, in all), and of states times sections of all rods:
-# 64 bytes each.
+# Maximum numbers of states, of sections of a rod (per element, in all), and of states times sections of all rods (64
+# bytes each).
 _STATES, _PER_ELEMENT, _SECTIONS, _MOST = 400, 8, 121, 50_000
 _FEWEST = 9
-# Duration (s) of the play of a path, and of motions that are not shown in real time; the latter take 4 to 20 s.
+# Duration (s) of the play of paths, and of motions outside the range of durations that are shown in real time.
 _PLAY, _REAL_TIME = 8.0, (4.0, 20.0)
 _PARTS = ("rods.js", "camera.js", "axes.js", "app.js")
 
 
 def write(result, file):
-    """Write a path or a motion as an interactive .html file, on one rank: a slider over the states, turning, zooming
-    and moving by mouse and touch, a play button, and a choice of the field that colours the rods.
+    """Write a path or a motion to an interactive .html file (a `pathlib.Path`), on one rank: a slider over the states,
+    turning, zooming and moving by mouse and touch, a play button, and a choice of the field that colours the rods.
 
     States beyond some hundreds are left out evenly, which the file says.
-
-    Args:
-        file: a `pathlib.Path`.
-
-    Raises:
-        OSError: the file cannot be written.
     """
     with replaced(file) as fresh:
         fresh.write_text(page(result), encoding="utf-8")
@@ -73,7 +67,7 @@ def _data(result):
     everywhere = np.concatenate([*at_rest(result.scene), *(shape.positions.reshape(-1, 3) for shape in shapes)])
     low, high = everywhere.min(axis=0), everywhere.max(axis=0)
     middle, size = (low + high) / 2, float(np.linalg.norm(high - low)) / 2
-    factors = [thickness(shape.radius, float((high - low).max())) for shape in shapes]
+    factors = [thickening(shape, float((high - low).max())) for shape in shapes]
     axes = axes_of(everywhere)
     return {
         "title": _title(result),
@@ -159,7 +153,7 @@ def _seconds(result):
 
 
 def _notes(result, shown, factors):
-    """What the file says under its title: which states it shows, how fast, and what is not to scale."""
+    """Notes under the title: the states shown, the speed of the play, and what is not to scale."""
     kind, whole = f"{result.axis}s", len(result)
     notes = [f"{len(shown)} of {whole} {kind} shown, evenly chosen" if len(shown) < whole else f"{whole} {kind}"]
     notes[0] += ", straight lines between them"
