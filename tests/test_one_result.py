@@ -12,6 +12,7 @@ from reference_strings import pipe_and_collars
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.quantities import Units
 from cosserat_fenicsx.results.screen import LINES, WIDTH
+from cosserat_fenicsx.results.whirl import whirl_of
 
 pytestmark = pytest.mark.serial
 WELL = cf.well.WellPath.from_survey([0, 500, 1500, 2500], [0, 0, 60, 85], [0, 0, 0, 0])
@@ -43,6 +44,15 @@ def answer():
     return cf.well.torque_and_drag(HOLE, STRING, cf.well.TripOut(), mud=cf.well.Mud(1200.0), model="soft")
 
 
+def orbit():
+    """A section that rolls backward, clearance 22 mm, from 1 s on in contact."""
+    times = np.linspace(0, 4, 401)
+    z = 0.02 * np.exp(-40j * times)
+    plane = [np.column_stack([x.real, x.imag]) for x in (z, -40j * z)]
+    full = np.ones(len(times))
+    return cf.Orbit(times, *plane, 0.022 * full, 10.0 * full, 0.085, np.where(times > 1, 2e3, 0.0))
+
+
 #: A result of each class; and the name and the unit of one of its quantities, in field units too.
 RESULTS = {
     "Path": (path, "load_factor", "1", "1"),
@@ -64,6 +74,8 @@ RESULTS = {
         "1/s",
     ),
     "Campbell": (lambda: cf.drilling.campbell(pipe_and_collars(), 20.0, up_to=4.0), "critical_speed", "rad/s", "rpm"),
+    "Orbit": (orbit, "spin", "rad/s", "rpm"),
+    "Whirl": (lambda: whirl_of(orbit()), "largest", "m", "in"),
     "Study": (lambda: cf.study(lambda force: {"work": 2.0 * force}, {"force": range(60)}), "work", "1", "1"),
 }
 
@@ -165,3 +177,15 @@ def test_empty_results_are_refused():
             getattr(empty, method)()
     with pytest.raises(cf.SceneError, match="save: expected"):
         empty.save("nothing.h5")
+    assert str(empty) == "No point of the path was computed." and str(empty) in empty.details()
+
+
+def test_whirl_has_the_chart_of_its_orbit():
+    pytest.importorskip("matplotlib")
+    found = whirl_of(orbit())
+    assert [axes.get_ylabel().replace("\n", " ") for axes in found.plot(units="field").axes[::2]] == [
+        "distance from the axis of the hole (in)", "normal force of the wall on a node (klbf)"
+    ]  # fmt: skip
+    assert len(found.orbit.plot().axes) == 2
+    assert "backward whirl at -40 rad/s (-382 rpm)" in str(found) and "2 to 2 kN, mean 2 kN" in str(found)
+    assert "0.7874 in in the mean" in found.summary("field") and found.value("force").tolist() == [[2e3] * 3]

@@ -1,5 +1,7 @@
 """Orbits and whirl of sections in their hole: closed forms, a rolling collar, charts, refusals."""
 
+import pickle
+
 import numpy as np
 import pytest
 from rolling_collar import ARM, AXIS, CLEARANCE, COLLAR, LENGTH, rolling
@@ -86,6 +88,8 @@ def test_a_rolling_collar(collar):
     assert found.ratio == pytest.approx(COLLAR["rolling_ratio"], rel=3e-3)
     assert found.contact == pytest.approx(1)
     assert found.force[1] == pytest.approx(COLLAR["rolling_force"], rel=0.02)
+    sent = pickle.loads(pickle.dumps(found))
+    assert sent == found and sent.orbit.place == orbit.place and str(sent) == str(found)
     seldom = history.at_points(range(0, 101, 20)).whirl(middle)
     assert seldom.rate == pytest.approx(history.whirl(middle).rate, rel=1e-9)
     assert "backward whirl at -40." in str(found) and "rolling without slip: -3.85" in str(found)
@@ -136,7 +140,7 @@ def test_a_campbell_diagram_has_what_whirls(collar):
     np.testing.assert_allclose(rates[forward][np.argmax(amplitude[:, forward], axis=1)], speed, atol=resolution / 2)
     np.testing.assert_allclose(rates[backward][np.argmax(amplitude[:, backward], axis=1)], -30, atol=resolution / 4)
     np.testing.assert_allclose(amplitude[:, backward].max(axis=1), 0.004, rtol=0.05)
-    above, below, bar = draw_campbell(history, orbit, rod.end).axes
+    above, below, bar = draw_campbell(orbit).axes
     assert below.get_xlabel() == "speed of rotation (rpm)" and "(rpm)" in below.get_ylabel()
     assert "(mm)" in above.get_ylabel() and "(dB of" in bar.get_ylabel()
 
@@ -146,6 +150,7 @@ def test_what_is_refused_in_words(collar):
     middle = rod.at(LENGTH / 2)
     other = HoleWall(rod, AXIS, 0.108, ARM)
     for asked, words in (
+        (lambda: history.wall_forces(None), r"wall_forces.wall = None: expected a wall of the scene"),
         (lambda: history.orbit(middle, other), r"orbit.wall = .*expected a wall of the scene"),
         (lambda: history.orbit(rod.end, wall), r"orbit.station = .*expected a station that the wall is around"),
         (lambda: history.whirl(rod.end), "whirl.wall: expected one of the scene's walls .* 0 are around"),
@@ -154,7 +159,7 @@ def test_what_is_refused_in_words(collar):
         (lambda: history[0].whirl(middle), "whirl: expected a motion with at least two times"),
         (lambda: history[0].plot_orbit(middle), "expected a history with at least two times"),
         (lambda: history.plot_campbell(middle), "expected a motion with at least 200 times"),
-        (lambda: draw_campbell(history, circles(np.linspace(0, 1, 500), (0.01, 1.0)), middle), "expected a run-up"),
+        (lambda: draw_campbell(circles(np.linspace(0, 1, 500), (0.01, 1.0))), "expected a run-up"),
     ):
         with pytest.raises(cf.SceneError, match=words):
             asked()

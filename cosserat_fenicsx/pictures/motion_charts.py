@@ -1,15 +1,11 @@
-"""Charts of a motion, by matplotlib: its energies; a section in its hole: orbit, whirl and Campbell diagram.
-
-All take a file (.png, .pdf or another format of matplotlib, which rank 0 writes; None returns the Figure), and `look`:
-the width and the units of `charts.draw_chart`.
-"""
+"""Charts of a motion, by matplotlib: its energies; a section in its hole: orbit, whirl and Campbell diagram."""
 
 import numpy as np
 
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.pictures.charts import (
     GREY,
-    draw_chart,
+    chart,
     empty_figure,
     ledger,
     legend,
@@ -32,45 +28,38 @@ _RATE = Quantity("rate, forward in the direction of the spin", unit="rad/s", sho
 _OF_AXIS = Quantity("rate of the section's axis, forward positive", unit="rad/s", shown="rpm")
 _SPEED = Quantity("speed of rotation", unit="rad/s", shown="rpm")
 _NORMAL = Quantity("normal force of the wall on a node", unit="N", dimension="force")
-# Shares of the duration over which rates are taken in the chart, so that it shows no single impacts.
+# Window of the mean rates in the chart, as a share of the duration: single impacts do not show.
 _WINDOW = 0.01
 # The rate of rolling is drawn where the mean radius is above this share of the clearance.
 _NEAR_WALL = 0.95
 # A run-up changes the speed by more than this share of the largest.
 _CONSTANT = 0.05
-# Least number of times; shares of the duration that a window has at least and at most; windows that overlap at a time;
-# amplitudes below this share of the largest are not told apart; values of the transform per independent one.
+# Spectra: minimum number of times; shortest and longest window, as shares of the duration; overlapping windows at a
+# time; floor of amplitudes over the largest; values of the transform per independent one.
 _LEAST, _SHORTEST, _LONGEST, _OVERLAP, _FLOOR, _FINER = 200, 1 / 40, 1 / 4, 8, 1e-3, 4
 
 
-def draw_energy(history, file=None, **look):
-    """Draw the energies of a `History` over time above, and the error of the energy balance below.
+def _with_times(what):
+    """A check that a motion or an orbit has at least two times; `what`: the chart, in words."""
 
-    Raises:
-        SceneError: fewer than two times, an unknown ending, or matplotlib is missing.
-        OSError: the file cannot be written.
-    """
-    _check(history, "energies")
+    def check(result):
+        if len(result) < 2:
+            raise SceneError(f"chart of {what}: expected a history with at least two times")
+
+    return check
+
+
+@chart(_with_times("energies"))
+def draw_energy(history):
+    """See `History.plot_energy`."""
     curves = [(label, getattr(history, name), *style) for name, label, *style in _CURVES]
-    title = f"{_title(history)}: energy, scheme {history.scheme}"
-    return draw_chart(lambda: ledger(history.times, curves, history.balance, title), file, history.comm, **look)
+    title = f"{history.scene.title or 'Motion'}: energy, scheme {history.scheme}"
+    return ledger(history.times, curves, history.balance, title)
 
 
-def draw_orbit(history, orbit, station, file=None, **look):
-    """Draw the way of a section's axis as seen down the hole, coloured by time, in the circle of the clearance.
-
-    Args:
-        history: the `History`; orbit: an `Orbit` of it at `station`.
-
-    Raises:
-        SceneError: fewer than two times, an unknown ending, or matplotlib is missing.
-        OSError: the file cannot be written.
-    """
-    _check(history, "orbit")
-    return draw_chart(lambda: _orbit(history, orbit, station), file, history.comm, **look)
-
-
-def _orbit(history, orbit, station):
+@chart(_with_times("orbit"))
+def draw_orbit(orbit):
+    """See `Orbit.plot`."""
     from matplotlib.collections import LineCollection
 
     figure = empty_figure(7.5, 0.83 * room_for(7.5))
@@ -92,27 +81,21 @@ def _orbit(history, orbit, station):
     axes.set(**{f"{axis}label": f"{name} ({unit})" for axis, name in zip("xy", names, strict=True)})
     legend(axes)
     figure.colorbar(lines, ax=axes, label="time (s)")
-    figure.suptitle(f"{_title(history)}: orbit of {station}, seen down the hole")
+    figure.suptitle("{}: orbit of {}, seen down the hole".format(*orbit.place))
     return figure
 
 
-def draw_whirl(history, orbit, station, file=None, **look):
-    """Draw radius, rates of whirl and spin, and the normal force of the wall over time.
-
-    Args and raises as of `draw_orbit`.
-    """
-    _check(history, "whirl")
-    return draw_chart(lambda: _whirl(history, orbit, station), file, history.comm, **look)
-
-
-def _whirl(history, orbit, station):
+@chart(_with_times("whirl"))
+def draw_whirl(orbit):
+    """See `Whirl.plot`."""
     t = orbit.times
     figure, (above, middle, below) = stacked(10, (2.4, 2.4, 2.4))
     heading, size = scale(_DISTANCE)
     above.plot(t, orbit.radius / size, color="tab:blue", lw=0.9, label="radius")
     above.plot(t, orbit.clearance / size, color="peru", lw=1.6, label="clearance")
     above.set_ylabel(heading)
-    at, rate, spin, radius = rates(orbit)
+    at, rate, spin, radius = orbit._means(round(1 / _WINDOW), 0.5)
+    spin = np.abs(spin)
     heading, size = scale(_RATE)
     middle.plot(at, rate / size, color="tab:red", label="whirl")
     middle.plot(at, spin / size, color="tab:blue", label="spin")
@@ -128,61 +111,31 @@ def _whirl(history, orbit, station):
     for axes in (above, below):
         axes.set_ylim(0.0, 1.05 * axes.get_ylim()[1])
     legend(above, middle)
-    figure.suptitle(f"{_title(history)}: whirl of {station}")
+    figure.suptitle("{}: whirl of {}".format(*orbit.place))
     return figure
 
 
-def rates(orbit, windows=round(1 / _WINDOW)):
-    """Rates of an `Orbit` in parts of its duration.
-
-    Returns:
-        at, rate, spin, radius: (m,) middle (s), rate of whirl (rad/s, forward positive; NaN where the section has no
-        angle), spin (its size, rad/s) and mean radius (m) of up to `windows` parts.
-    """
-    edges = np.unique(np.linspace(0, len(orbit.times) - 1, min(windows, len(orbit.times) - 1) + 1).astype(int))
-    lengths, steps, turns = np.diff(orbit.times), orbit.steps, orbit.turns
-    first = edges[:-1]
-
-    def whole(values):
-        return np.add.reduceat(values, first)
-
-    counted, duration = whole(lengths * turns), whole(lengths)
-    rate = np.divide(whole(steps), counted, out=np.full(len(first), np.nan), where=counted > duration / 2)
-    spin, radius = (whole(lengths * (x[1:] + x[:-1]) / 2) / duration for x in (orbit.spin, orbit.radius))
-    at = (orbit.times[edges[1:]] + orbit.times[first]) / 2
-    return at, rate * np.where(spin < 0, -1.0, 1.0), np.abs(spin), radius
-
-
-def draw_campbell(history, orbit, station, file=None, *, reach=None, **look):
-    """Draw the amplitude of whirl over the speed of rotation above, and below, the spectrum over that speed: rates of
-    rotation of the section's axis, forward (positive) and backward, with lines for the speed of rotation itself,
-    forward and backward, and for rolling without slip.
-
-    Args:
-        history: the `History`; orbit: an `Orbit` of it at `station`.
-        reach: largest rate, rad/s; None for what contains the rolling or twice the rotation.
-
-    Raises:
-        SceneError: the speed of rotation hardly changes, too few times, an unknown ending, or matplotlib is missing.
-        OSError: the file cannot be written.
-    """
+def _check_run_up(orbit):
     speed = np.abs(orbit.spin)
     if len(orbit.times) < _LEAST:
-        raise SceneError(f"Campbell diagram: expected a motion with at least {_LEAST} times, not {len(history)}")
+        raise SceneError(f"Campbell diagram: expected a motion with at least {_LEAST} times, not {len(orbit)}")
     if np.ptp(speed) < _CONSTANT * speed.max() or speed.max() == 0:
         raise SceneError(
-            f"Campbell diagram: expected a run-up; the spin of {station} is {speed.min():.4g} to {speed.max():.4g} "
-            "rad/s all the time: see History.plot_whirl"
+            f"Campbell diagram: expected a run-up; the spin of {orbit.place[1]} stays from {speed.min():.4g} to "
+            f"{speed.max():.4g} rad/s: see History.plot_whirl"
         )
-    return draw_chart(lambda: _campbell(history, orbit, station, reach), file, history.comm, **look)
 
 
-def _campbell(history, orbit, station, reach):
+@chart(_check_run_up)
+def draw_campbell(orbit):
+    """Above, the amplitude of whirl over the speed of rotation; below, the spectrum over that speed: rates of the
+    section's axis, forward (positive) and backward, with lines for the speed of rotation itself, forward and backward,
+    and for rolling without slip."""
     at, amplitude, speed, rates = spectra(orbit)
     order = np.argsort(speed)
     touches = np.nan_to_num(orbit.normal).any()
     rolling = orbit.contact_radius / float(orbit.clearance.min())
-    reach = reach or (1.25 * rolling if touches else 2.5) * float(speed.max())
+    reach = (1.25 * rolling if touches else 2.5) * float(speed.max())
     figure, (above, below) = stacked(9, (2.3, 4.6))
     (along, turning), (heading, size) = scale(_SPEED), scale(_DISTANCE)
     x = np.interp(orbit.times, at, speed) / turning
@@ -204,7 +157,7 @@ def _campbell(history, orbit, station, reach):
     below.set(xlabel=along, ylabel=scale(_OF_AXIS)[0], xlim=ends, ylim=(-reach / turning, most / turning))
     below.grid(visible=False)
     legend(above, below)
-    figure.suptitle(f"{_title(history)}: run-up, {station}")
+    figure.suptitle("{}: run-up, {}".format(*orbit.place))
     return figure
 
 
@@ -231,12 +184,3 @@ def spectra(orbit):
     found = np.fft.fftshift(np.fft.fft(z[rows] * window, _FINER * size, axis=1), axes=1)
     rates = np.fft.fftshift(np.fft.fftfreq(_FINER * size, t[1] - t[0])) * 2 * np.pi
     return t[rows].mean(axis=1), np.abs(found) / window.sum(), np.abs(spin[rows].mean(axis=1)), rates
-
-
-def _check(history, what):
-    if len(history) < 2:
-        raise SceneError(f"chart of {what}: expected a history with at least two times")
-
-
-def _title(history):
-    return history.scene.title or "Motion"

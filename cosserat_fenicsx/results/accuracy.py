@@ -1,5 +1,5 @@
-"""Comparison of a path on two meshes: error estimates, and transfer of its points to another mesh; and where a solution
-needs short elements: in boundary layers of bending, and where two meshes differ most."""
+"""Error estimates of a path from two meshes, transfer of its points to another mesh, and where a solution needs short
+elements: in boundary layers of bending, and where two meshes differ most."""
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from cosserat_fenicsx.results.compared import (
     ROTATION,
     ROUNDING,
     cell_nodes,
+    cells_of,
     differences,
     halfway,
     transferred,
@@ -19,32 +20,31 @@ from cosserat_fenicsx.results.rods import resting
 
 #: Largest number of points of a path that are all sample points.
 FEW = 3
-# Ratios of the largest difference to that at the element ends, above which the superconvergence of the ends is evident.
+# Ratios of the largest difference to the one at element ends, above which the ends clearly superconverge.
 _AHEAD, _FAR_AHEAD = 4, 30
-# The same ratio, below which the error is that of the element ends.
+# The same ratio, below which the error of the element ends dominates.
 _OF_ENDS = 2
-# Safety of the assumed gain in accuracy, and that of differences below which convergence is asymptotic.
+# Safety factors of the assumed gain: usual, and for relative differences below the third number (asymptotic range).
 _SAFETY, _SAFETY_BELOW, _ASYMPTOTIC = 4, 2, 1e-3
-# Error of the finer of two meshes over their difference that is assumed where a kink lies inside elements; what the
-# assumed gain is divided by where it is at their ends.
+# Assumed error over the difference of two meshes where a kink lies inside elements; divisor of the gain where it lies
+# at their ends.
 _ROUGH, _NEARLY = 2.0, 4.0
-# Error of the finer of two meshes over its estimate that is assumed for the estimate of the coarser one; factor from an
-# assumed gain in accuracy to the likely one.
+# Assumed error of the finer mesh over its estimate, in the estimate of the coarser one; likely over assumed gain.
 _CAUTION, _LIKELY = 2, 1.5
-# Largest ratio of the lengths of the elements of a rod that are about equal.
+# Element lengths of a rod within this ratio count as equal.
 _UNEQUAL = 1.9
-# Exponents of an error as a function of what indicates it, below and above what is known.
+# Extrapolation exponents of an error over its indicator, below and above the known range.
 _BELOW, _ABOVE = 0.7, 1.4
-# Factor of an error that is interpolated over leading coefficients, as a power of their ratio to those of the nearest
-# sample point; the largest one.
+# Safety factor of errors interpolated over leading coefficients: exponent of the distance from the nearest sample, and
+# largest factor.
 _WIDENED, _WIDEST = 0.5, 2.0
-# Factors of all errors that are interpolated: of n, and of all others.
+# Safety factors of interpolated errors: of n, and of all others.
 _BETWEEN_FORCES, _BETWEEN = 2.0, 1.25
-# Largest ratio of the leading coefficients of sample points without another one between them.
+# Samples whose leading coefficients differ by more than this factor get another one between them.
 _APART = 10.0
-# Ratio of leading coefficients below which a second, smoother point is sampled, since its error may converge otherwise.
+# A point smoother than the roughest by this ratio of leading coefficients is sampled too: it may converge differently.
 _SMOOTHER = 0.1
-# Points with displacements below this times the largest one of the path are not sampled for their smoothness.
+# Least displacement, over the largest of the path, of a point that is sampled for its smoothness.
 _SEEN = 1e-3
 
 
@@ -61,8 +61,8 @@ def estimate_error(fine, coarse, before=None, *, smooth=True):
       these at most 2^(p - 3). A quarter at most where that does not hold for every quantity, and on elements of
       unequal length, as in boundary layers.
 
-    Each quantity is judged by itself, relative to its own size, see `compared.sizes_of`: the four of the package, and
-    after them those of further criteria (see `compared.Criterion`); (4, n) is more for these.
+    Each quantity is judged by itself, relative to its own size, see `compared.sizes_of`: the four of the package, then
+    further criteria (see `compared.Criterion`), which add rows to all (4, n) arrays.
 
     Args:
         smooth: of scenes with walls: False where an edge of contact lies inside elements. No gain is assumed then, and
@@ -77,7 +77,7 @@ def estimate_error(fine, coarse, before=None, *, smooth=True):
     part = np.where(relative < _ASYMPTOTIC, 1 / _SAFETY_BELOW, 1 / _SAFETY)
     if before is None:
         ahead, far = difference > _AHEAD * at_ends, difference > _FAR_AHEAD * at_ends
-        # n is constant where no loads act along rods, so that all of its error is that of the ends
+        # n is constant where no loads act along rods, so that the ends cause all of its error
         far[FORCE] |= far[:FORCE].all(axis=0) & (difference[FORCE] <= _OF_ENDS * at_ends[FORCE])
         sure = (far | (relative == 0))[: len(NAMES)].all(axis=0) & _equal(fine.layout)
         part = np.where(sure, part, 1 / _SAFETY)
@@ -99,25 +99,25 @@ def _equal(layout):
 
 
 def error_before(apart, gain):
-    """(4, n) the estimated errors of the coarse mesh of `estimate_error`, from what it returned: the differences and a
-    multiple of the errors of the fine mesh; infinite where nothing confirms that the meshes converge."""
+    """(4, n) the estimated errors of the coarse mesh from the differences and gains of `estimate_error`; infinite where
+    nothing confirms that the meshes converge."""
     return np.where(gain > 1, (1 + _CAUTION / gain) * apart, np.inf)
 
 
 def order_of(gain, p):
-    """(4,) orders of the errors in h that the gains (4, n) of a halving are those of."""
+    """(4,) orders in h of the errors, from the gains (4, n) of a halving."""
     return np.clip(np.log2(_LIKELY * np.min(gain, axis=1)), 1, p + 0.5)
 
 
 def carry_error(fine, coarse, factor, order, before=None):
-    """Set the errors of a path from those of the same points on a mesh of elements less than twice as long.
+    """Set the errors of a path from the errors of the same points on a mesh of elements less than twice as long.
 
     They are the coarser mesh's errors reduced by the assumed orders, limited to one to two times the Richardson
     estimate from the difference of the two meshes, since the coarser mesh's errors may be overestimated. The Richardson
     estimate uses the observed order minus one.
 
     Args:
-        factor: number of elements over that of the coarser mesh.
+        factor: ratio of the numbers of elements, fine over coarse.
         order: (4,) of the errors in h, see `order_of`.
         before: relative differences of the coarser mesh from the one before, where its elements were halved; or None.
 
@@ -126,15 +126,10 @@ def carry_error(fine, coarse, factor, order, before=None):
     """
     relative, *_ = _differences(fine, coarse)
     order = order[:, None]
-    seen = (
-        order
-        if before is None
-        else np.clip(
-            np.log2(np.maximum(before, 1e-300) / np.maximum(relative, 1e-300)) - 1,
-            order,
-            np.maximum(order, fine.degree),
-        )
-    )
+    seen = order
+    if before is not None:
+        observed = np.log2(np.maximum(before, 1e-300) / np.maximum(relative, 1e-300)) - 1
+        seen = np.clip(observed, order, np.maximum(order, fine.degree))
     reduction = factor**-seen
     estimate = relative * reduction / (1 - reduction)
     fine.set_errors(np.clip(coarse.by_mesh * factor**-order, estimate, 2 * estimate))
@@ -171,26 +166,25 @@ def hardest(path):
     sizes, of_rods = path._reference.sizes, path._roughness
     moved = sizes[POSITION]
     known = path.by_mesh is not None and np.isfinite(path.worst).all()
-    told = path.by_mesh[path.bounds] if known else (of_rods / sizes[:2, None]).reshape(-1, len(path))
-    which = {*np.argmax(told, axis=1).tolist(), int(np.argmax(moved)), len(path) - 1}
+    indicator = path.by_mesh[path.bounds] if known else (of_rods / sizes[:2, None]).reshape(-1, len(path))
+    which = {*np.argmax(indicator, axis=1).tolist(), int(np.argmax(moved)), len(path) - 1}
     seen, rough = np.flatnonzero(moved >= _SEEN * moved.max()), of_rods[0].max(axis=0)
     if rough[seen].min() < _SMOOTHER * rough.max():
         which.add(int(seen[np.argmin(rough[seen])]))
-    told = np.log(np.maximum(rough, 1e-300))
-    ends = np.array([min(told[list(which)]), max(told[list(which)])])
+    indicator = np.log(np.maximum(rough, 1e-300))
+    ends = np.array([min(indicator[list(which)]), max(indicator[list(which)])])
     if np.ptp(ends) > np.log(_APART):
-        which.add(int(np.argmin(np.abs(told - ends.mean()))))
+        which.add(int(np.argmin(np.abs(indicator - ends.mean()))))
     which = np.array(sorted(which))
     return path.at_points(which), which
 
 
 def spread_error(path, few, which, coarse=None):
-    """Set the errors of a path from those of its sample points on the same mesh.
+    """Set the errors of a path from the errors of its sample points on the same mesh.
 
-    The errors of the other points are interpolated over what indicates them, logarithmically: the differences from the
-    same points on a coarser mesh, or the leading coefficients (of displacements for positions, of rotations for the
-    rest). In the second case they are increased the more, the farther these are from those of the sample points, by
-    themselves or relative to the sizes.
+    The errors of the other points are interpolated logarithmically over an indicator: the differences from the same
+    points on a coarser mesh, or the leading coefficients (of displacements for positions, of rotations for the rest).
+    Leading coefficients far from all samples, absolutely or relative to the sizes, increase the error.
 
     Args:
         few: the sample points, with their errors; which: their indices.
@@ -198,14 +192,14 @@ def spread_error(path, few, which, coarse=None):
     """
     sizes = path._reference.sizes
     if coarse is not None:
-        told = differences(path, coarse)[0]
+        indicator = differences(path, coarse)[0]
     else:
-        told = path._roughness.max(axis=1)[[POSITION] + [ROTATION] * (len(sizes) - 1)]
+        indicator = path._roughness.max(axis=1)[[POSITION] + [ROTATION] * (len(sizes) - 1)]
     between = np.full(len(sizes), _BETWEEN)
     between[FORCE] = _BETWEEN_FORCES
     found = np.array([
         _spread(*numbers, which, of_mesh=coarse is not None)
-        for numbers in zip(told, sizes, few.by_mesh, between, strict=True)
+        for numbers in zip(indicator, sizes, few.by_mesh, between, strict=True)
     ])  # fmt: skip
     least = _as_positions(found * sizes, few.by_mesh * sizes[:, which], which) / sizes[ROTATION]
     found[ROTATION] = np.maximum(found[ROTATION], least)
@@ -214,11 +208,11 @@ def spread_error(path, few, which, coarse=None):
 
 
 def _as_positions(found, known, which):
-    """(n,) the least errors of rotations: relative to those of positions as at the sample points around, since the
-    differences of rotations on two meshes may almost vanish at a point where they change their sign.
+    """(n,) lower bounds of the errors of rotations, from the errors of positions and the ratio of both at neighbouring
+    samples: the difference of rotations on two meshes may vanish where it changes its sign.
 
     Args:
-        found: (4, n) absolute errors; known: (4, samples) those of the sample points; which: their indices.
+        found: (4, n) absolute errors; known: (4, samples) of the sample points; which: their indices.
     """
     usable = (known[[POSITION, ROTATION]] > ROUNDING).all(axis=0)
     if not usable.any():
@@ -227,31 +221,31 @@ def _as_positions(found, known, which):
     return found[POSITION] * np.exp(np.interp(np.arange(found.shape[1]), which[usable], ratios))
 
 
-def _spread(told, sizes, errors, between, which, *, of_mesh):
+def _spread(indicator, sizes, errors, between, which, *, of_mesh):
     """(n,) errors of one quantity at all points from those at the sample points, relative to its sizes.
 
     Args:
-        told: (n,) what indicates them; sizes: (n,); errors: (samples,); between: factor of
-            those of the others; which: indices of the samples.
-        of_mesh: whether `told` are differences of two meshes.
+        indicator: (n,); sizes: (n,); errors: (samples,); between: safety factor at the other points; which: indices of
+            the samples.
+        of_mesh: whether the indicator is a difference of two meshes.
     """
-    known, absolute = told[which], errors * sizes[which]
+    known, absolute = indicator[which], errors * sizes[which]
     usable = (known > 100 * ROUNDING) & (absolute > 0)
     if not usable.any():
-        return told / sizes if of_mesh else np.zeros(len(told))
-    still = told <= ROUNDING
+        return indicator / sizes if of_mesh else np.zeros(len(indicator))
+    still = indicator <= ROUNDING
     order = np.argsort(known[usable])
-    relative = np.log(np.maximum(told / sizes, 1e-300))
+    relative = np.log(np.maximum(indicator / sizes, 1e-300))
     known, absolute = np.log(known[usable][order]), np.log(np.maximum.accumulate(absolute[usable][order]))
-    told = np.log(np.maximum(told, 1e-300))
-    beyond = _BELOW * np.minimum(told - known[0], 0) + _ABOVE * np.maximum(told - known[-1], 0)
+    indicator = np.log(np.maximum(indicator, 1e-300))
+    beyond = _BELOW * np.minimum(indicator - known[0], 0) + _ABOVE * np.maximum(indicator - known[-1], 0)
     if not of_mesh:
         unlike = np.minimum(
-            np.abs(told[:, None] - known).min(axis=1),
+            np.abs(indicator[:, None] - known).min(axis=1),
             np.abs(relative[:, None] - relative[which][usable]).min(axis=1),
         )
         beyond += np.minimum(_WIDENED * unlike, np.log(_WIDEST))
-    found = between * np.exp(np.interp(told, known, absolute) + beyond) / sizes
+    found = between * np.exp(np.interp(indicator, known, absolute) + beyond) / sizes
     found[still] = 0.0
     return found
 
@@ -281,19 +275,12 @@ def on_mesh(path, layout):
         dimensionless, inertial.
     """
     rule, n = path.rule, path._stacked("gauss_fields")[..., :3]
-    places, at_gauss = transferred(path.layout, layout, rule)
-    rest = resting(path.scene, layout, rule) / path.scales.length
-    rq = np.concatenate([places.of(path._moved) + rest, _unit(places.of(path._turned))], axis=2)
-    forces, first = [], 0
-    for breaks, (cells, weights) in zip(path.layout.breaks, at_gauss, strict=True):
-        found = np.einsum("kj,pkjc->pkc", weights, n[:, first + cells])
-        forces.append(found.reshape(len(n), -1, len(rule.gauss), 3))
-        first += len(breaks) - 1
-    return rq, np.concatenate(forces, axis=1)
-
-
-def _unit(q):
-    return q / np.linalg.norm(q, axis=2, keepdims=True)
+    (nodes, at_nodes), (cells, at_gauss) = transferred(path.layout, layout, rule)
+    rq = np.einsum("xj,nxjk->nxk", at_nodes, path._motion[:, nodes])
+    rq[..., :3] += resting(path.scene, layout, rule) / path.scales.length
+    rq[..., 3:] /= np.linalg.norm(rq[..., 3:], axis=2, keepdims=True)
+    forces = np.einsum("xj,nxjk->nxk", at_gauss, n[:, cells])
+    return rq, forces.reshape(len(n), -1, len(rule.gauss), 3)
 
 
 # Largest length of an element next to a support, load or kink, over the length of the boundary layer there.
@@ -318,13 +305,11 @@ def layer_lengths(scene, scales, layout, rule, n):
         for rod, breaks in zip(scene.rods, layout.breaks, strict=True)
     ):
         return None
-    lengths, first = [], 0
-    largest = np.sqrt(np.square(n).sum(axis=3).max(axis=(0, 2))) * scales.force
-    for rod, x in zip(scene.rods, layout.inside(rule.gauss), strict=True):
-        forces = largest[first : first + len(x)]
-        first += len(x)
+    largest = np.maximum(np.sqrt(np.square(n).sum(axis=3).max(axis=(0, 2))) * scales.force, 1e-300)
+    lengths = []
+    for rod, x, cells in zip(scene.rods, layout.inside(rule.gauss), cells_of(layout), strict=True):
         bending = rod.stiffness_at(x.ravel() * rod.length).J[:, :2].min(axis=1).reshape(x.shape).min(axis=1)
-        lengths.append(np.sqrt(bending / np.maximum(forces, 1e-300)) / rod.length)
+        lengths.append(np.sqrt(bending / largest[cells]) / rod.length)
     return lengths
 
 
@@ -348,13 +333,12 @@ def winding_lengths(path):
     torque = np.einsum("...i,...i", m, d3)
     bending = np.linalg.norm(m - torque[..., None] * d3, axis=-1)
     torque, bending = (scale * np.abs(x).max(axis=(0, 2)) for x in (torque, bending))
-    lengths, first = [], 0
-    for rod, breaks in zip(path.scene.rods, path.layout.breaks, strict=True):
+    lengths = []
+    for rod, cells in zip(path.scene.rods, cells_of(path.layout), strict=True):
         *flexural, torsional = rod.profile.range[0].J
         soft, stiff = sorted(flexural)
         tilting = max(0.0, (1 - soft / stiff) * (1 - torsional / stiff)) / (soft * torsional)
-        here = slice(first, first := first + len(breaks) - 1)
-        k = np.maximum(torque[here] / soft, np.sqrt(tilting) * bending[here])
+        k = np.maximum(torque[cells] / soft, np.sqrt(tilting) * bending[cells])
         lengths.append(1 / np.maximum(k * rod.length, 1e-300))
     return lengths
 
@@ -363,16 +347,14 @@ def turns_of(path, most):
     """For every rod (elements,): the largest angle, rad, by which the moments at the Gauss points turn sections along
     an element, relative to the rest state, at any point of a path; None where none is larger than `most`."""
     m = path._stacked("gauss_fields")[..., 3:6]
-    of_rods = list(zip(path.scene.rods, path.layout.breaks, strict=True))
-    softness = [path.scales.moment * rod.length / rod.profile.range[0].J.min() for rod, _ in of_rods]
-    largest = max(np.diff(breaks).max() * soft for (_, breaks), soft in zip(of_rods, softness, strict=True))
-    if np.sqrt(3) * np.abs(m).max(initial=0.0) * largest <= most:
+    per_moment = [
+        np.diff(breaks) * (path.scales.moment * rod.length / rod.profile.range[0].J.min())
+        for rod, breaks in zip(path.scene.rods, path.layout.breaks, strict=True)
+    ]
+    if np.sqrt(3) * np.abs(m).max(initial=0.0) * max(turns.max() for turns in per_moment) <= most:
         return None
     m = (np.linalg.norm(m, axis=3) @ path.rule.weights).max(axis=0)
-    found, first = [], 0
-    for (_, breaks), soft in zip(of_rods, softness, strict=True):
-        cells = slice(first, first := first + len(breaks) - 1)
-        found.append(m[cells] * np.diff(breaks) * soft)
+    found = [m[cells] * turns for cells, turns in zip(cells_of(path.layout), per_moment, strict=True)]
     return found if max(turns.max() for turns in found) > most else None
 
 
@@ -429,9 +411,9 @@ def resolves(layout, lengths):
 def element_differences(fine, coarse):
     """The contribution of each element to the difference of the positions on two meshes.
 
-    It is the largest of three: the difference within the element, relative to the line between its ends; that of the
-    relative displacement of its ends; and that of their relative rotation times a lever arm. The lever arm is the
-    length over which the rest of the rod follows this rotation: the rod's length, or sqrt(EI/|n|) under tension.
+    It is the largest difference of three quantities: positions within the element, relative to the line between its
+    ends; the relative displacement of its ends; their relative rotation times a lever arm. The lever arm is the length
+    over which the rest of the rod follows this rotation: the rod's length, or sqrt(EI/|n|) under tension.
 
     Args:
         fine, coarse: Paths with the same points; every element of `fine` lies within one of `coarse`.
@@ -443,12 +425,12 @@ def element_differences(fine, coarse):
     sizes = fine._reference.sizes[POSITION]
     n = coarse._stacked("gauss_fields")[..., :3]
     forces = np.sqrt(np.square(n).sum(axis=3).max(axis=2))
-    found, first, p, scales = [], 0, fine.degree, fine.scales
-    for i, rod in enumerate(fine.scene.rods):
-        nodes, count = coarse.layout.node_s(coarse.rule.nodes)[i], coarse.elements[i]
+    found, p, scales = [], fine.degree, fine.scales
+    of_rods = zip(fine.scene.rods, coarse.layout.node_s(coarse.rule.nodes), cells_of(coarse.layout), strict=True)
+    for rod, nodes, cells in of_rods:
         x = halfway(nodes)
         moved = [path.motion(rod, x) for path in (coarse, fine)]
-        inside = 2 * p * np.arange(count)[:, None] + np.arange(2 * p + 1)
+        inside = 2 * p * np.arange(cells.stop - cells.start)[:, None] + np.arange(2 * p + 1)
         off = (moved[0] - moved[1])[:, inside, :3]
         along = halfway(coarse.rule.nodes)[:, None]
         off -= off[:, :, :1] * (1 - along) + off[:, :, -1:] * along
@@ -457,8 +439,7 @@ def element_differences(fine, coarse):
         deformed = [_deformation(m[:, :: 2 * p], rest) for m in moved]
         past, turned = (np.linalg.norm(a - b, axis=2) for a, b in zip(*deformed, strict=True))
         bending = rod.profile.range[1].J[:2].max() / (scales.moment * scales.length)
-        lever = 1 / np.sqrt((scales.length / rod.length) ** 2 + forces[:, first : first + count] / bending)
-        first += count
+        lever = 1 / np.sqrt((scales.length / rod.length) ** 2 + forces[:, cells] / bending)
         differences = np.maximum(np.linalg.norm(off, axis=3).max(axis=2), np.maximum(past, lever * turned))
         found.append((differences / sizes[:, None]).max(axis=0))
     return found

@@ -1,5 +1,6 @@
-"""What errors of a path are estimated of, what they are relative to, and how far two meshes differ in it."""
+"""Quantities with error estimates, the sizes that errors are relative to, and the differences of two meshes."""
 
+import itertools
 from collections import namedtuple
 from collections.abc import Sequence
 from functools import lru_cache
@@ -11,30 +12,32 @@ from cosserat_fenicsx.errors import SceneError, nearest
 from cosserat_fenicsx.remember import per_scene
 
 
-class Places(NamedTuple):
-    """Places on a mesh: (places, nodes per element) the nodes of their elements, all rods one after another, and the
-    weights of these; rods: for every rod the slice of its places."""
+def in_turn(sizes):
+    """Slices of parts of these sizes, one after another."""
+    return tuple(itertools.starmap(slice, itertools.pairwise(np.cumsum([0, *sizes]).tolist())))
 
-    nodes: np.ndarray
-    weights: np.ndarray
-    rods: tuple
 
-    @classmethod
-    def on(cls, layout, rule, xs):
-        """Those at arc lengths over the rod's length, an array for every rod."""
-        p, first, start = len(rule.nodes) - 1, 0, 0
-        nodes, weights, rods = [], [], []
-        for breaks, x in zip(layout.breaks, xs, strict=True):
-            cells, values = rule.locate_all(breaks, x)
-            nodes.append(first + cells[:, None] * p + np.arange(p + 1))
-            weights.append(values)
-            rods.append(slice(start, start + len(x)))
-            first, start = first + (len(breaks) - 1) * p + 1, start + len(x)
-        return cls(np.concatenate(nodes), np.concatenate(weights), tuple(rods))
+@lru_cache(maxsize=32)
+def cells_of(layout):
+    """For every rod the slice of its elements, numbered over all rods."""
+    return in_turn(layout.counts)
 
-    def of(self, values):
-        """(n, places, k) from nodal values (n, N, k)."""
-        return np.einsum("xj,nxjk->nxk", self.weights, values[:, self.nodes])
+
+@lru_cache(maxsize=32)
+def cell_nodes(layout, degree):
+    """For every rod (elements, degree + 1) the nodes of its elements, and their slice, numbered over all rods."""
+    inside = np.arange(degree + 1)
+    firsts = [(degree * cells.start + i, cells.stop - cells.start) for i, cells in enumerate(cells_of(layout))]
+    return [
+        (first + degree * np.arange(count)[:, None] + inside, slice(first, first + degree * count + 1))
+        for first, count in firsts
+    ]
+
+
+@lru_cache(maxsize=32)
+def all_cell_nodes(layout, degree):
+    """(elements, degree + 1) the nodes of the elements of all rods one after another."""
+    return np.concatenate([nodes for nodes, _ in cell_nodes(layout, degree)])
 
 
 class Compared(NamedTuple):
@@ -62,42 +65,27 @@ def compared(coarse, fine, rule):
     local = halfway(rule.nodes)
     ends = (local == local[0]) | (local == local[-1])
     near = np.clip(local, _INWARDS, 1 - _INWARDS)
-    found, rods, first, start = [], [], 0, 0
-    for breaks, x, sure in zip(fine.breaks, coarse.inside(local), coarse.inside(near), strict=True):
+    found, xs = [], coarse.inside(local)
+    for breaks, x, sure, of_rod in zip(fine.breaks, xs, coarse.inside(near), cells_of(fine), strict=True):
         cells, _ = rule.locate_all(breaks, sure.ravel())
         of_cells = (x.ravel() - breaks[cells]) / np.diff(breaks)[cells]
-        found.append((first + cells, rule.basis(np.clip(of_cells, 0.0, 1.0)), np.tile(ends, len(x))))
-        rods.append(slice(start, start + x.size))
-        first, start = first + len(breaks) - 1, start + x.size
-    return Compared(rule.basis(local), *map(np.concatenate, zip(*found, strict=True)), tuple(rods))
-
-
-@lru_cache(maxsize=32)
-def all_cell_nodes(layout, degree):
-    """(elements, degree + 1) the nodes of the elements of all rods one after another."""
-    return np.concatenate([nodes for nodes, _ in cell_nodes(layout, degree)])
+        found.append((of_rod.start + cells, rule.basis(np.clip(of_cells, 0.0, 1.0)), np.tile(ends, len(x))))
+    parts = map(np.concatenate, zip(*found, strict=True))
+    return Compared(rule.basis(local), *parts, in_turn(x.size for x in xs))
 
 
 @lru_cache(maxsize=16)
 def transferred(coarse, fine, rule):
-    """What takes a state to another mesh: `Places` of the fine nodes on the coarse mesh, and for every rod the coarse
-    elements and the weights of their Gauss points for the fine Gauss points."""
-    gauss = [
-        rule.locate_all(breaks, inside.ravel(), rule.between_gauss)
-        for breaks, inside in zip(coarse.breaks, fine.inside(rule.gauss), strict=True)
-    ]
-    return Places.on(coarse, rule, fine.node_s(rule.nodes)), gauss
-
-
-@lru_cache(maxsize=32)
-def cell_nodes(layout, degree):
-    """For every rod (elements, degree + 1) the nodes of its elements, and the slice of its nodes among those of all."""
-    found, first = [], 0
-    for count in layout.counts:
-        nodes = first + degree * np.arange(count)[:, None] + np.arange(degree + 1)
-        found.append((nodes, slice(first, first + degree * count + 1)))
-        first += degree * count + 1
-    return found
+    """What takes a state to another mesh: of all its nodes the nodes around them on the coarse mesh with their weights,
+    and of all its Gauss points the coarse elements with the weights of their Gauss points."""
+    at_nodes, at_gauss = [], []
+    xs, insides, of_rods = fine.node_s(rule.nodes), fine.inside(rule.gauss), cell_nodes(coarse, len(rule.nodes) - 1)
+    for i, breaks in enumerate(coarse.breaks):
+        cells, weights = rule.locate_all(breaks, xs[i])
+        at_nodes.append((of_rods[i][0][cells], weights))
+        cells, weights = rule.locate_all(breaks, insides[i].ravel(), rule.between_gauss)
+        at_gauss.append((cells_of(coarse)[i].start + cells, weights))
+    return [tuple(map(np.concatenate, zip(*found, strict=True))) for found in (at_nodes, at_gauss)]
 
 
 def halfway(places):
@@ -106,11 +94,11 @@ def halfway(places):
 
 
 class Criterion:
-    """An error that `tol` may bound: that of a quantity at the points of a path, relative to its size.
+    """A quantity at the points of a path whose error, relative to its size, `tol` may bound.
 
-    Those of the package are compared anywhere along the rods, see `differences`; one that is derived from this class
-    says with `values` what it compares. It is known by its `name` from its definition on: in `bound` of `solve` and of
-    scene files, in `Path.errors`, tables and stored paths.
+    The criteria of the package compare fields anywhere along the rods, see `differences`; a subclass compares its
+    `values`. From its definition on its `name` may be used in `bound` of `solve` and of scene files, and appears in
+    `Path.errors`, tables and stored paths.
 
     Attributes:
         name: a Python name.
@@ -164,14 +152,14 @@ class Moment(Criterion):
     name, words = "moment", "moments"
 
 
-#: Of the criteria that errors are always estimated of.
+#: Errors that are always estimated.
 Errors = namedtuple("Errors", "position rotation force moment")
 NAMES = Errors._fields
 POSITION, ROTATION, FORCE = 0, 1, 2
 
 
 def criteria_of(bound):
-    """(names of what `tol` bounds, the `Criterion`s beyond those of the package).
+    """(names of the criteria that `tol` bounds, the further `Criterion`s beyond those of the package).
 
     Args:
         bound: names, or classes or objects of criteria.
@@ -216,15 +204,15 @@ ROUNDING = 1e-14
 _NOTHING, _LEAST_MOMENT = 1e-9, 1e-9
 # Least size of positions and of rotations over the largest of the path: unloaded states differ by rounding.
 _AT_REST = 1e-6
-# Moments up to this multiple of their rounding at all points of a path vanish, as those of straight bars do.
+# Moments up to this multiple of their rounding at all points of a path count as zero, as in straight bars.
 _VANISHING = 10.0
-# Rounding of n over that of one difference of positions, times stiffness; differences of n and of m on two meshes up to
-# this multiple of their rounding are rounding alone.
+# Rounding of n over the stiffness times the rounding of one difference of positions; multiple of their rounding up to
+# which differences of n and m on two meshes count as zero.
 _OF_FORCE, _NOISE = 4.0, 2.0
 _EPS = np.finfo(float).eps
 
-#: sizes: (4, points) that the errors are relative to, dimensionless; turning: (points,) whether that of positions comes
-#: from rotations times the radius of gyration; rounding: (4, points) errors by rounding alone, dimensionless.
+#: sizes: (4, points) that the errors are relative to, dimensionless; turning: (points,) whether the size of positions
+#: is a rotation times the radius of gyration; rounding: (4, points) errors by rounding alone, dimensionless.
 Sizes = namedtuple("Sizes", "sizes turning rounding")
 
 
@@ -233,7 +221,7 @@ def sizes_of(path):
 
     positions: the largest displacement; where sections mainly rotate, their rotation times the radius of gyration.
     rotations: the largest rotation, in rad (2 sin of half of it), at least the displacement over the longest length.
-    Both at least 1e-6 of those of the whole path.
+    Both at least 1e-6 of the largest of the whole path.
     n: the largest |n|, at least the largest |m| over the longest length. m: the largest |m|, at least 1e-9 of |n| times
     that length; |n| times that length where m is rounding alone on the whole path.
     """
@@ -275,7 +263,7 @@ def _noise(path):
     """Errors of n and of m by rounding, dimensionless.
 
     n is a stiffness times differences of positions over the spacing of the nodes, unless it follows from statics;
-    m is that of rotations, and has a share of the moment of these n over the spacing of the nodes.
+    m likewise of rotations, with a share of the moment of n over the spacing of the nodes.
     """
     return _rounding(path.scene, path.scales, path.layout, path.degree, path.model == "determinate")
 
@@ -306,7 +294,7 @@ def differences(fine, coarse):
 
     Returns:
         Over all places, and over the ends of elements of the coarse mesh alone: (4, points), dimensionless, rotations
-        in rad; then those of further criteria, in both. Rounding counts as no difference.
+        in rad; then further criteria, in both. Differences within rounding are 0.
     """
     sizes = fine._reference
     places = compared(coarse.layout, fine.layout, coarse.rule)

@@ -1,8 +1,7 @@
-"""A motion as arrays with named fields, in SI units. Imports no solver; other packages make files and pictures."""
+"""A motion as arrays with named fields, in SI units."""
 
 import dataclasses
 from collections.abc import Sequence
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -22,7 +21,7 @@ from cosserat_fenicsx.scene.rod import RodOrName, StationOrName
 _TIMES = 21
 _ALONG = ("point", "s")
 _ENERGIES = ("kinetic", "strain", "work", "dissipated", "balance")
-# What belongs to every time, and the fields that paths do not have.
+# Quantities of every time, and the fields that paths do not have.
 _QUANTITIES = by_name(
     Quantity("time", unit="s", getter="times"),
     Quantity("steps"),
@@ -52,8 +51,8 @@ class History(RodResult):
     """A motion: its states at the saved times, energies and momenta.
 
     All station queries (`position`, `displacement`, `rotation`, `force`, `moment`, ...) give one row per time. Contact
-    forces and moments, and so stresses, include those of damping; strains and curvatures are those of the shape. If
-    `simulate` was given a `folder`, the states are read from a file in it.
+    forces and moments, and so stresses, include damping; strains and curvatures are of the shape alone. If `simulate`
+    was given a `folder`, the states are read from a file in it.
 
     Beside those of `RodResult` it has these attributes.
 
@@ -73,7 +72,6 @@ class History(RodResult):
     _quantities = _QUANTITIES
     _of_stations = ("displacement", "quaternion", "velocity", "angular_velocity", "force", "moment")
     more_fields = {"velocity": "velocity", "angular_velocity": "angular_velocity"}  # noqa: RUF012
-    _computed = (*RodResult._computed, "_all_rates", "_all_gauss")
 
     @classmethod
     def of(cls, model, scheme, why=()):
@@ -103,6 +101,8 @@ class History(RodResult):
         yield f"{self.steps[-1]} steps of the scheme {self.scheme}, {self.model} model."
 
     def _table(self, units, rows, station=None):
+        if not len(self):
+            return None
         rows = min(rows, _TIMES)
         known, station = self.quantities, self.station(station or self._most_displaced())
         title = f"{self.scene.title}\n" if self.scene.title else ""
@@ -141,11 +141,6 @@ class History(RodResult):
         """(n,), see the class."""
         return self._array("time")
 
-    @property
-    def steps(self) -> np.ndarray:
-        """(n,), see the class."""
-        return self._array("steps")
-
     kinetic = _of_ledger("kinetic")
     strain = _of_ledger("strain")
     work = _of_ledger("work")
@@ -154,7 +149,7 @@ class History(RodResult):
     angular_momentum = _of_ledger("angular_momentum")
 
     def _booked(self, name):
-        return np.array([getattr(record.ledger, name) for record in self._records])
+        return getattr(self._stacked("ledger"), name) if len(self) else np.empty(0)
 
     @property
     def time_unit(self) -> float:
@@ -213,30 +208,34 @@ class History(RodResult):
         return motion_charts.draw_energy(self, file, units=units, width=width)
 
     def animate(self, file, *, fps=25, speed=None, magnify=1.0, enlarge=1.0, size=(960, 720), progress=None):
-        """Film of the rods, coloured by bending moment, at a constant rate of frames; see `animation.film`.
+        """Film of the rods, coloured by bending moment; the camera is fixed and shows the whole motion.
+
+        Frames come at a constant rate, interpolated between the saved times.
 
         Args:
-            file: .gif or .mp4.
-            fps: frames per second.
-            speed: seconds of the motion per second of the film; None for a suitable round number, 1 if possible.
+            file: .gif or .mp4 (rank 0 writes). The time between frames of a .gif is rounded to 0.01 s.
+            fps: frames per second, 1 to 100.
+            speed: seconds of the motion per second of the film; None for 1 where the film then takes 2 to 10 s, and
+                otherwise for 1, 2 or 5 times a power of ten.
             magnify: factor of the displacements in the picture.
             enlarge: factor of the distances from the axes of the holes that rods are in, and of their clearances.
-            size: (width, height), pixels.
+            size: (width, height), pixels, even.
             progress: whether to show a progress bar; None: only if it takes long.
+
+        Raises:
+            SceneError: fewer than two times, another ending, an argument outside its range, or pyvista, Pillow or
+                ffmpeg is missing, with what to install.
+            OSError: the file cannot be written.
+            KeyboardInterrupt: Ctrl-C; the film ends with the frames drawn so far.
         """
         from cosserat_fenicsx.pictures import animation
 
         animation.film(self, file, fps=fps, speed=speed, magnify=magnify, enlarge=enlarge, size=size, progress=progress)
 
-    @cached_property
+    @property
     def _all_rates(self):
         """(times, nodes, 6) velocities and angular velocities, dimensionless."""
-        return np.array([record.rates for record in self._records]).reshape(len(self), -1, 6)
-
-    @cached_property
-    def _all_gauss(self):
-        """(times, elements, points, 9) n, m and r' at the Gauss points, dimensionless."""
-        return np.array([record.gauss_fields for record in self._records])
+        return self._stacked("rates") if len(self) else np.empty((0, len(self._rest), 6))
 
     def wall_forces(self, wall: Action) -> WallForces:
         """The forces of a wall of motions, such as a `HoleWall`, on the nodes that may touch it, in the step that led
@@ -283,16 +282,13 @@ class History(RodResult):
         units: Any = "SI",
         width: int | None = None,
     ):
-        """Chart of the way of a section's axis in the circle of the clearance, seen down the hole, coloured by time.
+        """Chart of a section's orbit in the circle of the clearance, seen down the hole, coloured by time.
 
         Args:
             station, wall: see `orbit`.
             file, units, width: see `plot_energy`.
         """
-        from cosserat_fenicsx.pictures import motion_charts
-
-        orbit, station = orbit_of(self, station, wall), self.station(station)
-        return motion_charts.draw_orbit(self, orbit, station, file, units=units, width=width)
+        return self.orbit(station, wall).plot(file, units=units, width=width)
 
     def plot_whirl(
         self,
@@ -308,10 +304,9 @@ class History(RodResult):
 
         Args: see `plot_orbit`.
         """
-        from cosserat_fenicsx.pictures import motion_charts
+        from cosserat_fenicsx.pictures.motion_charts import draw_whirl
 
-        orbit, station = orbit_of(self, station, wall), self.station(station)
-        return motion_charts.draw_whirl(self, orbit, station, file, units=units, width=width)
+        return draw_whirl(self.orbit(station, wall), file, units=units, width=width)
 
     def plot_campbell(
         self,
@@ -330,10 +325,9 @@ class History(RodResult):
         Raises:
             SceneError: the speed of rotation hardly changes, or too few times are saved.
         """
-        from cosserat_fenicsx.pictures import motion_charts
+        from cosserat_fenicsx.pictures.motion_charts import draw_campbell
 
-        orbit, station = orbit_of(self, station, wall), self.station(station)
-        return motion_charts.draw_campbell(self, orbit, station, file, units=units, width=width)
+        return draw_campbell(self.orbit(station, wall), file, units=units, width=width)
 
     def _at_clamp(self, point, joined):
         return self._stacked("clamp_forces")[:, point]
@@ -351,7 +345,7 @@ class History(RodResult):
         return np.einsum("jg,cgi->cji", self._from_gauss, self._records[k].gauss_fields[..., :6])
 
     def _contact_in(self, cell):
-        return np.einsum("jg,kgi->kji", self._from_gauss, self._all_gauss[:, cell, :, :6])
+        return np.einsum("jg,kgi->kji", self._from_gauss, self._stacked("gauss_fields")[:, cell, :, :6])
 
 
 def _named(scene):

@@ -80,8 +80,7 @@ class Buckling(Shapes):
         """The first-order standard deviation of `load_factors`, with the share of each parameter; see
         `Path.uncertainty`."""
         check_once(self.scene, standard_deviations)
-        named = {getattr(x, "name", x): deviation for x, deviation in standard_deviations.items()}
-        return self.sensitivity(standard_deviations).uncertainty(named, correlation)
+        return self.sensitivity(standard_deviations).uncertainty(standard_deviations, correlation)
 
     @property
     def none(self):

@@ -1,7 +1,5 @@
-"""An equilibrium path as arrays with named fields. Imports no solver; other packages make files and pictures."""
+"""An equilibrium path as arrays with named fields."""
 
-import dataclasses
-import itertools
 from collections import namedtuple
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cached_property
@@ -13,7 +11,7 @@ from cosserat_fenicsx.quantities import Quantity
 from cosserat_fenicsx.results import screen
 from cosserat_fenicsx.results.accuracy import leading_of
 from cosserat_fenicsx.results.compared import NAMES, Errors, all_cell_nodes, sizes_of, words_of
-from cosserat_fenicsx.results.records import Event, Record, Records
+from cosserat_fenicsx.results.records import Event, Records
 from cosserat_fenicsx.results.recovery import element_contact
 from cosserat_fenicsx.results.result import by_name
 from cosserat_fenicsx.results.rods import RodResult
@@ -31,7 +29,7 @@ def _of_events(name):
     return lambda path: np.array([getattr(event, name) for event in path.events])
 
 
-# What belongs to every point, and to every event.
+# Quantities of every point, and of every event.
 _QUANTITIES = by_name(
     Quantity("load_factor", getter="load_factors"),
     Quantity("steps"),
@@ -79,10 +77,9 @@ class Path(RodResult):
     axis = "load factor"
     _kind, _more_about, _coordinates = "Path", ("control",), ("load_factor",)
     _quantities = _QUANTITIES
-    #: whether the formulation's virtual rotations are those of changes of q instead of independent small rotations
+    #: whether the formulation's virtual rotations are changes of q instead of independent small rotations
     galerkin = False
-    _computed = (*RodResult._computed, "_records", "_contact", "conservative", "_reference", "_roughness",
-                 "_in_elements")  # fmt: skip
+    _computed = (*RodResult._computed, "_contact", "conservative", "_reference", "_roughness", "_in_elements")
     # functions of a path that compute its `conservative` and its `sensitivity`
     _potential = _differentiated = None
 
@@ -92,7 +89,6 @@ class Path(RodResult):
         self.control, self.left = "load", False
         self.rounding, self.bounded, self.criteria = 0.0, NAMES, ()
         self._errors = self.by_mesh = None
-        self._expanded: Records | None = None
 
     @property
     def quantities(self) -> dict[str, Quantity]:
@@ -112,28 +108,6 @@ class Path(RodResult):
         path._potential, path._differentiated = potential, differentiated
         return path
 
-    def extend(self, records):
-        """Add converged states at once: `Records`, whose `rq` and `gauss_fields` are of the form that a `Record` that
-        is appended has."""
-        self._appended.append(records)
-        self._forget()
-
-    @property
-    def _all(self):
-        """The `Records` of all points, expanded to three dimensions; None where there is none."""
-        if self._appended:
-            kinds = itertools.groupby(self._appended, key=lambda x: isinstance(x, Records))
-            parts = (part if whole else [Records.of(list(part))] for whole, part in kinds)
-            new, self._appended = Records.joined([*itertools.chain.from_iterable(parts)]), []
-            rq, fields = self._expand(np.array(new.load_factor, dtype=float), new.rq, new.gauss_fields)
-            new = dataclasses.replace(new, rq=rq, gauss_fields=fields)
-            self._expanded = new if self._expanded is None else Records.joined([self._expanded, new])
-        return self._expanded
-
-    @cached_property
-    def _records(self):
-        return [] if self._all is None else self._all.listed()
-
     @cached_property
     def _in_elements(self):
         """(points, elements, nodes per element, 13) `_motion`, n and m."""
@@ -147,20 +121,6 @@ class Path(RodResult):
     @cached_property
     def _roughness(self):
         return leading_of(self)
-
-    def _taken(self, which):
-        return None if self._all is None else self._all.at(which)
-
-    def _array(self, name):
-        parts = [*([] if self._expanded is None else [self._expanded]), *self._appended]
-        return np.concatenate([np.empty(0), *(np.atleast_1d(getattr(x, name)) for x in parts)])
-
-    def _stacked(self, name):
-        return getattr(self._all, name)
-
-    def __len__(self) -> int:
-        first = 0 if self._expanded is None else len(self._expanded)
-        return first + sum(1 if isinstance(x, Record) else len(x) for x in self._appended)
 
     def at_points(self, which: Sequence[int] | np.ndarray) -> Self:
         """A path of some of the points, without events.
@@ -212,6 +172,8 @@ class Path(RodResult):
         yield from errors_in_words(self)
 
     def _table(self, units, rows, station=None):
+        if not len(self):
+            return None
         station = self.station(station or self._most_displaced())
         known, stable = self.quantities, [stability(count) for count in self.negative_modes]
         title = f"{self.scene.title}\n" if self.scene.title else ""
@@ -247,11 +209,6 @@ class Path(RodResult):
         return self._array("load_factor").astype(float)
 
     @property
-    def steps(self) -> np.ndarray:
-        """(n,) whole numbers, see the class."""
-        return self._array("steps").astype(int)
-
-    @property
     def negative_modes(self) -> np.ndarray:
         """(n,) whole numbers, see the class."""
         return self._array("negative_modes").astype(int)
@@ -274,7 +231,7 @@ class Path(RodResult):
     ) -> Sensitivity:
         """Derivatives of a query by numbers of the scene, at every point of the path, by the direct method.
 
-        They are those of the discrete equations on the path's mesh: one back-substitution with Newton's tangent for
+        The discrete equations on the path's mesh are differentiated: one back-substitution with Newton's tangent for
         each point and parameter, see statics/sensitivity.py. Every rank calls.
 
         Args:
@@ -312,8 +269,7 @@ class Path(RodResult):
             SceneError, NotConverged: as of `sensitivity` and `Sensitivity.uncertainty`.
         """
         check_once(self.scene, standard_deviations)
-        named = {getattr(x, "name", x): deviation for x, deviation in standard_deviations.items()}
-        return self.sensitivity(query, standard_deviations).uncertainty(named, correlation)
+        return self.sensitivity(query, standard_deviations).uncertainty(standard_deviations, correlation)
 
     @property
     def along_axis(self) -> np.ndarray:
@@ -341,7 +297,7 @@ class Path(RodResult):
 
     @property
     def judged(self):
-        """Names of what errors are estimated of: the four of the package, then further criteria of `bound`."""
+        """Names of the criteria with error estimates: the four of the package, then further ones of `bound`."""
         return (*NAMES, *(criterion.name for criterion in self.criteria))
 
     @property
@@ -351,7 +307,7 @@ class Path(RodResult):
 
     @property
     def bounds(self):
-        """Indices of what is `bounded`."""
+        """Indices of the `bounded` criteria."""
         return [self.judged.index(name) for name in self.bounded]
 
     @property
@@ -360,7 +316,7 @@ class Path(RodResult):
         return np.full(len(self), np.nan) if self.by_mesh is None else self.by_mesh[self.bounds].max(axis=0)
 
     def set_errors(self, errors):
-        """Set the estimated errors (4, n) that the mesh causes; they are at least those of rounding."""
+        """Set the estimated errors (4, n) of the mesh, with those of rounding as a lower bound."""
         self.by_mesh = np.maximum(errors, self.rounding)
         self._errors = np.maximum(self.by_mesh, self.rounding_errors)
 
@@ -399,8 +355,7 @@ class Path(RodResult):
 
 
 class PerturbedPath(Path):
-    """States of a scene that differs slightly from that of another path; it takes the stations, rods and supports of
-    that path's scene for its own."""
+    """States of a slightly changed scene; stations, rods and supports of the given path's scene stand for its own."""
 
     @classmethod
     def beside(cls, path, model):
@@ -444,7 +399,7 @@ def errors_in_words(path):
 
 
 def _bounded(path):
-    """What `tol` bounds, in words."""
+    """The criteria that `tol` bounds, in words."""
     *names, last = map(words_of, path.bounded)
     return f"{', '.join(names)} and {last}, relative" if names else f"{last}, relative"
 

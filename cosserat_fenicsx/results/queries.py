@@ -7,6 +7,7 @@ import numpy as np
 from cosserat_fenicsx.checks import refuse
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.numerics import directors
+from cosserat_fenicsx.results.compared import cell_nodes
 from cosserat_fenicsx.results.result import OnNodes
 from cosserat_fenicsx.scene.describe import describe
 from cosserat_fenicsx.scene.rod import Station, StationOrName
@@ -46,8 +47,8 @@ class Extremes(OnNodes):
         """The largest contact forces, moments and stresses over all points of a path (or times of a motion) and all
         rods.
 
-        Both sides of jumps are included, and places between the nodes. Values are those of the mesh used: the `errors`
-        of a path tell how well it knows n and m; `tol` of a motion limits the error of positions only. With t = d_3:
+        Both sides of jumps are included, and places between the nodes. Values are for the mesh used: the `errors` of a
+        path say how accurate n and m are; `tol` of a motion limits the error of positions only. With t = d_3:
         bending ``|m - (m.t) t|``, twisting ``|m.t|``, shear ``|n - (n.t) t|``, tension ``n.t``, compression ``-n.t``.
 
         Returns:
@@ -82,9 +83,8 @@ class Extremes(OnNodes):
             contact: (states, elements, nodes per element, 6) n and m, dimensionless; which: indices of the states.
         """
         rod, basis, s = self.scene.rods[i], self.rule.basis(inside), self._places(i, inside)
-        nodes = np.arange(self.elements[i])[:, None] * self.degree + np.arange(self.degree + 1)
-        rows = self._rows(rod)[1]
-        q = np.einsum("qj,kcji->kcqi", basis, np.array([self._records[k].rq[rows, 3:] for k in which])[:, nodes])
+        nodes, _ = cell_nodes(self.layout, self.degree)[i]
+        q = np.einsum("qj,kcji->kcqi", basis, np.array([self._records[k].rq[nodes, 3:] for k in which]))
         q /= np.linalg.norm(q, axis=-1, keepdims=True)
         d = directors(q.reshape(-1, 4)).reshape(*q.shape[:-1], 3, 3) @ rod.curve.frame(s.ravel()).reshape(
             *s.shape, 3, 3
@@ -127,7 +127,7 @@ def largest_in_words(path):
 
 
 def _unknown_in_words(path):
-    """Sentences on rods of which stresses are not known, where those of others are."""
+    """Sentences on rods whose stresses are unknown, where some are known."""
     if not path.knows_stresses:
         return
     fields = {rod.name: path.fields(0, rod) for rod in path.scene.rods}
@@ -135,7 +135,7 @@ def _unknown_in_words(path):
         names = [name for name, values in fields.items() if np.isnan(values[field]).any()]
         if names:
             yield f"{what} of {', '.join(names)} are not computed, or not everywhere: see the sections there."
-            fields = {name: values for name, values in fields.items() if name not in names}  # each is told once
+            fields = {name: values for name, values in fields.items() if name not in names}  # each is named once
 
 
 # Components below this times the largest force or moment are rounding.
@@ -143,7 +143,11 @@ _NO_REACTION = 1e-6
 
 
 class Reactions(OnNodes):
-    """Reactions of a result, from the residual of the equations that it solves."""
+    """Reactions of a result, from the residual of the equations that it solves.
+
+    Subclasses have `_at_clamp(point, joined)`: (n, 6) force and moment, dimensionless, that hold a clamped point, by
+    its index, against internal forces and loads; joined: (rod index, element end) of all rods that share it.
+    """
 
     def reaction(self, support: Support | StationOrName) -> tuple[np.ndarray, np.ndarray]:
         """Force and moment that a support exerts on its rod in every state.
@@ -202,14 +206,6 @@ class Reactions(OnNodes):
                     exerted = exerted - tie_forces[:, i, k]
         return exerted
 
-    def _at_clamp(self, point, joined):
-        """(n, 6) force and moment that hold a clamped point against internal forces and loads, dimensionless.
-
-        Args:
-            point: index of the clamped point; joined: (rod index, element end) of all rods that share it.
-        """
-        raise NotImplementedError
-
 
 def reactions_in_words(result):
     """The reaction of every support in the last state, one sentence each."""
@@ -243,13 +239,13 @@ class Stresses(OnNodes):
     def stress(self, station: StationOrName, side: str | None = None) -> Stress:
         """Stresses of the section at a station, Pa; see `scene.stresses` for the theory.
 
-        They are those of tension, bending, torsion and shear by Saint-Venant, per area of the reference. Where the
+        They include tension, bending, torsion and shear by Saint-Venant, per area of the reference. Where the
         section changes or a point load acts, the two sides of the station differ: by default each stress is the worse
         of both, and a side whose section has no shape is left out. In motions they include the stresses of damping.
 
         Args:
             station: a `Station` or its name.
-            side: "left" for the side of smaller s, "right" for that of larger s; default the worse of both.
+            side: "left" towards smaller s, "right" towards larger s; default the worse of both.
 
         Returns:
             `Stress` of arrays (n,): von_mises, the largest of the section, NaN for a `Profile`; axial_max and

@@ -68,66 +68,66 @@ class Instant(Record):
     wall_forces: np.ndarray = field(default_factory=lambda: np.empty((0, 3)))
 
 
-@dataclass
+@dataclass(frozen=True, eq=False)
 class Records:
-    """Equilibria as arrays over them: the fields of `Record`, each (n, ...); None where those of a `Record` are None.
+    """States as arrays over them.
 
     Attributes:
-        see `Record`; densities: a pair of arrays or None.
+        kind: the class of one, `Record` or `Instant`.
+        columns: {field of it: array (n, ...)}, a tuple of arrays where the fields are tuples; None where they are None.
     """
 
-    load_factor: np.ndarray
-    rq: np.ndarray
-    gauss_fields: np.ndarray | None
-    negative_modes: np.ndarray
-    iterations: np.ndarray
-    reactions: np.ndarray
-    neutral: np.ndarray
-    densities: tuple
-    tie_forces: np.ndarray | None
-    clamp_loads: np.ndarray | None
-    steps: np.ndarray
+    kind: type
+    columns: dict
 
     @classmethod
     def of(cls, records):
-        """Those of a list of `Record`s."""
-        return cls(**{name: _along([getattr(x, name) for x in records], np.array) for name in _FIELDS})
+        """Those of a list of records of one class, at least one."""
+        kind = type(records[0])
+        return cls(kind, {x.name: _along([getattr(r, x.name) for r in records], np.array) for x in fields(kind)})
 
     @classmethod
     def joined(cls, parts):
         """Several one after another."""
         if len(parts) == 1:
             return parts[0]
-        return cls(**{name: _along([getattr(x, name) for x in parts], np.concatenate) for name in _FIELDS})
+        names = parts[0].columns
+        return cls(parts[0].kind, {name: _along([part[name] for part in parts], np.concatenate) for name in names})
 
     def __len__(self):
-        return len(self.load_factor)
+        return len(self["load_factor"])
+
+    def __getitem__(self, name):
+        return self.columns[name]
 
     def at(self, which) -> Self:
         """Those with the indices `which`, copied."""
         which = np.asarray(which, dtype=int)
-        return type(self)(**{name: _taken(getattr(self, name), which) for name in _FIELDS})
+        return type(self)(self.kind, {name: _taken(values, which) for name, values in self.columns.items()})
 
     def listed(self):
-        """A list of `Record`s, which share the arrays."""
-        return [Record(**{name: _taken(getattr(self, name), k) for name in _FIELDS}) for k in range(len(self))]
-
-
-_FIELDS = tuple(x.name for x in fields(Record))
+        """A list of the records, which share the arrays."""
+        columns = self.columns.items()
+        return [self.kind(**{name: _taken(values, k) for name, values in columns}) for k in range(len(self))]
 
 
 def _along(values, join):
     """Values of many records, or of parts of them, as one."""
     if isinstance(values[0], tuple):
-        return tuple(_along(part, join) for part in zip(*values, strict=True))
+        return _like(values[0], (_along(part, join) for part in zip(*values, strict=True)))
     return None if values[0] is None else join(values)
 
 
 def _taken(values, which):
     if isinstance(values, tuple):
-        return tuple(_taken(part, which) for part in values)
+        return _like(values, (_taken(part, which) for part in values))
     taken = None if values is None else values[which]
     return taken.item() if isinstance(taken, np.generic) else taken
+
+
+def _like(values, parts):
+    """A tuple of parts, named as another one."""
+    return values._make(parts) if hasattr(values, "_make") else tuple(parts)
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,9 +143,9 @@ class Event:
         residual: how nearly the tangent is singular: the stiffness against the mode at the event over that in the
             unloaded state; events with more than 1e-5 are not listed. The stiffness against a motion v is
             1/(v S^-1 v), with S the tangent in displacements and rotations. The ratio hardly depends on the mesh; where
-            the stiffness decreases linearly with the load, as that of a straight column does, it is the relative error
+            the stiffness decreases linearly with the load, as of a straight column, it is the relative error
             of the load factor.
-        error: relative difference of the load factor from that of the same event on the previous mesh; NaN where the
+        error: relative difference of the load factor from the same event on the previous mesh; NaN where the
             mesh was given.
     """
 

@@ -5,7 +5,7 @@ from functools import lru_cache
 import numpy as np
 
 from cosserat_fenicsx.numerics import directors, product_conjugate
-from cosserat_fenicsx.results.compared import all_cell_nodes
+from cosserat_fenicsx.results.compared import all_cell_nodes, cell_nodes
 
 
 def element_contact(path, records):
@@ -15,10 +15,10 @@ def element_contact(path, records):
     which is as accurate as the nodal positions (order 2p). At the nodes between they are interpolated by the polynomial
     through both ends and the Gauss points. Virtual rotations are those of the formulation, see `Path.galerkin`.
     """
-    rule, p, fields = path.rule, path.degree, records.gauss_fields
+    rule, p, fields = path.rule, path.degree, records["gauss_fields"]
     h, cells = _elements(path.layout, path.scene, path.scales.length, p)
     n, r_s = fields[..., :3], fields[..., 6:]
-    at_gauss, at_nodes = records.densities
+    at_gauss, at_nodes = records["densities"]
     density = np.zeros_like(fields[..., :6]) if at_gauss is None else at_gauss.copy()
     density[..., 3:] += r_s[..., _NEXT] * n[..., _LAST] - r_s[..., _LAST] * n[..., _NEXT]
     along = np.matmul(rule.contact_from_fields, fields[..., :6])
@@ -28,7 +28,7 @@ def element_contact(path, records):
         if at_nodes is not None:
             more -= h * rule.lobatto[[0, p], None] * at_nodes[:, :, [0, p]]
         if path.galerkin:
-            q, m = records.rq[:, :, 3:][:, cells], fields[..., 3:6]
+            q, m = records["rq"][:, :, 3:][:, cells], fields[..., 3:6]
             for i, end in enumerate((0, p)):
                 grad, value = rule.weights * rule.slopes[:, end], rule.weights * rule.at_gauss[:, end]
                 plain = np.matmul(grad, m) - h[..., 0] * np.matmul(value, density[..., 3:])
@@ -75,14 +75,14 @@ def _turned(c, a):
 
 
 def at_nodes(values):
-    """(nodes, k) from values at the nodes of every element of a rod (elements, p + 1, k); at shared nodes those of the
-    element before."""
+    """(nodes, k) from values at the nodes of every element of a rod (elements, p + 1, k); at shared nodes the values of
+    the element before."""
     return np.concatenate([values[:1, 0], values[:, 1:].reshape(-1, values.shape[2])])
 
 
 def viscous_contact(history, which, rod):
     """n and m (n, nodes, 3) of Kelvin-Voigt damping in several states, N and N m, material; at a jump of the section
-    those of the element before.
+    the values of the element before.
 
     Args:
         history: a `History`; which: indices of states (n,); rod: a rod with a `Damping`.
@@ -99,11 +99,11 @@ def _strain_rates(history, record, rod):
     v_t = R^T (r_t' - w x r') and u_t = R^T w', with the angular velocity w = 2 vec(q_t conj(q))/|q|^2 of the
     interpolated q, as in the models.
     """
-    i, rows = history._rows(rod)
+    i, _ = history._rows(rod)
     rule, breaks, cells = history.rule, history.layout.breaks[i], history._cells(i)
     h = np.diff(breaks)[:, None, None] * rod.length / history.scales.length
-    nodes = np.arange(len(h))[:, None] * history.degree + np.arange(history.degree + 1)
-    q, velocity, spin = np.split(np.hstack([record.rq[rows, 3:], record.rates[rows]])[nodes], [4, 7], axis=-1)
+    nodes, _ = cell_nodes(history.layout, history.degree)[i]
+    q, velocity, spin = record.rq[nodes, 3:], record.rates[nodes, :3], record.rates[nodes, 3:]
     zero = np.zeros_like(spin[..., :1])
     q_t = product_conjugate(np.concatenate([zero, spin], axis=-1), q * [1, -1, -1, -1]) / 2
     (p, p_t), (p_s, p_ts) = ([values @ x for x in (q, q_t)] for values in (rule.basis(rule.gauss), rule.slopes / h))

@@ -1,5 +1,5 @@
-"""`Result`: what all results offer. A class says its quantities once; dicts, data frames, xarray, files, tables on the
-screen and in notebooks follow from them."""
+"""`Result`, the base class of all results: a class declares its quantities once; dicts, data frames, xarray, files, and
+tables on the screen and in notebooks follow from them."""
 
 import csv
 from collections import namedtuple
@@ -15,6 +15,7 @@ from cosserat_fenicsx.new_files import replaced
 from cosserat_fenicsx.quantities import Quantities, Quantity, Units
 from cosserat_fenicsx.ranks import on_first, world
 from cosserat_fenicsx.results import screen
+from cosserat_fenicsx.results.compared import cell_nodes
 from cosserat_fenicsx.scene.rod import Rod, RodOrName
 
 #: dims: names of the dimensions of `values`, the components included; attributes: texts by names, such as units.
@@ -34,16 +35,16 @@ class Result:
     """
 
     _quantities: ClassVar[dict[str, Quantity]] = {}
-    # The axis that data frames, .csv files and tables run along; those of further .csv files, by ends of their names.
+    # Axis of the rows of data frames, .csv files and tables; {suffix of the name: axis} of further .csv files.
     _rows_axis: ClassVar[str] = "point"
+    _beside: ClassVar[dict[str, str]] = {}
     # Whether its table can be written without rows.
     _may_be_empty: ClassVar[bool] = False
-    _beside: ClassVar[dict[str, str]] = {}
     # Quantities of the table on the screen; () for all along `_rows_axis`.
     _on_screen: ClassVar[tuple[str, ...]] = ()
-    # The quantity that charts have across; "" for the first one along `_rows_axis`.
+    # The abscissa of charts; "" for the first quantity along `_rows_axis`.
     _over: ClassVar[str] = ""
-    # Quantities that are coordinates beside those that have the name of their axis.
+    # Coordinates in xarray, beside quantities with the name of their axis.
     _coordinates: ClassVar[tuple[str, ...]] = ()
 
     @classmethod
@@ -214,7 +215,7 @@ class Result:
         return screen.page(self._answer(units), lambda rows: self._table(units, rows))
 
     def details(self, units: str | Mapping = "SI") -> str:
-        """A longer table, the answer, and all that is told of the result."""
+        """A longer table, the answer, and all further sentences on the result."""
         units = Units(units)
         table = self._table(units, screen.ROWS)
         text = [] if table is None else [screen.as_text(table)]
@@ -246,7 +247,7 @@ class Result:
         return None, None
 
     def _told(self, name: str, units: Units, value: float | None = None, form: str = ".6g") -> str:
-        """A number with its unit: that of a quantity, or another one of its kind."""
+        """A number with the unit of a quantity: the quantity's own value, or another one."""
         quantity = self.quantities[name]
         value = float(quantity.of(self)) if value is None else value
         unit, size = units.on_screen(quantity, [value])
@@ -281,7 +282,7 @@ class Result:
 
 
 class OnNodes:
-    """A result on a mesh; subclasses have the `scene`, the `elements` of each rod and their `degree`."""
+    """A result on a mesh; subclasses have the `scene`, the `layout`, the `rule` and the `degree` of the elements."""
 
     def rod(self, rod: RodOrName | None = None) -> Rod:
         """A rod of the scene, given as a `Rod` or by its name; default the first.
@@ -298,10 +299,16 @@ class OnNodes:
         return rods[0] if rod is None else rod
 
     def _rows(self, rod=None):
-        """(index of a rod, slice of its nodes among those of all rods)."""
+        """(index of a rod, slice of its nodes, numbered over all rods)."""
         i = self.scene.rods.index(self.rod(rod))
-        first = sum(n * self.degree + 1 for n in self.elements[:i])
-        return i, slice(first, first + self.elements[i] * self.degree + 1)
+        return i, cell_nodes(self.layout, self.degree)[i][1]
+
+    def _between(self, rod, x):
+        """Nodes (n, nodes per element), numbered over all rods, and their weights, at arc lengths x (n,) over a rod's
+        length."""
+        i, _ = self._rows(rod)
+        cells, weights = self.rule.locate_all(self.layout.breaks[i], x)
+        return cell_nodes(self.layout, self.degree)[i][0][cells], weights
 
 
 def by_name(*quantities):
@@ -324,13 +331,13 @@ def components_of(quantity):
 
 
 def component_names(quantities, variables):
-    """{name: `Variable`} that name the components of those of `variables` that have any."""
+    """{name: `Variable`} with the names of the components of `variables`."""
     parts = {components_of(x): x.parts for name, x in quantities.items() if x.parts and name in variables}
     return {name: Variable((name,), np.array(list(x)), {}) for name, x in parts.items()}
 
 
 def dataset(xarray, variables, coordinates, attributes):
-    """A Dataset; coordinates are those named, and what has the name of its one dimension."""
+    """A Dataset; coordinates are the named variables, and those with the name of their only dimension."""
     named = {name for name, x in variables.items() if name in coordinates or x.dims == (name,)}
     data = {name: x for name, x in variables.items() if name not in named}
     return xarray.Dataset(data, {name: variables[name] for name in variables if name in named}, attributes)

@@ -14,6 +14,7 @@ from cosserat_fenicsx.quantities import Quantity, Units
 from cosserat_fenicsx.ranks import on_first
 from cosserat_fenicsx.remember import per_scene
 from cosserat_fenicsx.results import screen
+from cosserat_fenicsx.results.compared import cells_of
 from cosserat_fenicsx.results.queries import Extremes, Reactions, Stresses, largest_in_words, reactions_in_words
 from cosserat_fenicsx.results.recovery import at_nodes
 from cosserat_fenicsx.results.result import (
@@ -93,6 +94,10 @@ _WORTH_SHOWING = 0.2
 class RodResult(Result, Extremes, Reactions, Stresses, States):
     """A sequence of states of a scene. Public methods return SI units. It can be copied and pickled, see `States`.
 
+    Subclasses have the dimensionless contact forces and moments, which jump at point loads: `_contact_of(k)` in all
+    elements at point k, (elements, nodes per element, 6), and `_contact_in(cell)` in one element at all points,
+    (points, nodes per element, 6).
+
     Attributes:
         scene: the scene it belongs to.
         model, formulation: names of those it was computed with.
@@ -106,7 +111,7 @@ class RodResult(Result, Extremes, Reactions, Stresses, States):
     """
 
     _quantities = _QUANTITIES
-    # The name in files; attributes that tell more of it; queries of stations in tables.
+    # Name in files; attributes in the heads of files; queries of stations in tables.
     _kind = ""
     _more_about: tuple[str, ...] = ()
     _of_stations: tuple[str, ...] = ("displacement", "quaternion", "force", "moment")
@@ -165,7 +170,7 @@ class RodResult(Result, Extremes, Reactions, Stresses, States):
             bending 2, twist; 1/m), both material; bending_moment (N m, its size). Where a section of the scene knows
             its shape, also von_mises, axial_max and axial_min (Pa), see `stress`; NaN along other sections. Of a motion
             also velocity (m/s) and angular_velocity (rad/s), inertial. Where a section changes or a point load acts,
-            what jumps is that of the side of smaller s; `stress` and `largest` cover both sides.
+            fields that jump are taken on the side of smaller s; `stress` and `largest` cover both sides.
 
         Raises:
             IndexError: there is no point k.
@@ -190,7 +195,7 @@ class RodResult(Result, Extremes, Reactions, Stresses, States):
         d = directors(q.reshape(-1, 4)).reshape(*q.shape[:2], 3, 3) @ rod.curve.frame(s)
         n, m = contact[..., :3] * self.scales.force, contact[..., 3:] * self.scales.moment
         n_material, m_material = np.einsum("nkij,nki->nkj", d, n), np.einsum("nkij,nki->nkj", d, m)
-        # at a jump those of the element before, as n and m
+        # at a jump the values of the element before, as for n and m
         viscous = self._viscous(which, rod)
         strain, curvature = rod.stiffness_at(s, "left").strains(n_material - viscous[0], m_material - viscous[1])
         found = {
@@ -215,7 +220,7 @@ class RodResult(Result, Extremes, Reactions, Stresses, States):
         """(n,) the largest displacement of any node, m."""
         return np.linalg.norm(self._moved, axis=2).max(axis=1) * self.scales.length
 
-    @cached_property
+    @property
     def _all_rq(self):
         """(points, nodes, 7) r and q, dimensionless."""
         return self._stacked("rq") if len(self) else np.empty((0, len(self._rest), 7))
@@ -243,20 +248,12 @@ class RodResult(Result, Extremes, Reactions, Stresses, States):
         return self._all_rq[:, :, 3:]
 
     def _contact_at(self, station, side="left"):
-        """(points, 6) n and m at a station, dimensionless; at a jump those of the "left" or the "right" side."""
+        """(points, 6) n and m at a station, dimensionless; at a jump on the "left" or the "right" side."""
         station = self.station(station)
         i, _ = self._rows(station.rod)
         x = station.s / station.rod.length + (_BEYOND if side == "right" else 0.0)
         cell, weights = self.rule.locate(self.layout.breaks[i], x)
         return np.einsum("j,njk->nk", weights, self._contact_in(self._cells(i).start + cell))
-
-    def _contact_of(self, k):
-        """(elements, nodes per element, 6) n and m at point k, dimensionless; they jump at point loads."""
-        raise NotImplementedError
-
-    def _contact_in(self, cell):
-        """(points, nodes per element, 6) n and m in one element, dimensionless."""
-        raise NotImplementedError
 
     def _viscous(self, which, rod):
         """The viscous parts of n and m at the nodes of a rod in several states, material, N and N m: none at rest."""
@@ -264,8 +261,7 @@ class RodResult(Result, Extremes, Reactions, Stresses, States):
 
     def _cells(self, i):
         """Slice of the elements of the i-th rod."""
-        first = sum(self.elements[:i])
-        return slice(first, first + self.elements[i])
+        return cells_of(self.layout)[i]
 
     def _at(self, station, values, rest=None):
         """Values (points, nodes, k), minus those at rest (nodes, k), interpolated to a station."""
@@ -294,15 +290,10 @@ class RodResult(Result, Extremes, Reactions, Stresses, States):
     def motion(self, rod, x, records=None):
         """(points, n, 7) displacement over `scales.length` and unit quaternion at arc lengths x (n,) over the rod's
         length."""
-        i, rows = self._rows(rod)
-        cells, weights = self.rule.locate_all(self.layout.breaks[i], x)
-        nodes = cells[:, None] * self.degree + np.arange(self.degree + 1)
-        if records is None:
-            nodal = self._all_rq[:, rows].copy()
-        else:
-            nodal = np.array([record.rq[rows] for record in records])
-        nodal[:, :, :3] -= self._rest[rows]
-        moved = np.einsum("kj,nkjc->nkc", weights, nodal[:, nodes])
+        nodes, weights = self._between(rod, x)
+        nodal = self._all_rq[:, nodes] if records is None else np.array([record.rq[nodes] for record in records])
+        nodal[..., :3] -= self._rest[nodes]
+        moved = np.einsum("kj,nkjc->nkc", weights, nodal)
         moved[:, :, 3:] /= np.linalg.norm(moved[:, :, 3:], axis=2, keepdims=True)
         return moved
 
@@ -460,7 +451,7 @@ class RodResult(Result, Extremes, Reactions, Stresses, States):
             station: whose motion the table shows; default the one with the largest displacement.
         """
         units = Units(units)
-        table = self._table(units, screen.ROWS, station) if len(self) else None
+        table = self._table(units, screen.ROWS, station)
         text = [] if table is None else [screen.as_text(table)]
         return "\n".join([*text, *self._answer(units), *self._more(units)])
 
@@ -572,11 +563,13 @@ class RodResult(Result, Extremes, Reactions, Stresses, States):
             on_first(self.comm, lambda: written(self, file, k))
 
     def plot(self, file=None, points=None, *, magnify=1.0, color="bending_moment", units="SI"):
-        """Picture of the deformed rods with supports, joints and loads, at some points (default up to five).
+        """Picture of the deformed rods at some points, with the reference as a grey line, supports, joints and loads.
+
+        Supports and joints are drawn on the last shape, each load on the last shape where it is not zero.
 
         Args:
-            file: a .png; None returns the pyvista plotter.
-            points: indices of points of a path, or of times.
+            file: a .png, which rank 0 writes; None returns the pyvista plotter.
+            points: indices of points of a path, or of times; None for up to five, evenly spread.
             magnify: factor of the displacements in the picture.
             color: what colours the rods: bending_moment, twisting_moment, tension, shear_force, n, m, displacement,
                 strain, curvature, of a motion velocity and angular_velocity too; n.x, n.y, n.z for an inertial
@@ -584,7 +577,9 @@ class RodResult(Result, Extremes, Reactions, Stresses, States):
             units: "SI", "field", or a dict of units by dimensions, such as {"force": "klbf"}.
 
         Raises:
-            SceneError: an unknown field (lists the names), unknown units, or pyvista is missing.
+            SceneError: an empty result, an unknown field (lists the names), unknown units, a file that is no .png, or
+                pyvista is missing.
+            OSError: the file cannot be written.
         """
         from cosserat_fenicsx.pictures import plot
 

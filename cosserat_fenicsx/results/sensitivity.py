@@ -7,6 +7,7 @@ import numpy as np
 
 from cosserat_fenicsx.checks import number
 from cosserat_fenicsx.errors import SceneError, nearest
+from cosserat_fenicsx.scene.parameters import Parameter
 
 _NEGATIVE = 1e-6  # eigenvalues of correlations that were rounded, as in a table
 
@@ -18,10 +19,10 @@ class Sensitivity(Mapping):
     Attributes:
         value: the quantity, an array; of a path its first axis are the points.
         derivatives: {name: d value/d parameter}, SI units.
-        error: {name: estimated absolute error} of the derivatives as those of the discrete equations: an upper bound of
-            what the central differences of data and query leave.
+        error: {name: estimated absolute error} of the derivatives of the discrete equations: an upper bound of the
+            error of the central differences of data and query.
         parameters: {name: value of the parameter, NaN where the name stands for several}. units: {name: its unit}.
-        quantity, unit: what is differentiated, and its unit, for `print`; empty where it is not known.
+        quantity, unit: name and unit of the differentiated quantity, for `print`; empty where unknown.
     """
 
     value: np.ndarray
@@ -34,7 +35,7 @@ class Sensitivity(Mapping):
 
     @classmethod
     def by(cls, parameters, value, derivatives, error, quantity="value"):
-        """Of parameters of a scene, which tell their values and units."""
+        """The derivatives by `Parameter`s of a scene, with their values and units."""
         values, units = ({x.name: getattr(x, what) for x in parameters} for what in ("value", "unit"))
         return cls(value, derivatives, error, values, units, quantity)
 
@@ -50,23 +51,24 @@ class Sensitivity(Mapping):
         return len(self.derivatives)
 
     def relative(self, name: str) -> np.ndarray:
-        """The relative change of the value over that of the parameter, p/q dq/dp; NaN where the value is 0, and where
+        """The ratio of relative changes of value and parameter, p/q dq/dp; NaN where the value is 0, and where
         the name stands for several numbers."""
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.where(self.value != 0, self[name] * self.parameters[name] / self.value, np.nan)
 
     def uncertainty(
-        self, standard_deviations: Mapping[str, float], correlation: np.ndarray | None = None
+        self, standard_deviations: Mapping[str | Parameter, float], correlation: np.ndarray | None = None
     ) -> "Uncertainty":
         """First-order (linear) propagation: variance = sum_ij q_i s_i rho_ij s_j q_j, with the derivatives q_i.
 
         Args:
-            standard_deviations: {name of a parameter: s_i}, in its unit; one of each derivative.
+            standard_deviations: {name of a parameter, or the `Parameter`: s_i}, in its unit; one of each derivative.
             correlation: (m, m) rho of the parameters in the order of `standard_deviations`; None: independent.
 
         Raises:
             SceneError: a name without a derivative, a standard deviation below 0, or no matrix of correlations.
         """
+        standard_deviations = {getattr(x, "name", x): deviation for x, deviation in standard_deviations.items()}
         names = list(standard_deviations)
         for name in names:
             number("uncertainty", f"standard_deviations['{name}']", standard_deviations[name],
@@ -79,7 +81,7 @@ class Sensitivity(Mapping):
             shares = np.where(variance > 0, products / variance, 0.0)
         return Uncertainty(
             self.value, np.sqrt(np.maximum(variance, 0.0)), dict(zip(names, parts, strict=True)),
-            dict(zip(names, shares, strict=True)), dict(standard_deviations), self.units, self.quantity, self.unit,
+            dict(zip(names, shares, strict=True)), standard_deviations, self.units, self.quantity, self.unit,
         )  # fmt: skip
 
     def __str__(self):

@@ -57,9 +57,8 @@ class Equilibrium(OnNodes):
 
     def between(self, rod, x, values):
         """(n, k) nodal values (N, k) interpolated to arc lengths x (n,) over a rod's length, in [0, 1]."""
-        i, rows = self._rows(rod)
-        cells, weights = self.rule.locate_all(self.layout.breaks[i], x)
-        return np.einsum("nj,njk->nk", weights, values[rows][cells[:, None] * self.degree + np.arange(self.degree + 1)])
+        nodes, weights = self._between(rod, x)
+        return np.einsum("nj,njk->nk", weights, values[nodes])
 
     def sample(self, rod, x):
         """Positions (n, 3), m, and directors (n, 3, 3) as columns, both inertial, at arc lengths x (n,) over a rod's
@@ -112,6 +111,9 @@ class Shapes(Result, OnNodes):
         error: (n,) estimated relative error of the eigenvalues; NaN where the mesh was given.
         conservative: whether the loads have a potential near the state, for all motions that the supports allow.
         comm: the MPI communicator; every rank has the whole result, rank 0 writes files and pictures.
+
+    Subclasses have `label(k)`, the eigenvalue of mode k in words, with its unit, for pictures, and `caution`, the
+    limits of the result, in sentences.
     """
 
     _may_be_empty = True
@@ -129,20 +131,12 @@ class Shapes(Result, OnNodes):
 
     scene = property(lambda self: self.equilibrium.scene)
     load_factor = property(lambda self: self.equilibrium.load_factor)
-    elements = property(lambda self: self.equilibrium.elements)
+    layout = property(lambda self: self.equilibrium.layout)
+    elements = property(lambda self: self.layout.counts)
     degree = property(lambda self: self.equilibrium.degree)
 
     def __len__(self):
         return len(self.error)
-
-    def label(self, k):
-        """The eigenvalue of mode k in words, with its unit, for pictures."""
-        raise NotImplementedError
-
-    @property
-    def caution(self):
-        """The limits of the result, in a sentence; "" where the loads have a potential."""
-        raise NotImplementedError
 
     def mode(self, k, rod=None):
         """(nodes, 3) displacements of mode k at the nodes of a rod (default the first), m, inertial."""
@@ -164,11 +158,7 @@ class Shapes(Result, OnNodes):
         return int(k) % len(self)
 
     def require_modes(self, file):
-        """Refuse a file or picture of no mode at all.
-
-        Raises:
-            SceneError: there is none.
-        """
+        """Refuse a file or picture of no mode at all."""
         if not len(self):
             raise SceneError(f"{file or 'picture'}: there is no mode to show")
 

@@ -1,23 +1,27 @@
 """A sequence of states of a scene: how they are added, looked up, copied and pickled."""
 
 import copy
+import itertools
 import pickle
 from collections.abc import Sequence
+from functools import cached_property
 from typing import Self
 
 import numpy as np
 from mpi4py import MPI
 
 from cosserat_fenicsx.errors import SceneError
+from cosserat_fenicsx.results.records import Records
 from cosserat_fenicsx.results.result import OnNodes
 from cosserat_fenicsx.scene.describe import unpicklable
 
 
 class States(OnNodes):
-    """Base class of `Result` with its list of states. It can be copied and pickled.
+    """Base class of `Result` with its list of states. It can be copied and pickled. Subclasses have `along_axis`, (n,)
+    the load factor or the time (s) of each state, and `label(k)`, the label of state k in pictures.
 
     A deep copy shares the scene, so that stations of the scene's rods can be used with both. A loaded pickle has a copy
-    of the scene: its stations are those of `result.rod(name)`, or are given by name. It belongs to the one process that
+    of the scene: stations are taken from `result.rod(name)`, or given by name. It belongs to the one process that
     loaded it.
     """
 
@@ -26,14 +30,15 @@ class States(OnNodes):
     #: whether stability is judged by the number of negative modes
     counts_modes = True
     #: cached properties, which are cleared when a state is added
-    _computed = ("_all_rq", "_motion", "_moved")
+    _computed = ("_records", "_motion", "_moved")
 
     def __init__(self, scene, layout, scales, rule, *, comm, model, formulation, degree, unknowns, why, connections,
                  expand):  # fmt: skip
         self.scene, self.layout, self.scales, self.rule, self.comm = scene, layout, scales, rule, comm
         self.model, self.formulation, self.degree, self.unknowns = model, formulation, degree, unknowns
         self.elements, self.why, self._connections = layout.counts, why, connections
-        self._expand, self._expanded, self._appended = expand, [], []
+        self._expand, self._appended = expand, []
+        self._expanded: Records | None = None
 
     @classmethod
     def of(cls, model, formulation, why=()):
@@ -55,7 +60,12 @@ class States(OnNodes):
 
     def append(self, record):
         """Add a converged state."""
-        self._appended.append(record)
+        self.extend(record)
+
+    def extend(self, records):
+        """Add converged states at once: `Records`, whose `rq` and `gauss_fields` are of the form that a `Record` that
+        is appended has."""
+        self._appended.append(records)
         self._forget()
 
     def _forget(self):
@@ -63,19 +73,26 @@ class States(OnNodes):
             self.__dict__.pop(name, None)
 
     @property
-    def _records(self):
-        """All records, expanded to three dimensions."""
+    def _all(self):
+        """The `Records` of all states, expanded to three dimensions; None where there is none."""
         if self._appended:
-            new, self._appended = self._appended, []
-            gauss = None if new[0].gauss_fields is None else np.array([x.gauss_fields for x in new])
-            load_factors = np.array([x.load_factor for x in new])
-            rq, fields = self._expand(load_factors, np.array([x.rq for x in new]), gauss)
-            for x, x.rq, x.gauss_fields in zip(new, rq, fields, strict=True):
-                self._expanded.append(x)
+            kinds = itertools.groupby(self._appended, key=lambda x: isinstance(x, Records))
+            parts = (part if whole else [Records.of(list(part))] for whole, part in kinds)
+            new, self._appended = Records.joined([*itertools.chain.from_iterable(parts)]), []
+            load_factors = np.array(new["load_factor"], dtype=float)
+            rq, gauss_fields = self._expand(load_factors, new["rq"], new["gauss_fields"])
+            new = Records(new.kind, new.columns | {"rq": rq, "gauss_fields": gauss_fields})
+            self._expanded = new if self._expanded is None else Records.joined([self._expanded, new])
         return self._expanded
 
+    @cached_property
+    def _records(self):
+        """A list of all records, expanded to three dimensions."""
+        return [] if self._all is None else self._all.listed()
+
     def __len__(self) -> int:
-        return len(self._expanded) + len(self._appended)
+        first = 0 if self._expanded is None else len(self._expanded)
+        return first + sum(len(x) if isinstance(x, Records) else 1 for x in self._appended)
 
     def __getitem__(self, k: int | slice) -> Self:
         """State k, or the states of a slice: a result of the same kind with these states alone, in SI units as ever.
@@ -111,8 +128,8 @@ class States(OnNodes):
         return k
 
     def _taken(self, which):
-        """What `_expanded` of a result with the states `which` is."""
-        return [self._records[k] for k in which]
+        """The `_expanded` of a result with the states `which` alone."""
+        return None if self._all is None else self._all.at(which)
 
     def _with(self, expanded):
         """A copy with other states, already expanded."""
@@ -123,25 +140,24 @@ class States(OnNodes):
         return part
 
     def _array(self, name):
-        return np.array([getattr(record, name) for record in (*self._expanded, *self._appended)])
+        """(states,) numbers of all states, which need not be expanded for it."""
+        parts = [*([] if self._expanded is None else [self._expanded]), *self._appended]
+        columns = (x[name] if isinstance(x, Records) else [getattr(x, name)] for x in parts)
+        return np.concatenate([np.empty(0), *columns])
 
     def _stacked(self, name):
-        """(states, ..) arrays of all records."""
-        return np.array([getattr(record, name) for record in self._records])
+        """(states, ..) arrays of all states; None where they have none."""
+        return self._all[name]
+
+    @property
+    def steps(self) -> np.ndarray:
+        """(n,) number of steps since the start, see the class."""
+        return self._array("steps").astype(int)
 
     @property
     def iterations(self) -> np.ndarray:
         """(n,) Newton iterations since the previous state, rejected steps included."""
         return self._array("iterations").astype(int)
-
-    @property
-    def along_axis(self) -> np.ndarray:
-        """(n,) the load factor or the time (s) of each state."""
-        raise NotImplementedError
-
-    def label(self, k: int) -> str:
-        """The label of state k in pictures."""
-        raise NotImplementedError
 
     # -- copies ------------------------------------------------------------------------------------------------------
 
@@ -159,8 +175,8 @@ class States(OnNodes):
         names = unpicklable(self.scene)
         if names:
             raise pickle.PicklingError(
-                f"a {type(self).__name__} cannot be pickled where its scene cannot: {names}. Functions must have a "
-                "name at the top of a module to be found by: expected no lambda and no function within a function"
+                f"a {type(self).__name__} cannot be pickled where its scene cannot: {names}. Functions must be defined "
+                "at module level: expected no lambda and no nested function"
             )
         plain = vars(copy.copy(self))
         return {name: value for name, value in plain.items() if name not in ("comm", "_expand", "_rest")}

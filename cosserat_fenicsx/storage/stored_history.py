@@ -5,7 +5,7 @@ import numpy as np
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.numerics import ElementRule
 from cosserat_fenicsx.results.history import History
-from cosserat_fenicsx.results.records import Instant, Ledger
+from cosserat_fenicsx.results.records import Instant, Ledger, Records
 from cosserat_fenicsx.scene.scene import Scene
 from cosserat_fenicsx.storage.store import Kind
 
@@ -77,13 +77,12 @@ class StoredHistory(History):
         """A `History` in memory of the states at the indices `which`."""
         part = History.__new__(History)
         mine = {name: value for name, value in vars(self).items() if name not in ("folder", "_file", "_store")}
-        vars(part).update(
-            mine, _expanded=[self._records[self._index(k, f"at_points([{k!r}])")] for k in which], _appended=[]
-        )
+        taken = [self._records[self._index(k, f"at_points([{k!r}])")] for k in which]
+        vars(part).update(mine, _expanded=Records.of(taken) if taken else None, _appended=[])
         return part
 
     def __copy__(self):
-        return self._with([])
+        return self._with(None)
 
     def __getstate__(self):
         """Pickle the folder instead of the states, which are read from there again."""
@@ -101,12 +100,6 @@ class StoredHistory(History):
 
     _booked = _array
     _stacked = property(lambda self: self._file.rows.__getitem__)
-    _all_rq = property(lambda self: self._column("rq", 7))
-    _all_rates = property(lambda self: self._column("rates", 6))
-    _all_gauss = property(lambda self: self._file.rows["gauss_fields"])
-
-    def _column(self, name, size):
-        return self._file.rows[name] if len(self) else np.empty((0, len(self._rest), size))
 
 
 class Instants:

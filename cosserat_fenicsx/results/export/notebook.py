@@ -5,6 +5,7 @@ import html
 import numpy as np
 
 from cosserat_fenicsx.quantities import Units
+from cosserat_fenicsx.results.screen import rows_of
 
 # Rows of the table, states and points of the picture, and its size in pixels.
 _ROWS, _STATES, _POINTS, _SIZE, _MARGIN = 8, 4, 240, 200, 6
@@ -24,11 +25,6 @@ def as_html(result):
     )
 
 
-def _some(result, count):
-    """Indices of at most `count` states, with the first and the last."""
-    return np.unique(np.linspace(0, len(result) - 1, count).round().astype(int))
-
-
 def _table(result):
     columns = result._table(Units(), _ROWS).columns
     rows = [("th", [column.header for column in columns])]
@@ -40,7 +36,7 @@ def _table(result):
 
 def _picture(result):
     """SVG of the rods in some states, the last one darkest, in the plane that shows most of them."""
-    shown, rods = _some(result, _STATES), result.scene.rods
+    shown, rods = rows_of(len(result), _STATES), result.scene.rods
     x = np.linspace(0, 1, max(2, _POINTS // (len(shown) * len(rods))))
     lines = [(k, result.sample(k, rod, x)[0]) for k in shown.tolist() for rod in rods]
     points = np.concatenate([places for _, places in lines])

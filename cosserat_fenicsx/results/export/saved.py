@@ -137,22 +137,20 @@ def _settings(result):
 
 def _solution(result):
     """{name: array} the numbers that the result is made of."""
-    moving, records = result.axis == "time", list(result._records)
+    moving, records = result.axis == "time", Records.of(list(result._records))
     rule = {name: getattr(result.rule, name) for name in ("nodes", "gauss", "weights")}
     found = {"element_ends": np.concatenate(result.layout.breaks), **rule}
-    for name in _OF_INSTANT if moving else _OF_POINT:
-        found[name] = [getattr(record, name) for record in records]
+    found |= {name: records[name] for name in (_OF_INSTANT if moving else _OF_POINT)}
     if moving:
-        found |= {name: [getattr(record.ledger, name) for record in records] for name in Ledger._fields}
+        found |= records["ledger"]._asdict()
     else:
-        found |= {name: [record.densities[i] for record in records] for i, name in enumerate(_DENSITIES)}
+        found |= dict(zip(_DENSITIES, records["densities"], strict=True))
         if result._errors is not None:
             found |= {"error": result.error, "errors": result._errors}
         found |= {f"event_{name}": [getattr(event, name) for event in result.events] for name in _OF_EVENT}
         found["event_mode"] = [event.mode for event in result.events] or np.empty((0, result._rest.shape[0], 3))
         found["event_is_limit"] = [event.kind == "limit" for event in result.events]
-    missing = [name for name, values in found.items() if values is None or any(x is None for x in values)]
-    return {name: np.array(values) for name, values in found.items() if name not in missing}
+    return {name: np.array(values) for name, values in found.items() if values is not None}
 
 
 def read(file, kind, assemble, comm):
@@ -164,9 +162,6 @@ def read(file, kind, assemble, comm):
         assemble: function of the scene, the element ends of every rod and the units of length, force and moment, that
             returns the layout, the scales and the connections.
         comm: the MPI communicator of the result.
-
-    Raises:
-        SceneError: it cannot be read, is damaged, holds something else, or is of a newer release.
     """
     with opened(file, kind._kind) as store:
         check_format(file, store.attrs, kind._kind, FORMAT)
@@ -179,11 +174,7 @@ def read(file, kind, assemble, comm):
 
 @contextmanager
 def opened(file, kind):
-    """Context manager: an `h5py.File` that a `kind` of result was saved to; what fails in it is told in words.
-
-    Raises:
-        SceneError: there is none, or it is damaged.
-    """
+    """Context manager: an `h5py.File` that a `kind` of result was saved to; a missing or damaged one is refused."""
     h5py, expected = h5py_for(file), f"expected a file that `save` of a {kind} wrote"
     if not os.path.isfile(file):
         raise SceneError(f"{file}: there is no such file: {expected}")
@@ -242,7 +233,7 @@ def _restored(kind, scene, settings, numbers, assemble, comm):
     result = kind(scene, layout, scales, rule, comm=comm, **common, connections=connections,
                                            expand=None)  # fmt: skip
     listed = [_record(numbers, k, moving) for k in range(states)]
-    result._expanded = listed if moving else Records.of(listed) if listed else None
+    result._expanded = Records.of(listed) if listed else None
     if moving:
         result.scheme, result._time_unit = settings["scheme"], settings["time_unit"]
     else:
@@ -255,7 +246,7 @@ def _restored(kind, scene, settings, numbers, assemble, comm):
 
 
 def _errors(numbers, count, states):
-    """(count, states) estimated errors, or None; older files have those of positions alone."""
+    """(count, states) estimated errors, or None; older files have errors of positions alone."""
     if "errors" in numbers:
         _check_shape("errors", numbers["errors"].shape, (count, states))
         return numbers["errors"]

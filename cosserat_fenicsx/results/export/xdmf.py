@@ -44,38 +44,30 @@ _TAIL = """    </Grid>
 
 
 def write_state(path, file, k=None):
-    """Write one point in a format of meshio.
+    """Write point k, by default the last, in the format of meshio that the ending of a `pathlib.Path` names."""
 
-    Args:
-        file: a `pathlib.Path`, whose ending sets the format; k: index of the point, None for the last.
+    def mesh():
+        points, lines, fields = meshes_of(path, [-1 if k is None else k])
+        return points[0], lines, {name: values[0] for name, values in fields.items()} | constants_of(path)
 
-    Raises:
-        SceneError: an ending that meshio does not support.
-        OSError: the file cannot be written.
-    """
-    known = (
-        ".xdmf, .csv, .html, .vtu, .vtk, .ply or another ending that meshio knows; `save` writes a whole result as .h5"
-    )
-    write_mesh(file, lambda: mesh_of(path, -1 if k is None else k), known)
+    known = ".xdmf, .csv, .html, .vtu, .vtk, .ply or another ending that meshio knows"
+    write_mesh(file, mesh, f"{known}; `save` writes a whole result as .h5")
 
 
 def write_mesh(file, mesh, known):
     """Write nodes, lines and fields in a format of meshio.
 
     Args:
-        file: a `pathlib.Path`; mesh: function that returns them as `mesh_of` does; known: the endings, in words.
-
-    Raises:
-        SceneError: an ending that meshio does not support.
-        OSError: the file cannot be written.
+        file: a `pathlib.Path`; mesh: function that returns nodes (n, 3), lines (elements, 2) and {name: (n, ...)};
+            known: the endings, for the SceneError on an unknown one.
     """
     import meshio
 
     if file.suffix not in meshio.extension_to_filetypes:
         raise SceneError(f"{file}: the ending '{file.suffix}' is not known: expected {known}")
-    points, cells, data = mesh()
+    points, lines, fields = mesh()
     with replaced(file) as fresh:
-        meshio.write(fresh, meshio.Mesh(points, cells, point_data=data))
+        meshio.write(fresh, meshio.Mesh(points, [("line", lines)], point_data=fields))
 
 
 def write_series(path, file, k=None):
@@ -87,12 +79,12 @@ def write_series(path, file, k=None):
 
 
 def _blocks(path):
-    """Reference, lines and fields of some states after others, as `write_blocks` takes them."""
+    """Reference, lines and fields of consecutive blocks of states, as `write_blocks` takes them."""
     for first in range(0, len(path), _BLOCK):
-        points, cells, data = meshes_of(path, range(first, min(first + _BLOCK, len(path))))
+        points, lines, data = meshes_of(path, range(first, min(first + _BLOCK, len(path))))
         q = data.pop("quaternion")  # some readers support no arrays of four components
         fields = {"position": points, **data, "quaternion_a": q[..., 0], "quaternion_bcd": q[..., 1:]}
-        yield points[0] - data["displacement"][0], cells[0][1], fields
+        yield points[0] - data["displacement"][0], lines, fields
 
 
 def write_blocks(file, name, meshed, along, blocks, units):
@@ -102,14 +94,11 @@ def write_blocks(file, name, meshed, along, blocks, units):
 
     Args:
         file: the .xdmf; name: of the series.
-        meshed: what has the `scene`, `layout` and `rule` of the nodes.
+        meshed: a result with the `scene`, `layout` and `rule` of the nodes.
         along: (states,) their times.
-        blocks: of some states after others: nodes (n, 3) in m, lines (elements, 2) and fields {name: (states, n) or
+        blocks: of consecutive states: nodes (n, 3) in m, lines (elements, 2) and fields {name: (states, n) or
             (states, n, 3)}; nodes and lines are the same in all of them.
         units: {name of a field: its unit}, for information in the file.
-
-    Raises:
-        OSError: they cannot be written; the old ones stay.
     """
     numbers, constants, k = file.with_suffix(".h5"), constants_of(meshed), 0
     with replaced(file) as text, replaced(numbers) as fresh:
@@ -165,16 +154,6 @@ def _grid(store, lines, fields, constants):
     return f"      {xml.tostring(grid, encoding='unicode').rstrip()}\n"
 
 
-def mesh_of(path, k):
-    """Nodes, lines and fields of all rods at point k.
-
-    Returns:
-        points (n, 3), m; cells in meshio's format; dict of arrays (n, ...).
-    """
-    points, cells, data = meshes_of(path, [k])
-    return points[0], cells, {name: values[0] for name, values in data.items()} | constants_of(path)
-
-
 def constants_of(meshed):
     """{name: (n,)} at all nodes: the arc length, m, and the number of the rod, from 0."""
     nodes = meshed.layout.node_s(meshed.rule.nodes)
@@ -191,25 +170,26 @@ def _names(path):
 
 
 def meshes_of(path, which):
-    """`mesh_of` at several points: arrays (points, n, ...)."""
-    names = _names(path)
-    points, data = [], {name: [] for name in names}
+    """Nodes, lines and fields of all rods at several points.
+
+    Returns:
+        nodes (points, n, 3), m; lines (elements, 2); {name: (points, n, ...)}.
+    """
+    names, of_rods = _names(path), []
     for rod in path.scene.rods:
         fields = path.fields_at(which, rod)
-        points.append(fields["position"])
-        for name, field in names.items():
-            data[name].append(fields[field] if field in fields else path.quantities[field].of(path, rod)[list(which)])
-    joined = {name: np.concatenate(values, axis=1) for name, values in data.items()}
-    return np.concatenate(points, axis=1), [("line", lines_of(p.shape[1] for p in points))], joined
+        own = {name: path.quantities[name].of(path, rod)[list(which)] for name in names.values() if name not in fields}
+        of_rods.append(fields | own)
+    joined = {name: np.concatenate([fields[field] for fields in of_rods], axis=1) for name, field in names.items()}
+    points = np.concatenate([fields["position"] for fields in of_rods], axis=1)
+    return points, lines_of([len(fields["s"]) for fields in of_rods]), joined
 
 
 def lines_of(counts):
     """(elements, 2) lines between neighbours among the nodes of all rods, of which there are `counts`."""
-    lines, first = [], 0
-    for n in counts:
-        lines.append(first + np.column_stack([np.arange(n - 1), np.arange(1, n)]))
-        first += n
-    return np.concatenate(lines)
+    ends = np.cumsum(counts)
+    first = np.delete(np.arange(ends[-1]), ends - 1)
+    return np.column_stack([first, first + 1])
 
 
 _UNITS_OF_SHAPES = {
@@ -226,22 +206,17 @@ def write_shapes(found, file, k=0):
     file = Path(file)
     found.require_modes(file)
     k = found.number(k)
-    on_first(found.comm, lambda: _write_shapes(found, file, k))
-
-
-def _write_shapes(found, file, k):
     positions = [found.equilibrium.position(rod) for rod in found.scene.rods]
-    points, lines = np.concatenate(positions), lines_of(map(len, positions))
-    if file.suffix == ".xdmf":
-        block = points, lines, _shape_fields(found, points, slice(None))
-        write_blocks(file, "modes", found.equilibrium, range(len(found)), [block], _UNITS_OF_SHAPES)
-        return
-    fields = {name: values[0] for name, values in _shape_fields(found, points, slice(k, k + 1)).items()}
-    known = ".xdmf, .csv, .nc, .vtu, .vtk or another ending that meshio knows"
-    write_mesh(file, lambda: (points, [("line", lines)], fields), known)
+    points, lines = np.concatenate(positions), lines_of([len(x) for x in positions])
+    moved, turned = np.split(found.shapes, 2, axis=2)
+    fields = {"displacement": moved, "rotation": turned, "position": np.broadcast_to(points, moved.shape)}
 
+    def written():
+        if file.suffix == ".xdmf":
+            block = points, lines, fields
+            write_blocks(file, "modes", found.equilibrium, range(len(found)), [block], _UNITS_OF_SHAPES)
+        else:
+            known = ".xdmf, .csv, .nc, .vtu, .vtk or another ending that meshio knows"
+            write_mesh(file, lambda: (points, lines, {name: x[k] for name, x in fields.items()}), known)
 
-def _shape_fields(found, points, which):
-    """{name: (n, N, 3)} of modes, a slice of all."""
-    moved, turned = found.shapes[which, :, :3], found.shapes[which, :, 3:]
-    return {"displacement": moved, "rotation": turned, "position": np.broadcast_to(points, moved.shape)}
+    on_first(found.comm, written)

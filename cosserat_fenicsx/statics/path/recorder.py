@@ -18,7 +18,7 @@ from cosserat_fenicsx.ranks import communicator
 from cosserat_fenicsx.results.accuracy import on_mesh
 from cosserat_fenicsx.results.export import saved
 from cosserat_fenicsx.results.path import Path
-from cosserat_fenicsx.results.records import Event, Records
+from cosserat_fenicsx.results.records import Event, Record, Records
 from cosserat_fenicsx.statics.circulatory import conservative_along
 from cosserat_fenicsx.statics.critical import derivatives_of
 from cosserat_fenicsx.statics.path.chord import Chord
@@ -180,13 +180,20 @@ class Tracing:
         count, model, problem = len(swept.load_factors), self.model, self.problem
         nodal, fields = model.snapshots(swept.x, swept.fields)
         ties = [problem.at_ties(x, load_factor) for x, load_factor in zip(swept.x, swept.load_factors, strict=True)]
-        self.path.extend(Records(
-            swept.load_factors.copy(), nodal, fields, np.full(count, self.track.here.negative_modes),
-            swept.iterations.astype(int), np.array([multipliers for multipliers, _ in ties]),
-            np.zeros(count, dtype=bool), model.densities.at(swept.load_factors), np.array([f for _, f in ties]),
-            np.array([model.clamps.loads(load_factor) for load_factor in swept.load_factors.tolist()]),
-            swept.steps.astype(int),
-        ))  # fmt: skip
+        columns = {
+            "load_factor": swept.load_factors.copy(),
+            "rq": nodal,
+            "gauss_fields": fields,
+            "negative_modes": np.full(count, self.track.here.negative_modes),
+            "iterations": swept.iterations.astype(int),
+            "reactions": np.array([multipliers for multipliers, _ in ties]),
+            "neutral": np.zeros(count, dtype=bool),
+            "densities": model.densities.at(swept.load_factors),
+            "tie_forces": np.array([forces for _, forces in ties]),
+            "clamp_loads": np.array([model.clamps.loads(load_factor) for load_factor in swept.load_factors.tolist()]),
+            "steps": swept.steps.astype(int),
+        }
+        self.path.extend(Records(Record, columns))
 
     def _advice(self, here, load):
         if not self._options["steps"].adaptive:
