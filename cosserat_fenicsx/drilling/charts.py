@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from cosserat_fenicsx.checks import finite_array, number, positive, refuse
+from cosserat_fenicsx.checks import finite_array, positive, refuse
 from cosserat_fenicsx.drilling.protocol import LEDGER
 from cosserat_fenicsx.drilling.stick_slip import AT_REST, alias, turns
 from cosserat_fenicsx.drilling.top_drive import PI
