@@ -50,7 +50,7 @@ def orbit():
     z = 0.02 * np.exp(-40j * times)
     plane = [np.column_stack([x.real, x.imag]) for x in (z, -40j * z)]
     full = np.ones(len(times))
-    return cf.Orbit(times, *plane, 0.022 * full, 10.0 * full, 0.085, np.where(times > 1, 2e3, 0.0))
+    return cf.drilling.Orbit(times, *plane, 0.022 * full, 10.0 * full, 0.085, np.where(times > 1, 2e3, 0.0))
 
 
 #: A result of each class; and the name and the unit of one of its quantities, in field units too.
