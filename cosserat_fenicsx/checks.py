@@ -189,11 +189,7 @@ def text_of(file, expected, *, pipes=False):
 
 
 def call(function, x, name, where):
-    """function(x) of a function that the user wrote; whatever it raises becomes a SceneError.
-
-    Args:
-        name, where: begin and end of the message.
-    """
+    """function(x) of a user's function; exceptions become a SceneError whose message begins `name`, ends `where`."""
     try:
         return function(x)
     except Exception as problem:  # a user's function may raise any exception
@@ -275,12 +271,5 @@ def _wrong_arguments(call, name, given, named):
             other = _USUAL.get(unknown)
             hint = f"did you mean '{other}'?" if other in known else nearest(unknown, known)
             return f"{name} has no argument '{unknown}': {hint}"
-    return f"{name}: {usual}: expected {name}({', '.join(_without_self(signature))})"
-
-
-def _without_self(signature):
-    return [_short(x) for x in signature.parameters.values() if x.name != "self"]
-
-
-def _short(parameter):
-    return parameter.name if parameter.default is inspect.Parameter.empty else f"{parameter.name}=..."
+    taken = [x if signature.parameters[x].default is inspect.Parameter.empty else f"{x}=..." for x in known]
+    return f"{name}: {usual}: expected {name}({', '.join(taken)})"

@@ -93,7 +93,7 @@ def alone_with(name):
     """One process at a time makes the file `name` of the folder, in a new folder of its own, which is given.
 
     The lock ends with its process, however that ends; where the file system has no locks, several processes may make
-    the same file. What ended processes have left of theirs is removed.
+    the same file. Folders that ended processes have left are removed.
     """
     place = folder()
     make(place)
@@ -144,11 +144,7 @@ def install(made, *beside):
 
 
 def load(name):
-    """The compiled module of this name; None where there is none that is complete, the user's own, and of this system.
-
-    Raises:
-        OSError: the cache cannot be read.
-    """
+    """The compiled module of this name, or None: it must be complete, the user's own, and of this system."""
     file = folder() / (name + SUFFIX)
     if why_unsafe(file) is not None:
         return None

@@ -47,11 +47,7 @@ if _VERSION < (0, 5):
 
 
 def require_real_scalars(scalar_type=PETSc.ScalarType):
-    """Refuse a PETSc built for complex numbers: a rod's equilibrium is a real problem.
-
-    Raises:
-        InstallationError: PETSc's scalar is complex.
-    """
+    """Refuse a PETSc built for complex numbers: a rod's equilibrium is a real problem."""
     if "complex" in scalar_type.__name__:
         raise InstallationError(
             f"PETSc was built for complex numbers ({scalar_type.__name__}); cosserat_fenicsx needs the real build. "

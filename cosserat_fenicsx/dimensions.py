@@ -21,8 +21,8 @@ class Dimension(NamedTuple):
         si: the SI unit.
         units: {name: size in SI} of the units that a text may have.
         field: the unit of the field system (ft, in, klbf, ft-lbf, ppg, rev/min, psi), one of `units`.
-        most: the largest size in SI that anything of a string, its hole, its mud and its rig has: larger numbers are
-            mistakes, such as of units.
+        most: the largest plausible size in SI for a string, its hole, its mud and its rig; larger ones are refused as
+            mistakes of units.
     """
 
     si: str
@@ -129,11 +129,7 @@ def in_si(where, value, dimension):
 
 
 def size_of(where, unit, dimension):
-    """The size of a unit in SI by its name.
-
-    Raises:
-        SceneError: an unknown one.
-    """
+    """The size of a unit in SI by its name; SceneError where it is unknown."""
     known = DIMENSIONS[dimension].units
     if not isinstance(unit, str) or unit not in known:
         raise SceneError(f"{where} = {unit!r}: {nearest(unit, [name for name in known if name.isalpha()])}")

@@ -51,7 +51,7 @@ def _inside(key):
 
 
 def members(family):
-    """{name: class} of a family, in the order of definition, those of the package first."""
+    """{name: class} of a family, in the order of definition, classes of the package first."""
     _import(family._homes)
     return {name: cls for name, cls in family._members.items() if dataclasses.is_dataclass(cls)}
 
@@ -61,7 +61,7 @@ def member(family, name):
     if not isinstance(name, str):
         return None
     if name in family._twice:
-        raise SceneError(f"type = '{name}': several classes have this name: expected that of one alone")
+        raise SceneError(f"type = '{name}': several classes have this name: expected a unique name")
     found = family._members.get(name)
     return found if dataclasses.is_dataclass(found) else members(family).get(name)
 
@@ -122,7 +122,7 @@ class Reading:
     """Where data are read from.
 
     Attributes:
-        folder: that of the file, which names of files start from; None for stored data.
+        folder: of the scene file, to which names of files are relative; None for stored data.
         named: {name of a class: {name: object}} of objects that data may refer to by their names.
     """
 
@@ -132,11 +132,7 @@ class Reading:
 
 @dataclasses.dataclass
 class Writing:
-    """How data are written.
-
-    Attributes:
-        whole: whether values that are the defaults are written too. modules: those that define classes of users.
-    """
+    """How data are written: `whole`, with defaults too; `modules`: where classes of users are defined."""
 
     whole: bool = True
     modules: set = dataclasses.field(default_factory=set)
@@ -217,7 +213,7 @@ class Kind:
         return value
 
     def read(self, where, data, reading):
-        """What the constructor is given, from data at a place of a file, see `made`."""
+        """The argument of the constructor, from data at a place of a file, see `made`."""
         return data
 
     def write(self, value, writing):

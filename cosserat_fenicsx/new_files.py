@@ -1,4 +1,4 @@
-"""New files: they replace the old ones when they are complete; HDF5 on a disk that may be full."""
+"""New files, which replace old ones when they are complete; HDF5 on a disk that may be full."""
 
 import contextlib
 import os
@@ -10,18 +10,15 @@ from cosserat_fenicsx.errors import SceneError
 
 
 class NotWritten(OSError):
-    """A file cannot be written; its text says what to do."""
+    """A file cannot be written; the message says what to do."""
 
 
 @contextlib.contextmanager
 def replaced(file):
-    """The name of a new file, which replaces `file` at the end of the block, and is removed where the block fails.
+    """Context manager: the name of a new file, which replaces `file` at the end, or is removed where the block fails.
 
-    It has the same ending and lies in the same folder, which is made. What is no plain file, such as a pipe, is written
-    to as it is.
-
-    Raises:
-        NotWritten: it cannot be written; the old file stays, or none.
+    It has the same ending and lies in the same folder, which is made. A special file, such as a pipe, is written to
+    directly. `NotWritten` where it cannot be written.
     """
     file = Path(os.path.realpath(file))
     fresh = file.with_name(f"{file.stem}.new{file.suffix}")
@@ -44,12 +41,7 @@ def replaced(file):
 
 @contextlib.contextmanager
 def new_hdf5(file):
-    """Context manager: a new `h5py.File`.
-
-    Raises:
-        SceneError: h5py is missing.
-        OSError: the file cannot be written.
-    """
+    """Context manager: a new `h5py.File`."""
     h5py = h5py_for(file)
     with open(file, "w+b", buffering=0) as stream:
         patient = _Patient(stream)
@@ -74,11 +66,7 @@ def arrays_in(file):
 
 
 def h5py_for(file):
-    """The module h5py, needed for a file.
-
-    Raises:
-        SceneError: it is missing.
-    """
+    """The module h5py, needed for a file; SceneError where it is missing."""
     try:
         import h5py
     except ImportError:
@@ -113,7 +101,7 @@ class _Patient:
         return done
 
     def read(self, size=-1):
-        """Not used: h5py tells a file by it."""
+        """Not used: h5py recognises files by it."""
         raise NotImplementedError
 
     def seek(self, place, whence=os.SEEK_SET):

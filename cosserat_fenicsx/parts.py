@@ -153,11 +153,7 @@ def to_data(part, whole=True):
 
 
 def from_data(cls, data):
-    """The part of a class from `to_data`.
-
-    Raises:
-        SceneError: no data of such a part.
-    """
+    """The part of a class from `to_data`; SceneError where these are no data of such a part."""
     try:
         use(data.get("use", ()))
         return made(cls, {key: value for key, value in data.items() if key != "use"})
@@ -167,11 +163,7 @@ def from_data(cls, data):
 
 
 def use(modules):
-    """Import modules that define parts of the user's own.
-
-    Raises:
-        SceneError: one cannot be imported.
-    """
+    """Import modules that define parts of the user's own; SceneError where one cannot be imported."""
     if not isinstance(modules, list | tuple):
         raise misplaced(("use",), f"use = {modules!r}: expected a list of the names of modules")
     for i, module in enumerate(modules):

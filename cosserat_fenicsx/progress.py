@@ -21,16 +21,13 @@ class Progress:
     """Context manager that shows the progress of a path or a motion.
 
     Args:
-        targets: the requested load factors or times (s), in their order.
+        targets: the requested load factors or times (s), in their order; quantity: their name.
         wanted: True, False, or None to show it in runs of more than two seconds.
         comm: MPI communicator; only rank 0 shows anything.
-        quantity: the name of the quantity that advances.
     """
 
     def __init__(self, targets, wanted, comm, quantity="load factor"):
-        self._quantity = quantity
-        self._show = _shown(wanted, comm)
-        self._now = wanted is True
+        self._quantity, self._show, self._now = quantity, _shown(wanted, comm), wanted is True
         self._terminal = sys.stderr.isatty()
         way = [0.0, *targets]
         self._way = sum(abs(b - a) for a, b in zip(way[:-1], way[1:], strict=True)) or 1.0
@@ -84,11 +81,7 @@ class Progress:
 
 
 class _Clocked:
-    """Base of progress that a thread shows, since one step may take minutes.
-
-    Args:
-        wanted, comm: see `Progress`.
-    """
+    """Base of progress that a thread shows, since one step may take minutes: the text of `_line()` of subclasses."""
 
     def __init__(self, wanted, comm):
         self._now, self._terminal = wanted is True, sys.stderr.isatty()
@@ -100,10 +93,6 @@ class _Clocked:
         if self._thread:
             self._thread.start()
         return self
-
-    def _line(self):
-        """What there is to say, in a line."""
-        raise NotImplementedError
 
     def _say(self):
         """Print the line at once, where progress was asked for outside a terminal."""
@@ -134,13 +123,10 @@ class _Clocked:
 
 
 class MeshProgress(_Clocked):
-    """Context manager that says which mesh an eigenproblem is solved on, and for how long it has run.
-
-    The number of meshes is not known in advance, and one may take minutes.
+    """Context manager that shows the mesh of an eigenproblem and the elapsed time; the number of meshes is not known.
 
     Args:
-        what: name of the computation; tol: its relative accuracy.
-        wanted, comm: see `Progress`.
+        what: name of the computation; tol: its relative accuracy. wanted, comm: see `Progress`.
     """
 
     def __init__(self, what, tol, wanted, comm):
@@ -148,10 +134,9 @@ class MeshProgress(_Clocked):
         self._what, self._tol, self._text = what, tol, what
 
     def on(self, elements, reached):
-        """The computation begins on a mesh.
+        """The computation begins on a mesh of at most so many elements per rod.
 
-        Args:
-            elements: the largest number per rod; reached: estimated relative error so far, infinite where unknown.
+        `reached`: the estimated relative error so far, infinite where unknown.
         """
         error = f", estimated error {reached:.1e} of {self._tol:g}" if math.isfinite(reached) else ""
         self._text = f"{self._what}: {elements} elements per rod{error}"
@@ -162,7 +147,7 @@ class MeshProgress(_Clocked):
 
 
 class CaseProgress(_Clocked):
-    """Context manager that says how many cases of a study are done, on all ranks.
+    """Context manager that shows how many cases of a study are done, on all ranks.
 
     Args:
         total: their number; counts: a function that returns how many are done, and how many of these have failed.

@@ -86,12 +86,8 @@ def world():
 
 
 def on_first(comm, action):
-    """Run `action()` on rank 0; where it fails, every rank raises the same exception.
-
-    Raises:
-        Exception: as `action` did, such as OSError; RuntimeError with its text, on the other ranks, where it cannot be
-            sent to them.
-    """
+    """Run `action()` on rank 0; where it fails, every rank raises the same exception, or, where that cannot be sent,
+    a RuntimeError with its text."""
     trouble = None
     if comm.rank == 0:
         try:

@@ -21,7 +21,7 @@ from cosserat_fenicsx.scene.signals import signals_of
 from cosserat_fenicsx.statics.meshes import first_layout, meshes_for, resolving_turns
 from cosserat_fenicsx.statics.solve import check_arguments
 
-#: What the unknowns of a model are, in a plane (True) or in space.
+#: The unknowns of a model, in a plane (True) or in space.
 _UNKNOWNS = {
     ("determinate", True): "the angle theta along the rods alone",
     ("determinate", False): "the quaternion q along the rods alone",

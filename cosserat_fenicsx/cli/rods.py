@@ -7,7 +7,7 @@ from cosserat_fenicsx.cli.output import deliver, given
 from cosserat_fenicsx.cli.say import say
 from cosserat_fenicsx.errors import SceneError, SceneWarning
 
-# Options of a motion, and those of an equilibrium path, by the names of the arguments of `simulate` and `solve`.
+# Options of a motion, of an equilibrium path and of both: names of arguments of `simulate` and `solve`.
 _MOTION, _PATH = (
     ("duration", "dt", "scheme", "save_every", "start", "folder"),
     ("load_factors", "bound", "formulation", "control", "branch"),

@@ -1,7 +1,6 @@
 """Scene files, in TOML: their tables, keys and types are the argument and class names of the package.
 
-What a file may hold are the arguments of the class that it is read as: `RodScene`, `WellScene` or `DrillingScene`. In
-every file:
+A file holds the arguments of the class that it is read as: `RodScene`, `WellScene` or `DrillingScene`. In every file:
 
 use = ["my_rig"]                 # optional: modules that define parts of the user's own
 [materials.steel]                # optional: materials, which others refer to by their names
@@ -26,7 +25,7 @@ _OF_DRILLING = {"drive", "bit", "hook", "wall_friction", "drag", "simulate", "st
 
 
 def kinds() -> dict:
-    """{what it is: class} of all that files are read as."""
+    """{kind: class} of scene files."""
     from cosserat_fenicsx.drilling.scenefile import DrillingScene
     from cosserat_fenicsx.files.rods import RodScene
     from cosserat_fenicsx.well.scenefile import WellScene
@@ -35,7 +34,7 @@ def kinds() -> dict:
 
 
 def kind_of(tables) -> str:
-    """What a file is by its tables, also one of whose tables is missing or misspelt: a key of `kinds`."""
+    """The kind of a file by its tables, also where one of them is missing or misspelt: a key of `kinds`."""
     if "drive" in tables or ({"string", "well", "discs"} & tables.keys() and _OF_DRILLING & tables.keys()):
         return "drilling"
     return "well" if "rods" not in tables and {"well", "string", "operations"} & tables.keys() else "rods"

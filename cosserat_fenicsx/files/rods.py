@@ -176,18 +176,12 @@ class RodScene(Part):
 
 
 def load_factors_in(text):
-    """The load factors of a text: "0:1" is a tuple (0.0, 1.0), "0.5,1" a list [0.5, 1.0], see `solve`.
-
-    Raises:
-        SceneError: it is neither.
-    """
+    """The load factors of a text: "0:1" is a tuple (0.0, 1.0), "0.5,1" a list [0.5, 1.0], see `solve`."""
     separator = ":" if ":" in text else ","
     try:
         values = [float(part) for part in text.split(separator)]
     except ValueError:
         values = []
     if not values or (separator == ":" and len(values) != 2):
-        raise SceneError(
-            f"load factors '{text}': expected A:B (the solver chooses its steps) or A,B,... (reached exactly)"
-        )
+        raise SceneError(f"load factors '{text}': expected A:B (in steps of the solver) or A,B,... (reached exactly)")
     return tuple(values) if separator == ":" else values

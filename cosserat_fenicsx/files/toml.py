@@ -22,11 +22,7 @@ class _GivenTwice(Exception):
 
 
 def text_and_tables(file):
-    """(text, tables) of a TOML file.
-
-    Raises:
-        SceneError: the file is missing, or not TOML.
-    """
+    """(text, tables) of a TOML file; SceneError where it is missing, or not TOML."""
     file = Path(file)
     text = text_of(file, "a scene file in TOML", pipes=True)
     try:
@@ -46,7 +42,7 @@ def _refused(text, problem):
             places(text)
         except _GivenTwice as twice:
             name, offset, first = twice.args
-            return f"{_at(text, offset)}: {name} is given twice, first at{_at(text, first)[1:]}: expected one"
+            return f"{_at(text, offset)}: {name} is given twice, first at{_at(text, first)[1:]}: expected it once"
         except (AttributeError, IndexError):  # the text is no TOML further down
             pass
     at = _AT.search(problem)
@@ -74,11 +70,7 @@ def place_of(text, where):
 
 
 def places(text):
-    """{place: offset} of all keys and items of TOML; a place is a tuple of keys and numbers from 0.
-
-    Raises:
-        _GivenTwice: a table or a key.
-    """
+    """{place: offset} of all keys and items of TOML, or `_GivenTwice`; a place is a tuple of keys and numbers."""
     found, counts, table, i = {}, {}, (), 0
     while (i := _BLANK.match(text, i).end()) < len(text):
         if text[i] != "[":

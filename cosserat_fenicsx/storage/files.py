@@ -1,6 +1,6 @@
-"""Files with checksums: JSON, lines of JSON, checkpoints, and growing tables of rows. What was changed is noticed.
+"""Files with checksums: JSON, lines of JSON, checkpoints, and growing tables of rows. Changes are noticed.
 
-A checksum (CRC-32) begins with a seed, a number of the folder, so that a file of another folder is noticed as well.
+The seed of a checksum (CRC-32) is a number of the folder, so that a file of another folder is noticed as well.
 """
 
 import ast
@@ -8,7 +8,6 @@ import io
 import json
 import os
 import struct
-import zipfile
 import zlib
 from pathlib import Path
 
@@ -29,11 +28,7 @@ class Damaged(Exception):
 
 
 def replace(file, data):
-    """Write bytes to a file; an old one is replaced once the new one is complete.
-
-    Raises:
-        OSError: it cannot be written; the old file stays.
-    """
+    """Write bytes to a file; an old one is replaced once the new one is complete, and stays where that fails."""
     fresh = file.with_name(f"{file.name}.new")
     try:
         with open(fresh, "wb") as stream:
@@ -56,11 +51,7 @@ def sealed(data, seed=0, indent=None):
 
 
 def unsealed(data, seed=0):
-    """The dict in bytes that `sealed` made.
-
-    Raises:
-        Damaged: saying what is wrong.
-    """
+    """The dict in bytes that `sealed` made, or `Damaged`."""
     try:
         text, mark, told = data.decode().rpartition(_SEAL)
         if not mark:
@@ -79,29 +70,20 @@ def unsealed(data, seed=0):
 
 
 def write_checkpoint(file, memory, seed=0):
-    """Write a dict of arrays, numbers, texts and such dicts as .npz, the keys of nested dicts joined by "/".
-
-    Raises:
-        OSError: see `replace`.
-    """
+    """Write a dict of arrays, numbers, texts and such dicts as .npz, the keys of nested dicts joined by "/"."""
     flat, data = dict(_flat(memory)), io.BytesIO()
     np.savez(data, **flat, **{CHECKSUM: np.asarray(_checksum(flat, seed))})
     replace(file, data.getbuffer())
 
 
 def read_checkpoint(file, seed=0):
-    """The dict that was written; None where the file is missing.
-
-    Raises:
-        Damaged: it cannot be read, or its numbers are not those that were written.
-    """
+    """The dict that was written, or `Damaged`; None where the file is missing."""
     try:
         with np.load(file, allow_pickle=False) as stored:
             flat = {name: stored[name] for name in stored.files}
     except FileNotFoundError:
         return None
-    except (OSError, ValueError, EOFError, KeyError, TypeError, MemoryError, NotImplementedError, RuntimeError,
-            SyntaxError, struct.error, zipfile.BadZipFile, zlib.error) as problem:  # fmt: skip
+    except Exception as problem:  # a damaged file may cause any
         raise Damaged(f"{file} cannot be read ({problem})") from None
     told, memory = flat.pop(CHECKSUM, np.asarray(None)), {}
     if told.tolist() != _checksum(flat, seed):
@@ -118,7 +100,7 @@ def read_checkpoint(file, seed=0):
 
 
 def unlike(memory, like, where=""):
-    """Where the data of a checkpoint are not of the kind of others, in words; None where they are.
+    """How the data of a checkpoint differ in structure from others, in words; None where they agree.
 
     Every entry of `like` must be there: dicts, numbers and texts as such, and arrays of the same kind of numbers and
     the same shape but for their first axis, since some grow during a computation.
@@ -174,16 +156,12 @@ class Table:
     last row at most, and `numpy.load(file, mmap_mode="r")` opens the rest.
 
     Args:
-        file: its name; a missing file has no rows.
-        accept: a function at the top of a module; whether rows of a numpy dtype and of a shape are those of this table.
-        seed: of the checksums.
+        file: its name; a missing file has no rows, another one than a table is refused.
+        accept: a function at the top of a module; whether a numpy dtype and a shape are those of this table's rows.
 
     Attributes:
-        next: the number of the row that is written next: after the last one, unless a computation goes on from an
-            earlier one. Those behind stay until they are overwritten, by the same digits.
-
-    Raises:
-        SceneError: a file that holds something else.
+        next: the number of the row that is written next: after the last one, unless a computation continues from an
+            earlier one. Later rows stay until they are overwritten, by the same digits.
     """
 
     def __init__(self, file, accept, seed=0):
@@ -217,11 +195,7 @@ class Table:
         self._size = dtype.itemsize * int(np.prod(shape, dtype=int))
 
     def put(self, rows):
-        """Write rows, an array, from the number `next` on; `look` makes them visible.
-
-        Raises:
-            OSError: they cannot be written; the rows before them stay.
-        """
+        """Write rows, an array, from the number `next` on; where that fails, those before them stay."""
         if self._dtype is None:
             self._make(rows)
         place, data = self._first + self.next * self._size, np.ascontiguousarray(rows, self._dtype).tobytes()
@@ -297,8 +271,8 @@ class Table:
         return self._rows
 
     def _header(self, count):
-        """The header of a .npy file of `count` rows; all have the same characters but for the digits of the count, so
-        that what remains of two, where overwriting one by the other is broken off, can be read."""
+        """The header of a .npy file of `count` rows. All headers differ in the digits of the count alone, so a header
+        that is overwritten in part can be read."""
         descr = self._dtype.descr if self._dtype.names else self._dtype.str
         shape = "".join(f"{n}, " for n in self._shape)
         text = f"{{'descr': {descr!r}, 'fortran_order': False, 'shape': ({count:>19}, {shape})}}".encode()

@@ -1,4 +1,4 @@
-"""Marks of objects: flat data that say whether an object is the same as one of an earlier run.
+"""Marks of objects: flat data by which an object is compared with one of an earlier run.
 
 A mark is {place: number, text, None or list of these}, data for JSON. Every object is walked as a whole: all fields of
 a dataclass (but those that it leaves out of comparisons), all entries of lists and dicts. Functions of time and of the
@@ -41,12 +41,12 @@ class NotMarked(Exception):
 
 
 def mark_of(value, where="", times=None):
-    """The mark of a value, the same for what computes the same.
+    """The mark of a value, equal for values that compute the same.
 
     Args:
-        where: the name of the value, the begin of all places.
+        where: the name of the value, with which all places begin.
         times: where functions of time are sampled, s, see `sample_times`; None where there is no time. With times,
-            objects of a class that says nothing of its fields are compared by what they hold.
+            objects of a class without declared fields are compared by their attributes.
 
     Raises:
         NotMarked: without times, a value that is none of numbers, texts, arrays, lists, dicts, functions, and
@@ -58,8 +58,7 @@ def mark_of(value, where="", times=None):
 
 
 def sample_times(duration):
-    """Times (s) at which functions of time are sampled: up to the duration, and after it, where they are compared once
-    a longer one is asked for."""
+    """Times (s) at which functions of time are sampled: up to the duration, and after it for longer durations."""
     within = duration * np.concatenate([np.linspace(0, 1, _IN_TIME), np.geomspace(1e-4, 1, 30)[:-1]])
     return sorted({*within.tolist(), *(duration * _AHEAD).tolist()})
 
@@ -70,13 +69,11 @@ def until(mark, time):
 
 
 def difference(given, expected, what, rounding=0.0):
-    """A text that says where two marks differ; None where they agree.
-
-    It gives the first place that differs, and the sample of a function where this differs most.
+    """The first difference of two marks in words, of a function at the sample that differs most; None for none.
 
     Args:
         what: the stored thing that `expected` belongs to, such as "motion".
-        rounding: relative difference of numbers that does not count.
+        rounding: relative difference of numbers that counts as equal.
     """
     groups = {}
     for place in expected:
@@ -96,11 +93,7 @@ def difference(given, expected, what, rounding=0.0):
 
 
 class _Walk:
-    """A walk through a value.
-
-    Attributes:
-        found: the mark so far.
-    """
+    """A walk through a value; `found` is the mark so far."""
 
     def __init__(self, times):
         self.found, self._times, self._rods, self._inside = {}, times, {}, set()
@@ -228,8 +221,8 @@ def _hash(data):
 
 
 def _code(function, seen):
-    """What a function does, as nested tuples: its instructions, and the functions of its own module and the objects
-    that these name. Other modules, and objects that may change while it runs, are left out."""
+    """A function as nested tuples: its instructions, and the functions of its own module and the objects that these
+    name. Other modules, and objects that may change while it runs, are left out."""
     if function in seen:
         return function.__qualname__
     seen.add(function)

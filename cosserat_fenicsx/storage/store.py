@@ -1,13 +1,12 @@
-"""The folder that a computation is written to as it goes, from which it is read, and gone on with whatever ended it.
+"""Folders of running computations: written during the run, read at any time, resumed whatever ended the run.
 
-stored.json      what the folder holds, the arguments, the mark of all that the numbers follow from, and the scene as
-                 data where it has that form: no folder can run code of its own
+stored.json      what the folder holds, the arguments, the mark of all inputs, and the scene as data where it has that
+                 form: no folder can run code of its own
 NAME.npy         tables of rows, see `files.Table`; only complete rows count
-start.npz, checkpoint.npz   what the computation goes on from: at its start, and the latest; with the numbers of rows
-                 then, and their checksums
-rows.RANK.jsonl  rows that stand for themselves, JSON objects a line, appended as they come
+start.npz, checkpoint.npz   the first and the latest checkpoint, with the numbers of rows and their checksums
+rows.RANK.jsonl  independent rows, one JSON object a line, appended as they come
 
-Every file has a checksum. Folders have one format; those of other formats are refused.
+Every file has a checksum. Folders of other formats than `FORMAT` are refused.
 """
 
 import contextlib
@@ -36,11 +35,10 @@ FORMAT = 4
 #: What says what a folder holds; and the files that did so in earlier releases.
 HEAD, EARLIER = "stored.json", ("motion.json", "drilling.json", "study.json")
 _START, _LATEST, _LINES = "start.npz", "checkpoint.npz", "rows.{}.jsonl"
-# The entry of a checkpoint that tells of the rows in tables.
+# Entry of a checkpoint with the number of rows of each table, and their checksum.
 _ROWS = "rows"
-# What the data of a file can raise where they are not those that were written.
+# Exceptions that damaged data of a file can cause.
 _UNFIT = (ValueError, TypeError, LookupError, AttributeError, ArithmeticError, RecursionError, MemoryError)
-# What a checkpoint tells of the rows of a table.
 _TOLD = {"count": 0, files.CHECKSUM: 0}
 
 
@@ -49,16 +47,16 @@ class Kind:
     """What one kind of computation stores, in words and data; all kinds share `Store`.
 
     Attributes:
-        what: "motion"; also how a folder says what it holds.
+        what: its name, such as "motion", also in stored.json.
         home: the module, below the package, whose functions `go_on(store, scene, duration, progress)` and
             `read(store, scene)` continue and read it, and whose `KIND` this is.
         call: the function whose argument `folder` names the folder.
-        again: how it is gone on with, a text with {place}. differs: what is said before the first difference.
+        again: how to resume it, a text with {place}. differs: the beginning of messages on another computation.
         tables: the names of its tables.
         each_rank: whether every rank has rows and a memory of its own.
         starts: whether there is a checkpoint of the start, before which nothing is stored.
-        rounding: relative difference of numbers that does not make the arguments others.
-        scene: the class of the scene, which is stored as data; None where none is.
+        rounding: relative difference of arguments that counts as equal.
+        scene: the class of the scene that is stored as data, or None.
     """
 
     what: str
@@ -88,11 +86,7 @@ class Nowhere:
 
     @contextlib.contextmanager
     def ending(self, result):
-        """Context manager of a computation, at whose end the folder is released.
-
-        Raises:
-            Interrupted: by Ctrl-C; with what is done so far, and how to go on.
-        """
+        """Context manager of a computation: Ctrl-C becomes `Interrupted`, and the folder is released at the end."""
         try:
             yield
         except Interrupted:
@@ -109,14 +103,11 @@ class Store(Nowhere):
     Args:
         place: its name; comm: MPI communicator, or None for all ranks.
 
-    Raises:
-        SceneError: `place` is not a name.
-
     Attributes:
-        place: a `pathlib.Path`. head: what is in stored.json. tables: {name: `files.Table`}.
+        place: a `pathlib.Path`. head: the content of stored.json. tables: {name: `files.Table`}.
     """
 
-    #: Least time between checkpoints: in s, and as a multiple of the time that it takes to write one.
+    #: Least time between checkpoints: in s, and as a multiple of the time of writing one.
     APART, SELDOM = 2.0, 50
 
     def __init__(self, place, kind, comm=None):
@@ -127,10 +118,10 @@ class Store(Nowhere):
     # -- what the folder holds ---------------------------------------------------------------------------------------
 
     def make(self, asked, scene, duration):
-        """Make the folder for a new motion, and lock it.
+        """Make the folder for a new motion of a scene up to a duration (s), and lock it.
 
         Args:
-            asked: {name: plain value}, entries of `head`. scene: all that the numbers follow from; duration: s.
+            asked: {name: plain value}, entries of `head`.
 
         Raises:
             SceneError: it holds a computation, or files of the user's own that have the names of this one's; another
@@ -191,11 +182,7 @@ class Store(Nowhere):
             )
 
     def open(self):
-        """Read what the folder holds.
-
-        Raises:
-            SceneError: nothing that this release reads.
-        """
+        """Read stored.json; SceneError where this release reads nothing there."""
         self.head = self._from_first(lambda: _head(self.place))
         if self.kind is None:
             self.kind = self.home.KIND
@@ -209,14 +196,7 @@ class Store(Nowhere):
         self._on_first(self._put_head)
 
     def compare(self, marked, until=float("inf")):
-        """Refuse another computation than the one in the folder, by the objects of rank 0.
-
-        Args:
-            marked: the mark of all that its numbers follow from; until: the time up to which they are compared, s.
-
-        Raises:
-            SceneError: saying what differs.
-        """
+        """Refuse another computation than that in the folder, by the mark of its inputs on rank 0 up to a time, s."""
 
         def compared():
             given, expected = (mark.until(x, until) for x in (json.loads(json.dumps(marked)), self.head["mark"]))
@@ -228,11 +208,7 @@ class Store(Nowhere):
         on_first(self.comm, compared)
 
     def scene(self, given, until):
-        """The scene: the given one, compared with that of the folder up to a time (s), or the one that is stored.
-
-        Raises:
-            SceneError: another scene, or none is given and none is stored.
-        """
+        """The scene: the given one, compared with that of the folder up to a time (s), or the stored one."""
         scene = self._stored_scene() if given is None else given
         times = [t for t in self.head["times"] if t <= until * (1 + 1e-12)]
         self.compare(_marked(scene, times)["mark"], until)
@@ -255,22 +231,18 @@ class Store(Nowhere):
 
     @property
     def again(self):
-        """How the computation is gone on with, in words."""
+        """How to resume the computation, in words."""
         return self.kind.again.format(place=str(self.place))
 
     @property
     def kept(self):
-        """Where what is done is kept, and how it is gone on with, for `Interrupted`."""
+        """Where the result so far is kept, and how to resume, for `Interrupted`."""
         return f"; they are kept in {self.place}, and {self.again}"
 
     # -- one process at a time ---------------------------------------------------------------------------------------
 
     def hold(self):
-        """Lock the folder, so that no other process writes to it.
-
-        Raises:
-            SceneError: another process has locked it.
-        """
+        """Lock the folder against other processes; SceneError where one of them has locked it."""
         self._on_first(self._take)
 
     def _take(self):
@@ -299,13 +271,10 @@ class Store(Nowhere):
     # -- rows that stand for themselves ------------------------------------------------------------------------------
 
     def begin(self, marked, as_data=None):
-        """Make the folder, or go on with it where it holds the same computation.
+        """Make the folder, or resume it where it holds the same computation; errors: see `make` and `compare`.
 
         Args:
-            marked: the mark of all that the numbers follow from; as_data: function that gives the arguments as data.
-
-        Raises:
-            SceneError: see `make` and `compare`.
+            marked: the mark of all inputs; as_data: function that gives the arguments as data.
         """
         if self._from_first(lambda: holds(self.place)) != self.kind.what:
             return self._made({"scene": _data(as_data) if as_data else None, "mark": marked})
@@ -315,8 +284,8 @@ class Store(Nowhere):
         return self
 
     def lines(self, read):
-        """What `read(row)` makes of the stored rows. A row that it refuses by an exception, or that is damaged, is left
-        out with a warning, and removed from its file where the folder is held."""
+        """[read(row)] of the stored rows. A row that is damaged, or that `read` refuses by an exception, is left out
+        with a warning, and removed from its file where the folder is locked."""
         return self._from_first(
             lambda: [row for file in sorted(self.place.glob(_LINES.format("*"))) for row in self._lines_of(file, read)]
         )
@@ -338,11 +307,10 @@ class Store(Nowhere):
         return found
 
     def keep(self, row, result=()):
-        """Append a row, a dict, where it survives the end of the process; `result`: what is done so far.
+        """Append a row, a dict, so that it survives the end of the process; `result`: the result so far.
 
         Raises:
-            NotStored: it cannot be written.
-            OSError: likewise, on one rank of those that all have rows of their own.
+            NotStored: it cannot be written; an OSError where every rank has rows of its own.
         """
         if self.kind.each_rank:
             self._append(row)
@@ -364,14 +332,7 @@ class Store(Nowhere):
         return self.tables[name]
 
     def put(self, result, what, **rows):
-        """Append rows to tables, by their names.
-
-        Args:
-            result: what is done so far; what: is written, for messages.
-
-        Raises:
-            NotStored: they cannot be written.
-        """
+        """Append rows to tables, by their names; NotStored, with the result so far, where they cannot be written."""
 
         def written():
             for name, added in rows.items():
@@ -389,14 +350,7 @@ class Store(Nowhere):
         return self.comm.bcast(self._last is None or time.monotonic() - self._last > self._apart)
 
     def checkpoint(self, memory, result):
-        """Write a checkpoint, after the rows so far; the first one is also kept as that of the start.
-
-        Args:
-            memory: the data of this rank, see `files.write_checkpoint`; result: what is done so far.
-
-        Raises:
-            NotStored: it cannot be written.
-        """
+        """Write a checkpoint of the data of this rank after the rows so far; the first is kept as that of the start."""
         began = time.monotonic()
         parts = self.comm.gather(memory) if self.kind.each_rank else [memory]
 
@@ -415,13 +369,10 @@ class Store(Nowhere):
         self._apart = max(self.APART, self.SELDOM * (self._last - began))
 
     def memory(self, like=None, recall=None):
-        """The latest checkpoint of this rank whose rows are stored; with `recall`, the computation goes on from it.
+        """The latest checkpoint of this rank whose rows are stored; with `recall`, the computation continues from it.
 
         Args:
-            like: data of the same kind; recall: restores the data, and may raise what data that do not fit cause.
-
-        Raises:
-            SceneError: there is none.
+            like: data of the same structure; recall: restores the data, and raises where they do not fit.
         """
         lost = []
         for name in (_LATEST, _START):
@@ -453,19 +404,18 @@ class Store(Nowhere):
             return None, None, str(problem)
 
     def _rows_differ(self, whole):
-        """Where the rows in the tables are not those that a checkpoint tells of, in words; "" where they are."""
+        """How the rows in the tables differ from those of a checkpoint, in words; "" where they agree."""
         for name, table in self.tables.items():
             table.look()
             told = whole[_ROWS][name]
             if not 0 <= told["count"] <= len(table):
-                return f"{table.file} has fewer rows than its checkpoint tells of"
+                return f"{table.file} has fewer rows than its checkpoint says"
             if table.checksum(told["count"]) != told[files.CHECKSUM]:
                 return f"{table.file}: its numbers are not those that were written"
         return ""
 
     def _not_recalled(self, name, recall, memory):
-        """Call `recall`; why it fails, in words, or "". On several ranks that compute together one cannot fail alone,
-        since that is collective: there all exceptions are raised."""
+        """Call `recall`; why it fails, in words, or "". Where ranks compute together its exceptions are raised."""
         try:
             recall(memory)
         except _UNFIT as problem:
@@ -475,7 +425,7 @@ class Store(Nowhere):
         return ""
 
     def _go_on_from(self, told, lost):
-        """Write rows after those that a checkpoint tells of; `lost`: why a later one is not used, if there was one."""
+        """Continue after the rows of a checkpoint; `lost`: why a later one cannot be used, if there was one."""
 
         def cut():
             for name, table in self.tables.items():
@@ -490,14 +440,7 @@ class Store(Nowhere):
             table.next = told[name]["count"]
 
     def check_rows(self, times):
-        """Refuse rows that are not those of the computation; another process may be appending some.
-
-        Args:
-            times: function of a table's rows that gives the time of each, which ascends.
-
-        Raises:
-            SceneError: naming the file.
-        """
+        """Refuse damaged rows, while another process may append some; `times(rows)`: their times, which ascend."""
         whole, _, damaged = self._read(_LATEST, {})  # before the rows
 
         def compared():

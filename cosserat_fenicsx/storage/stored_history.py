@@ -9,7 +9,7 @@ from cosserat_fenicsx.results.records import Instant, Ledger, Records
 from cosserat_fenicsx.scene.scene import Scene
 from cosserat_fenicsx.storage.store import Kind
 
-#: Scalars of an `Instant` by their types in the file, and its arrays; those of its `Ledger` follow.
+#: Scalars of an `Instant` by their types in the file, and its arrays; the fields of its `Ledger` follow.
 _OF_INSTANT = {"time": "<f8", "load_factor": "<f8", "steps": "<i8", "iterations": "<i8"}
 _ARRAYS = ("rq", "rates", "gauss_fields", "reactions", "tie_forces", "clamp_forces", "wall_forces")
 KIND = Kind(
@@ -45,11 +45,7 @@ class StoredHistory(History):
         return history
 
     def keep_in(self, store):
-        """Set the `Store` of the states, and return the history; states that are already in it belong to the history.
-
-        Raises:
-            SceneError: these are the states of other rods, or on another mesh.
-        """
+        """Set the `Store` of the states, and return the history; stored states of other rods or meshes are refused."""
         self.folder, self._store, self._file = store.place, store, store.table("instants", are_instants)
         cells, rule, dtype = sum(self.elements), self.rule, self._file.dtype[0]
         nodes = cells * self.degree + len(self.elements)
@@ -60,11 +56,7 @@ class StoredHistory(History):
         return self
 
     def append(self, record):
-        """Add a saved state.
-
-        Raises:
-            NotStored: it cannot be written.
-        """
+        """Add a saved state; NotStored where it cannot be written."""
         rq, gauss = self._expand(np.array([record.load_factor]), record.rq[None], record.gauss_fields[None])
         whole = {**vars(record), **record.ledger._asdict(), "rq": rq[0], "gauss_fields": gauss[0]}
         names = (*_OF_INSTANT, *Ledger._fields, *_ARRAYS)
@@ -123,6 +115,6 @@ class Instants:
 
 
 def are_instants(dtype, shape):
-    """Whether the rows of a table are those of saved states."""
+    """Whether a dtype and a shape of rows are those of saved states."""
     expected = {**_OF_INSTANT, **dict.fromkeys((*Ledger._fields, *_ARRAYS), "<f8")}
     return not shape and dtype.names is not None and {x: dtype[x].base.str for x in dtype.names} == expected

@@ -67,8 +67,8 @@ class Study(Result):
     def to_dataframe(self, units: str | Mapping = "SI") -> Any:
         """A pandas DataFrame with a row for every case: its arguments, its results and `failure`, a text, "" for none.
 
-        A result that is a single value is in the column `result`, that of a dict in columns by its names ("name
-        (result)" where an argument has it). What is missing is NaN or None; an array is one entry.
+        A single value is in the column `result`, the values of a dict in columns by their names ("name (result)" where
+        an argument has the name). Missing values are NaN or None; an array is one entry.
 
         Raises:
             InstallationError: pandas is missing.
@@ -77,7 +77,7 @@ class Study(Result):
         return pandas.DataFrame({name: pandas.Series(values) for name, values in self.columns(units).items()})
 
     def columns(self, units: str | Mapping = "SI", axis: str = "") -> dict[str, np.ndarray]:
-        """{heading: (cases,)} as of `Result`, with those of which nothing is known."""
+        """{heading: (cases,)} as of `Result`, but with unknown columns too."""
         units, found = Units(units), {}
         for quantity in self.quantities.values():
             found |= quantity.columns(quantity.of(self), units)
@@ -150,7 +150,7 @@ class Study(Result):
         return screen.table(given, units, rows, which=[i for i in range(count) if i < half or i >= count - half])
 
 
-# Failures that are told; more are counted.
+# Failures that are listed; more are counted.
 _FAILURES = 12
 
 

@@ -120,7 +120,7 @@ def _told(task, cases, *, strictly):
 
 
 def _outcome_in(row, count):
-    """A stored row; ValueError, LookupError or TypeError where it is not that of one of `count` cases."""
+    """A stored row; ValueError, LookupError or TypeError where it belongs to none of `count` cases."""
     if not 0 <= row["case"] < count or ("result" in row) == ("failure" in row):
         raise ValueError(f"case = {row['case']}: expected a result or a failure of one of {count} cases")
     row["attempt"] + row["seconds"], from_data(row.get("result"))
@@ -188,7 +188,7 @@ class _CannotKeep(Exception):
 
 
 def _sentence(problem):
-    """What was raised; and where, unless it is an error of this package, which says what is wrong."""
+    """The exception in words, with its line unless it is an error of this package, which says what is wrong."""
     said = f"{type(problem).__name__}: {problem}" if str(problem) else type(problem).__name__
     if isinstance(problem, CosseratError):
         return said
@@ -346,7 +346,7 @@ class TaskPool:
         self._add(_DONE, 1)
 
     def counts(self):
-        """(tasks done, those of them that failed) on all ranks; on rank 0 alone."""
+        """(numbers of tasks done, and of failed ones) of all ranks; on rank 0 alone."""
         return int(self._counters[_DONE]), int(self._counters[_FAILED])
 
     def stop(self):
