@@ -3,7 +3,6 @@
 See `parts`, which this module serves: annotations become kinds by `kind_of`.
 """
 
-import contextlib
 import dataclasses
 import functools
 import importlib
@@ -40,14 +39,9 @@ class NotData(Exception):
     def __str__(self):
         return f"{spoken(self.where)}: {self.why}" if self.where else self.why
 
-
-@contextlib.contextmanager
-def _inside(key):
-    """Context manager: a `NotData` names its place within an outer one."""
-    try:
-        yield
-    except NotData as problem:
-        raise NotData(problem.why, (key, *problem.where)) from None
+    def inside(self, key):
+        """The same within an outer place."""
+        return NotData(self.why, (key, *self.where))
 
 
 def members(family):
@@ -419,8 +413,11 @@ class Object(Kind):
         return first if not is_family(first) and all(map(is_family, others)) else None
 
     def _find(self, name):
-        found = (member(cls, name) if is_family(cls) else cls for cls in self.classes)
-        return next((cls for cls in found if cls is not None and cls.__name__ == name), None)
+        for cls in self.classes:
+            found = member(cls, name) if is_family(cls) else cls
+            if found is not None and found.__name__ == name:
+                return found
+        return None
 
     def read(self, where, data, reading):
         """See `Kind`: a table; the name of an object; or the name of a class, for an object without arguments."""
@@ -458,12 +455,15 @@ class Object(Kind):
         if not cls.__module__.startswith("cosserat_fenicsx."):
             writing.modules.add(cls.__module__)
         data, defaults = {"type": cls.__name__} if self._typed else {}, inspect.signature(cls).parameters
-        for name, given in value.arguments().items():
-            default = defaults[name].default
-            same = given is default or given is None or (type(given) is type(default) and given == default)
-            if writing.whole or not same:
-                with _inside(name):
-                    data[name] = arguments_of(cls)[name][0].write(given, writing)
+        known, name = arguments_of(cls), ""
+        try:
+            for name, given in value.arguments().items():
+                default = defaults[name].default
+                same = given is default or given is None or (type(given) is type(default) and given == default)
+                if writing.whole or not same:
+                    data[name] = known[name][0].write(given, writing)
+        except NotData as problem:
+            raise problem.inside(name) from None
         return data
 
     def schema(self, definitions):
@@ -566,9 +566,11 @@ class Items(Kind):
 
     def write(self, value, writing):
         found = []
-        for i, x in enumerate(value):
-            with _inside(i):
+        try:
+            for x in value:
                 found.append(self.inner.write(x, writing))
+        except NotData as problem:
+            raise problem.inside(len(found)) from None
         return found
 
     def schema(self, definitions):
