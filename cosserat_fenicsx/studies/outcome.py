@@ -1,15 +1,19 @@
-"""`Study`: the cases of a task, and what came of each."""
+"""`Study`: the cases of a task and their outcomes; and outcomes as data for JSON and back, to the last digit."""
 
+import numbers
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from cosserat_fenicsx.checks import File
+from cosserat_fenicsx.checks import File, refuse
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.quantities import Quantity, Units
 from cosserat_fenicsx.results import screen
 from cosserat_fenicsx.results.result import Result, import_library
+
+# What a task may return.
+_EXPECTED = "a number, a text, an array of numbers or of texts, None, or a dict of these by name"
 
 
 class Failure(NamedTuple):
@@ -119,10 +123,10 @@ class Study(Result):
         Args:
             name: of the result; None for the first that is a number.
         """
-        numbers = [x for x, values in _columns(self)[1].items() if _series(values).dtype.kind in "fi"]
-        if name is None and not numbers:
+        known = [x for x, values in _columns(self)[1].items() if _series(values).dtype.kind in "fi"]
+        if name is None and not known:
             raise SceneError("plot: expected a study with a result that is a number for each case")
-        return self.plot_quantity(name or numbers[0], file, units=units, width=width)
+        return self.plot_quantity(name or known[0], file, units=units, width=width)
 
     def __repr__(self):
         failed = f", {len(self.failures)} failed" if self.failures else ""
@@ -219,3 +223,53 @@ def _cell(value):
         return f"array {value.shape}" if value.size > 4 else np.array2string(value, precision=4)
     text = _label(value)
     return text if len(text) <= 40 else f"{text[:37]}..."
+
+
+def to_data(result):
+    """A task's result as data.
+
+    Raises:
+        SceneError: it is none of what a task may return.
+    """
+    if isinstance(result, dict):
+        for name in result:
+            if not isinstance(name, str):
+                refuse("study", "task", name, "names of results that are texts")
+        return {"dict": {name: _of_value(value) for name, value in result.items()}}
+    return _of_value(result)
+
+
+def from_data(data):
+    """The result of `to_data`; lists have become arrays."""
+    if not isinstance(data, dict):
+        return data
+    if "dict" in data:
+        return {name: from_data(value) for name, value in data["dict"].items()}
+    if "number" in data:
+        return complex(*data["number"])
+    flat = np.array(data["array"], dtype=data["dtype"])
+    return (flat.view(complex) if data["complex numbers"] else flat).reshape(data["shape"])
+
+
+def _of_value(value):
+    if isinstance(value, np.generic) or (isinstance(value, np.ndarray) and value.ndim == 0):
+        value = value.item()
+    if value is None or isinstance(value, bool | int | float | str):
+        return value
+    if isinstance(value, complex):
+        return {"number": [value.real, value.imag]}
+    if isinstance(value, numbers.Real):  # such as a fraction
+        return float(value)
+    try:
+        array = np.asarray(value)
+    except ValueError:  # rows of different lengths
+        array = np.asarray(None)
+    masked = isinstance(value, np.ma.MaskedArray)  # whose mask would be lost
+    if masked or not isinstance(value, np.ndarray | list | tuple) or array.dtype.kind not in "biufcU":
+        refuse("study.task", "result", value, _EXPECTED)
+    flat, pairs = array.ravel(), array.dtype.kind == "c"
+    if pairs:
+        flat = flat.astype(complex).view(float)
+    elif array.dtype.kind == "f" and array.itemsize > 8:
+        flat = flat.astype(float)
+    return {"array": flat.tolist(), "dtype": flat.dtype.str, "shape": array.shape, "complex numbers": pairs}

@@ -20,8 +20,7 @@ from cosserat_fenicsx.progress import CaseProgress
 from cosserat_fenicsx.ranks import apart, communicator
 from cosserat_fenicsx.storage.mark import NotMarked, mark_of
 from cosserat_fenicsx.storage.store import Kind, Nowhere, Store
-from cosserat_fenicsx.studies.outcome import Study
-from cosserat_fenicsx.studies.values import from_data, to_data
+from cosserat_fenicsx.studies.outcome import Study, from_data, to_data
 
 KIND = Kind(
     what="study", home="studies.study", call="study", again="the same call of study goes on from there",
