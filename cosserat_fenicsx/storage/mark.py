@@ -293,10 +293,10 @@ def _time_of(place):
 
 def _is_numbers(items):
     """Whether a list holds numbers alone, or lists of as many each, and at least one."""
-    if not items or any(isinstance(item, list | tuple | str | bool) or item is None for item in items):
-        inner = [item for item in items if isinstance(item, list | tuple)]
-        return len(inner) == len(items) > 0 and all(map(_is_numbers, inner)) and len({len(x) for x in inner}) == 1
-    return all(isinstance(item, int | float | np.integer | np.floating) for item in items)
+    if items and all(isinstance(item, list | tuple) for item in items):
+        return all(map(_is_numbers, items)) and len(set(map(len, items))) == 1
+    numbers = (isinstance(x, int | float | np.integer | np.floating) and not isinstance(x, bool) for x in items)
+    return len(items) > 0 and all(numbers)
 
 
 def _apart(a, b, exactly):
