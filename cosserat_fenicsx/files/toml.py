@@ -43,7 +43,7 @@ def _refused(text, problem):
         except _GivenTwice as twice:
             name, offset, first = twice.args
             return f"{_at(text, offset)}: {name} is given twice, first at{_at(text, first)[1:]}: expected it once"
-        except (AttributeError, IndexError):  # the text is no TOML further down
+        except (AttributeError, IndexError, ValueError):  # the text is no TOML further down
             pass
     at = _AT.search(problem)
     hint = "; text, and a number with its unit, stand in quotes" if "Invalid value" in problem else ""
