@@ -261,7 +261,7 @@ def test_how_often_a_string_starts_off_bottom():
     steps, told = [], []
     while model.time < 60:
         told.append(model.advance(1)[0])
-        steps.append(model._changing["speed"][-1])
+        steps.append(model._kept["speed"][-1])
     times, mean = np.array(told)[:, 0], np.array(told)[:, COLUMN["bit_speed"]]
     assert len(starts_of(times, mean)) == 10
     assert len(starts_of(times, np.array(steps))) > 100

@@ -29,7 +29,6 @@ from cosserat_fenicsx.drilling.top_drive import Hook
 from cosserat_fenicsx.drilling.wall_friction import law_of, static_weight
 from cosserat_fenicsx.errors import SceneError
 
-_STATE = ("x", "v", "w", "force")
 _TRIALS = 30
 _ELEMENTS = 1_000_000
 _SUMS = ("drive", "hook", "bit", "wall", "mud")
@@ -60,6 +59,7 @@ class AxialTorsional(StringModel):
             falling law of friction; a steady start that the drive does not have; torsion alone of a bit that cuts.
     """
 
+    _changing = ("x", "v", "w", "force", "held")
     _failure = (
         "the step at t = {time:g} s does not converge however short it is made: expected a smoother signal, or laws "
         "that fall less steeply"
@@ -111,31 +111,25 @@ class AxialTorsional(StringModel):
 
     # -- the record of C -----------------------------------------------------------------------------------------------
 
-    def _array(self, name, values):
-        """Give C an array under a name of its struct."""
-        whole = np.asarray(values).dtype.kind in "ib"
-        array = self._kept[name] = np.array(values, dtype=np.int32 if whole else float, order="C")
-        setattr(self._m, name, (self.integers if whole else self.doubles)(array))
-
     def _set_chain(self):
         m, chain, n = self._m, self._chain, self._dofs
         nodes = len(chain.depths)
         m.nodes, m.dofs, m.hanging_top = nodes, n, chain.hanging_top
         m.at_end = self.scene.discs is not None
         for name in ("mass", "mass_off", "drag", "drag_off", "spring", "hanging"):
-            self._array(name, getattr(chain, name))
-        for name in (*_STATE, "a", "o", "rho", "b", "y", "c"):
-            self._array(name, np.zeros((nodes, n)))
+            self._array(m, name, getattr(chain, name))
+        for name in ("x", "v", "w", "force", "a", "o", "rho", "b", "y", "c"):
+            self._array(m, name, np.zeros((nodes, n)))
         for name, width in (("limit", 3), ("q", 4), ("d", 3), ("guess", 2 * n)):
-            self._array(name, np.zeros((nodes, width)))
+            self._array(m, name, np.zeros((nodes, width)))
         for name in ("mask", "broken", "held"):
-            self._array(name, np.zeros(nodes, dtype=np.int32))
+            self._array(m, name, np.zeros(nodes, dtype=np.int32))
 
     def _set_wall(self, friction):
         m, wall = self._m, self._chain.wall
         m.pieces, m.fixed = len(wall.element), self._dofs == 1
         for name, values in vars(wall).items():
-            self._array(name, values)
+            self._array(m, name, values)
         self._wall, m.of_rotation, _ = law_of(friction)
         self._laws = [InC(self._ffi, self._wall)]
         self._laws[0].put(*(self._ffi.addressof(m[0], name) for name in ("wall", "curve")))
@@ -295,7 +289,7 @@ class AxialTorsional(StringModel):
 
     def memory(self) -> dict:
         m = self._m
-        found = super().memory() | {name: self._kept[name].copy() for name in (*_STATE, "held")}
+        found = super().memory()
         found["sums"] = np.array([getattr(m.sums, name) for name in _SUMS])
         found["ends"] = np.array([*((m.top[i].error, m.top[i].force) for i in (0, 1))]).ravel()
         found["bit"] = np.array([*(getattr(m.bit, name) for name in _BIT), *m.bit.recorded])
@@ -307,8 +301,6 @@ class AxialTorsional(StringModel):
     def recall(self, memory: dict) -> None:
         super().recall(memory)
         m = self._m
-        for name in (*_STATE, "held"):
-            self._kept[name][:] = memory[name]
         for name, value in zip(_SUMS, memory["sums"], strict=True):
             setattr(m.sums, name, value)
         for i, (error, force) in enumerate(np.reshape(memory["ends"], (2, 2))):

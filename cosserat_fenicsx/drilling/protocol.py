@@ -48,12 +48,19 @@ class StringModel(Pointers):
     dt: float
     depths: np.ndarray
     counts: dict[str, int]
-    # Message of a step that fails, with {time}.
+    # Message of a step that fails, with {time}; names of the arrays that change in a step.
     _failure: str
+    _changing: tuple[str, ...]
 
     def __init__(self):
         super().__init__(*SOURCES)
-        self.steps, self._laws, self._sampler, self._top = 0, [], None, None
+        self.steps, self._laws, self._sampler, self._top, self._kept = 0, [], None, None, {}
+
+    def _array(self, record, name, values):
+        """Give C's record a copy of an array, which is kept by its name."""
+        whole = np.asarray(values).dtype.kind in "ib"
+        array = self._kept[name] = np.array(values, dtype=np.int32 if whole else float, order="C")
+        setattr(record, name, (self.integers if whole else self.doubles)(array))
 
     def _set_sampler(self, drive, top):
         """Take the samples of a `SampledControl`; `top`: C's record that holds the torque `given` by the drive."""
@@ -110,9 +117,12 @@ class StringModel(Pointers):
 
     def memory(self) -> dict[str, Any]:
         """All that later steps depend on, arrays and numbers, such that `recall` leads to the same digits."""
-        return {"control": self._sampler.state.copy(), "given": self._top.given} if self._sampler else {}
+        found = {name: self._kept[name].copy() for name in self._changing}
+        return found | ({"control": self._sampler.state.copy(), "given": self._top.given} if self._sampler else {})
 
     def recall(self, memory: dict[str, Any]) -> None:
         """Restore the result of `memory`."""
+        for name in self._changing:
+            self._kept[name][:] = memory[name]
         if self._sampler:
             self._sampler.state, self._top.given = memory["control"].copy(), float(memory["given"])

@@ -111,15 +111,12 @@ static double settle(model *m, int d)
     for (int i = 0; i <= last; i++) {
         const double sinking = i == last && d < n - 1 && on_rigid(m) ? m->bit.sinking : 0;
         change[i * n] = m->held[i] & mask ? sinking - v[i * n] : 0;
+        pivot[i * n] = (i == 0 && rigid) || m->held[i] & mask ? 0 : mass[i * n]; /* 0 where a node is held */
         moves |= change[i * n] != 0;
     }
     if (!moves) return 0;
-    /* pivots of free nodes; 0 where a node is held */
-    for (int i = 0; i <= last; i++) {
-        pivot[i * n] = 0;
-        if ((i == 0 && rigid) || m->held[i] & mask) continue;
-        pivot[i * n] = mass[i * n];
-        if (!i) continue;
+    for (int i = 1; i <= last; i++) {
+        if (!pivot[i * n]) continue;
         const double before = pivot[(i - 1) * n], o = off[(i - 1) * n];
         if (before) pivot[i * n] -= o * o / before;
         change[i * n] -= before ? o / before * change[(i - 1) * n] : o * change[(i - 1) * n];

@@ -141,9 +141,8 @@ def _long_enough(parts, dt):
     return parts, short
 
 
-# Numbers and arrays of C that change in a step.
+# Numbers of C that change in a step.
 _NUMBERS = ("drive_speed", "integral", "bit_speed", "last_on_bit", "work", "at_bit", "at_wall", "in_mud", "iterations")
-_CHANGING = ("down", "up", "down_kept", "up_kept", "speed", "angle", "torque", "moment", "last_speed", "last_moment")
 
 
 class TorsionWaves(StringModel):
@@ -166,6 +165,8 @@ class TorsionWaves(StringModel):
     """
 
     name, _failure = "torsion", "a number was not finite at t = {time:.6g} s"
+    _changing = ("down", "up", "down_kept", "up_kept", "speed", "angle", "torque", "moment", "last_speed",
+                 "last_moment")  # fmt: skip
 
     def __init__(self, scene, dt=None, elements=None, *, normal_force=None):
         super().__init__()
@@ -254,18 +255,18 @@ class TorsionWaves(StringModel):
 
     def _allocate(self):
         cells, scene, n = self.cells, self.scene, len(self.cells.time)
-        self._filtered = filtered = np.flatnonzero(cells.time > 1.25 * cells.dt).astype(np.int32)
-        sizes = {"down": n, "up": n, "down_kept": len(filtered), "up_kept": len(filtered)}
-        self._changing = {name: np.zeros(sizes.get(name, n + 1)) for name in _CHANGING}
+        filtered = np.flatnonzero(cells.time > 1.25 * cells.dt).astype(np.int32)
         self.c = c = self._ffi.new("waves *")
         c.cells, c.filters, c.dt = n, len(filtered), self.dt
-        c.filtered = self.integers(filtered)
         for name, array in (
-            ("above", self._above), ("below", self._below), ("share", self.dt / (4 * cells.impedance)),
-            ("turn", cells.turn[filtered]), ("drag", self._drag), ("hold", self._hold), ("slide", self._slide),
-            ("decay", self._decay), ("grip", self._grip), ("reach", self._reach), *self._changing.items(),
+            ("filtered", filtered), ("above", self._above), ("below", self._below), ("turn", cells.turn[filtered]),
+            ("share", self.dt / (4 * cells.impedance)), ("drag", self._drag), ("hold", self._hold),
+            ("slide", self._slide), ("decay", self._decay), ("grip", self._grip), ("reach", self._reach),
         ):  # fmt: skip
-            setattr(c, name, self.doubles(array))
+            self._array(c, name, array)
+        sizes = {"down": n, "up": n, "down_kept": len(filtered), "up_kept": len(filtered)}
+        for name in self._changing:
+            self._array(c, name, np.zeros(sizes.get(name, n + 1)))
         drive, bit = scene.drive, scene.bit
         c.bit, c.drive_inertia = bit is not None, drive.inertia
         self._set_sampler(drive, c)
@@ -281,14 +282,14 @@ class TorsionWaves(StringModel):
 
     def _set_steady(self, speed):
         """A steady start at the drive's speed (rad/s), twisted by friction and drag."""
-        cells, now, c = self.cells, self._changing, self.c
+        cells, now, c = self.cells, self._kept, self.c
         law = np.where(self._hold > 0, self._grip * self._wall(speed * self._reach), 0.0)
         if self._law is not None:
             law[-1] = self._law(speed)
         above = np.cumsum((law + self._drag * speed)[::-1])[::-1]  # handed down to the nodes
         torque, Z = above[1:], cells.impedance
         now["down"][:], now["up"][:] = torque + Z * speed, torque - Z * speed
-        filtered = self._filtered
+        filtered = now["filtered"]
         kept = np.sqrt((1 - cells.turn) / (1 + cells.turn))[filtered]  # of what passes a filter unchanged
         now["down_kept"][:], now["up_kept"][:] = kept * now["down"][filtered], kept * now["up"][filtered]
         now["speed"][:] = now["last_speed"][:] = speed
@@ -304,7 +305,7 @@ class TorsionWaves(StringModel):
         return {"halved": 0, "iterations": int(self.c.iterations)}
 
     def _at_drive(self):
-        return self.c.drive_speed, self._changing["angle"][0], self._changing["moment"][0]
+        return self.c.drive_speed, self._kept["angle"][0], self._kept["moment"][0]
 
     def _record(self, steps, records):
         signal, dt, buffer = self._signal, self.dt, self._ffi.from_buffer
@@ -318,7 +319,7 @@ class TorsionWaves(StringModel):
     def profile(self) -> np.ndarray:
         # speeds and torques are means over the last two steps; a bit that sticks counts, too
         found = np.full((len(PROFILE), len(self.depths)), np.nan)
-        now = self._changing
+        now = self._kept
         speed, torque = ((now[f"last_{name}"] + now[name]) / 2 for name in ("speed", "moment"))
         sticking = (self._hold > 0) & (now["last_speed"] == 0) & (now["speed"] == 0)
         for name, values in (("angle", now["angle"]), ("speed", speed), ("torque", torque), ("sticking", sticking)):
@@ -327,13 +328,10 @@ class TorsionWaves(StringModel):
 
     def memory(self) -> dict:
         numbers = {name: getattr(self.c, name) for name in _NUMBERS}
-        arrays = {name: array.copy() for name, array in self._changing.items()}
-        return {"steps": self.steps} | numbers | arrays | super().memory()
+        return {"steps": self.steps} | numbers | super().memory()
 
     def recall(self, memory: dict) -> None:
         super().recall(memory)
-        for name, array in self._changing.items():
-            array[:] = memory[name]
         for name in _NUMBERS:
             setattr(self.c, name, memory[name])
         self.steps = int(memory["steps"])
