@@ -124,8 +124,13 @@ def _running(store, scene):
     """
     asked, head = store.head["asked"], store.head
     running = model_of(scene, asked["model"], asked["dt"], asked["elements"])
-    for name, value in (("model", running.name), ("dt", running.dt), ("depths", running.depths)):
-        if value != head[name] if name == "model" else not _alike(value, head[name]):
+    alike = {
+        "model": running.name == head["model"],
+        "dt": _alike(running.dt, head["dt"]),
+        "depths": _alike(running.depths, head["depths"]),
+    }
+    for name, same in alike.items():
+        if not same:
             raise SceneError(
                 f"{store.place}: the {name} of its motion differs from this release: expected a new motion by "
                 "drilling.simulate"

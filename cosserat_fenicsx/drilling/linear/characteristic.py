@@ -33,9 +33,26 @@ class Characteristic:
     """Base of characteristic functions, see roots.py.
 
     Attributes:
-        guides: the waveguides that move. spacing: typical distance of roots along the imaginary axis, rad/s.
-        exponents: see roots.py. fastest: a growth rate that no root reaches, 1/s.
+        guides: the waveguides that move. delay: of the function, s. fastest: a growth rate that no root reaches, 1/s.
     """
+
+    delay = 0.0
+
+    @property
+    def travel(self):
+        """Travel time of waves from the top to the bit, of all guides together, s."""
+        return sum(guide.travel for guide in self.guides)
+
+    @property
+    def spacing(self):
+        """Typical distance of roots along the imaginary axis, rad/s."""
+        return 2 * math.pi / (2 * self.travel + self.delay)
+
+    @property
+    def exponents(self):
+        """See roots.py."""
+        travel = self.travel
+        return -travel - self.delay, travel
 
     def motion(self, s):
         """Relative motion of the bit in each guide: rotation, and axial velocity where there is some."""
@@ -52,14 +69,6 @@ class FallingTorque(Characteristic):
     def __call__(self, s):
         om, B, dom, dB = self.torsion.bit(s)
         return B + self.kappa * om, dB + self.kappa * dom
-
-    @property
-    def spacing(self):
-        return math.pi / self.torsion.travel
-
-    @property
-    def exponents(self):
-        return -self.torsion.travel, self.torsion.travel
 
     @property
     def fastest(self):
@@ -98,7 +107,6 @@ class Regenerative(Characteristic):
 
     @property
     def delay(self):
-        """s."""
         return 2 * math.pi / (self.blades * self.speed)
 
     def _memory(self, s):
@@ -122,15 +130,6 @@ class Regenerative(Characteristic):
         ka, kt = self.ka, self.kt * self.penetration / self.speed
         cut, dcut = ka * v * T - kt * om * A, ka * (dv * T + v * dT) - kt * (dom * A + om * dA)
         return q * A * T + e * cut, q * (dA * T + A * dT) + de * cut + e * dcut
-
-    @property
-    def spacing(self):
-        return 2 * math.pi / (2 * self.torsion.travel + 2 * self.axial.travel + self.delay)
-
-    @property
-    def exponents(self):
-        travel = self.torsion.travel + self.axial.travel
-        return -travel - self.delay, travel
 
     @property
     def fastest(self):
