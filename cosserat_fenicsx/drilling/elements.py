@@ -233,14 +233,14 @@ class AxialTorsional(StringModel):
     def _at_drive(self):
         return self._kept["v"][0, -1], self._kept["x"][0, -1], self._top.force
 
-    def _record(self, steps, records):
-        rows, start = intervals(self._signals, (self.steps, self.steps + steps), self.dt), self.steps
+    def _record(self, steps, rows):
+        parts, start = intervals(self._signals, (self.steps, self.steps + steps), self.dt), self.steps
         if self._axial:
-            rows[:, [1, 3]] *= -1  # the hook's speed is positive upwards
-        for part in [rows] if self.end is None else rows[:, None]:
+            parts[:, [1, 3]] *= -1  # the hook's speed is positive upwards
+        for part in [parts] if self.end is None else parts[:, None]:
             if self.end is not None:
                 self._take(self.end.begin(self, part[0, 0]))
-            cast, out = self._ffi.cast, records[self.steps - start :]
+            cast, out = self._ffi.cast, rows[self.steps - start :]
             done = self._lib.advance_elements(
                 self._m, len(part), cast("double *", part.ctypes.data), cast("double *", out.ctypes.data)
             )

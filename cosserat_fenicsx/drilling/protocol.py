@@ -83,18 +83,17 @@ class StringModel(Pointers):
             NotConverged: a step fails however short it is; `rows` of the exception holds the steps before.
         """
         start, last, sampler = self.steps, self.steps + steps, self._sampler
-        records = np.full((steps, len(SERIES) + len(LEDGER)), np.nan)
-        failed = False
+        rows, failed = np.empty((steps, 1 + len(SERIES) + len(LEDGER))), False
         while self.steps < last and not failed:
             end = last
             if sampler:
                 if self.steps % sampler.every == 0:
                     self._top.given = sampler.torque(self.time, *map(float, self._at_drive()))
                 end = min(last, self.steps + sampler.left(self.steps))
-            self._record(end - self.steps, records[self.steps - start :])
+            self._record(end - self.steps, rows[self.steps - start :])
             failed = self.steps < end
-        times = np.arange(start + 1, self.steps + 1) * self.dt
-        rows = np.column_stack([times, records[: len(times)]])
+        rows = rows[: self.steps - start]
+        rows[:, 0] = np.arange(start + 1, self.steps + 1) * self.dt
         for law in self._laws:
             law.raise_failure()
         if failed:
@@ -107,8 +106,8 @@ class StringModel(Pointers):
         """Speed (rad/s) and angle (rad) of the drive, and the torque (N m) that it hands down."""
         raise NotImplementedError
 
-    def _record(self, steps, records):
-        """Do up to so many steps, with their `records` (n, len(SERIES) + len(LEDGER)), and count them."""
+    def _record(self, steps, rows):
+        """Do up to so many steps, count them, and write their `rows`, see `advance`, but for the times."""
         raise NotImplementedError
 
     def profile(self) -> np.ndarray:

@@ -300,7 +300,7 @@ static void write_record(const model *m, double *row)
 
 /* Do intervals, rows (h, velocities asked for at the begin, at the end, whether a record is written). Returns how many
    were done; of one that fails nothing, or its first parts, have been done, which nobody may use. */
-int advance_elements(model *m, int intervals, const double *interval, double *record)
+int advance_elements(model *m, int intervals, const double *interval, double *rows)
 {
     const int n = m->dofs;
     for (int i = 0; i < intervals; i++, interval += 2 + 2 * n) {
@@ -331,8 +331,8 @@ int advance_elements(model *m, int intervals, const double *interval, double *re
             }
         }
         if (interval[1 + 2 * n] != 0) {
-            write_record(m, record);
-            record += 19;
+            write_record(m, rows + 1); /* after the time */
+            rows += 20;
         }
     }
     return intervals;

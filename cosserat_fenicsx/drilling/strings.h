@@ -117,8 +117,8 @@ typedef struct {
     long long inner;                /* iterations for the slips that belong to forces */
 } model;
 
-int advance_waves(waves *w, int steps, const double *speeds, double *record);
-int advance_elements(model *m, int intervals, const double *interval, double *record);
+int advance_waves(waves *w, int steps, const double *speeds, double *rows);
+int advance_elements(model *m, int intervals, const double *interval, double *rows);
 void limits(model *m);
 int build(model *m, double h);
 double steepest(model *m, double h);

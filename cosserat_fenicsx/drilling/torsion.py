@@ -307,14 +307,14 @@ class TorsionWaves(StringModel):
     def _at_drive(self):
         return self.c.drive_speed, self._kept["angle"][0], self._kept["moment"][0]
 
-    def _record(self, steps, records):
+    def _record(self, steps, rows):
         signal, dt, buffer = self._signal, self.dt, self._ffi.from_buffer
         if signal.constant:
             speeds = np.full(steps, signal(0.0))
         else:
             speeds = np.array([signal.mean(n * dt, (n + 1) * dt) for n in range(self.steps, self.steps + steps)])
-        records = buffer("double[]", records, require_writable=True)
-        self.steps += self._lib.advance_waves(self.c, steps, buffer("double[]", speeds), records)
+        rows = buffer("double[]", rows, require_writable=True)
+        self.steps += self._lib.advance_waves(self.c, steps, buffer("double[]", speeds), rows)
 
     def profile(self) -> np.ndarray:
         # speeds and torques are means over the last two steps; a bit that sticks counts, too
