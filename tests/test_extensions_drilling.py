@@ -300,5 +300,5 @@ def test_controls_that_fail_are_refused_in_words():
 
     with pytest.raises(cf.SceneError, match=r"Changing.torque = .*expected a state of 0 numbers at t = 0 s"):
         cf.drilling.simulate(scene(control=Changing(), inertia=2000.0), 1.0)
-    with pytest.raises(cf.SceneError, match="expected that of the drive .* for a sampled control"):
+    with pytest.raises(cf.SceneError, match="expected the drive's own .* for a sampled control"):
         scene(control=Changing())
