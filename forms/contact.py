@@ -6,8 +6,8 @@ nearest point of the tube's axis, its tangent and its curvature vector are data.
 
 import ufl
 
-# Below this fraction of the tube's radius the distance from the axis counts as that: on the axis the radial direction
-# is undefined. Only a ring without clearance, which is held there elastically, touches something so close to it.
+# Lower bound of the distance from the axis over the tube's radius, since the radial direction is undefined on the axis.
+# Only a ring without clearance, which is held there elastically, touches so close to it.
 _ON_AXIS = 1e-10
 
 

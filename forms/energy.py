@@ -21,19 +21,10 @@ Configuration = namedtuple("Configuration", "r_s q q_s")
 Variation = namedtuple("Variation", "r q r_s q_s")
 
 
-def stretch_and_shear(line, section):
-    """v - v_R with directors that are not normalised, material."""
-    return section.R_R.T * (directors(line.q).T * line.r_s) - section.v_R
-
-
-def bending_and_torsion(line, section):
-    """u - u_R with q not normalised, material."""
-    return section.R_R.T * (2 * conjugate_product(line.q, line.q_s))
-
-
 def strains(line, section):
     """(v - v_R, u - u_R) with directors and q not normalised, material."""
-    return stretch_and_shear(line, section), bending_and_torsion(line, section)
+    e = section.R_R.T * (directors(line.q).T * line.r_s) - section.v_R
+    return e, section.R_R.T * (2 * conjugate_product(line.q, line.q_s))
 
 
 def turned(q, dq):

@@ -25,7 +25,7 @@ Inertia = namedtuple("Inertia", "mass I_R offset lateral", defaults=(None, None)
 
 
 def lateral(direction, a, b):
-    """What the virtual work mass a . b lacks for a mass that does not move along a fixed `direction`, see `Inertia`."""
+    """Correction of the virtual work mass a . b where a mass does not move along a fixed `direction`, see `Inertia`."""
     return 0 if direction is None else -ufl.dot(direction, a) * ufl.dot(direction, b)
 
 

@@ -101,12 +101,11 @@ def stress(law, e, k):
 
 def energy(law, e, k):
     """Strain energy per length."""
-    n, m = stress(law, e, k)
-    return (ufl.dot(e, n) + ufl.dot(k, m)) / 2
+    return power(law, e, k) / 2
 
 
 def power(law, e, k):
-    """Power dissipated by a viscous law at the strain rates e and k, per unit length."""
+    """e . n + k . m per unit length: of strain rates, the power that a viscous law dissipates."""
     n, m = stress(law, e, k)
     return ufl.dot(e, n) + ufl.dot(k, m)
 

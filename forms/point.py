@@ -3,6 +3,7 @@
 from functools import cached_property
 
 import ufl
+from cosserat_fenicsx.forms.equilibrium import VirtualMotion
 
 NONE = ufl.as_vector([0, 0, 0])
 AXES = tuple(ufl.as_vector([float(i == j) for j in range(3)]) for i in range(3))
@@ -81,8 +82,6 @@ def variation(work, point, test, direction):
 
 def resultants(work, point):
     """Force and moment of a virtual work, inertial: the factors of phi_r and phi in it."""
-    from cosserat_fenicsx.forms.equilibrium import VirtualMotion
-
     force = [work(point, VirtualMotion(axis, NONE, NONE, NONE)) for axis in AXES]
     moment = [work(point, VirtualMotion(NONE, axis, NONE, NONE)) for axis in AXES]
     return ufl.as_vector(force), ufl.as_vector(moment)

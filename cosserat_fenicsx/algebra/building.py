@@ -56,7 +56,7 @@ def module(*sources):
 def begin():
     """Let a thread compile the files of this folder where they are not; the caller has forms compiled meanwhile.
 
-    Whatever fails there, `module` will tell.
+    `module` reports any failure.
     """
     with contextlib.suppress(Exception):
         name, *task = _task(SOURCES)
@@ -109,8 +109,8 @@ def _build(name, folder, sources, header, flags):
         raise cffi.VerificationError(str(problem)) from problem
     if done.returncode:
         lines = done.stderr.strip().splitlines() or [f"{command[0]}: exit code {done.returncode}"]
-        told = (line for line in lines if "error" in line or "failed" in line)  # ld's words come before gcc's
-        raise cffi.VerificationError(next(told, lines[0]))
+        causes = (line for line in lines if "error" in line or "failed" in line)  # ld's come before gcc's
+        raise cffi.VerificationError(next(causes, lines[0]))
     return made
 
 

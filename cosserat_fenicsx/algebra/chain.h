@@ -1,10 +1,10 @@
-/* What Python sees of chain.c and newton.c; read by cffi too, so declarations alone. Frames and units are those of the
-   forms: all numbers are dimensionless. Arrays belong to numpy. */
+/* Declarations of the C code of this folder, for C and for cffi. Frames and units are those of the forms: all numbers
+   are dimensionless. Arrays belong to numpy. */
 
 #ifndef CHAIN_H
 #define CHAIN_H
 
-/* Values of a Function that change: the numbers of an element go into its packed coefficients from a column on. */
+/* Values of a Function that change, and the first column of an element's packed coefficients that takes them. */
 typedef struct {
     const double *values;
     const int *which; /* (elements, count) */
@@ -14,7 +14,7 @@ typedef struct {
 /* A compiled form or expression with the coefficients of all elements. */
 typedef struct kernel {
     void *tabulate;                /* FFCx's function for one element */
-    int elements, size, width;     /* numbers that it returns, and that it takes, for an element */
+    int elements, size, width;     /* sizes of its result and of the coefficients of an element */
     double *w, *c;                 /* coefficients (elements, width), constants */
     int sources, constants;
     source *source;
@@ -23,7 +23,7 @@ typedef struct kernel {
     const double *x;               /* (points, 3) the mesh's geometry */
     const int *corners;            /* (elements, 2) */
     double *A;                     /* (size,) work space */
-    struct kernel *next;           /* a part of the same form, whose numbers are added; 0 for none */
+    struct kernel *next;           /* another part of the same form, which is added; or 0 */
 } kernel;
 
 /* Elimination of the unknowns of elements in turn, along the rods. A segment is a run of elements that share unknowns

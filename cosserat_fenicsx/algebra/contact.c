@@ -195,8 +195,8 @@ int settle(contact *c)
     return c->most;
 }
 
-/* Whether the normal forces are other than those of the motion, which is given, or a node has crossed the axis while it
-   touches: an iteration may settle on a motion that is none. */
+/* Whether the normal forces differ from those of the given motion, or a node has crossed the axis while it touches: the
+   iteration may converge to a spurious motion. */
 int broken(const contact *c)
 {
     for (int i = 0; i < c->nodes; i++) {
@@ -223,8 +223,8 @@ double stored(const contact *c, int at_start)
 }
 
 /* Energy that friction and damping took in a step whose forces are those of its end: by the mean of both ends, but no
-   less than zero at a node. A force that begins or ends in the step is no source of energy; what the scheme errs there
-   is left to the balance. before: the law's numbers at the start. The motion is given. */
+   less than zero at a node. A force that begins or ends in the step is no source of energy; the error of the scheme
+   there remains in the energy balance. before: `law` at the start. The motion is given. */
 double lost(const contact *c, const double *before)
 {
     double sum = 0;

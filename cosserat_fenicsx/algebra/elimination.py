@@ -278,7 +278,7 @@ class _Dense(Pointers):
         matrix = scale[:, None] * matrix * scale
         units = 2 * float(np.log(scale).sum())
         with contextlib.suppress(np.linalg.LinAlgError):
-            # of small eigenvalues it tells the sign more accurately than their values do
+            # more accurate than eigenvalues in the signs of small ones
             factor = np.linalg.cholesky(matrix)
             return 0, 0, 2 * float(np.log(np.diag(factor)).sum()) - units
         values = np.linalg.eigvalsh(matrix)

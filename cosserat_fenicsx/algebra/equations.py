@@ -1,4 +1,4 @@
-"""Base of equilibrium and time step problems: residual, tangent and its inverse in C, with what Python adds."""
+"""Base of equilibrium and time step problems: residual, tangent and its inverse in C, with hooks in Python."""
 
 import weakref
 from functools import cache
@@ -9,13 +9,13 @@ from mpi4py import MPI
 from cosserat_fenicsx.algebra.building import Pointers, module
 from cosserat_fenicsx.algebra.elimination import condensed
 
-#: What C asks Python for, see newton.c.
+#: Hooks: requests of C to Python, see newton.c.
 STATE, RESIDUAL, TANGENT, INTERFACE, ADD_UP, SUM, MATRICES, COUNT, CONTACT = (1 << k for k in range(9))
 
 
 @cache
 def _hook():
-    """Let C call `Called.called`."""
+    """Let C call `Called._answer`."""
     ffi, _ = module()
 
     def keep(kind, failure, trace):  # C cannot pass it on; Ctrl-C is raised here as soon as Python is entered
@@ -31,10 +31,10 @@ def _hook():
 
 
 class Called(Pointers):
-    """An object that C asks for what Python has to do.
+    """An object whose hooks C calls.
 
     Attributes:
-        failure: the exception that has ended the last answer, if any.
+        failure: the exception raised by the last hook, if any.
     """
 
     def __init__(self):
@@ -57,7 +57,7 @@ class Equations(Called):
 
     Args:
         model: see `models.base.RodModel` for the protocol.
-        hooks: what of STATE, RESIDUAL and MATRICES Python changes, in addition to what this class needs.
+        hooks: those of STATE, RESIDUAL and MATRICES that a subclass needs in addition.
 
     Attributes:
         x, b: unknowns, residual; the model's state follows x.
@@ -178,7 +178,7 @@ class Equations(Called):
             self.interface.recall(memory["interface"])
         self.c.singular = 0
 
-    # -- what C asks for ---------------------------------------------------------------------------------------------
+    # -- hooks -------------------------------------------------------------------------------------------------------
 
     def _answer(self, what, a, b):
         numbering, ties = self.numbering, self.ties

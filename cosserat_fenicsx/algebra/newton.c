@@ -1,5 +1,5 @@
-/* Newton's method: the callbacks of PETSc's SNES. What only some problems have (constraint equations, other ranks, loads
-   that ask Python) is done by Python, in hooks. */
+/* Newton's method: the callbacks of PETSc's SNES, and the iterations of a time step. Hooks let Python add constraint
+   equations, exchange with other ranks, and evaluate loads. */
 #include "chain.h"
 
 #include <math.h>
@@ -58,7 +58,7 @@ int tangent(problem *p)
     return hook(p, TANGENT, 0, 0);
 }
 
-/* x with tangent * x = b; not numbers where it is singular. */
+/* x with tangent * x = b; NaN where it is singular. */
 int solve(problem *p, const double *b, double *x)
 {
     for (int i = 0; i < p->interfaces; i++) p->interface[i] = p->of_interface[i] < 0 ? 0 : b[p->of_interface[i]];
@@ -83,10 +83,10 @@ void advance(problem *p)
 
 /* ---- convergence ------------------------------------------------------------------------------------------------- */
 
-/* Whether the estimated error after a step of Newton's method is below what is allowed, from the step before.
+/* Whether the error estimated from two successive Newton steps is below `allowed`.
 
-   With the ratio c of the two the error is step * c/(1 - c) for linear convergence. Where convergence is quadratic the next
-   ratio is c^2 or less; the estimate is then multiplied by min(1, 100 c), with a margin. */
+   With their ratio c the error is step * c/(1 - c) for linear convergence. Where convergence is quadratic the next
+   ratio is c^2 or less, and the estimate is multiplied by min(1, 100 c), with a margin. */
 static int error_is_small(double step, double before, int quadratic, double allowed)
 {
     const double c = step / before;
@@ -109,7 +109,7 @@ static int motion_in(const stepping *s, const double *a, const double *b, double
     return 0;
 }
 
-/* Whether the iteration stops after an increment, and whether it goes on with a new tangent. */
+/* Decide after an increment whether to stop, and whether to continue with a new tangent. */
 static void judge_increment(stepping *s, double step, double before)
 {
     const double rate = s->iterations > 1 ? step / before : 1;
@@ -254,7 +254,8 @@ int attach(petsc *functions, newton *n, void *snes, void *vector, void *matrix, 
 {
     with = functions;
     return with->SNESSetFunction(snes, vector, snes_function, n)
-        || with->SNESSetJacobian(snes, matrix, matrix, snes_jacobian, n) || with->SNESSetConvergenceTest(snes, test, n, 0)
+        || with->SNESSetJacobian(snes, matrix, matrix, snes_jacobian, n)
+        || with->SNESSetConvergenceTest(snes, test, n, 0)
         || with->SNESSetApplicationContext(snes, n) || with->SNESSetUpdate(snes, update)
         || (pc && (with->PCShellSetContext(pc, n) || with->PCShellSetApply(pc, apply)));
 }

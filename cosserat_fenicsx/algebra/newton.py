@@ -147,9 +147,9 @@ class BorderedNewton(Newton):
 
     SNES solves for x alone. Where it applies the tangent's inverse, the bordered system is solved by block elimination
     (Keller, in: Applications of Bifurcation Theory, 1977, 359): with the tangent A, A d1 = R and A d2 = dR/deta the
-    step is -(d1 + d2 deta), and the plane gives deta. The load factor is updated with x, so that SNES's next residual
-    and tangent are those of the new (x, eta). Products with `normal` are the model's inner products over all ranks, so
-    that all ranks have the same load factor.
+    step is -(d1 + d2 deta), and the plane gives deta. The load factor eta is updated with x, so that SNES's next
+    residual and tangent are those of the new (x, eta). Products with `normal` are the model's inner products over all
+    ranks, so that all ranks have the same load factor.
 
     Where a motion is neutral (a buckled round column may rotate about its axis) the tangent is singular along the whole
     path; the component of each step along this null vector is removed.
@@ -204,7 +204,7 @@ class BorderedNewton(Newton):
             self._take_loads()
 
     def _leave_out_neutral(self, step):
-        """Remove the neutral motion from the step and from dx/d eta, and update it by inverse iteration."""
+        """Remove the neutral motion from the step and from dx/d load_factor, and update it by inverse iteration."""
         inner, motion = self.problem.model.inner, self.neutral
         force = self.problem.load_derivative(self.problem.x)
         force.array_w[:] = motion
@@ -217,7 +217,7 @@ class BorderedNewton(Newton):
 
     @property
     def slope(self):
-        """(owned unknowns,) dx/d eta at the last step of the last solve."""
+        """(owned unknowns,) dx/d load_factor at the last step of the last solve."""
         return -self._slope.array_r
 
     def motion_of(self, change):
@@ -271,7 +271,7 @@ class BorderedNewton(Newton):
         return problem.solve(force, motion) and math.isfinite(motion.norm())
 
     def slope_here(self, neutral=None):
-        """(owned unknowns,) dx/d eta at the problem's x and load factor, without the neutral motion.
+        """(owned unknowns,) dx/d load_factor at the problem's x and load factor, without the neutral motion.
 
         Raises:
             NotConverged: the tangent is singular.
@@ -287,7 +287,7 @@ class BorderedNewton(Newton):
         return self.slope
 
 
-# Smallest pivots beside a stiff wall, over those that are zero to rounding.
+# Factor on the zero pivot beside a stiff wall, where pivots of a slender rod are small.
 _SMALLER = 1e-2
 
 
@@ -306,8 +306,8 @@ class LimitedNewton:
     against a wall.
 
     The contact force that is carried at the Gauss points takes the same share of its step as the motion. A tangent that
-    is singular to rounding is solved with all the same: beside a stiff wall the pivots of a slender rod are as small,
-    and whoever takes the steps tests what is found by its balance.
+    is singular to rounding is used all the same, because pivots of a slender rod beside a stiff wall are as small; the
+    caller must check the result by its balance.
 
     Args:
         problem: a `Problem`.

@@ -66,7 +66,7 @@ class Pencil:
         inertia); missing ones are located by bisection with this count.
 
         Returns:
-            (values (n,) ascending, vectors (size, n), rounding errors (n,) of the values as a rule), n <= count; values
+            (values (n,) ascending, vectors (size, n), typical rounding errors (n,) of the values), n <= count; values
             that are zero to rounding are 0.0.
 
         Raises:

@@ -1,5 +1,5 @@
-/* The sweep over load factors while steps are accepted at once: predictor, Newton's method, and the checks of
-   statics/path/load_control.py, to which any other step is left. */
+/* A sweep over load factors: predictor, Newton's method, and the checks of statics/path/load_control.py. A step that is
+   neither accepted nor halved is left to Python. */
 #include "chain.h"
 
 #include <math.h>
@@ -156,7 +156,7 @@ static int take(const sweep *s, double *numbers)
     return s->library->VecRestoreArrayRead(s->x, &x);
 }
 
-/* dx/d eta at numbers, where the state is; see `Problem.load_derivative`. */
+/* The derivative of x by the load factor at the state, whose unknowns are x; see `Problem.load_derivative`. */
 static int slope(const sweep *s, const double *x, double *out)
 {
     problem *p = s->newton->problem;

@@ -67,7 +67,7 @@ class TieRows:
         self._forget()
 
     def _forget(self):
-        """What was evaluated is of another state."""
+        """Discard what was evaluated at another state."""
         self._values = self._change = (None, None)
 
     @property

@@ -91,8 +91,7 @@ class Densities:
         points, and at the nodes for actions integrated there."""
         model, at_gauss = self._model, None
         if self._dead is not None:
-            factors = (float(factor.value) for factor in (model.load_factor, model.permanent_factor))
-            at_gauss = sum(factor * of_unit for factor, of_unit in zip(factors, self._dead, strict=True))
+            at_gauss, _ = self.at(float(model.load_factor.value))
         elif model.forms.density:
             at_gauss = self._at(model.forms.density, len(model.forms.gauss))
         if not model.forms.node_density:
@@ -134,7 +133,7 @@ class ActionTerms:
             term.fill(model, members, time)
 
     def at(self, t):
-        """Fill the Functions with the data at the time t (s); whether they differ from those before."""
+        """Fill the Functions with the data at the time t (s); returns whether they have changed."""
         return any([term.put(t) for term in self.terms if term.moves])
 
     @property
@@ -189,6 +188,7 @@ class Term:
             because the end-point rule gives each end half that length; 0 elsewhere.
         data, memory: Functions of the data, and of the memory (history variables).
         moves: whether any of its data depend on time.
+        compiled_evolution: the compiled `evolution`; None without memory.
         acting: (action, rod) of those that depend on time, with their values at the time of the last `put`.
     """
 
@@ -197,7 +197,7 @@ class Term:
         self.weight = self._function(1)
         self.data = [self._function(size) for size in kind.sizes]
         self.memory = [self._function(size) for size in kind.memory]
-        self._rest = self._frame = self._evolution = None
+        self._rest = self._frame = self.compiled_evolution = None
         # dolfinx makes an array of a Function anew whenever it is asked for one
         self._arrays = [f.x.array.reshape(-1, size) for f, size in zip(self.data, kind.sizes, strict=True)]
 
@@ -234,20 +234,14 @@ class Term:
         changed = [x for a in self.kind.evolve(point, *self.numbers) for x in (a if a.ufl_shape else [a])]
         return ufl.as_vector(changed), self._dof_places
 
-    def take_evolution(self, compiled):
-        """Take the compiled `evolution`."""
-        self._evolution = compiled
-
     # -- numbers -----------------------------------------------------------------------------------------------------
 
     @property
     def _dof_places(self):
         """Reference coordinates of the degrees of freedom of an element, in dolfinx's order."""
-        return self._gauss if self.kind.place == "line" else compat.element_nodes(self.weight.function_space)
-
-    @property
-    def _gauss(self):
-        return np.polynomial.legendre.leggauss(self._signature.points)[0] / 2 + 0.5
+        if self.kind.place == "line":
+            return np.polynomial.legendre.leggauss(self._signature.points)[0] / 2 + 0.5
+        return compat.element_nodes(self.weight.function_space)
 
     def fill(self, model, members, time):
         """Fill in the data of actions.
@@ -293,7 +287,7 @@ class Term:
         self._values = None
         self._delayed = {}
         self.put(0.0)
-        self._values = None  # so that the first step takes them for new, and checks them
+        self._values = None  # the first step then counts as a change, which is checked
         for k, function in enumerate(self.memory):
             for action, rod, rows, *_ in self._where:
                 function.x.array.reshape(-1, action.memory[k].size)[rows] = self._scaled(action.memory[k], rod)
@@ -314,7 +308,7 @@ class Term:
         return values_at(action, t) if delayed is None else {**values_at(action, t), **delayed.at(t)}
 
     def put(self, t):
-        """Fill in the data at the time t, s; whether they differ from those before."""
+        """Fill in the data at the time t, s; returns whether they have changed."""
         # on all ranks, since a user's function of time may communicate
         values = [self._values_of(action, t) for action, *_ in self._where]
         if values == self._values:
@@ -359,7 +353,7 @@ class Term:
 
     def commit(self):
         """Store the memory evaluated at the state."""
-        values = compat.evaluate(self._evolution, self._rods.mesh, np.arange(len(self._rods.cells), dtype=np.int32))
+        values = compat.evaluate(self.compiled_evolution, self._rods.mesh, np.arange(len(self._rods.cells), dtype=np.int32))
         sizes = self.kind.memory
         values = values.reshape(len(self._rods.cells), -1, sum(sizes))
         for function, part in zip(self.memory, np.split(values, np.cumsum(sizes)[:-1], axis=2), strict=True):

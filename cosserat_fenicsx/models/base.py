@@ -11,10 +11,13 @@ from mpi4py import MPI
 
 from cosserat_fenicsx import compat
 from cosserat_fenicsx.compat import compiling
+from cosserat_fenicsx.forms.equilibrium import Section
 from cosserat_fenicsx.forms.law import stiffness_for
 from cosserat_fenicsx.models.action_terms import ActionTerms, Densities
+from cosserat_fenicsx.models.compiled import compile_static
 from cosserat_fenicsx.models.connections import Clamps, Ties, ties_of
 from cosserat_fenicsx.models.rod_data import (
+    as_matrix,
     bending_lengths,
     bounded,
     fill_fields,
@@ -62,14 +65,15 @@ class RodModel:
     """Spaces, data and forms of one `Signature`; `load` fills in the data of a scene. Subclasses are the models.
 
     Attributes:
-        state: Function of the unknowns (nodal ones, and those that the formulation adds), clamped nodes included.
+        state: Function of the unknowns (nodal, and of the formulation), clamped nodes included.
         before, step: the state before a Newton step and the step, for `advance`.
         carried: Functions updated after each Newton step together with the unknowns: n at the Gauss points, or ().
         carried_dofs: (local elements, n) places of an element's carried numbers.
         carries_force: whether n is not a function of the motion alone; force_is_unknown: whether it is a field of
             unknowns.
         force_nodes: reference coordinates of the nodes of n, where n is an unknown.
-        load_factor: the Constant eta; permanent_factor: that of permanent loads, 1 except while they are applied.
+        load_factor: Constant, the factor of loads and prescribed motions; permanent_factor: Constant, the factor of
+            permanent loads, 1 except while they are applied.
         actions: the `ActionTerms` with the data of all actions; densities: their `Densities`.
         forms: the `CompiledForms`.
         slots: (n,) the scene's number of every local node; the first `owned_nodes` belong to this rank.
@@ -117,7 +121,7 @@ class RodModel:
 
     def _compile(self, spaces):
         """The `CompiledForms`; `spaces` of the second variations."""
-        raise NotImplementedError
+        return compile_static(self, spaces)
 
     def _section_data(self, data):
         """`RodData` in the form that the model's forms use."""
@@ -125,7 +129,7 @@ class RodModel:
 
     def cross_section(self):
         """The `equilibrium.Section` of the model's data, UFL."""
-        raise NotImplementedError
+        return Section(self.data.law, as_matrix(self.data.R_R), self.data.v_R)
 
     def motion_of(self, w, nodal):
         """The `equilibrium.Motion` of unknowns w; nodal: the same, or an alias for other quadrature rules."""
@@ -152,7 +156,7 @@ class RodModel:
         return n
 
     def fields_of(self, n, m, r_s):
-        """The same of n, m and r'; None where results follow from statics."""
+        """The components of n, m and r' that do not vanish, for results; None where these follow from statics."""
         return ufl.as_vector([*n, *m, *r_s])
 
     def _at_rest(self):
@@ -224,7 +228,7 @@ class RodModel:
         self.forms = self._compile(spaces)
         evolutions = compat.expressions(self.mesh, [term.evolution(point) for term, point in self.evolving])
         for (term, _), compiled in zip(self.evolving, evolutions, strict=True):
-            term.take_evolution(compiled)
+            term.compiled_evolution = compiled
         self.rule = ElementRule(self.nodes, self.forms.gauss, self.forms.weights)
         self._prepare_variations(spaces)
         self.clamps = Clamps(self)

@@ -1,4 +1,4 @@
-"""Supports and joints on a layout: where they act, their constraint equations, and what clamped points are held with.
+"""Supports and joints on a layout: where they act, their constraint equations, and the reactions of clamped points.
 
 Every equation c = 0 is a function of the position and the rotation of one or two nodes (forms/ties.py); its multiplier
 lambda is the reaction. Derivatives are by small displacements and small inertial rotations, which every model maps to
@@ -218,7 +218,7 @@ class Ties:
     def _see(self, rq, load_factor):
         self._motion[:-1] = rq
         self._rows[:, : eq.MOTION] = self._motion.take(self._nodes, axis=0).reshape(-1, eq.MOTION)
-        self._rows[:, -2] = load_factor
+        self._rows[:, eq.PLACES["load_factor"]] = load_factor
 
     def evaluate(self, rq, load_factor):
         """Values at (r, q) (tied nodes, 7) and a load factor.
@@ -241,7 +241,7 @@ class Ties:
         multipliers (ties,)."""
         found = np.zeros((len(self._turning), 144))
         self._see(rq, load_factor)
-        self._rows[:, -1] = multipliers
+        self._rows[:, eq.PLACES["multiplier"]] = multipliers[:, None]
         self._add_changes(self._rows[self._turning], found)
         return self.pattern.sums(found.reshape(-1, 2, 6, 2, 6), self._turning)
 

@@ -6,13 +6,12 @@ from dolfinx import cpp
 from cosserat_fenicsx import compat
 from cosserat_fenicsx.forms import determinate as eq
 from cosserat_fenicsx.forms import planar, spatial
-from cosserat_fenicsx.forms.equilibrium import Section
 from cosserat_fenicsx.forms.point import NONE, Point
 from cosserat_fenicsx.forms.rotation import rotation_matrix, rotation_vector
 from cosserat_fenicsx.models.base import RodModel
 from cosserat_fenicsx.models.compiled import along, compile_static
 from cosserat_fenicsx.models.planar import PlaneModel, in_space
-from cosserat_fenicsx.models.rod_data import as_matrix, gauss_function, moment, strain
+from cosserat_fenicsx.models.rod_data import gauss_function, moment, strain
 from cosserat_fenicsx.numerics import conjugate_product, directors
 
 
@@ -227,9 +226,6 @@ class DeterminateInSpace(_KnownForce):
 
     components, moves, turn = 4, 0, 2.0
     variations = ((3, False, lambda w: eq.tests_of(w, along(w))),)
-
-    def cross_section(self):
-        return Section(self.data.law, as_matrix(self.data.R_R), self.data.v_R)
 
     def motion_of(self, w, nodal):
         return spatial.motion_of(NONE, w, along(w), nodal)

@@ -128,7 +128,7 @@ class StepForms:
         return self.momentum(self.nodal, 2 * self.passed - self.rates)
 
     def of_moving_axis(self):
-        """What the balances have per length besides the rates of `momentum`; or None."""
+        """Terms of the balances per length in addition to the rates of `momentum`, or None."""
         return
 
     # -- forms -------------------------------------------------------------------------------------------------------
@@ -193,9 +193,8 @@ def compile_momentum(step, stress=inertia.averaged_stress):
     """The `MotionForms` of the momentum-conserving scheme; `stress` gives the virtual work of the stress."""
     model, dx, h = step.model, step.dx, step.model.h
     residual = 1 / h * step.momentum_after() * dx.nodes
-    besides = step.of_moving_axis()
-    if besides is not None:
-        residual += besides * dx.nodes
+    if (of_axis := step.of_moving_axis()) is not None:
+        residual += of_axis * dx.nodes
 
     def of_stress(test):
         return stress(step.before, step.after, step.middle, step.section, step.viscosity, h, test)
@@ -399,7 +398,7 @@ class Moving:
         rates[:] = 2 / h * (now - before) - rates
 
     def loads_at(self, t):
-        """Fill the forms' Functions with the loads at the time t (s); whether they differ from those before."""
+        """Fill the forms' Functions with the loads at the time t (s); returns whether they have changed."""
         return self.actions.at(t)
 
     def ties_at(self, t):

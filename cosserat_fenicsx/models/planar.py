@@ -8,7 +8,7 @@ import ufl
 from cosserat_fenicsx.forms import planar as eq
 from cosserat_fenicsx.forms.point import NONE
 from cosserat_fenicsx.models.base import RodModel
-from cosserat_fenicsx.models.compiled import along, compile_static
+from cosserat_fenicsx.models.compiled import along
 from cosserat_fenicsx.models.rod_data import turned
 
 
@@ -80,9 +80,6 @@ class PlanarModel(PlaneModel):
         (3, False, lambda w: eq.tests_of(w, along(w))),
         (3, True, lambda w: eq.sideways_tests_of(w, along(w))),
     )
-
-    def _compile(self, spaces):
-        return compile_static(self, spaces)
 
     def motion_of(self, w, nodal):
         return eq.motion_of(along(w), w[2], along(w)[2])

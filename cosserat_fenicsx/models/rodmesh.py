@@ -237,7 +237,7 @@ class RodMesh:
         function.x.array.reshape(-1, values.shape[2])[compat.cell_nodes(space)] = local
 
     def slots(self, space, degree):
-        """The scene's number of every local node of a degree-`degree` space, and its local number, both (nodes,)."""
+        """(nodes,) the scene's number of every local node of a space of this degree."""
         order = np.argsort(np.argsort(compat.element_nodes(space)))
         along = np.where(self.reversed[:, None], degree - order[None, :], order[None, :])
         slots = self.first_nodes(degree)[self.cell_rod][:, None] + self.cell_inner[:, None] * degree + along

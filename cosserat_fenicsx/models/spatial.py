@@ -8,21 +8,11 @@ import ufl
 from dolfinx import fem
 
 from cosserat_fenicsx import compat
-from cosserat_fenicsx.forms import equilibrium
 from cosserat_fenicsx.forms import spatial as eq
 from cosserat_fenicsx.forms.equilibrium import VirtualMotion
 from cosserat_fenicsx.forms.point import NONE
 from cosserat_fenicsx.models.base import RodModel
-from cosserat_fenicsx.models.compiled import (
-    CompiledForms,
-    action_work,
-    along,
-    compile_parts,
-    compile_static,
-    measures,
-    varied_actions,
-)
-from cosserat_fenicsx.models.rod_data import as_matrix
+from cosserat_fenicsx.models.compiled import CompiledForms, action_work, along, compile_parts, measures, varied_actions
 from cosserat_fenicsx.numerics import small_rotations
 
 
@@ -55,10 +45,7 @@ class SpatialModel(RodModel):
 
     def _compile(self, spaces):
         self.stiffness = fem.Constant(self.mesh, np.float64(1))  # of the second variation, see `stress_alone`
-        return compile_static(self, spaces)
-
-    def cross_section(self):
-        return equilibrium.Section(self.data.law, as_matrix(self.data.R_R), self.data.v_R)
+        return super()._compile(spaces)
 
     def motion_of(self, w, nodal):
         return eq.state_of(w, along(w), nodal)
