@@ -11,7 +11,7 @@ from cosserat_fenicsx.algebra.packed import Packed
 from cosserat_fenicsx.algebra.pencil import Pencil, constraint_rows, on_every_rank
 from cosserat_fenicsx.checks import instance, number, tolerance, whole
 from cosserat_fenicsx.errors import NotConverged, SceneError
-from cosserat_fenicsx.models.rod_data import check_inertia, nodal_inertia, nodal_lateral, nodal_offsets
+from cosserat_fenicsx.models.rod_data import check_inertia, nodal_inertia
 from cosserat_fenicsx.models.traits import traits_of
 from cosserat_fenicsx.numerics import directors, lobatto_weights
 from cosserat_fenicsx.progress import MeshProgress
@@ -211,15 +211,15 @@ def _mass(model, rows, size, unit):
         slots.append(first + p * np.arange(cells)[:, None] + np.arange(p + 1))
         first = slots[-1][-1, -1] + 1
     slots = np.concatenate(slots)
-    mass, J, frames = nodal_inertia(scene, layout, model.nodes)
-    T = directors(q[slots.ravel()]).reshape(frames.shape) @ frames
+    at_nodes = nodal_inertia(scene, layout, model.nodes)
+    T = directors(q[slots.ravel()]).reshape(at_nodes.frames.shape) @ at_nodes.frames
     w = sizes[:, None] * weights / unit
     block = np.zeros((*slots.shape, 6, 6))
-    block[..., [0, 1, 2], [0, 1, 2]] = (w * mass)[..., None]
-    block[..., 3:, 3:] = np.einsum("...ik,...k,...jk->...ij", T, J * (w / scales.length**2)[..., None], T)
-    lateral = nodal_lateral(scene, layout, model.nodes) * np.sqrt(w)[..., None]
+    block[..., [0, 1, 2], [0, 1, 2]] = (w * at_nodes.mass)[..., None]
+    block[..., 3:, 3:] = np.einsum("...ik,...k,...jk->...ij", T, at_nodes.J * (w / scales.length**2)[..., None], T)
+    lateral = at_nodes.lateral * np.sqrt(w)[..., None]
     if model.signature.eccentric:
-        _off_axis(block, nodal_offsets(scene, layout, model.nodes, mass), T @ frames.swapaxes(2, 3), w, scales.length)
+        _off_axis(block, at_nodes, T @ at_nodes.frames.swapaxes(2, 3), w, scales.length)
     block[..., :3, :3] -= lateral[..., :, None] * lateral[..., None, :]
     of_node = rows[slots]
     i, j = (np.broadcast_to(x, block.shape).ravel() for x in (of_node[..., :, None], of_node[..., None, :]))
@@ -227,14 +227,14 @@ def _mass(model, rows, size, unit):
     return sparse.csr_matrix((block.ravel()[free], (i[free], j[free])), shape=(size, size)).tobsr((6, 6))
 
 
-def _off_axis(block, offsets, R, w, length):
+def _off_axis(block, at_nodes, R, w, length):
     """Add to the mass matrices of nodes what mass centres off the axis contribute: z x rotation to their velocities.
 
     Args:
-        block: (elements, nodes, 6, 6); offsets: see `nodal_offsets`; R: rotations of the nodes; w: (elements, nodes)
+        block: (elements, nodes, 6, 6); at_nodes: the `NodalInertia`; R: rotations of the nodes; w: (elements, nodes)
             quadrature weights; length: the unit.
     """
-    z, more = np.einsum("...ij,...j->...i", R, offsets[0]) / length, R @ offsets[1] @ R.swapaxes(2, 3)
+    z, more = np.einsum("...ij,...j->...i", R, at_nodes.offset) / length, R @ at_nodes.apart @ R.swapaxes(2, 3)
     mass, across = block[..., 0, 0][..., None, None], np.cross(np.eye(3), z[..., None, :])  # across @ v = z x v
     block[..., :3, 3:], block[..., 3:, :3] = -mass * across, mass * across
     block[..., 3:, 3:] += mass * (across.swapaxes(2, 3) @ across) + more * (w / length**2)[..., None, None]

@@ -353,9 +353,8 @@ class Term:
 
     def commit(self):
         """Store the memory evaluated at the state."""
-        values = compat.evaluate(self.compiled_evolution, self._rods.mesh, np.arange(len(self._rods.cells), dtype=np.int32))
-        sizes = self.kind.memory
-        values = values.reshape(len(self._rods.cells), -1, sum(sizes))
+        sizes, cells = self.kind.memory, self._model._local_cells
+        values = compat.evaluate(self.compiled_evolution, self._rods.mesh, cells).reshape(len(cells), -1, sum(sizes))
         for function, part in zip(self.memory, np.split(values, np.cumsum(sizes)[:-1], axis=2), strict=True):
             function.x.array.reshape(-1, part.shape[2])[compat.cell_nodes(function.function_space)] = part
 

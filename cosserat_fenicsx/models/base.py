@@ -314,6 +314,7 @@ class RodModel:
             for rod, x in zip(scene.rods, layout.node_s(self.nodes), strict=True)
         ])  # fmt: skip
         data = rod_data(scene, layout, scales, self.rule, self.reference, coupled=self.signature.coupled)
+        self._in_space = data
         self.section = self._section_data(data)
         sizes = layout.sizes(scene) / scales.length
         lengths = bending_lengths(data, [rod.length / scales.length for rod in scene.rods], layout.counts)

@@ -35,9 +35,6 @@ from cosserat_fenicsx.models.rod_data import (
     law_data,
     law_of,
     nodal_inertia,
-    nodal_lateral,
-    nodal_offsets,
-    rod_data,
     viscous_values,
 )
 from cosserat_fenicsx.models.spatial import SpatialModel, spun
@@ -274,7 +271,7 @@ class Moving:
         damped: whether any rod has damping.
         offset: Function, the mass centre from the axis, along the inertial axes at rest; None in a scene without
             eccentric rods.
-        lateral: Function, see `rod_data.nodal_lateral`; None in a scene without such masses.
+        lateral: Function, see `rod_data.NodalInertia`; None in a scene without such masses.
         viscosity: the Functions of the law of the strain rates, as `rod_data.law_of` takes them.
         delays: the `Delays` of its actions.
     """
@@ -317,19 +314,17 @@ class Moving:
             np.tile(scene.origin(rod) / scales.length, (cells * self.signature.degree + 1, 1))
             for rod, cells in zip(scene.rods, layout.counts, strict=True)
         ])  # fmt: skip
-        mass, J, frames = nodal_inertia(scene, layout, self.nodes)
+        here = nodal_inertia(scene, layout, self.nodes)
         drags = [rod.damping.drag * self.time if rod.damping else 0.0 for rod in scene.rods]
         fill = partial(self.rods.fill, at_nodes=True)
-        fill(self.mass, mass[..., None] / heaviest)
-        inertia = self._section_inertia(J / (heaviest * scales.length**2), frames)
+        fill(self.mass, here.mass[..., None] / heaviest)
+        inertia = self._section_inertia(here.J / (heaviest * scales.length**2), here.frames)
         if self.offset is not None:
-            offset, more = nodal_offsets(scene, layout, self.nodes, mass)
-            fill(self.offset, offset / scales.length)
-            inertia = inertia + six_of(more / (heaviest * scales.length**2))
+            fill(self.offset, here.offset / scales.length)
+            inertia = inertia + six_of(here.apart / (heaviest * scales.length**2))
         fill(self.inertia, inertia)
         if self.lateral is not None:
-            directions = nodal_lateral(scene, layout, self.nodes) / math.sqrt(heaviest)
-            fill(self.lateral, directions @ self.axes[: self.moves].T)
+            fill(self.lateral, here.lateral / math.sqrt(heaviest) @ self.axes[: self.moves].T)
         fill(self.drag, np.repeat(drags, layout.counts)[:, None, None] * np.ones((1, len(self.nodes), 1)))
         self.start.x.array[:] = self.state.x.array
         self.velocity.x.array[:] = 0.0
@@ -345,8 +340,7 @@ class Moving:
             law_data(damping.viscosity(rod.stiffness_at(x * rod.length)), units, coupled=coupled)
             for rod, damping, x in zip(scene.rods, damped, layout.inside(self.rule.gauss), strict=True)
         ])  # fmt: skip
-        data = rod_data(scene, layout, self.scales, self.rule, self.reference, coupled=coupled)
-        data = self._section_data(data._replace(**given._asdict()))
+        data = self._section_data(self._in_space._replace(**given._asdict()))
         for function, values in zip(self.viscosity, viscous_values(data), strict=True):
             if function is not None:
                 self.rods.fill(function, values)

@@ -242,14 +242,25 @@ def check_inertia(scene):
         require_inertia(rod, "a motion")
 
 
+#: At the nodes of every element, (elements, p + 1, ..): mass, kg/m; Jrho about d_1, d_2, d_3 (3,), kg m; frames at rest
+#: (3, 3); offset of the mass centre (3,), m, and the moment of inertia that it adds (3, 3), kg m, inertial at rest; and
+#: tangents at rest times the square root of the mass, kg/m, that does not move along them (3,).
+NodalInertia = namedtuple("NodalInertia", "mass J frames offset apart lateral")
+
+
 def nodal_inertia(scene, layout, nodes):
-    """Mass (elements, p + 1), kg/m, Jrho about d_1, d_2, d_3 (elements, p + 1, 3), kg m, and frames at rest (elements,
-    p + 1, 3, 3). Masses that move with the axis count; point masses are added to one of the adjacent elements."""
+    """The `NodalInertia` of a scene. Point masses are added to one of the adjacent elements.
+
+    The mass of a rod lies at the offset a, masses that move with its axis lie on it. Together they are a mass m at the
+    offset a m_rod/m, and a moment of inertia m_rod (m - m_rod)/m (a.a - a a) in addition to that of the section.
+    """
     parts, weights = [], lobatto_weights(nodes)
-    for i, (rod, s) in enumerate(_nodes_of(scene, layout, nodes)):
+    for i, (rod, x) in enumerate(zip(scene.rods, layout.inside(nodes), strict=True)):
+        s = x * rod.length
         along, frames = _by_side(rod.stiffness_at, s), rod.curve.frame(s.ravel()).reshape(*s.shape, 3, 3)
-        mass, J = (_own(along, name) for name in ("mass", "inertia"))
-        mass = mass + sum(across for across, _ in _added(scene, rod, s))
+        own, J = (_pick(*(getattr(side, name) for side in along)) for name in ("mass", "inertia"))
+        added = list(_added(scene, rod, s))
+        mass = own + sum(across for across, _ in added)
         for action in scene.loads:
             body = action.inertia(rod) if action.station is not None and action.station.rod is rod else None
             if body is not None:  # divided by the node's quadrature weight, which multiplies it again
@@ -259,48 +270,14 @@ def nodal_inertia(scene, layout, nodes):
                 length = weights[at[1]] * (layout.breaks[i][cell + 1] - layout.breaks[i][cell]) * rod.length
                 mass[at] += body[0] / length
                 J[at] += body[1] / length
-        parts.append((mass, J, frames))
-    return tuple(np.concatenate(part) for part in zip(*parts, strict=True))
-
-
-def nodal_offsets(scene, layout, nodes, mass):
-    """What eccentricity adds to `nodal_inertia`, inertial at rest.
-
-    The mass of a rod lies at the offset a, masses that are added to it on its axis. Together they are a mass m at the
-    offset a m_rod/m, and a moment of inertia m_rod (m - m_rod)/m (a.a - a a) besides that of the section.
-
-    Args:
-        mass: of `nodal_inertia`.
-
-    Returns:
-        Offsets (elements, p + 1, 3), m, and moments of inertia (elements, p + 1, 3, 3), kg m.
-    """
-    arms, own = [], []
-    for rod, s in _nodes_of(scene, layout, nodes):
-        own.append(_own(_by_side(rod.stiffness_at, s), "mass"))
-        offsets = _pick(*_by_side(rod.mass_centre.at, s)) if rod.mass_centre else np.zeros((*s.shape, 3))
-        frames = rod.curve.frame(s.ravel()).reshape(*s.shape, 3, 3)
-        arms.append(np.einsum("...ij,...j->...i", frames, offsets))
-    arm, own = np.concatenate(arms), np.concatenate(own)
-    apart = own * (mass - own) / mass
-    squares = np.einsum("...i,...i->...", arm, arm)[..., None, None] * np.eye(3)
-    return arm * (own / mass)[..., None], apart[..., None, None] * (squares - arm[..., :, None] * arm[..., None, :])
-
-
-def nodal_lateral(scene, layout, nodes):
-    """(elements, p + 1, 3) tangents at rest times the square root of the mass, kg/m, that does not move along them."""
-    parts = []
-    for rod, s in _nodes_of(scene, layout, nodes):
-        left_out = sum((across - along for across, along in _added(scene, rod, s)), np.zeros(s.shape))
-        tangents = rod.curve.frame(s.ravel())[..., 2].reshape(*s.shape, 3)
-        parts.append(np.sqrt(left_out)[..., None] * tangents)
-    return np.concatenate(parts)
-
-
-def _nodes_of(scene, layout, nodes):
-    """(rod, arc lengths (elements, p + 1) of the nodes, m) of every rod."""
-    for rod, x in zip(scene.rods, layout.inside(nodes), strict=True):
-        yield rod, x * rod.length
+        offset = _pick(*_by_side(rod.mass_centre.at, s)) if rod.mass_centre else np.zeros((*s.shape, 3))
+        arm = np.einsum("...ij,...j->...i", frames, offset)
+        squares = np.einsum("...i,...i->...", arm, arm)[..., None, None] * np.eye(3)
+        apart = (own * (mass - own) / mass)[..., None, None] * (squares - arm[..., :, None] * arm[..., None, :])
+        left_out = sum((across - along for across, along in added), np.zeros(s.shape))
+        tangents = np.sqrt(left_out)[..., None] * frames[..., 2]
+        parts.append(NodalInertia(mass, J, frames, arm * (own / mass)[..., None], apart, tangents))
+    return joined(parts)
 
 
 def _added(scene, rod, s):
@@ -315,11 +292,6 @@ def _added(scene, rod, s):
 def _by_side(function, s):
     """Values at the nodes of elements as limits from above, and from below."""
     return tuple(function(s, side) for side in ("right", "left"))
-
-
-def _own(along, name):
-    """A field of `Stiffnesses` at the nodes of every element."""
-    return _pick(*(getattr(side, name) for side in along))
 
 
 def _pick(after, before):
