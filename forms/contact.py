@@ -22,7 +22,7 @@ def wall_work(point, test, c0, t0, k0, clearance, stiffness, spring, anchor, alo
     With d0 = r - c0 the nearest point moves by sigma = t0 . d0/(1 - k0 . d0) along the axis, which is zero in value and
     gives the derivative of the projection: c = c0 + t0 sigma, t = t0 + k0 sigma. The distance from the axis is
     a = sqrt(rho . rho) with rho = d - t (t . d), d = r - c, its direction e = rho/a, the pressure
-    p = stiffness <a - clearance>, or that of another law.
+    p = stiffness <a - clearance>, or another law `pressure`.
 
     Args:
         point: a `Point`; test: a `VirtualMotion`.

@@ -52,7 +52,7 @@ def euler_tensor(I_R):
 
 
 def of_mass_centre(rate, W, inertia):
-    """The rate of y = r + R a for rates of r and R; that of r where a = 0."""
+    """The rate of y = r + R a from the rates of r and R."""
     return rate if inertia.offset is None else rate + W * inertia.offset
 
 

@@ -14,7 +14,7 @@ from collections import namedtuple
 import ufl
 from cosserat_fenicsx.forms.rotation import product_conjugate, rotation_matrix
 
-#: What an equation depends on, and how many numbers each is; `multiplier` is that of the equation, the reaction.
+#: Arguments of an equation and their sizes; `multiplier` is the reaction.
 SIZES = {
     "r_a": 3, "q_a": 4, "r_b": 3, "q_b": 4,
     "n": 3, "place": 3, "rate": 1, "t": 3, "w": 3, "axis": 3, "about": 3, "angle": 1,

@@ -28,8 +28,8 @@ _FLAGS = ("-O3", "-fno-math-errno", "-ffp-contract=fast", "-fno-wrapv", "-fopenm
 
 @functools.cache
 def module(*sources):
-    """cffi's (ffi, lib) of C files, by default those of this folder, and the header of the first one, which must only
-    declare; lines with # are for C alone.
+    """cffi's (ffi, lib) of C files (default: this folder's) and the header of the first one, which must only declare;
+    lines with # are for C alone.
 
     C finds the number of arguments of FFCx's kernels as KERNEL_ARGUMENTS, and PETSc's integers as PetscInt. Processes
     that come at the same time wait for the one that compiles; a file that is damaged or belongs to another system is

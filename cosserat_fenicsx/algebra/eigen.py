@@ -258,7 +258,7 @@ def _factor_constrained(pc, K, null=0.0):
     pc.setType("cholesky")
     factor = _mumps(pc, K)
     factor.setMumpsIcntl(13, 1)  # root front not distributed: otherwise some negative pivots are not counted
-    factor.setMumpsIcntl(6, 0)  # no search for a large diagonal, which gives up where a row is zero
+    factor.setMumpsIcntl(6, 0)  # no search for a large diagonal, which fails where a row is zero
     factor.setMumpsIcntl(24, 1)  # null pivots are counted separately
     factor.setMumpsIcntl(33, 1)  # the determinant
     factor.setMumpsCntl(3, -null)

@@ -1,4 +1,4 @@
-"""Elimination along the rods, in C: the unknowns of elements in turn, those of the interface last.
+"""Elimination along the rods, in C: the unknowns of elements in turn, the interface last.
 
 The interface has the unknowns that cannot be eliminated along a rod: of nodes in constraint equations, of nodes where
 rods meet other than end to start, and of nodes that several ranks share; and the multipliers. Every rank condenses its
@@ -51,7 +51,7 @@ class Elimination(Pointers):
         self._allocate(order, rows.shape[1], _DELAYS if delays else 0, len(order) if factors else 2)
 
     def _kept(self, number, apart, tied):
-        """The numbers of the nodes' unknowns on the interface, those of all ranks."""
+        """Numbers of the nodes' unknowns on the interface, of all ranks."""
         numbering, comm = self.numbering, self.numbering.comm
         here = number[number >= 0]
         mine = (here >= numbering.first) & (here < numbering.first + numbering.size)
@@ -350,6 +350,6 @@ def _inertia(matrix):
 
 
 def _scale(diagonal):
-    """Factors that make the diagonal ones, which leaves the signs, whatever the units of the unknowns."""
+    """Factors that scale the diagonal to ones and keep the signs, for any units of the unknowns."""
     size = np.sqrt(np.abs(diagonal))
     return 1 / np.where(size > 0, size, 1.0)

@@ -36,7 +36,7 @@ WORDS = (
 
 @cache
 def petsc():
-    """The functions of PETSc that newton.c calls: those of the library that petsc4py has loaded."""
+    """PETSc's functions that newton.c and sweep.c call, from the library that petsc4py has loaded."""
     ffi, _ = module()
     library, table = ctypes.CDLL(PETSc.__file__), ffi.new("petsc *")
     for name, field in ffi.typeof("petsc").fields:
@@ -113,7 +113,7 @@ class Newton:
         self.snes.setTolerances(max_it=iterations + 1)  # newton.c stops before SNES's own limit
 
     def _take_loads(self):
-        """What the residual is compared with."""
+        """Set the limits of the residual's norm."""
         problem = self.problem
         self.c.loads, self.c.rounding = abs(problem.load_factor) * problem.load_norm, problem.model.round_off
 
@@ -306,7 +306,7 @@ class LimitedNewton:
     against a wall.
 
     The contact force that is carried at the Gauss points takes the same share of its step as the motion. A tangent that
-    is singular to rounding is used all the same, because pivots of a slender rod beside a stiff wall are as small; the
+    is singular to rounding is used nevertheless, because pivots of a slender rod beside a stiff wall are as small; the
     caller must check the result by its balance.
 
     Args:

@@ -10,7 +10,7 @@ _MARK = 0.8765432198765432
 
 
 class _Kernel(Pointers):
-    """The C structure `kernel`, and what it points to."""
+    """The C structure `kernel` and the arrays that it points to."""
 
     def __init__(self, compiled, address, mesh, elements, size):
         super().__init__()
@@ -43,8 +43,7 @@ class Packed(_Kernel):
 
     Args:
         form: a linear or bilinear form, integrated over this rank's elements; or several as a tuple, for their sum.
-        moving: the Functions whose values change; those of all others are taken by `refresh`.
-        constants: the Constants whose values change; those of all others are taken by `refresh`, too.
+        moving, constants: the Functions and Constants whose values change; all others are read by `refresh`.
 
     Attributes:
         dofs_c: C's pointer to the local degrees of freedom (elements, size) of the vector, of a linear form.
@@ -96,7 +95,7 @@ class Packed(_Kernel):
         return [(value, int(slot)) for slot in found]
 
     def refresh(self):
-        """Pack all coefficients and constants anew; to be called after the values of a scene are filled in."""
+        """Pack all coefficients and constants again; to be called after a scene is loaded."""
         for packed in self._pack().values():
             self._w[:] = packed
         self._c[:] = cpp.fem.pack_constants(self._form)
@@ -124,7 +123,7 @@ class Packed(_Kernel):
 
 class PackedExpression(_Kernel):
     """A compiled expression at points of all local elements, ghosts included, or of this rank's own; all of its
-    coefficients and constants are taken anew at every evaluation.
+    coefficients and constants are read at every evaluation.
 
     Args:
         expression: a compiled expression.

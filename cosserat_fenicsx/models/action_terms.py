@@ -198,7 +198,7 @@ class Term:
         self.data = [self._function(size) for size in kind.sizes]
         self.memory = [self._function(size) for size in kind.memory]
         self._rest = self._frame = self.compiled_evolution = None
-        # dolfinx makes an array of a Function anew whenever it is asked for one
+        # dolfinx makes a new array at every access to `x.array`
         self._arrays = [f.x.array.reshape(-1, size) for f, size in zip(self.data, kind.sizes, strict=True)]
 
     def _function(self, size):

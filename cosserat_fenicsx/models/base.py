@@ -107,7 +107,7 @@ class RodModel:
     load_norm = 0.0
     #: unit of time for velocities, s; not used in statics
     time = 1.0
-    #: bending stiffness that the units are made of, N m^2; None for that of each scene
+    #: bending stiffness that defines the units, N m^2; None to take each scene's own
     EI = None
     #: a `DataDerivative` and an `EnergyOfMotion`, see `made_once`
     data_derivative = energy_of_motion = None
@@ -144,7 +144,7 @@ class RodModel:
         raise NotImplementedError
 
     def constraint(self, motion, test, nodal, phi):
-        """What is added to eq. (1) at the nodes, or None; nodal, phi: unknowns of a node and their test functions."""
+        """Terms added to eq. (1) at the nodes, or None; nodal, phi: unknowns of a node and their test functions."""
         return None
 
     def vector(self, a):
@@ -241,7 +241,7 @@ class RodModel:
         #: (local elements, p + 1) local nodes in dolfinx's order, and the position of each along its element
         self.cell_nodes = compat.cell_nodes(V)
         self.node_order = np.argsort(np.argsort(compat.element_nodes(V)))
-        dofs = compat.cell_dofs(self.space)  # those of the nodes come first, node by node
+        dofs = compat.cell_dofs(self.space)  # nodal ones come first, node by node
         self.nodal, self.owned_nodes = np.empty((len(slots), size), dtype=np.int64), V.dofmap.index_map.size_local
         self.nodal[self.cell_nodes] = dofs[:, : size * (p + 1)].reshape(-1, p + 1, size)
         owned_cells = self.mesh.topology.index_map(1).size_local

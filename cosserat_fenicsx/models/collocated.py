@@ -52,7 +52,7 @@ class SpatialCollocation(SpatialStep):
 
 
 class PlanarCollocation(PlanarStep):
-    """A `PlanarStep` whose rates are those of its unknowns."""
+    """A `PlanarStep` whose velocities are the rates of its unknowns."""
 
     def increment(self, w, w0):
         return w - w0

@@ -27,7 +27,7 @@ ActionWork = namedtuple("ActionWork", "dead permanent live")
 #: and its integrand, a function (point, test).
 Live = namedtuple("Live", "number form factor measure point work")
 
-#: What derivatives by data need, UFL: the forms that are balanced in equilibrium, factors included; n by the law, where
+#: UFL for derivatives by data: the residual with all loads and their factors; n by the law, where
 #: n is carried, or None; the Functions of the unknowns; and the second variations.
 Symbols = namedtuple("Symbols", "balance contact unknowns seconds")
 
@@ -137,11 +137,11 @@ def compile_static(model, spaces, displacements=None):
 
 
 def compile_parts(model, core, terms, fields, *, advance=None, densities=None, **works):
-    """Compile UFL: what the model needs whatever acts on it is one module, and what a term of the actions adds another.
+    """Compile UFL: one module for the model without actions, and one for each term of the actions.
 
     Args:
         core: {name: form}; terms: {number of a term: {name: form}}; works: for a name {number of a term: form}. Names
-            are those of attributes, or the numbers of second variations; forms may be None.
+            are attributes, or the numbers of second variations; forms may be None.
         fields, advance: see `CompiledForms`; densities: see `action_densities`.
 
     Returns:
@@ -180,8 +180,8 @@ def _symmetric(form):
 
 
 def live_parts(live, derivative, variations=()):
-    """What a `Live` adds to the residual, to the tangent and to every second variation, by its number: UFL forms by
-    name, None where nothing; variations: pairs of test and trial `VirtualMotion`, None for the tangent."""
+    """Contributions of a `Live` to residual, tangent and second variations (by number): {name: UFL form or None};
+    variations: pairs of test and trial `VirtualMotion`, None for the tangent."""
     tangent = nonzero(derivative(live.form))
     parts = {"residual": -live.factor * live.form, "tangent": None if tangent is None else -live.factor * tangent}
     for i, pair in enumerate(variations):

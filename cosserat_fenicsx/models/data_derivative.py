@@ -16,7 +16,7 @@ class DataDerivative:
         model: a `RodModel` of statics.
 
     Attributes:
-        form: the compiled form of the change of what is balanced, at the model's state and data.
+        form: the compiled change of the residual at the model's state and data.
     """
 
     def __init__(self, model):

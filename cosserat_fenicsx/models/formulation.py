@@ -53,8 +53,8 @@ class ContactForce:
             n, phi_n: see `symbols`, as vectors of three components.
             motion, before: the `equilibrium.Motion`, now and before the step.
             section, test, ds: see forms/equilibrium.py.
-            derivative: that of a form or expression in the direction of the trial function.
-            along_step: that of an expression at `before` along the step.
+            derivative: differentiates a form or expression in the direction of the trial function.
+            along_step: differentiates an expression at `before` along the step.
         """
         internal = self.internal(n, phi_n, motion, section, test, ds)
         return WeakForm(n, internal, derivative(internal), None)
@@ -92,7 +92,7 @@ class _Carried(ContactForce):
 
 class _Unknown(ContactForce):
     def symbols(self, model, U, phi):
-        """See `ContactForce`: the components of n come after those of the nodal unknowns."""
+        """See `ContactForce`: the components of n follow the nodal unknowns."""
         places = range(model.components, model.components + model.force_size)
         return [U[i] for i in places], [phi[i] for i in places]
 
@@ -118,19 +118,19 @@ class _Known(ContactForce):
         return determinate.moments(n, motion, section, test, ds)
 
     def second_variation(self, n, motion, data, section, test, direction, stiffness):
-        """See `ContactForce`: that of the energy minimised over r."""
+        """See `ContactForce`: of the energy minimised over r."""
         return determinate.second_variation(n, motion, section, test, direction)
 
 
 #: n by the law: on slender rods the rounding error of the residual then affects the solution.
-OF_MOTION = _OfMotion("the contact force is that of the motion", of_motion=True, stiff=1e6, rounding=0.1)
+OF_MOTION = _OfMotion("the contact force follows from the motion", of_motion=True, stiff=1e6, rounding=0.1)
 CARRIED = _Carried("the contact force is carried at the Gauss points", carried=True, stiff=1e6)
 UNKNOWN = _Unknown("a stiffness is infinite or next to it, so the contact force is an unknown", unknown=True, stiff=1e5)
 #: for the determinate models
 KNOWN = _Known("the contact force follows from statics alone")
 
 
-# From a moment to the residual rows of q: those of its vector part.
+# From a moment to the residual rows of q, the rows of its vector part.
 _LAST_ROWS = np.eye(4)[None, :, 1:]
 
 
@@ -154,7 +154,7 @@ class Formulation:
         advice: what else to try if it does not converge.
         says: text for `Path.why` in front of how n is represented.
         multipliers: number of a node's unknowns after r and q in the spatial model.
-        galerkin: whether virtual rotations are those of changes of q.
+        galerkin: whether virtual rotations follow from changes of q.
     """
 
     force: ContactForce = CARRIED
@@ -234,7 +234,7 @@ class Displacement(Formulation):
 
 
 class Multiplier(Formulation):
-    """lambda is the unknown after r and q; virtual rotations are those of changes of q."""
+    """lambda is the unknown after r and q; virtual rotations follow from changes of q."""
 
     name, says = "multiplier", "a multiplier at every node holds |q| = 1; "
     multipliers, galerkin = 1, True

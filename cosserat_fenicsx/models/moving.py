@@ -45,7 +45,7 @@ from cosserat_fenicsx.scene.signals import signals_of
 
 @dataclass(frozen=True)
 class MotionForms(CompiledForms):
-    """What a time stepper assembles and evaluates: the residual is that of a step from `start` to `state`.
+    """Forms that a time stepper assembles and evaluates; the residual belongs to a step from `start` to `state`.
 
     Attributes:
         residual: without the dead loads, and without the momenta at the start of the step, over h.
@@ -74,7 +74,7 @@ class StepForms:
         halfway, passed: the average of both ends of the step, and their difference over h, at the nodes.
         before, after, middle: `Motion`s; section, viscosity: data, and the law of the strain rates.
         phi, test: test functions of the unknowns, and their `VirtualMotion`.
-        derivative: that of a form in the direction of the trial function.
+        derivative: differentiates a form in the direction of the trial function.
     """
 
     def __init__(self, model):
@@ -170,7 +170,7 @@ class StepForms:
             "dissipated": self.viscous_loss() * dx.gauss + by_drag,
         }
         terms = {live.number: live_parts(live, derivative) for live in acting.live}
-        for live in () if working is None else working.live:  # after what is in the residual
+        for live in () if working is None else working.live:  # after the parts of the residual
             change = nonzero(derivative(live.form)) if turned else None
             terms.setdefault(live.number, {}).update(
                 live=-live.factor * live.form, live_tangent=None if change is None else -live.factor * change
@@ -205,7 +205,7 @@ def compile_momentum(step, stress=inertia.averaged_stress):
 
 
 def virtual_work_of_step(model, stress, point_at):
-    """Coefficients of the virtual work of a step per unit length: that of the stress minus that of actions along rods.
+    """Coefficients of the virtual work of a step per unit length: of the stress, minus the actions along rods.
 
     Args:
         stress: function from a `VirtualMotion` to the virtual work of the stress; point_at: see `action_work`.
@@ -242,7 +242,7 @@ class SpatialStep(StepForms):
         super().__init__(model)
 
     def momentum(self, w, w_t, z_t=None):
-        """See `StepForms`; z_t: rate of the mass centre about the axis, where it is not that of q."""
+        """See `StepForms`; z_t: rate of the mass centre about the axis, by default from the rates of q."""
         (_, q), (r_t, q_t), body = parts_of(w), parts_of(w_t), self.body
         kappa = inertia.angular_momentum(q, q_t, body)
         if body.offset is None:
@@ -290,7 +290,7 @@ class Moving:
         """Make the Functions that the forms need in addition to those of a `RodModel`."""
         mesh, points, coupled = self.mesh, self.signature.points, self.signature.coupled
         self.start, self.velocity = fem.Function(self.space), fem.Function(self.space)
-        # dolfinx makes an array of a Function anew whenever it is asked for one
+        # dolfinx makes a new array at every access to `x.array`
         self._arrays = self.state.x.array, self.start.x.array, self.velocity.x.array
         self.h = fem.Constant(mesh, np.float64(1))
         at_nodes = partial(element_function, mesh, self.signature.degree)

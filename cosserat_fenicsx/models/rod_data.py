@@ -78,8 +78,7 @@ def _times(matrix, a):
 
 
 def field_values(data, stiff):
-    """What the Functions K, K_inv, K_stiff, J and G hold, (elements, points, k) each: diagonals, or matrices row by
-    row.
+    """Values of the Functions K, K_inv, K_stiff, J and G, (elements, points, k): diagonals, or matrices row by row.
 
     Args:
         data: the `LawData`; stiff: the bounded K for the second variation.
@@ -160,7 +159,7 @@ def rod_data(scene, layout, scales, rule, reference, *, coupled):
 
 
 def joined(parts):
-    """One named tuple of arrays from those of all rods."""
+    """Concatenate the named tuples of arrays of all rods."""
     fields = (None if field[0] is None else np.concatenate(field) for field in zip(*parts, strict=True))
     return type(parts[0])(*fields)
 

@@ -273,8 +273,8 @@ class Numbering:
     """The unknowns on one space.
 
     Args:
-        comm: MPI communicator of the vectors and matrices: that of the caller and not the mesh's copy, on which nobody
-            would free what PETSc puts aside.
+        comm: MPI communicator of the vectors and matrices: the caller's, not the mesh's copy, on which objects that
+            PETSc puts aside would never be freed.
         space: dolfinx's space; `node_dofs` (local nodes, block): its local degrees of freedom of every node.
         owned: number of the local nodes that this rank owns.
         slots: the scene's number of every local node.
