@@ -1,6 +1,5 @@
 """The base of all models: units, mesh, unknowns, data of a scene, and what solvers evaluate."""
 
-import math
 from collections import namedtuple
 from dataclasses import dataclass
 
