@@ -31,7 +31,7 @@ from cosserat_fenicsx.pictures.drawing import (
     thickening,
     thicker,
 )
-from cosserat_fenicsx.pictures.view import plain
+from cosserat_fenicsx.pictures.view import plain, round_step
 from cosserat_fenicsx.progress import Progress
 from cosserat_fenicsx.ranks import Alone, on_first
 
@@ -95,8 +95,7 @@ def _round_speed(duration):
     enough."""
     if _SHORTEST_REAL_TIME <= duration <= _LONGEST_REAL_TIME:
         return 1.0
-    decade = 10.0 ** math.floor(math.log10(duration / _LONGEST))
-    return next(x * decade for x in (1, 2, 5, 10) if duration / (x * decade) <= _LONGEST * (1 + 1e-9))
+    return round_step(duration, _LONGEST)
 
 
 def _times(start, duration, speed, fps):

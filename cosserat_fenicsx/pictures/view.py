@@ -252,24 +252,13 @@ def axes_of(points):
     if unit == "m":
         scale, unit = next((scale, unit) for least, scale, unit in _UNITS if size >= least)
     step = scale * round_step(size / scale, _INTERVALS)
-    first, last = np.floor(low / step + 1e-9), np.ceil(high / step - 1e-9)
-    return tuple(
-        _axis(f"{name} ({unit})", int(a), int(b), step, scale, size) if b > a else _flat(f"{name} ({unit})", x, size)
-        for name, a, b, x in zip("xyz", first, last, (low + high) / 2, strict=True)
-    )
-
-
-def _axis(name, first, last, step, scale, size):
-    return Axis(
-        name,
-        first * step,
-        last * step,
-        tuple((k * step, text_of(k * step, step, scale)) for k in range(first, last + 1)),
-    )
-
-
-def _flat(name, middle, size):
-    return Axis(name, middle - _FLAT * size, middle + _FLAT * size, ())
+    first, last = (x.astype(int).tolist() for x in (np.floor(low / step + 1e-9), np.ceil(high / step - 1e-9)))
+    axes = []
+    for name, a, b, middle in zip("xyz", first, last, (low + high) / 2, strict=True):
+        ticks = tuple((k * step, text_of(k * step, step, scale)) for k in range(a, b + 1)) if b > a else ()
+        ends = (a * step, b * step) if ticks else (middle - _FLAT * size, middle + _FLAT * size)
+        axes.append(Axis(f"{name} ({unit})", *ends, ticks))
+    return tuple(axes)
 
 
 def draw_axes(plotter, pyvista, axes, view, labels):

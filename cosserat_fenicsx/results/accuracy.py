@@ -254,8 +254,8 @@ def leading_of(path):
     """(2, rods, points) the largest leading coefficient of an element's displacement, and of its rotation (twice that
     of q), dimensionless."""
     return np.array([
-        [found.max(axis=1) for found in leading_coefficients(path, path._moved)],
-        [2 * found.max(axis=1) for found in leading_coefficients(path, path._turned)],
+        [found.max(axis=1) for found in leading_coefficients(path, path._motion[..., :3])],
+        [2 * found.max(axis=1) for found in leading_coefficients(path, path._motion[..., 3:])],
     ])  # fmt: skip
 
 

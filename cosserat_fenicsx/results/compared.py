@@ -26,12 +26,8 @@ def cells_of(layout):
 @lru_cache(maxsize=32)
 def cell_nodes(layout, degree):
     """For every rod (elements, degree + 1) the nodes of its elements, and their slice, numbered over all rods."""
-    inside = np.arange(degree + 1)
-    firsts = [(degree * cells.start + i, cells.stop - cells.start) for i, cells in enumerate(cells_of(layout))]
-    return [
-        (first + degree * np.arange(count)[:, None] + inside, slice(first, first + degree * count + 1))
-        for first, count in firsts
-    ]
+    rows = in_turn(degree * count + 1 for count in layout.counts)
+    return [(np.arange(x.start, x.stop - 1, degree)[:, None] + np.arange(degree + 1), x) for x in rows]
 
 
 @lru_cache(maxsize=32)

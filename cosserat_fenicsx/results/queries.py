@@ -7,7 +7,7 @@ import numpy as np
 from cosserat_fenicsx.checks import refuse
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.numerics import directors
-from cosserat_fenicsx.results.compared import cell_nodes
+from cosserat_fenicsx.results.compared import cell_nodes, in_turn
 from cosserat_fenicsx.results.result import OnNodes
 from cosserat_fenicsx.scene.describe import describe
 from cosserat_fenicsx.scene.rod import Station, StationOrName
@@ -181,8 +181,7 @@ class Reactions(OnNodes):
 
     def _of_equations(self, which):
         """(n, 6) force and moment, dimensionless, of a support with constraint equations."""
-        first = sum(len(support.ties()) for support in self.scene.supports[:which])
-        own = slice(first, first + len(self.scene.supports[which].ties()))
+        own = in_turn(len(support.ties()) for support in self.scene.supports)[which]
         return self._stacked("tie_forces")[:, own, 0].sum(axis=1)
 
     def _of_clamp(self, clamp):

@@ -218,7 +218,7 @@ class RodResult(Result, Extremes, Reactions, Stresses, States):
 
     def largest_displacement(self) -> np.ndarray:
         """(n,) the largest displacement of any node, m."""
-        return np.linalg.norm(self._moved, axis=2).max(axis=1) * self.scales.length
+        return np.linalg.norm(self._motion[..., :3], axis=2).max(axis=1) * self.scales.length
 
     @property
     def _all_rq(self):
@@ -231,21 +231,11 @@ class RodResult(Result, Extremes, Reactions, Stresses, States):
         return resting(self.scene, self.layout, self.rule) / self.scales.length
 
     @cached_property
-    def _moved(self):
-        """(points, nodes, 3) displacements of the nodes, dimensionless."""
-        return self._motion[:, :, :3]
-
-    @cached_property
     def _motion(self):
         """(points, nodes, 7) displacements of the nodes, dimensionless, and q."""
         motion = self._all_rq.copy()
         motion[:, :, :3] -= self._rest
         return motion
-
-    @property
-    def _turned(self):
-        """(points, nodes, 4) q at the nodes."""
-        return self._all_rq[:, :, 3:]
 
     def _contact_at(self, station, side="left"):
         """(points, 6) n and m at a station, dimensionless; at a jump on the "left" or the "right" side."""

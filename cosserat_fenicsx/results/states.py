@@ -30,7 +30,7 @@ class States(OnNodes):
     #: whether stability is judged by the number of negative modes
     counts_modes = True
     #: cached properties, which are cleared when a state is added
-    _computed = ("_records", "_motion", "_moved")
+    _computed = ("_records", "_motion")
 
     def __init__(self, scene, layout, scales, rule, *, comm, model, formulation, degree, unknowns, why, connections,
                  expand):  # fmt: skip

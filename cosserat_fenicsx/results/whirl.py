@@ -382,12 +382,12 @@ class Whirl(Result):
             file, units, width: see `History.plot_energy`.
 
         Raises:
-            SceneError: made without its orbit.
+            SceneError: the Whirl was made without its orbit.
         """
         from cosserat_fenicsx.pictures.motion_charts import draw_whirl
 
         if self.orbit is None:
-            raise SceneError("plot: expected a Whirl with its orbit, such as that of History.whirl")
+            raise SceneError("plot: expected a Whirl with its orbit, as History.whirl returns it")
         return draw_whirl(self.orbit, file, units=units, width=width)
 
 

@@ -334,7 +334,7 @@ def balanced(fine, coarse, above):
     layout, order = coarse.layout, coarse.degree + 1
     if sum(fine.elements) * above ** (1 / order) < _GRADING.many:
         return None
-    rough = np.concatenate([found.max(axis=0) for found in leading_coefficients(fine, fine._moved)])
+    rough = np.concatenate([found.max(axis=0) for found in leading_coefficients(fine, fine._motion[..., :3])])
     if _even(rough ** (1 / coarse.degree)):
         return None
     differences = element_differences(fine, coarse)
