@@ -91,7 +91,7 @@ def test_refusals():
         "Damping.Kt = -1": lambda: cf.Damping(Kt=(0, -1, 0)),
         "Damping.ratio.frequencies = 0": lambda: cf.Damping.ratio(0.1, (0, 1)),
         "Damping.ratio.ratio = 1": lambda: cf.Damping.ratio(1, (1, 2)),
-        "Rod.damping = 0.1: expected a Damping": lambda: cf.Rod(cf.Line((0, 0, 0), (L, 0, 0)), SECTION, damping=0.1),
+        "Rod.damping = 0.1: expected Damping(...)": lambda: cf.Rod(cf.Line((0, 0, 0), (L, 0, 0)), SECTION, damping=0.1),
     }.items():
         with pytest.raises(cf.SceneError) as refusal:
             make()

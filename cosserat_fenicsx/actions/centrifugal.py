@@ -1,14 +1,16 @@
 """Steady rotation of a whole scene about a fixed axis: the inertia of its rods in the rotating frame."""
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 import ufl
 
-from cosserat_fenicsx.checks import Numbers, refuse, store, vector
+from cosserat_fenicsx.checks import Numbers, refuse
+from cosserat_fenicsx.parts import Several
 from cosserat_fenicsx.scene import action
 from cosserat_fenicsx.scene.action import LineAction, PointAction
-from cosserat_fenicsx.scene.rod import Rod, Station, require_inertia
+from cosserat_fenicsx.scene.rod import Rod, Station, mass_arm, require_inertia
 from cosserat_fenicsx.scene.supports import InitialVelocity
 
 # Samples along a rod, and the sine of the angle below which it has the direction of the axis.
@@ -36,13 +38,12 @@ class Centrifugal(LineAction):
             across the axis with an `AddedMass` that is not `axial` (raised by `solve`).
     """
 
-    rate: Numbers
-    through: Numbers = (0.0, 0.0, 0.0)
+    rate: Annotated[Numbers, Several("angular velocity")]
+    through: Annotated[Numbers, Several("length")] = (0.0, 0.0, 0.0)
 
     rod, work, scaled, of_inertia = None, None, False, True
 
-    def __post_init__(self):
-        store(self, rate=vector(self, "rate", self.rate, "rad/s"), through=vector(self, "through", self.through, "m"))
+    def validate(self):
         if not any(self.rate):
             refuse(self, "rate", self.rate, "an angular velocity that is not zero")
 
@@ -58,7 +59,7 @@ class Centrifugal(LineAction):
         return tuple(InitialVelocity(rod, angular=self.rate, about=self.through) for rod in rods)
 
     def companions(self, scene):
-        """What it does to each rod, to their unbalance, and to point masses."""
+        """Its actions on rods, on their unbalance, and on point masses."""
         along = [x for x in scene.loads if x.station is None]
         for load in along:
             if load.lateral and not self._is_along(load.rod):
@@ -83,7 +84,7 @@ def turning(point, test, mass, J1, J2, J3, rate, through):
 
 
 def unbalanced(point, test, mass, arm, rate, through):
-    """What a mass centre on an arm, inertial at rest, adds to `turning`."""
+    """Addition to `turning` for a mass centre at the end of an arm, inertial in the reference."""
     z = point.R * arm
     more = -mass * ufl.cross(rate, ufl.cross(rate, z))
     whole = more - mass * ufl.cross(rate, ufl.cross(rate, point.r - through))
@@ -118,7 +119,7 @@ class _OfRod(LineAction):
 
 @dataclass(frozen=True)
 class _OfUnbalance(LineAction):
-    """What the eccentricity of a rod adds."""
+    """The additional inertia of an eccentric rod."""
 
     rod: Rod
     of: Centrifugal
@@ -126,10 +127,9 @@ class _OfUnbalance(LineAction):
     at_nodes, work = True, staticmethod(unbalanced)
 
     def data(self, rod, s):
-        arm = np.einsum("...ij,...j->...i", rod.curve.frame(s), rod.mass_centre.at(s))
         return (
             action.scalar(rod.stiffness_at(s).mass, "kg/m"),
-            action.vector(arm, "m"),
+            action.vector(mass_arm(rod, s), "m"),
             action.vector(self.of.rate, "rad/s"),
             action.vector(self.of.through, "m from origin"),
         )

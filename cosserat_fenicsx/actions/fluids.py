@@ -2,19 +2,20 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 import ufl
 
 from cosserat_fenicsx.actions.springs import require_one
-from cosserat_fenicsx.checks import Numbers, number, positive, refuse, store, vector
-from cosserat_fenicsx.parts import DampingPerLength, QuadraticDrag
+from cosserat_fenicsx.checks import Numbers, number, positive, refuse, store
+from cosserat_fenicsx.parts import DampingPerLength, FunctionAlong, QuadraticDrag, Several
 from cosserat_fenicsx.scene import action
 from cosserat_fenicsx.scene.action import LineAction, scalar
-from cosserat_fenicsx.scene.loads import Load
-from cosserat_fenicsx.scene.profiles import checked_pieces
-from cosserat_fenicsx.scene.rod import Rod, RodOrName, is_known
-from cosserat_fenicsx.scene.signals import FunctionAlong, along_or_vector, breaks_of, kinks_of, values_of
+from cosserat_fenicsx.scene.loads import AlongRod, Load
+from cosserat_fenicsx.scene.profiles import checked_pieces, piece_at
+from cosserat_fenicsx.scene.rod import Rod, RodOrName
+from cosserat_fenicsx.scene.signals import VectorInTime, values_of
 
 
 @dataclass(frozen=True)
@@ -45,13 +46,12 @@ class AddedMass(LineAction):
     work, scaled = None, False
 
     def validate(self):
-        known = is_known(self, "rod", Rod)
         if not isinstance(self.mass, list | tuple):
             store(self, mass=positive(self, "mass", self.mass, "kg/m"))
             return
         if not self.mass:
             refuse(self, "mass", self.mass, "at least one piece (s_end, kg/m)")
-        if known:  # `Scene` looks a name up, and makes it again
+        if isinstance(self.rod, Rod):  # `Scene` looks a name up, and makes it again
             pieces = checked_pieces("AddedMass", "mass", self.mass, self.rod.length, "kg/m")
             store(self, mass=tuple((s, self._checked(i, mass)) for i, (s, mass) in enumerate(pieces)))
 
@@ -67,8 +67,7 @@ class AddedMass(LineAction):
 
     def added_mass(self, rod, s, side):
         ends, masses = zip(*self._pieces, strict=True)
-        within = 1e-9 * rod.length * (1 if side == "left" else -1)
-        across = np.array(masses)[np.searchsorted(np.add(ends[:-1], within), s, side=side)]
+        across = np.array(masses)[piece_at(ends[:-1], s, side, rod.length)]
         return across, across if self.axial else np.zeros_like(across)
 
     @property
@@ -78,10 +77,11 @@ class AddedMass(LineAction):
 
 # |w| is replaced by this constant at smaller speeds (in units of speed), so that it is differentiable at w = 0.
 _STILL = 1e-12
+_Current = Annotated[Numbers | FunctionAlong, VectorInTime(Several("speed"), (FunctionAlong,), functions=False)]
 
 
 @dataclass(frozen=True)
-class Drag(Load, LineAction):
+class Drag(Load, AlongRod, LineAction):
     """Quadratic drag of a fluid per unit of reference length: ``-c_n |w_n| w_n - c_t |w_t| w_t``.
 
     w is the velocity of the rod relative to the fluid, w_t its part along the tangent and w_n that across it (Morison's
@@ -104,27 +104,17 @@ class Drag(Load, LineAction):
     rod: RodOrName
     normal: QuadraticDrag
     tangential: QuadraticDrag = 0.0
-    current: Numbers | FunctionAlong = (0.0, 0.0, 0.0)
+    current: _Current = (0.0, 0.0, 0.0)
     permanent: bool = False
 
-    jumps, follows = (), True
+    jumps, follows, _vector = (), True, "current"
 
     def validate(self):
-        is_known(self, "rod", Rod)
         require_one(self, ("normal", "tangential"), "a coefficient (N s^2/m^3)")
-        if along_or_vector(self, "current", self.current, self.rod) is None:
-            store(self, current=vector(self, "current", self.current, "m/s"))
-        self._check_permanent()
 
     def data(self, rod, s):
         coefficients = (action.scalar(c, "N s^2/m^3") for c in (self.normal, self.tangential))
         return (*coefficients, action.vector(values_of(self.current, s), "m/s"))
-
-    def breaks(self, rod):
-        return breaks_of(self.current)
-
-    def kinks(self, rod):
-        return kinks_of(self.current)
 
     @staticmethod
     def work(point, test, c_n, c_t, current):
@@ -161,7 +151,6 @@ class LinearDrag(LineAction):
     scaled = False
 
     def validate(self):
-        is_known(self, "rod", Rod)
         require_one(self, ("normal", "tangential"), "a coefficient (N s/m^2)")
 
     def data(self, rod, s):

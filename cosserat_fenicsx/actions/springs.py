@@ -19,7 +19,7 @@ from cosserat_fenicsx.parts import (
     positive,
 )
 from cosserat_fenicsx.scene.action import LineAction, PointAction, scalar, vector
-from cosserat_fenicsx.scene.rod import Rod, RodOrName, Station, StationOrName, is_known
+from cosserat_fenicsx.scene.rod import RodOrName, StationOrName
 
 
 def require_one(action, fields, expected):
@@ -75,9 +75,6 @@ class Foundation(Directed, LineAction):
     def works(self):
         return alike, along
 
-    def validate(self):
-        is_known(self, "rod", Rod)
-
     def data(self, rod, s):
         return self._with_direction(scalar(self.stiffness, "N/m^2"))
 
@@ -126,7 +123,6 @@ class Spring(Directed, PointAction):
         return _sprung, _sprung_along
 
     def validate(self):
-        is_known(self, "station", Station)
         require_one(self, ("stiffness", "rotational"), "a stiffness (N/m), or a rotational one (N m/rad)")
 
     def data(self, rod, s):
@@ -178,7 +174,6 @@ class Dashpot(Directed, PointAction):
         return _resisted, _resisted_along
 
     def validate(self):
-        is_known(self, "station", Station)
         require_one(self, ("damping", "rotational"), "a damping (N s/m), or a rotational one (N m s/rad)")
 
     def data(self, rod, s):
@@ -213,7 +208,6 @@ class PointMass(PointAction):
     work, scaled = None, False
 
     def validate(self):
-        is_known(self, "station", Station)
         given = np.atleast_1d(self.moments)
         if given.shape not in ((1,), (3,)):
             refuse(self, "moments", self.moments, "one number, or three about d_1, d_2, d_3 (kg m^2)")

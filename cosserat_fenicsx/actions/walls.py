@@ -32,15 +32,15 @@ from cosserat_fenicsx.parts import (
 )
 from cosserat_fenicsx.scene import action
 from cosserat_fenicsx.scene.action import LineAction, PointAction
-from cosserat_fenicsx.scene.rod import Rod, RodOrName, Station, StationOrName, is_known
+from cosserat_fenicsx.scene.rod import Rod, RodOrName, StationOrName
 
-# Places along a rod, and share of its length by which it may lie outside the clearance at rest, for rounding.
+# Samples along a rod; tolerance, relative to its length, by which it may lie outside the clearance at rest.
 _SAMPLES, _OUTSIDE = 257, 1e-9
 # Distances from the axis below this fraction of the clearance are replaced by it: the radial direction is undefined on
 # the axis, and there is no contact there.
 _ON_AXIS = 1e-6
-# Half the length over which sizes and coefficients of the tube change at a jump, over its smallest radius; and over the
-# shortest piece, at most.
+# Half the length of the ramp that replaces a jump of radius or friction, over the smallest radius; upper bound, over
+# the shortest piece.
 _RAMP, _OF_PIECE = 0.05, 0.25
 # Points along a tube in a picture.
 _DRAWN = 201
@@ -119,7 +119,7 @@ class Wall(_Pressing, LineAction):
     scaled, at_nodes, presses, wall_work = False, True, True, staticmethod(straight_wall)
 
     def validate(self):
-        if is_known(self, "rod", Rod):
+        if isinstance(self.rod, Rod):
             self._check_inside()
 
     def _check_inside(self):
@@ -147,9 +147,9 @@ class Wall(_Pressing, LineAction):
 
 @dataclass
 class Stage:
-    """What solvers change of a wall for a while: its stiffness, `most` at most, and that of a spring, both over the
-    wall's own stiffness; and the part of the friction that acts. The spring leads to the axis, or to where the rod was
-    when it was anchored."""
+    """Temporary changes of a wall by solvers: factors of its stiffness (`wall`, at most `most`), of a spring relative
+    to that stiffness, and of its friction. The spring pulls to the axis, or to the positions at which it was anchored.
+    """
 
     wall: float = 1.0
     most: float = np.inf
@@ -164,7 +164,7 @@ class Stage:
 
 
 class _Confined(_Pressing):
-    """What walls along rods and at stations share."""
+    """Shared by walls along rods and at stations."""
 
     scaled, wall_work = False, staticmethod(wall_work)
     traits = {"dead": False, "known_force": False, "rates": False, "turns": True, "flat": False}
@@ -246,7 +246,7 @@ class TubeWall(_Confined, LineAction):
         store(self, radius=pieces(self, "radius", self.radius, "m", least=0.0))
         store(self, contact_radius=pieces(self, "contact_radius", self.contact_radius, "m", least=0.0))
         store(self, friction=pieces(self, "friction", self.friction, "1"), slip=slip_pieces(self, self.slip))
-        if is_known(self, "rod", Rod):
+        if isinstance(self.rod, Rod):
             self._check_inside()
 
     def _check_inside(self):
@@ -338,7 +338,6 @@ class TubeRing(_Confined, PointAction):
     def validate(self):
         super().validate()
         store(self, slip=slip_pieces(self, self.slip))
-        is_known(self, "station", Station)
 
     def tube(self):
         """See `Action`: as long as it is wide."""
@@ -399,13 +398,20 @@ def value_at(given, x):
     return np.array([value for _, value in given])[np.searchsorted([end for end, _ in given], x)]
 
 
-#: Of a tube, near points of a rod: measured depth (n,), m; point of the axis (n, 3), m, inertial; unit tangent (n, 3);
+#: A tube near points of a rod: measured depth (n,), m; point of the axis (n, 3), m, inertial; unit tangent (n, 3);
 #: clearance (n,), m; radius of the rod's surface where friction acts (n,), m; friction coefficient (n,).
 Around = namedtuple("Around", "md position tangent clearance arm friction")
 
 
+@dataclass(frozen=True)
 class _InMotion:
-    """What walls of motions share."""
+    """Shared by walls of motions."""
+
+    slip: Numbers = field(default=(0.0, 0.0), init=False, repr=False, compare=False)
+    law: None = field(default=None, init=False, repr=False, compare=False)
+    damping: Annotated[float, Number(limits=at_least(0))] = 0.0
+    kinetic: Annotated[float, Number(limits=between(0, 1))] = 1.0
+    speed: Annotated[Speed, positive()] = 0.1
 
     touches, work, refreshed = True, None, None
 
@@ -449,12 +455,7 @@ class HoleWall(_InMotion, TubeWall):
         SceneError: numbers outside their range, or a rod as wide as the hole.
     """
 
-    slip: Numbers = field(default=(0.0, 0.0), init=False, repr=False, compare=False)
-    law: None = field(default=None, init=False, repr=False, compare=False)
     has_arm: bool = field(default=True, init=False, repr=False, compare=False)
-    damping: Annotated[float, Number(limits=at_least(0))] = 0.0
-    kinetic: Annotated[float, Number(limits=between(0, 1))] = 1.0
-    speed: Annotated[Speed, positive()] = 0.1
 
 
 @dataclass(frozen=True)
@@ -473,9 +474,3 @@ class HoleRing(_InMotion, TubeRing):
     Raises:
         SceneError: numbers outside their range.
     """
-
-    slip: Numbers = field(default=(0.0, 0.0), init=False, repr=False, compare=False)
-    law: None = field(default=None, init=False, repr=False, compare=False)
-    damping: Annotated[float, Number(limits=at_least(0))] = 0.0
-    kinetic: Annotated[float, Number(limits=between(0, 1))] = 1.0
-    speed: Annotated[Speed, positive()] = 0.1

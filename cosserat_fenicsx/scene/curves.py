@@ -16,13 +16,13 @@ from typing import Annotated
 import numpy as np
 from numpy.polynomial import legendre
 
-from cosserat_fenicsx.checks import File, Numbers, Rows, instance, number, positive, refuse, store, text_of, vector
+from cosserat_fenicsx.checks import File, Numbers, Rows, positive, refuse, store, text_of, vector
 from cosserat_fenicsx.dimensions import LARGEST
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.numerics import gauss
-from cosserat_fenicsx.parts import FileName, Part
+from cosserat_fenicsx.parts import FileName, Limits, Number, Part, Several
 
-# Smallest distance of neighbouring points over the extent of all: nearer ones leave the curvature to rounding errors.
+# Smallest distance of neighbouring points, relative to the extent of all: closer ones make the curvature inaccurate.
 _APART = 1e-7
 
 
@@ -215,6 +215,18 @@ _GAUSS = gauss(20)
 _MOST_HALVINGS, _MOST_PANELS = 24, 200
 
 
+Point = Annotated[Numbers, Several("length")]
+Direction = Annotated[Numbers, Several(unit="direction")]
+_NONZERO = Limits(what="a finite number other than 0")
+
+
+class PointsOrFile(FileName):
+    """Rows of numbers, or the name of a file of them; `polyline` checks both."""
+
+    def check(self, owner, field, value):
+        return value
+
+
 class Curve(Part, family="curve"):
     """Base of reference centrelines."""
 
@@ -245,20 +257,17 @@ class Spline(Curve):
             that turns back on itself in a cusp, or d1 along the tangent.
     """
 
-    points: Annotated[Rows | File, FileName()] = field(repr=False)
-    d1: Numbers | None = None
+    points: Annotated[Rows | File, PointsOrFile()] = field(repr=False)
+    d1: Direction | None = None
     closed: bool = False
     length: float = field(init=False)
     breaks: tuple = field(init=False, repr=False, compare=False)
 
     uniform = False
 
-    def __post_init__(self):
+    def validate(self):
         from scipy.interpolate import CubicSpline  # imported here: it is slow to import, and few scenes need it
 
-        instance(self, "closed", self.closed, bool, "true or false")
-        if self.d1 is not None:
-            store(self, d1=vector(self, "d1", self.d1, "direction"))
         points = polyline(self, "points", self.points, closed=self.closed)
         store(self, points=tuple(map(tuple, points.tolist())))
         offsets = points - points[0]  # a large distance from the origin costs no accuracy
@@ -408,16 +417,14 @@ class Line(Curve):
         SceneError: points that coincide, or d1 along the line.
     """
 
-    start: Numbers
-    end: Numbers
-    d1: Numbers | None = None
+    start: Point
+    end: Point
+    d1: Direction | None = None
     length: float = field(init=False)
 
     breaks, uniform = (), True
 
-    def __post_init__(self):
-        store(self, start=vector(self, "start", self.start, "m"), end=vector(self, "end", self.end, "m"))
-        _check_d1(self)
+    def validate(self):
         chord = np.subtract(self.end, self.start)
         length = float(np.linalg.norm(chord))
         if not length > 1e-12 * max(np.abs(self.start).max(), np.abs(self.end).max()):
@@ -452,6 +459,23 @@ class _Uniform(Curve):
         """R_R at the arc lengths s (n,); shape (n, 3, 3), the directors as columns, inertial components."""
         return self._frame @ exponential(np.asarray(s, dtype=float)[..., None] * self._curvature)
 
+    def _axis_and_arm(self, turned):
+        """The unit axis, the unit vector from it to the start, and their distance, m; the field `turned` is not 0."""
+        if getattr(self, turned) == 0:
+            refuse(self, turned, getattr(self, turned), _NONZERO.what)
+        axis = np.array(self.axis)
+        if not np.linalg.norm(axis) > 0:
+            refuse(self, "axis", self.axis, "a direction other than 0")
+        axis = axis / np.abs(axis).max()
+        axis /= np.linalg.norm(axis)
+        arm = np.subtract(self.start, self.centre)
+        across = arm - np.dot(arm, axis) * axis
+        across -= np.dot(across, axis) * axis  # twice, against cancellation where the component along the axis is large
+        radius = float(np.linalg.norm(across))
+        if not radius > 1e-12 * np.abs([self.start, self.centre]).max():
+            refuse(self, "start", self.start, f"a point off the axis through centre = {self.centre}")
+        return axis, across / radius, radius
+
     def _wind(self, axis, angle, length, frame):
         """Store a uniform rotation about an axis by `angle`, rad, over `length`, m, of curve and frame."""
         if not length > 1e-12 * np.abs([self.start, self.centre]).max():
@@ -475,16 +499,15 @@ class Arc(_Uniform):
         SceneError: no angle, no axis, a start on the axis, or d1 along the tangent.
     """
 
-    centre: Numbers
-    start: Numbers
-    angle: float
-    axis: Numbers = (0.0, 0.0, 1.0)
-    d1: Numbers | None = None
+    centre: Point
+    start: Point
+    angle: Annotated[float, Number("angle", _NONZERO)]
+    axis: Direction = (0.0, 0.0, 1.0)
+    d1: Direction | None = None
     length: float = field(init=False)
 
-    def __post_init__(self):
-        axis, out, radius = _axis_and_arm(self)
-        store(self, angle=_nonzero(self, "angle", self.angle, "rad"))
+    def validate(self):
+        axis, out, radius = self._axis_and_arm("angle")
         frame = start_frame(self, math.copysign(1, self.angle) * np.cross(axis, out), axis)
         self._wind(axis, self.angle, radius * abs(self.angle), frame)
 
@@ -506,18 +529,16 @@ class Helix(_Uniform):
         SceneError: no turns, no axis, a start on the axis, or d1 along the tangent.
     """
 
-    centre: Numbers
-    start: Numbers
-    turns: float
-    pitch: float
-    axis: Numbers = (0.0, 0.0, 1.0)
-    d1: Numbers | None = None
+    centre: Point
+    start: Point
+    turns: Annotated[float, Number(limits=_NONZERO)]
+    pitch: Annotated[float, Number("length")]
+    axis: Direction = (0.0, 0.0, 1.0)
+    d1: Direction | None = None
     length: float = field(init=False)
 
-    def __post_init__(self):
-        axis, out, radius = _axis_and_arm(self)
-        store(self, turns=_nonzero(self, "turns", self.turns, "-"))
-        store(self, pitch=number(self, "pitch", self.pitch, "a finite number (m)", math.isfinite))
+    def validate(self):
+        axis, out, radius = self._axis_and_arm("turns")
         round_ = math.copysign(2 * math.pi * radius, self.turns)
         turn = math.hypot(round_, self.pitch)
         d3 = (round_ * np.cross(axis, out) + self.pitch * axis) / turn
@@ -562,31 +583,3 @@ class UniformCurvature(_Uniform):
 
     def arguments(self):
         return {"frame" if name == "quaternion" else name: value for name, value in super().arguments().items()}
-
-
-def _check_d1(curve):
-    if curve.d1 is not None:
-        store(curve, d1=vector(curve, "d1", curve.d1, "direction"))
-
-
-def _nonzero(curve, name, value, unit):
-    return number(curve, name, value, f"a finite number other than 0 ({unit})", lambda x: x != 0 and math.isfinite(x))
-
-
-def _axis_and_arm(curve):
-    """The checked unit axis, the unit vector from it to the start, and their distance, m."""
-    for name, unit in (("centre", "m"), ("start", "m"), ("axis", "direction")):
-        store(curve, **{name: vector(curve, name, getattr(curve, name), unit)})
-    _check_d1(curve)
-    axis = np.array(curve.axis)
-    if not np.linalg.norm(axis) > 0:
-        refuse(curve, "axis", curve.axis, "a direction other than 0")
-    axis = axis / np.abs(axis).max()
-    axis /= np.linalg.norm(axis)
-    arm = np.subtract(curve.start, curve.centre)
-    across = arm - np.dot(arm, axis) * axis
-    across -= np.dot(across, axis) * axis  # twice, against cancellation where the component along the axis is large
-    radius = float(np.linalg.norm(across))
-    if not radius > 1e-12 * np.abs([curve.start, curve.centre]).max():
-        refuse(curve, "start", curve.start, f"a point off the axis through centre = {curve.centre}")
-    return axis, across / radius, radius

@@ -5,21 +5,19 @@ of a distributed load may be a function of the arc length (`along`). Virtual wor
 """
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
-from cosserat_fenicsx.checks import Numbers, NumbersInTime, instance, refuse, store, vector
-from cosserat_fenicsx.parts import FunctionAlong
+from cosserat_fenicsx.checks import Numbers, NumbersInTime
+from cosserat_fenicsx.parts import FunctionAlong, Several
 from cosserat_fenicsx.scene import action
 from cosserat_fenicsx.scene.action import LineAction, PointAction
-from cosserat_fenicsx.scene.rod import Rod, RodOrName, Station, StationOrName, is_known
-from cosserat_fenicsx.scene.signals import (
-    along_or_vector,
-    breaks_of,
-    kinks_of,
-    values_of,
-    vector_or_signal,
-)
+from cosserat_fenicsx.scene.rod import Rod, RodOrName, StationOrName, mass_arm, require_inertia
+from cosserat_fenicsx.scene.signals import VectorInTime, values_of
+
+_ForceInTime = Annotated[NumbersInTime, VectorInTime(Several("force"))]
+_MomentInTime = Annotated[NumbersInTime, VectorInTime(Several("moment"))]
 
 
 @dataclass(frozen=True)
@@ -44,8 +42,7 @@ class _WeightOffAxis(LineAction):
 
     def data(self, rod, s):
         force = rod.stiffness_at(s).mass[..., None] * np.asarray(self.gravity)
-        arm = np.einsum("...ij,...j->...i", rod.curve.frame(s), rod.mass_centre.at(s))
-        return action.vector(force, "N/m"), action.vector(arm, "m")
+        return action.vector(force, "N/m"), action.vector(mass_arm(rod, s), "m")
 
 
 class Load:
@@ -58,21 +55,26 @@ class Load:
         """See `Action`."""
         return not self.permanent
 
-    def _check_permanent(self):
-        instance(self, "permanent", self.permanent, bool, "True or False")
-
 
 class PointLoad(Load, PointAction):
-    """A load at a station."""
+    """A load at a station: the vector in the field `_vector`, inertial."""
 
-    def _check(self, field, unit):
-        is_known(self, "station", Station)
-        store(self, **{field: vector_or_signal(self, field, getattr(self, field), unit, self.jumps)})
-        self._check_permanent()
+    def data(self, rod, s):
+        return (action.vector(getattr(self, self._vector), self._unit),)
 
-    def _turned(self, rod, a):
-        """Inertial components of the vector with the material components a, in the reference."""
-        return rod.curve.frame(self.station.s) @ np.asarray(a)
+
+class FollowerLoad(PointLoad):
+    """A point load that turns with the section: the vector in the field `_vector`, material."""
+
+    follows = True
+
+    def data(self, rod, s):
+        return (action.vector(_turned(self.station, getattr(self, self._vector)), self._unit),)
+
+
+def _turned(station, a):
+    """Inertial components of the vector with the material components a, in the reference."""
+    return station.rod.curve.frame(station.s) @ np.asarray(a)
 
 
 @dataclass(frozen=True)
@@ -89,17 +91,11 @@ class Force(PointLoad):
     """
 
     station: StationOrName
-    force: NumbersInTime
+    force: _ForceInTime
     jumps: Numbers = ()
     permanent: bool = False
 
-    work = "force"
-
-    def __post_init__(self):
-        self._check("force", "N")
-
-    def data(self, rod, s):
-        return (action.vector(self.force, "N"),)
+    work, _vector, _unit = "force", "force", "N"
 
 
 @dataclass(frozen=True)
@@ -116,17 +112,11 @@ class Moment(PointLoad):
     """
 
     station: StationOrName
-    moment: NumbersInTime
+    moment: _MomentInTime
     jumps: Numbers = ()
     permanent: bool = False
 
-    work = "moment"
-
-    def __post_init__(self):
-        self._check("moment", "N m")
-
-    def data(self, rod, s):
-        return (action.vector(self.moment, "N m"),)
+    work, _vector, _unit = "moment", "moment", "N m"
 
 
 @dataclass(frozen=True)
@@ -144,23 +134,19 @@ class EccentricForce(PointLoad):
     """
 
     station: StationOrName
-    force: NumbersInTime
-    offset: Numbers
+    force: _ForceInTime
+    offset: Annotated[Numbers, Several("diameter", 2)]
     jumps: Numbers = ()
     permanent: bool = False
 
     work = "eccentric_force"
 
-    def __post_init__(self):
-        self._check("force", "N")
-        store(self, offset=vector(self, "offset", self.offset, "m", size=2))
-
     def data(self, rod, s):
-        return (action.vector(self.force, "N"), action.vector(self._turned(rod, [*self.offset, 0.0]), "m"))
+        return (action.vector(self.force, "N"), action.vector(_turned(self.station, [*self.offset, 0.0]), "m"))
 
 
 @dataclass(frozen=True)
-class FollowerForce(PointLoad):
+class FollowerForce(FollowerLoad):
     """A point force that turns with the section.
 
     Args:
@@ -173,21 +159,15 @@ class FollowerForce(PointLoad):
     """
 
     station: StationOrName
-    force: NumbersInTime
+    force: _ForceInTime
     jumps: Numbers = ()
     permanent: bool = False
 
-    work, follows = "follower_force", True
-
-    def __post_init__(self):
-        self._check("force", "N")
-
-    def data(self, rod, s):
-        return (action.vector(self._turned(rod, self.force), "N"),)
+    work, _vector, _unit = "follower_force", "force", "N"
 
 
 @dataclass(frozen=True)
-class FollowerMoment(PointLoad):
+class FollowerMoment(FollowerLoad):
     """A point moment that turns with the section.
 
     Args:
@@ -200,17 +180,11 @@ class FollowerMoment(PointLoad):
     """
 
     station: StationOrName
-    moment: NumbersInTime
+    moment: _MomentInTime
     jumps: Numbers = ()
     permanent: bool = False
 
-    work, follows = "follower_moment", True
-
-    def __post_init__(self):
-        self._check("moment", "N m")
-
-    def data(self, rod, s):
-        return (action.vector(self._turned(rod, self.moment), "N m"),)
+    work, _vector, _unit = "follower_moment", "moment", "N m"
 
 
 @dataclass(frozen=True)
@@ -226,20 +200,13 @@ class Weight(Load, LineAction):
         SceneError: not three finite numbers; a rod without mass (raised by `Scene`).
     """
 
-    gravity: Numbers = (0.0, 0.0, -9.81)
+    gravity: Annotated[Numbers, Several("acceleration")] = (0.0, 0.0, -9.81)
     permanent: bool = False
 
     work, rod = "force", None
 
-    def __post_init__(self):
-        store(self, gravity=vector(self, "gravity", self.gravity, "m/s^2"))
-        self._check_permanent()
-
     def check_rod(self, rod):
-        """Refuse a rod without mass."""
-        if rod.profile.range[0].mass is None:
-            field = "Stiffness.mass" if rod.material is None else "Material.density"
-            refuse(f"Rod '{rod.name}': {field.split('.')[0]}", field.split(".")[1], None, "a value, which Weight needs")
+        require_inertia(rod, "Weight", ("mass",))
 
     def acts_on(self, rod):
         """All rods have weight."""
@@ -260,16 +227,21 @@ class Weight(Load, LineAction):
         return (*weights, *(_WeightOffAxis(rod, self.gravity, self.permanent) for rod in offset))
 
 
-class LineLoad(Load, LineAction):
-    """A dead load along a rod, per unit of reference length."""
+class AlongRod:
+    """An action along a rod with a vector, in the field `_vector`, that may be a function of the arc length."""
 
-    def _check(self, field, unit):
-        is_known(self, "rod", Rod)
-        given = along_or_vector(self, field, getattr(self, field), self.rod)
-        if given is None:
-            given = vector_or_signal(self, field, getattr(self, field), unit, self.jumps)
-        store(self, **{field: given})
-        self._check_permanent()
+    def breaks(self, rod):
+        return getattr(getattr(self, self._vector), "breaks", ())
+
+    def kinks(self, rod):
+        return getattr(getattr(self, self._vector), "kinks", ())
+
+
+class LineLoad(Load, AlongRod, LineAction):
+    """A dead load along a rod, per unit of reference length: the vector in the field `_vector`, inertial."""
+
+    def data(self, rod, s):
+        return (action.vector(values_of(getattr(self, self._vector), s), self._unit),)
 
 
 @dataclass(frozen=True)
@@ -287,23 +259,11 @@ class LineForce(LineLoad):
     """
 
     rod: RodOrName
-    force: NumbersInTime | FunctionAlong
+    force: Annotated[NumbersInTime | FunctionAlong, VectorInTime(Several("force per length"), (FunctionAlong,))]
     jumps: Numbers = ()
     permanent: bool = False
 
-    work = "force"
-
-    def __post_init__(self):
-        self._check("force", "N/m")
-
-    def data(self, rod, s):
-        return (action.vector(values_of(self.force, s), "N/m"),)
-
-    def breaks(self, rod):
-        return breaks_of(self.force)
-
-    def kinks(self, rod):
-        return kinks_of(self.force)
+    work, _vector, _unit = "force", "force", "N/m"
 
 
 @dataclass(frozen=True)
@@ -320,20 +280,8 @@ class LineMoment(LineLoad):
     """
 
     rod: RodOrName
-    moment: NumbersInTime | FunctionAlong
+    moment: Annotated[NumbersInTime | FunctionAlong, VectorInTime(Several(unit="N m/m"), (FunctionAlong,))]
     jumps: Numbers = ()
     permanent: bool = False
 
-    work = "moment"
-
-    def __post_init__(self):
-        self._check("moment", "N m/m")
-
-    def data(self, rod, s):
-        return (action.vector(values_of(self.moment, s), "N m/m"),)
-
-    def breaks(self, rod):
-        return breaks_of(self.moment)
-
-    def kinks(self, rod):
-        return kinks_of(self.moment)
+    work, _vector, _unit = "moment", "moment", "N m/m"

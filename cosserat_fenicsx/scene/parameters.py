@@ -20,7 +20,7 @@ from cosserat_fenicsx.scene.rod import Station
 from cosserat_fenicsx.scene.scene import Scene
 from cosserat_fenicsx.scene.sections import Tube
 
-_NOTHING = 1e-6  # of a vector: components that are 0 but for rounding
+_NOTHING = 1e-6  # vector components below this, relative to the vector, are rounding errors
 _PARTS = ("rods", "materials", "supports", "loads", "joints")
 _TOKEN = re.compile(r"\[(\d+)\]|\.?([^.\[\]]+)")
 _UNITS = {
@@ -43,7 +43,7 @@ class Parameter:
         scene_of: a function of a value that returns the `Scene` with it: the same rods, supports, joints and loads in
             the same order, at the same shares of the rods' lengths. It is called with values close to `value`.
         unit: for tables.
-        scale: how large a change of it is large; None for the size of `value`, which then must not be zero.
+        scale: the size of a large change; None for the size of `value`, which then must not be zero.
 
     Raises:
         SceneError: an argument of the wrong kind, or no scale.
@@ -68,13 +68,13 @@ class Parameter:
 
     @property
     def size(self):
-        """How large a change of it is large."""
+        """The size of a large change."""
         return abs(self.value if self.scale is None else self.scale)
 
 
 @dataclass(frozen=True)
 class _OfScene(Parameter):
-    """A parameter by its name: `place` tells whether another name means the same number."""
+    """A parameter by its name; `place` identifies the number, whatever its name."""
 
     place: tuple = ()
 
@@ -181,7 +181,7 @@ def _kind(value):
 
 
 def _inside(value, name):
-    """What may follow a name, in words."""
+    """Examples of longer names, for messages."""
     if dataclasses.is_dataclass(value):
         return ", such as " + " or ".join(f"'{name}.{x.name}'" for x in dataclasses.fields(value)[:3] if x.init)
     return f", such as '{name}[0]'" if isinstance(value, tuple | list | np.ndarray) else ""

@@ -10,6 +10,8 @@ import numpy as np
 
 from cosserat_fenicsx.scene.action import is_axial
 from cosserat_fenicsx.scene.curves import Line
+from cosserat_fenicsx.scene.describe import describe
+from cosserat_fenicsx.scene.rod import mass_arm
 from cosserat_fenicsx.scene.signals import at, sample_times
 from cosserat_fenicsx.scene.statical import rows_of
 from cosserat_fenicsx.scene.supports import PositionTie, TurnTie
@@ -100,11 +102,11 @@ def _find(scene):
         bent = [np.linalg.norm(np.cross(v, normal)) for v in _units(across)]
         if max([*np.abs(_units(inside) @ normal), *bent], default=0.0) > _SMALLEST_ANGLE:
             what = "does not turn in" if across and not inside else "points out of"
-            raise _Leaves(f"load {i + 1} ({_words(load)}) {what} the plane of the rods")
+            raise _Leaves(f"load {i + 1} ({describe(load)}) {what} the plane of the rods")
     for rod, (s, frames) in zip(scene.rods, tangents, strict=True):
         _check_section(rod, s, frames, normal)
         if rod.mass_centre:
-            offsets = np.concatenate([_offsets(rod, s, frames, side) for side in ("left", "right")])
+            offsets = np.concatenate([mass_arm(rod, s, side) for side in ("left", "right")])
             if np.abs(offsets @ normal).max() > _SMALLEST_ANGLE * rod.mass_centre.largest:
                 raise _Leaves(f"the mass centre of rod '{rod.name}' lies off the plane (Rod.eccentricity)")
     e1 = np.cross(normal, np.eye(3)[np.argmin(np.abs(normal))])
@@ -112,11 +114,6 @@ def _find(scene):
     plane = Plane(tuple(map(tuple, (e1, np.cross(normal, e1), normal))))
     _check_supports(scene, plane)
     return plane
-
-
-def _offsets(rod, s, frames, side):
-    """(n, 3) offsets of the mass centre from the axis, inertial, m."""
-    return np.einsum("nij,nj->ni", frames, rod.mass_centre.at(s, side))
 
 
 def _sample(rod):
@@ -235,9 +232,3 @@ def _check_supports(scene, plane):
                 where = getattr(holder, "station", None) or f"{holder.first} with {holder.second}"
                 name = type(holder).__name__
                 raise _Leaves(f"{what} {i + 1} ({name} at {where}) constrains motions oblique to the plane of the rods")
-
-
-def _words(load):
-    where = load.station or getattr(load, "rod", None)
-    where = getattr(where, "name", where)
-    return type(load).__name__ + (f" at {where}" if where else "")

@@ -1,18 +1,17 @@
-"""What changes along a rod: its sections and its mass centre, one for all, in pieces, or by a function of the arc
-length."""
+"""Sections and mass centre along a rod: constant, in pieces, or a function of the arc length."""
 
 from collections import namedtuple
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Annotated
 
 import numpy as np
 
-from cosserat_fenicsx.checks import Numbers, call, instance, number, refuse, store, vector
+from cosserat_fenicsx.checks import Numbers, call, instance, number, refuse, vector
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.parts import Kind, Object, Several, misplaced, spoken
-from cosserat_fenicsx.scene.sections import Material, Section, Stiffness, inverse, representative
+from cosserat_fenicsx.scene.sections import Section, Stiffness, inverse, representative
 from cosserat_fenicsx.scene.stresses import Stress
 
 
@@ -44,9 +43,15 @@ def checked_pieces(where, field, given, length, what):
     return pieces
 
 
+def piece_at(breaks, s, side, length):
+    """Indices of the pieces of a rod that end at `breaks`, at arc lengths s (...), m; `side` as for `stiffness_at`."""
+    within = 1e-9 * length * (1 if side == "left" else -1)  # tolerance for s at a break
+    return np.searchsorted(np.add(breaks, within), s, side=side)
+
+
 @dataclass(frozen=True)
 class InPieces(Kind):
-    """What another kind takes, or pieces of it along a rod, (s_end, value).
+    """A value of another kind, or pieces (s_end, value) along a rod.
 
     Attributes:
         key: that of the value in the table of a piece, beside "to"; "" where the value is itself the table.
@@ -133,8 +138,7 @@ class MassCentre:
     def at(self, s, side="right"):
         """(..., 3) offsets along d_1, d_2, d_3 at arc lengths s (...), m; `side` as for `Rod.stiffness_at`."""
         s = np.asarray(s, dtype=float)
-        within = 1e-9 * self._length * (1 if side == "left" else -1)
-        index = np.searchsorted(np.add(self.breaks, within), s, side=side)
+        index = piece_at(self.breaks, s, side, self._length)
         offsets = np.zeros((*s.shape, 3))
         for k, offset in enumerate(self._offsets):
             here = index == k
@@ -224,7 +228,6 @@ _NUMBERS = _DIAGONAL + 36
 _UNKNOWN = [np.nan] * _NUMBERS  # stands for a piece given by a function
 
 
-@dataclass(frozen=True, eq=False)
 class Sections:
     """The sections of a rod as a function of its arc length.
 
@@ -245,20 +248,12 @@ class Sections:
         SceneError: pieces that do not ascend to the rod's length, or a function that returns no section at a sample.
     """
 
-    owner: object = field(repr=False)
-    given: object
-    material: Material | None
-    pieces: tuple = field(init=False)
-    start: Stiffness = field(init=False)
-    range: tuple = field(init=False)
-    coupled: bool = field(init=False)
-
-    def __post_init__(self):
-        given = self.given if isinstance(self.given, list | tuple) else [(None, self.given)]
-        store(self, pieces=self._check_pieces(given))
-        store(self, start=self._stiffness(self._piece(0.0, 0)))
+    def __init__(self, owner, given, material):
+        self.owner, self.material = owner, material
+        self.pieces = self._check_pieces(given if isinstance(given, list | tuple) else [(None, given)])
+        self.start = self._stiffness(self._piece(0.0, 0))
         fixed = [_UNKNOWN if _is_law(section) else _row(self._stiffness(section)) for _, section in self.pieces]
-        store(self, _fixed=np.array(fixed), _law=[row is _UNKNOWN for row in fixed])
+        self._fixed, self._law = np.array(fixed), [row is _UNKNOWN for row in fixed]
         rows = [self._fixed[[not law for law in self._law]]]
         before = 0.0
         for i, (end, _) in enumerate(self.pieces):
@@ -267,11 +262,11 @@ class Sections:
                 rows.append(self._rows(s, np.full(_SAMPLES, i)))
             before = end
         rows = np.concatenate(rows)
-        store(self, coupled=bool(np.isfinite(rows[:, _DIAGONAL:]).any()))
+        self.coupled = bool(np.isfinite(rows[:, _DIAGONAL:]).any())
         if self.coupled and np.isinf(rows[:, :3]).any():
             expected = "finite stiffnesses along a rod that has a section with a matrix"
-            refuse(f"Rod '{self.owner.name}'", "section", self.given, expected)
-        store(self, range=tuple(_split(bound(rows[:, :_DIAGONAL], axis=0), False) for bound in (np.min, np.max)))
+            refuse(f"Rod '{owner.name}'", "section", given, expected)
+        self.range = tuple(_split(bound(rows[:, :_DIAGONAL], axis=0), False) for bound in (np.min, np.max))
 
     def _check_pieces(self, given):
         where = f"Rod '{self.owner.name}'"
@@ -341,8 +336,7 @@ class Sections:
     def _index(self, s, side):
         if side not in ("left", "right"):
             refuse(f"Rod '{self.owner.name}'", "side", side, "'left' or 'right'")
-        within = 1e-9 * self.owner.length * (1 if side == "left" else -1)  # tolerance for s at a break
-        return np.searchsorted(np.add(self.breaks, within), s, side=side)
+        return piece_at(self.breaks, s, side, self.owner.length)
 
     def _rows(self, s, index):
         rows = self._fixed[index]

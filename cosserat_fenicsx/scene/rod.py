@@ -13,7 +13,7 @@ import numpy as np
 from cosserat_fenicsx.checks import Numbers, instance, number, refuse, store
 from cosserat_fenicsx.errors import SceneError, nearest
 from cosserat_fenicsx.numerics import gauss
-from cosserat_fenicsx.parts import Part, Text
+from cosserat_fenicsx.parts import Number, Part, Text, at_least, fields_of
 from cosserat_fenicsx.scene.curves import Curve
 from cosserat_fenicsx.scene.profiles import (
     MassCentre,
@@ -24,7 +24,7 @@ from cosserat_fenicsx.scene.profiles import (
     Stiffnesses,
     mass_centre_of,
 )
-from cosserat_fenicsx.scene.sections import Material, Stiffness
+from cosserat_fenicsx.scene.sections import Material, PerDirector, Stiffness
 from cosserat_fenicsx.scene.signals import Signal
 
 
@@ -47,21 +47,10 @@ class Damping(Part):
         SceneError: a number below zero, or not three of them.
     """
 
-    time: float = 0.0
-    drag: float = 0.0
-    Kt: tuple | None = None
-    Jt: tuple | None = None
-
-    def __post_init__(self):
-        for field, unit in (("time", "s"), ("drag", "1/s")):
-            store(self, **{field: _not_negative(self, field, getattr(self, field), unit)})
-        for field, unit in (("Kt", "N s"), ("Jt", "N m^2 s")):
-            values = getattr(self, field)
-            if values is None:
-                continue
-            if not isinstance(values, tuple | list) or len(values) != 3:
-                refuse(self, field, values, f"three numbers, along or about d_1, d_2 and d_3 ({unit})")
-            store(self, **{field: tuple(_not_negative(self, field, value, unit) for value in values)})
+    time: Annotated[float, Number("time", at_least(0))] = 0.0
+    drag: Annotated[float, Number("rate", at_least(0))] = 0.0
+    Kt: Annotated[tuple, PerDirector(Number(limits=at_least(0, "a viscosity (N s)")))] | None = None
+    Jt: Annotated[tuple, PerDirector(Number(limits=at_least(0, "a viscosity (N m^2 s)")))] | None = None
 
     @classmethod
     def ratio(cls, ratio: float, frequencies: Numbers) -> "Damping":
@@ -108,12 +97,8 @@ class Damping(Part):
         return stiffnesses._replace(K=Kt, J=Jt, matrix=matrix)
 
 
-def _not_negative(owner, field, value, unit):
-    return number(owner, field, value, f"a number that is not negative ({unit})", lambda x: 0 <= x < math.inf)
-
-
 _unnamed = itertools.count(1)
-# Rods that a message lists.
+# Largest number of rods listed in a message.
 _NAMED = 8
 
 
@@ -152,17 +137,11 @@ class Rod(Part):
     profile: Sections = dataclasses.field(init=False, repr=False)
     mass_centre: MassCentre | None = dataclasses.field(init=False, repr=False)
 
-    def __post_init__(self):
+    def validate(self):
         if self.name is None:
             store(self, name=f"rod{next(_unnamed)}")
-        instance(self, "name", self.name, str, "a string")
         if "@" in self.name:
             refuse(self, "name", self.name, "a name without '@', which separates it from the s of a station")
-        instance(self, "curve", self.curve, Curve, "a curve such as Line(start, end)")
-        if self.material is not None:
-            instance(self, "material", self.material, Material, "a Material")
-        if self.damping is not None:
-            instance(self, "damping", self.damping, Damping, "a Damping")
         store(self, profile=Sections(self, self.section, self.material))
         store(self, stiffness=self.profile.start)
         store(self, mass_centre=mass_centre_of(self))
@@ -227,19 +206,6 @@ class Rod(Part):
 
 
 @dataclass(frozen=True)
-class ByName(Text):
-    """A rod or a station, or its name, which data have."""
-
-    words = "a rod, a station such as rod.end, or its name"
-
-    def check(self, owner, field, value):
-        return instance(owner, field, value, Station | Rod | str, self.words)
-
-    def write(self, value, writing):
-        return value if isinstance(value, str) else value.name if isinstance(value, Rod) else value.full_name
-
-
-@dataclass(frozen=True)
 class Station:
     """A point of a rod by its reference arc length s, m; made by `rod.start`, `rod.end`, `rod.at(s)`."""
 
@@ -293,10 +259,27 @@ def station_named(where, text, rods):
         raise SceneError(f"{where} = '{text}': {problem}") from None
 
 
-#: What the fields of supports, loads and joints take that say where they act: names are looked up by `Scene`.
-Station.by_name = Rod.by_name = ByName()
-StationOrName = Annotated[Station | str, ByName()]
-RodOrName = Annotated[Rod | str, ByName()]
+@dataclass(frozen=True)
+class ByName(Text):
+    """A `Station` or a `Rod` (`kind`), or its name, which data have and `Scene` looks up."""
+
+    kind: type = Station
+
+    @property
+    def words(self):
+        return f"{'a station such as rod.end' if self.kind is Station else 'a Rod'}, or its name"
+
+    def check(self, owner, field, value):
+        return instance(owner, field, value, self.kind | str, self.words)
+
+    def write(self, value, writing):
+        return value if isinstance(value, str) else value.name if isinstance(value, Rod) else value.full_name
+
+
+Station.by_name, Rod.by_name = ByName(Station), ByName(Rod)
+#: Fields of supports, loads and joints that say where they act.
+StationOrName = Annotated[Station | str, Station.by_name]
+RodOrName = Annotated[Rod | str, Rod.by_name]
 
 
 def is_known(owner, field, kind):
@@ -308,18 +291,22 @@ def is_known(owner, field, kind):
     Raises:
         SceneError: neither of the two.
     """
-    expected = "a station such as rod.end" if kind is Station else "a Rod"
-    return not isinstance(instance(owner, field, getattr(owner, field), kind | str, f"{expected}, or its name"), str)
+    return not isinstance(kind.by_name.check(owner, field, getattr(owner, field)), str)
 
 
-def require_inertia(rod, user):
+def mass_arm(rod, s, side="right"):
+    """The arms (..., 3) from the axis of an eccentric rod to its mass centre in the reference, inertial, m."""
+    return np.einsum("...ij,...j->...i", rod.curve.frame(s), rod.mass_centre.at(s, side))
+
+
+def require_inertia(rod, user, fields=("mass", "inertia")):
     """Refuse a rod without mass or inertia, which `user` needs.
 
     Raises:
         SceneError: naming the property that the rod lacks.
     """
     low = rod.profile.range[0]
-    for name in ("mass", "inertia"):
+    for name in fields:
         if getattr(low, name) is None:
             owner, field = ("Stiffness", name) if rod.material is None else ("Material", "density")
             refuse(f"Rod '{rod.name}': {owner}", field, None, f"a value, which {user} needs")
@@ -354,51 +341,38 @@ def _column_load(rod, pieces=4, points=8):
     return float(1 / np.linalg.norm(scaled.reshape(2 * len(s), -1), 2) ** 2)
 
 
-# The fields of actions, whatever the annotations of a class of the user's own are.
-_OF_ACTIONS = {"station": Station, "rod": Rod}
-_KINDS = {Station: Station, StationOrName: Station, Rod: Rod, RodOrName: Rod}
+# Fields of actions that may hold names, also in users' classes with other annotations.
+_OF_ACTIONS = {"station": Station.by_name, "rod": Rod.by_name}
 
 
-def kind_of(annotation):
-    """`Station` or `Rod` where a field with this annotation takes one, or its name; else None."""
-    return _KINDS.get(annotation)
-
-
-def look_up(where, name, kind, rods):
-    """The `Station` or `Rod` (`kind`) of a name among rods {name: rod}.
-
-    Raises:
-        SceneError: there is none of that name.
-    """
-    if kind is Station:
+def _look_up(where, name, kind, rods):
+    """The `Station` or `Rod` of a name among rods {name: rod}; `kind`: a `ByName`."""
+    if kind.kind is Station:
         return station_named(where, name, rods)
-    if not isinstance(name, str) or name not in rods:
+    if name not in rods:
         raise SceneError(f"{where} = {name!r}: no rod has this name, {nearest(name, rods)}")
     return rods[name]
 
 
 def with_names(where, item, rods):
-    """A part of a scene with the stations and rods that its names stand for; the part itself where it has no names.
+    """A part of a scene with stations and rods in place of their names; the part itself where it has no names.
 
     Args:
         where: for error messages; rods: {name: rod}.
 
     Raises:
-        SceneError: there is none of that name, or the part refuses what it stands for.
+        SceneError: there is none of that name, or the part refuses the station or rod.
     """
+    if isinstance(item, type) or not dataclasses.is_dataclass(item):  # refused by `Scene`
+        return item
+    given = {name: (getattr(item, name), kind) for name, kind in fields_of(type(item)).items()}
     found = {
-        field.name: look_up(f"{where}.{field.name}", getattr(item, field.name), kind, rods)
-        for field in _fields(item)
-        if (kind := kind_of(field.type) or _OF_ACTIONS.get(field.name)) and isinstance(getattr(item, field.name), str)
+        name: _look_up(f"{where}.{name}", value, kind if isinstance(kind, ByName) else _OF_ACTIONS[name], rods)
+        for name, (value, kind) in given.items()
+        if isinstance(value, str) and (isinstance(kind, ByName) or name in _OF_ACTIONS)
     }
     if not found:
         return item
-    # functions of time are checked again by the constructor, with the place in their messages
-    given = {f.name: getattr(item, f.name).function for f in _fields(item) if isinstance(getattr(item, f.name), Signal)}
-    return dataclasses.replace(item, **given, **found)
-
-
-def _fields(item):
-    if isinstance(item, type) or not dataclasses.is_dataclass(item):  # no part of a scene, which says so
-        return []
-    return [field for field in dataclasses.fields(item) if field.init]
+    # the constructor checks functions of time again, with the place in their messages
+    functions = {name: value.function for name, (value, _) in given.items() if isinstance(value, Signal)}
+    return dataclasses.replace(item, **functions, **found)

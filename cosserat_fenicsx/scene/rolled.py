@@ -183,7 +183,7 @@ def _flow(pieces):
 
 
 def _near(name):
-    """Names near to an unknown one: the sizes of its series that are nearest to its own, or all series."""
+    """A hint for an unknown name: the nearest sizes of its series, or the known series."""
     series, size = name[:3], name[3:]
     sizes = [int(known.split()[1]) for known in _table() if known.startswith(f"{series} ")]
     if not sizes or not size.isdigit():

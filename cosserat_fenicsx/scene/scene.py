@@ -1,5 +1,5 @@
-"""A scene: rods, joints, supports and actions, independent of solvers and meshes; and numbers that cannot be
-meant."""
+"""A scene: rods, joints, supports and actions, independent of solvers and meshes; and plausibility checks of its
+numbers."""
 
 import contextlib
 import copy
@@ -23,8 +23,7 @@ from cosserat_fenicsx.scene.signals import at, sample_times, signals_of
 from cosserat_fenicsx.scene.statical import Groups, check_held_once, touching
 from cosserat_fenicsx.scene.supports import InitialVelocity, Joint, Support
 
-# Largest load over the largest EA; and over EI/L^2 where a rod's EA is infinite. For larger loads rounding errors
-# dominate.
+# Largest load over the largest EA, and over EI/L^2 where a rod's EA is infinite: beyond, rounding errors dominate.
 _MOST_STRAIN, _MOST_BENDING = 1e6, 1e15
 # Largest prescribed displacement over the longest rod, and largest prescribed rotation, rad.
 _MOST_MOTION = 1e6
@@ -98,8 +97,14 @@ def check_magnitudes(scene, load_factor):
             )
 
 
-# Young's moduli below this, Pa, are those of gels, or mistakes in units.
+# Young's moduli below this, Pa, are probably mistakes in units.
 _SOFTEST = 1e6
+_PARTS = {
+    "supports": (Support, "a support such as Clamp(rod.start)"),
+    "joints": (Joint, "a Joint(one.end, other.start)"),
+    "loads": (Action, "a load such as Force(rod.end, (0, 0, -1)), or another Action"),
+    "velocities": (InitialVelocity, "an InitialVelocity(rod)"),
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,24 +157,16 @@ class Scene(Part):
         for field in ("supports", "loads", "joints", "velocities"):
             items = [with_names(f"Scene.{field}[{i}]", x, rods) for i, x in enumerate(getattr(self, field))]
             object.__setattr__(self, field, tuple(items))
-        for i, support in enumerate(self.supports):
-            instance("Scene", f"supports[{i}]", support, Support, "a support such as Clamp(rod.start)")
-            self._check_rod(f"supports[{i}]", support.station, support.station.rod)
-        for i, joint in enumerate(self.joints):
-            instance("Scene", f"joints[{i}]", joint, Joint, "a Joint(one.end, other.start)")
-            for end in (joint.first, joint.second):
-                self._check_rod(f"joints[{i}]", end, end.rod)
-        for i, load in enumerate(self.loads):
-            self._check_load(f"loads[{i}]", load)
-        moving = set()
+        for field, (kind, expected) in _PARTS.items():
+            for i, item in enumerate(getattr(self, field)):
+                instance("Scene", f"{field}[{i}]", item, kind, expected)
+                self._check_places(f"{field}[{i}]", item)
+        first = {}
         for i, velocity in enumerate(self.velocities):
-            instance("Scene", f"velocities[{i}]", velocity, InitialVelocity, "an InitialVelocity(rod)")
-            self._check_rod(f"velocities[{i}]", velocity.rod, velocity.rod)
-            if velocity.rod in moving:
+            if first.setdefault(velocity.rod, i) != i:
                 raise SceneError(
                     f"Scene.velocities[{i}] is the second of rod '{velocity.rod.name}': expected one a rod"
                 )
-            moving.add(velocity.rod)
         check_held_once(self)
         object.__setattr__(self, "_leaders", self._find_leaders())
 
@@ -178,23 +175,20 @@ class Scene(Part):
         rods = ", ".join(rod.name for rod in self.rods)
         return f"<Scene{f' {self.title!r}' if self.title else ''}: rods {rods}; {', '.join(counts)}>"
 
-    def _check_load(self, field, load):
-        instance("Scene", field, load, Action, "a load such as Force(rod.end, (0, 0, -1)), or another Action")
-        if load.station is not None:
-            instance("Scene", f"{field}.station", load.station, Station, "a station such as rod.end")
-            self._check_rod(field, load.station, load.station.rod)
-            return
-        if load.rod is not None:
-            self._check_rod(field, load.rod, load.rod)
-        for rod in self.rods_of(load):
-            load.check_rod(rod)
-
-    def _check_rod(self, field, place, rod):
-        if rod not in self._numbers:
-            raise SceneError(
-                f"Scene.{field} acts at {place}, a station of a rod that is not in the scene: "
-                f"expected one of {', '.join(rod.name for rod in self.rods)}"
-            )
+    def _check_places(self, field, item):
+        station, rod = getattr(item, "station", None), getattr(item, "rod", None)
+        if station is not None:
+            instance("Scene", f"{field}.station", station, Station, "a station such as rod.end")
+        places = (item.first, item.second) if isinstance(item, Joint) else (station or rod,)
+        for place in filter(None, places):
+            if getattr(place, "rod", place) not in self._numbers:
+                raise SceneError(
+                    f"Scene.{field} acts at {place}, a station of a rod that is not in the scene: "
+                    f"expected one of {', '.join(rod.name for rod in self.rods)}"
+                )
+        if isinstance(item, Action) and station is None:
+            for rod in self.rods_of(item):
+                item.check_rod(rod)
 
     def _find_leaders(self):
         """For every rod the first rod of its structure: the rods connected by joints, directly or indirectly."""

@@ -1,6 +1,6 @@
 """Materials and cross-sections: d_1 and d_2 span the section, d_3 is the tangent.
 
-A section tells its `stiffness` and, where it knows its shape, its `stresses`, both in a material.
+A section has a `stiffness` and, where its shape is known, `stresses`, both in a material.
 
 Shear factors: Cowper, J. Appl. Mech. 33 (1966) 335, doi:10.1115/1.3625046; torsion of a rectangle: Saint-Venant's
 series.
@@ -14,18 +14,7 @@ from typing import Annotated, Any
 import numpy as np
 
 from cosserat_fenicsx import parts
-from cosserat_fenicsx.checks import (
-    Numbers,
-    Rows,
-    finite_array,
-    instance,
-    number,
-    positive,
-    refuse,
-    stiffness,
-    store,
-    vector,
-)
+from cosserat_fenicsx.checks import Numbers, Rows, finite_array, instance, number, positive, refuse, store, vector
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.scene.stresses import rectangle_fibres, round_stress
 
@@ -53,7 +42,7 @@ class Material(parts.Part):
         return self.E / (2 * (1 + self.nu))
 
 
-# Offsets over the radius of gyration, and products of inertia over moments, that are errors of finite elements.
+# Offsets over the radius of gyration, and products of inertia over moments, below these are finite-element errors.
 _OFFSET, _SKEW = 1e-5, 1e-6
 _WHERE = "Stiffness.from_section"
 
@@ -181,11 +170,30 @@ def _outline(section, line, unit):
 
 
 _ZETA_5 = 1.0369277551433699263  # sum of 1/n^5
-# Asymmetry and smallest eigenvalue of a matrix, scaled to a unit diagonal, that are rounding.
+# Tolerance of the asymmetry and of the smallest eigenvalue of a matrix scaled to a unit diagonal.
 _ROUNDING = 1e-12
 
 
 ShearFactor = Annotated[float, parts.Number(limits=parts.Limits(0, 1, above=True))]
+_FORCE = parts.Number("force", parts.positive(infinite=True))
+_BENDING = parts.Number("bending stiffness", parts.positive())
+
+
+@dataclass(frozen=True)
+class PerDirector(parts.Items):
+    """`size` numbers of one kind, one for each of the first directors."""
+
+    size: int = 3
+
+    @property
+    def words(self):
+        many, names = ("two", "d_1 and d_2") if self.size == 2 else ("three", "d_1, d_2 and d_3")
+        return f"{many} numbers, along or about {names}, each {self.inner.words}"
+
+    def check(self, owner, field, value):
+        if not isinstance(value, tuple | list) or len(value) != self.size:
+            refuse(owner, field, value, self.words)
+        return tuple(self.inner.check(owner, field, x) for x in value)
 
 
 class Section(parts.Part, family="section"):
@@ -219,35 +227,26 @@ class Stiffness(Section):
             stiffnesses given twice or not at all.
     """
 
-    shear: Numbers | None = None
-    axial: float | None = None
-    bending: Numbers | None = None
-    torsion: float | None = None
-    mass: float | None = None
+    shear: Annotated[Numbers, PerDirector(_FORCE, 2)] | None = None
+    axial: Annotated[float, _FORCE] | None = None
+    bending: Annotated[Numbers, PerDirector(_BENDING, 2)] | None = None
+    torsion: Annotated[float, _BENDING] | None = None
+    mass: parts.MassPerLength | None = None
     outline: Rows | None = None
-    inertia: Numbers | None = None
+    inertia: Annotated[Numbers, PerDirector(parts.Number(limits=parts.positive("a number (kg m)")))] | None = None
     matrix: Rows | None = None
 
-    def __post_init__(self):
-        if self.matrix is None:
-            self._check_stiffnesses()
-        else:
-            for field in ("shear", "axial", "bending", "torsion"):
-                if getattr(self, field) is not None:
-                    refuse(self, field, getattr(self, field), "None beside a matrix, which holds all stiffnesses")
+    def validate(self):
+        for field in ("shear", "axial", "bending", "torsion"):
+            value = getattr(self, field)
+            if self.matrix is not None and value is not None:
+                refuse(self, field, value, "None beside a matrix, which holds all stiffnesses")
+            if self.matrix is None and value is None:
+                refuse(self, field, None, parts.fields_of(Stiffness)[field].inner.words)
+        if self.matrix is not None:
             store(self, matrix=_checked(self, self.matrix))
-        if self.mass is not None:
-            store(self, mass=positive(self, "mass", self.mass, "kg/m"))
-        if self.inertia is not None:
-            _check_numbers(self, "inertia", "three numbers, about d_1, d_2 and d_3 (kg m)", "kg m", positive, 3)
         if self.outline is not None:
             store(self, outline=_corners(self, self.outline))
-
-    def _check_stiffnesses(self):
-        for field, unit, check in (("shear", "N", stiffness), ("bending", "N m^2", positive)):
-            _check_numbers(self, field, f"two numbers, about or along d_1 and d_2 ({unit})", unit, check, 2)
-        store(self, axial=stiffness(self, "axial", self.axial, "N"))
-        store(self, torsion=positive(self, "torsion", self.torsion, "N m^2"))
 
     @classmethod
     def offset(
@@ -337,7 +336,7 @@ class Stiffness(Section):
         return self
 
     def stresses(self, material, force, moment):
-        """None: the shape is not known (the outline is that of pictures alone)."""
+        """None: the shape is not known (the outline serves pictures only)."""
         return None
 
 
@@ -431,13 +430,6 @@ class Rectangle(Section):
         """The `Stress` for contact forces and moments (..., 3), N and N m, along d_1, d_2, d_3."""
         b, h = self.width, self.height
         return rectangle_fibres(b, h, material.nu, _rectangle_torsion(b, h)).stress(force, moment)
-
-
-def _check_numbers(section, field, expected, unit, check, size):
-    values = getattr(section, field)
-    if not isinstance(values, tuple | list) or len(values) != size:
-        refuse(section, field, values, expected)
-    store(section, **{field: tuple(check(section, field, value, unit) for value in values)})
 
 
 def _checked(section, matrix):

@@ -22,11 +22,43 @@ import numpy as np
 from cosserat_fenicsx.checks import File, Numbers, Rows, call, number, refuse, store, text_of, vector
 from cosserat_fenicsx.dimensions import LARGEST
 from cosserat_fenicsx.errors import SceneError
-from cosserat_fenicsx.parts import FileName, FunctionAlong, FunctionOfTime
+from cosserat_fenicsx.kinds import Either
+from cosserat_fenicsx.parts import FileName, FunctionAlong, FunctionOfTime, Limits, Number
+
+
+_Time = Annotated[float, Number("time", Limits(what="a time"))]
+
+
+class _Timed(FunctionOfTime):
+    """Base of functions of time that are smooth but at the times of their fields `start`, `peak` and `end`, s."""
+
+    def validate(self):
+        if not isinstance(self.value, tuple | list | np.ndarray | str | numbers.Real) or isinstance(self.value, bool):
+            refuse(self, "value", self.value, "a vector, such as (0, 0, 1), or a number")
+        for (_, before), (field, after) in itertools.pairwise(self._times.items()):
+            if after <= before:
+                refuse(self, field, after, f"a time after {before:g} s")
+
+    @property
+    def _times(self):
+        given = {field: getattr(self, field, None) for field in ("start", "peak", "end")}
+        return {field: t for field, t in given.items() if t is not None}
+
+    @property
+    def jumps(self):
+        """Where it is not smooth, s."""
+        return tuple(self._times.values())
+
+    def _acts(self, t):
+        return self.start <= t and (self.end is None or t < self.end)
+
+    def _share(self, t):
+        """The share of the time from `start` to `end` that has passed at t, in [0, 1]."""
+        return min(max((t - self.start) / (self.end - self.start), 0.0), 1.0)
 
 
 @dataclass(frozen=True)
-class Step(FunctionOfTime):
+class Step(_Timed):
     """`value` from `start` up to `end`, or for ever; zero otherwise. Times in s.
 
     Raises:
@@ -34,58 +66,37 @@ class Step(FunctionOfTime):
     """
 
     value: Numbers
-    start: float = 0.0
-    end: float | None = None
+    start: _Time = 0.0
+    end: _Time | None = None
 
     straight = True
 
-    def __post_init__(self):
-        _check(self, "start", *(() if self.end is None else ("end",)))
-
-    @property
-    def jumps(self):
-        """Where it is not smooth, s."""
-        return (self.start,) if self.end is None else (self.start, self.end)
-
     def __call__(self, t: float) -> tuple:
         """The vector at t."""
-        return _times(self.start <= t and (self.end is None or t < self.end), self.value)
+        return _times(self._acts(t), self.value)
 
 
 @dataclass(frozen=True)
-class _FromTo(FunctionOfTime):
-    """Base of functions that change between two times, s."""
-
-    value: Numbers
-    start: float = 0.0
-    end: float = 1.0
-
-    def __post_init__(self):
-        _check(self, "start", "end")
-
-    @property
-    def jumps(self):
-        """Where it is not smooth, s."""
-        return self.start, self.end
-
-
-@dataclass(frozen=True)
-class Ramp(_FromTo):
+class Ramp(_Timed):
     """Zero up to `start`, linear from there, `value` from `end` on. Times in s.
 
     Raises:
         SceneError: numbers that are not finite, or an end that is not after the start.
     """
 
+    value: Numbers
+    start: _Time = 0.0
+    end: _Time = 1.0
+
     straight = True
 
     def __call__(self, t: float) -> tuple:
         """The vector at t."""
-        return _times(min(max((t - self.start) / (self.end - self.start), 0.0), 1.0), self.value)
+        return _times(self._share(t), self.value)
 
 
 @dataclass(frozen=True)
-class RunUp(_FromTo):
+class RunUp(_Timed):
     """A smooth start of a motion with constant speed: zero up to `start`, the rate of change `value` (per s) from `end`
     on.
 
@@ -98,16 +109,19 @@ class RunUp(_FromTo):
         SceneError: numbers that are not finite, or an end that is not after the start.
     """
 
+    value: Numbers
+    start: _Time = 0.0
+    end: _Time = 1.0
+
     def __call__(self, t: float) -> tuple:
         """The vector at t."""
-        whole = self.end - self.start
-        x = min(max((t - self.start) / whole, 0.0), 1.0)
+        x = self._share(t)
         ran = x * x / 2 + (math.cos(2 * math.pi * x) - 1) / (2 * math.pi) ** 2
-        return _times(whole * ran + max(t - self.end, 0.0), self.value)
+        return _times((self.end - self.start) * ran + max(t - self.end, 0.0), self.value)
 
 
 @dataclass(frozen=True)
-class Triangle(FunctionOfTime):
+class Triangle(_Timed):
     """Linear from zero at `start` to `value` at `peak` and back to zero at `end`; zero otherwise. Times in s.
 
     Raises:
@@ -115,19 +129,11 @@ class Triangle(FunctionOfTime):
     """
 
     value: Numbers
-    start: float = 0.0
-    peak: float = 1.0
-    end: float = 2.0
+    start: _Time = 0.0
+    peak: _Time = 1.0
+    end: _Time = 2.0
 
     straight = True
-
-    def __post_init__(self):
-        _check(self, "start", "peak", "end")
-
-    @property
-    def jumps(self):
-        """Where it is not smooth, s."""
-        return self.start, self.peak, self.end
 
     def __call__(self, t: float) -> tuple:
         """The vector at t."""
@@ -136,7 +142,7 @@ class Triangle(FunctionOfTime):
 
 
 @dataclass(frozen=True)
-class Sine(FunctionOfTime):
+class Sine(_Timed):
     """`value` times sin(2 pi frequency (t - start) + phase) from `start` up to `end`, or for ever; zero otherwise.
 
     Args:
@@ -149,23 +155,13 @@ class Sine(FunctionOfTime):
     value: Numbers
     frequency: float
     phase: float = 0.0
-    start: float = 0.0
-    end: float | None = None
-
-    def __post_init__(self):
-        for field in ("frequency", "phase"):
-            number(self, field, getattr(self, field), "a finite number", math.isfinite)
-        _check(self, "start", *(() if self.end is None else ("end",)))
-
-    @property
-    def jumps(self):
-        """Where it is not smooth, s."""
-        return (self.start,) if self.end is None else (self.start, self.end)
+    start: _Time = 0.0
+    end: _Time | None = None
 
     def __call__(self, t: float) -> tuple:
         """The vector at t."""
-        on = self.start <= t and (self.end is None or t < self.end)
-        return _times(on and math.sin(2 * math.pi * self.frequency * (t - self.start) + self.phase), self.value)
+        wave = math.sin(2 * math.pi * self.frequency * (t - self.start) + self.phase)
+        return _times(self._acts(t) and wave, self.value)
 
 
 @dataclass(frozen=True)
@@ -223,19 +219,9 @@ class Table(FunctionOfTime):
 
 
 def _as_text(rows):
-    """Whether rows of a table have text with units, which what the table is given to checks."""
+    """Whether rows of a table contain text with units, which the owner of the table converts."""
     inner = [x for row in rows for x in (row if isinstance(row, list | tuple) else (row,))] if np.ndim(rows) else ()
     return any(isinstance(x, str) for x in inner)
-
-
-def _check(signal, *times):
-    if not isinstance(signal.value, tuple | list | np.ndarray | str | numbers.Real) or isinstance(signal.value, bool):
-        refuse(signal, "value", signal.value, "a vector, such as (0, 0, 1), or a number")
-    values = [number(signal, field, getattr(signal, field), "a time (s)", math.isfinite) for field in times]
-    store(signal, **dict(zip(times, values, strict=True)))
-    for field, before, after in zip(times[1:], values[:-1], values[1:], strict=True):
-        if after <= before:
-            refuse(signal, field, after, f"a time after {before:g} s")
 
 
 def _times(factor, value):
@@ -262,7 +248,7 @@ class Signal:
     place: str = ""
 
     def as_data(self):
-        """What stands for it in data."""
+        """Its form in stored data: the function."""
         return self.function
 
     def __call__(self, t: float) -> tuple:
@@ -276,39 +262,51 @@ class Signal:
         given = call(self.function, t, f"{self.owner}.{self.field}: its function", f", {when}")
         floats = type(given) is tuple and all(type(x) is float and abs(x) <= LARGEST for x in given)
         if floats and len(given) == self.size:
-            return given  # as most are; the whole check takes ten times as long
+            return given  # the usual case; the full check takes ten times as long
         try:
             return vector(self.owner, self.field, given, self.unit, self.size)
         except SceneError as problem:
             raise SceneError(f"{problem}, {when}") from None
 
 
-def vector_or_signal(owner, field, value, unit, jumps=()):
-    """A tuple of three finite numbers, or a `Signal` of three where `value` is a function of time.
+@dataclass(frozen=True)
+class VectorInTime(Either):
+    """Three numbers of a dimension; or, with `functions`, a function of time, with the `jumps` of its owner; or, with
+    `FunctionAlong` among the classes, one of the arc length of the `rod` of its owner."""
 
-    Raises:
-        SceneError: neither of the two, or jumps that are no times.
-    """
-    if not callable(value):
-        if len(jumps):
-            refuse(owner, "jumps", jumps, f"none, since {field} does not depend on time")
-        return vector(owner, field, value, unit)
-    if isinstance(value, FunctionOfTime):
-        value = value.in_units(lambda x: number(owner, field, x, f"a number ({unit})", math.isfinite))
-    place = getattr(owner, "station", None) or getattr(owner, "rod", None)
-    place = str(getattr(place, "name", place) or "")
-    signal = Signal(type(owner).__name__, field, unit, value, _times_of(owner, value, jumps), place=place)
-    signal(0.0)
-    return signal
+    functions: bool = True
 
+    def check(self, owner, field, value):
+        if self.classes and isinstance(value, str | PurePath):
+            refuse(owner, field, value, f"a vector, or AlongTable({str(value)!r}) for a file of s and three components")
+        if isinstance(value, self.classes):
+            self._refuse_jumps(owner, field)
+            if not isinstance(owner.rod, str):  # `Scene` looks a name up
+                value.check(owner.rod.length)
+            return value
+        if self.functions and callable(value):
+            return self._signal(owner, field, value)
+        if not any(map(callable, vars(owner).values())):  # jumps of another field
+            self._refuse_jumps(owner, field)
+        return self.inner.check(owner, field, value)
 
-def _times_of(owner, value, jumps):
-    known = getattr(value, "jumps", ())
-    if not isinstance(jumps, tuple | list):
-        refuse(owner, "jumps", jumps, "a list of times (s)")
-    for t in jumps:
-        number(owner, "jumps", t, "finite times (s)", math.isfinite)
-    return tuple(sorted({float(t) for t in (*known, *jumps)}))
+    def _signal(self, owner, field, function):
+        unit = self.inner.unit or Number(self.inner.dimension).unit
+        if isinstance(function, FunctionOfTime):
+            function = function.in_units(lambda x: number(owner, field, x, f"a number ({unit})", math.isfinite))
+        if not isinstance(owner.jumps, tuple | list):
+            refuse(owner, "jumps", owner.jumps, "a list of times (s)")
+        given = [number(owner, "jumps", t, "finite times (s)", math.isfinite) for t in owner.jumps]
+        jumps = tuple(sorted({float(t) for t in (*getattr(function, "jumps", ()), *given)}))
+        place = getattr(owner, "station", None) or getattr(owner, "rod", None)
+        place = str(getattr(place, "name", place) or "")
+        signal = Signal(type(owner).__name__, field, unit, function, jumps, place=place)
+        signal(0.0)
+        return signal
+
+    def _refuse_jumps(self, owner, field):
+        if len(owner.jumps):
+            refuse(owner, "jumps", owner.jumps, f"none, since {field} does not depend on time")
 
 
 def signals_of(item):
@@ -364,9 +362,7 @@ class Along(FunctionAlong):
 
     function: Callable[[float], Numbers]
 
-    breaks = ()
-
-    def __post_init__(self):
+    def validate(self):
         if not callable(self.function):
             refuse(self, "function", self.function, "a function of the arc length s (m)")
 
@@ -415,8 +411,7 @@ class AlongTable(FunctionAlong):
             refuse(self, "s", self.s, "ascending arc lengths (m)")
         if values.shape != (len(s), 3) or not np.isfinite(values).all():
             refuse(self, "values", self.values, f"three finite numbers for each of the {len(s)} arc lengths")
-        object.__setattr__(self, "s", tuple(s.tolist()))
-        object.__setattr__(self, "values", tuple(map(tuple, values.tolist())))
+        store(self, s=tuple(s.tolist()), values=tuple(map(tuple, values.tolist())))
 
     @property
     def breaks(self):
@@ -462,7 +457,7 @@ class AlongPieces(FunctionAlong):
                          lambda x, before=before: before < x < math.inf)  # fmt: skip
             kept.append((end, vector(self, f"pieces[{i}]", piece[1], "per length")))
             before = end
-        object.__setattr__(self, "pieces", tuple(kept))
+        store(self, pieces=tuple(kept))
 
     @property
     def breaks(self):
@@ -478,32 +473,9 @@ class AlongPieces(FunctionAlong):
         """Pieces fit any length."""
 
 
-def along_or_vector(owner, field, value, rod):
-    """`value` where it is a function of the arc length, checked along the rod; None where it is something else."""
-    if isinstance(value, str | PurePath):
-        refuse(owner, field, value, f"a vector, or AlongTable({str(value)!r}) for a file of s and three components")
-    if not isinstance(value, FunctionAlong):
-        return None
-    if len(owner.jumps):
-        refuse(owner, "jumps", owner.jumps, f"none, since {field} does not depend on time")
-    if not isinstance(rod, str):  # `Scene` looks a name up
-        value.check(rod.length)
-    return value
-
-
 def values_of(value, s):
     """(3,) or (n, 3) numbers of a vector or of a function of the arc length at s (n,), m."""
     return value(s) if isinstance(value, FunctionAlong) else value
-
-
-def breaks_of(value):
-    """Arc lengths (m) where a vector or a function of the arc length is not smooth."""
-    return getattr(value, "breaks", ()) if isinstance(value, FunctionAlong) else ()
-
-
-def kinks_of(value):
-    """Arc lengths (m) where a function of the arc length is not smooth, though elements need not end there."""
-    return getattr(value, "kinks", ()) if isinstance(value, FunctionAlong) else ()
 
 
 def _read(file):

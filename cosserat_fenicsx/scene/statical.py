@@ -12,25 +12,25 @@ from cosserat_fenicsx.scene.supports import Clamp, Joint, PositionTie, TurnTie
 
 
 class Groups:
-    """Groups of hashable things that can be ordered; the least of each group is its leader.
+    """Union-find of hashable, ordered items; the smallest item of a group is its leader.
 
-    Whatever was not joined yet is a group of its own.
+    An item that was never joined is a group of its own.
     """
 
     def __init__(self):
         self._above = {}
 
     def leader(self, x):
-        """The least member of the group of x."""
+        """The smallest member of the group of x."""
         above, up = self._above, self._above.get(x, x)
         while up != x:
             further = above.get(up, up)
-            above[x] = further  # halves the way of later calls
+            above[x] = further  # path halving
             x, up = up, further
         return x
 
     def join(self, one, other):
-        """Make one group of two; False where they are one already."""
+        """Merge two groups; False where they are one already."""
         first, second = self.leader(one), self.leader(other)
         if first == second:
             return False
@@ -49,13 +49,13 @@ _RANK_TOLERANCE = 1e-9
 _DENSE = 150
 # Shift of the normal matrix over its largest diagonal entry: well above rounding, which is some 1e-16.
 _SHIFT = 1e-12
-# The smallest singular values are all found once one beyond them is found that is larger than this, over the largest.
+# The block holds all small singular values once its largest one exceeds this, relative to the largest of the matrix.
 _GAP = 1e-4
-# Vectors that are iterated first, and by how many times more where these do not reach the gap.
+# Initial block size, and the factor by which it grows until it reaches the gap.
 _BLOCK, _GROWTH = 8, 8
-# An iteration damps what belongs to singular values beyond the gap to _SHIFT / _GAP**2 of its size.
+# Each iteration reduces components of singular values beyond the gap by the factor _SHIFT / _GAP**2.
 _ITERATIONS = 5
-#: More vectors than this are not searched for in a matrix of more than `_DENSE` columns.
+#: Largest number of null vectors that are searched for in a matrix of more than `_DENSE` columns.
 MOST = 64
 
 
@@ -106,11 +106,11 @@ def null_space(row, column, value, shape):
         count *= _GROWTH
 
 
-# Ends nearer than this, over a rod's length, lie at one point.
+# Ends closer than this, relative to a rod's length, lie at one point.
 _TOUCHING_DISTANCE = 1e-6
-# Holders that a message lists.
+# Largest number of supports and joints listed in a message.
 _NAMED = 8
-# A direction along which hardly two points of a structure have the same coordinate.
+# A generic direction, along which different points rarely have the same coordinate.
 _OBLIQUE = np.array([0.5381, 0.6427, 0.5453])
 
 
@@ -186,7 +186,7 @@ def check_held_once(scene):
 
 
 def _redundant(scene, constraints):
-    """The holders among (holder, [(station, row), ...]) constraints that hold a motion which others of them hold."""
+    """The holders of linearly dependent constraints (holder, [(station, row), ...])."""
     columns, entries = {}, []
     for i, (_, parts) in enumerate(constraints):
         for station, values in parts:

@@ -16,20 +16,22 @@ import numpy as np
 #: the largest and the smallest normal stress sigma of the section, tension positive.
 Stress = namedtuple("Stress", "von_mises axial_max axial_min")
 
-# Iterations of Newton's method for the largest von Mises stress around a circle, and intervals of the radius.
+# Newton iterations for the largest von Mises stress around a circle; intervals along the radius.
 _ITERATIONS, _RINGS = 6, 8
-# Rows of forces and moments whose stresses at all fibres are in the processor's cache.
+# Forces and moments per block: their stresses at all fibres fit into the processor's cache.
 _BLOCK = 256
-# Intervals of every side of a rectangle, places near each corner beside, of both every third inside; terms of series.
-_INTERVALS, _NEAR, _INSIDE, _TERMS = 24, 12, 3, 300
+# Sample intervals per side of a rectangle, extra samples near each corner, stride of the samples inside.
+_INTERVALS, _NEAR, _INSIDE = 24, 12, 3
+# Terms of the series of a rectangle.
+_TERMS = 300
 
 
 class Fibres:
-    """Places in a section, and the stresses there per force and moment.
+    """Sample points of a section, and the stresses there per unit of force and moment.
 
     Args:
-        normal: (places, 3) normal stress per contact force along d_3 (1/m^2), and per moment about d_1 and d_2 (1/m^3).
-        shear: (2, places, 3) shear stress along two directions at right angles, per contact force along d_1 and d_2
+        normal: (points, 3) normal stress per contact force along d_3 (1/m^2), and per moment about d_1 and d_2 (1/m^3).
+        shear: (2, points, 3) shear stress along two directions at right angles, per contact force along d_1 and d_2
             (1/m^2), and per moment about d_3 (1/m^3).
     """
 
@@ -103,7 +105,7 @@ def _largest_around(sigma, *taus):
 
 @functools.lru_cache(maxsize=64)
 def rectangle_fibres(width, height, nu, torsion):
-    """The `Fibres` of a rectangle: corners, places of all sides, denser near the corners, and places inside.
+    """The `Fibres` of a rectangle: corners, points on all sides, denser near the corners, and points inside.
 
     Between them von Mises stresses may be larger by 0.7 % (sides of 1:1 to 1:300, nu from 0 to 0.49), commonly 0.1 %.
 
@@ -124,7 +126,7 @@ def rectangle_fibres(width, height, nu, torsion):
 
 
 def _places(a, short):
-    """Places from -a to a, denser over the length 5 `short` at the ends, and whether each is one of those inside."""
+    """Coordinates from -a to a, denser over the length 5 `short` at the ends, and whether points inside have them."""
     corner = 1 - 5 * short / a * np.linspace(0, 1, _NEAR + 1)[1:] ** 1.5
     half = np.unique(np.round(np.concatenate([np.linspace(0, 1, _INTERVALS // 2 + 1), corner[corner > 0]]), 9))
     inside = np.arange(1 - len(half), len(half)) % _INSIDE == 0

@@ -7,14 +7,15 @@ or solver refers to a support by name.
 from collections import namedtuple
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
 from cosserat_fenicsx.checks import Numbers, NumbersInTime, direction, refuse, store, vector
 from cosserat_fenicsx.errors import SceneError
-from cosserat_fenicsx.parts import Part
-from cosserat_fenicsx.scene.rod import Rod, RodOrName, Station, StationOrName, is_known
-from cosserat_fenicsx.scene.signals import at, vector_or_signal
+from cosserat_fenicsx.parts import Part, Several, UnitVector
+from cosserat_fenicsx.scene.rod import RodOrName, Station, StationOrName
+from cosserat_fenicsx.scene.signals import VectorInTime, at
 
 #: direction . (r_a - r_b) = its value in the reference + rate times the load factor (m).
 PositionTie = namedtuple("PositionTie", "a b direction rate")
@@ -55,6 +56,8 @@ def _unit(a):
 class Support(Part, family="support"):
     """Base of supports."""
 
+    clamps = False
+
 
 @dataclass(frozen=True)
 class Clamp(Support):
@@ -67,9 +70,6 @@ class Clamp(Support):
     station: StationOrName
 
     clamps = True
-
-    def __post_init__(self):
-        is_known(self, "station", Station)
 
     def ties(self):
         """No constraints: the station has no unknowns left."""
@@ -85,11 +85,6 @@ class Pin(Support):
     """
 
     station: StationOrName
-
-    clamps = False
-
-    def __post_init__(self):
-        is_known(self, "station", Station)
 
     def ties(self):
         """The scalar constraints."""
@@ -109,13 +104,7 @@ class Hinge(Support):
     """
 
     station: StationOrName
-    axis: Numbers
-
-    clamps = False
-
-    def __post_init__(self):
-        is_known(self, "station", Station)
-        store(self, axis=direction(self, "axis", self.axis))
+    axis: UnitVector
 
     def ties(self):
         """The scalar constraints."""
@@ -135,13 +124,7 @@ class Roller(Support):
     """
 
     station: StationOrName
-    normal: Numbers
-
-    clamps = False
-
-    def __post_init__(self):
-        is_known(self, "station", Station)
-        store(self, normal=direction(self, "normal", self.normal))
+    normal: UnitVector
 
     def ties(self):
         """The scalar constraints."""
@@ -164,22 +147,13 @@ class Prescribed(Support):
     """
 
     station: StationOrName
-    displacement: NumbersInTime | None = None
-    rotation: NumbersInTime | None = None
+    displacement: Annotated[NumbersInTime, VectorInTime(Several("length"))] | None = None
+    rotation: Annotated[NumbersInTime, VectorInTime(Several("angle"))] | None = None
     jumps: Numbers = ()
 
-    clamps = False
-
-    def __post_init__(self):
-        is_known(self, "station", Station)
+    def validate(self):
         if self.displacement is None and self.rotation is None:
             refuse(self, "displacement", None, "a displacement (m) or a rotation (rad), or both")
-        given = [("displacement", self.displacement, "m"), ("rotation", self.rotation, "rad")]
-        moving = any(callable(value) for _, value, _ in given)
-        for field, value, unit in given:
-            if value is not None:
-                jumps = () if moving and not callable(value) else self.jumps
-                store(self, **{field: vector_or_signal(self, field, value, unit, jumps)})
 
     def ties(self):
         """The scalar constraints; at the time 0 where the motion depends on time."""
@@ -205,8 +179,8 @@ class Joint(Part):
     second: StationOrName
     release: Numbers | str | None = None
 
-    def __post_init__(self):
-        if all([is_known(self, field, Station) for field in ("first", "second")]):
+    def validate(self):
+        if isinstance(self.first, Station) and isinstance(self.second, Station):
             self._check_place()
         if isinstance(self.release, str):
             if self.release != "all":
@@ -260,17 +234,14 @@ class InitialVelocity(Part):
     rod: RodOrName
     linear: Numbers | Callable[[float], Numbers] = (0.0, 0.0, 0.0)
     angular: Numbers | Callable[[float], Numbers] = (0.0, 0.0, 0.0)
-    about: Numbers | None = None
+    about: Annotated[Numbers, Several("length")] | None = None
 
-    def __post_init__(self):
-        is_known(self, "rod", Rod)
+    def validate(self):
         for field, unit in (("linear", "m/s"), ("angular", "rad/s")):
             if not callable(getattr(self, field)):
                 store(self, **{field: vector(self, field, getattr(self, field), unit)})
-        if self.about is not None:
-            if not self._rigid:
-                refuse(self, "about", self.about, "None, since the velocity is a function of arc length")
-            store(self, about=vector(self, "about", self.about, "m"))
+        if self.about is not None and not self._rigid:
+            refuse(self, "about", self.about, "None, since the velocity is a function of arc length")
 
     @property
     def _rigid(self):
