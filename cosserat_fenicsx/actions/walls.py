@@ -12,10 +12,11 @@ from typing import Annotated
 import numpy as np
 import ufl
 
-from cosserat_fenicsx.checks import Numbers, number, refuse, store, vector
+from cosserat_fenicsx.checks import Numbers, number, refuse, vector
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.forms.contact import linear, wall_work
 from cosserat_fenicsx.parts import (
+    Items,
     Length,
     Limits,
     Number,
@@ -79,6 +80,47 @@ class _Pressing:
 
     def _law_data(self):
         return () if self.law is None else self.law.data()
+
+
+@dataclass(frozen=True)
+class Slip(Several):
+    """The direction (c_a, c_r) of slip, a unit vector, or (0, 0)."""
+
+    words = "a unit vector (c_a, c_r), or (0, 0)"
+
+    def check(self, owner, field, value):
+        slip = vector(owner, field, value, "1", 2)
+        if any(slip) and abs(np.hypot(*slip) - 1) > 1e-9:
+            refuse(owner, field, value, self.words)
+        return slip
+
+
+@dataclass(frozen=True)
+class Pieces(Items):
+    """((end, value), ...) with ascending ends, the last infinite, of one value of another kind or of pairs."""
+
+    @property
+    def words(self):
+        return f"{self.inner.words}, or pairs (end, value)"
+
+    def check(self, owner, field, value):
+        if not isinstance(value, list | tuple) or not all(isinstance(x, list | tuple) for x in value):
+            return ((np.inf, self.inner.check(owner, field, value)),)
+        if not value or any(len(piece) != 2 for piece in value):
+            refuse(owner, field, value, self.words)
+        found, last = [], 0.0
+        for end, x in value:
+            last = number(owner, field, end, "ends (m) that ascend from above zero", lambda x, last=last: x > last)
+            found.append((last, self.inner.check(owner, field, x)))
+        return (*found[:-1], (np.inf, found[-1][1]))
+
+
+_LENGTHS = Pieces(Number("length", positive()))
+
+
+def value_at(given, x):
+    """(n, ..) values of `Pieces` at x (n,); at an end that of the piece before it."""
+    return np.array([value for _, value in given])[np.searchsorted([end for end, _ in given], x)]
 
 
 def straight_wall(point, test, a, t, clearance, kp, *law, pressure=linear):
@@ -229,11 +271,11 @@ class TubeWall(_Confined, LineAction):
 
     rod: RodOrName
     path: object
-    radius: float | Numbers
-    contact_radius: float | Numbers
+    radius: Annotated[float | Numbers, _LENGTHS]
+    contact_radius: Annotated[float | Numbers, _LENGTHS]
     stiffness: WallStiffness = 1e9
-    friction: float | Numbers = 0.0
-    slip: Numbers = (0.0, 0.0)
+    friction: Annotated[float | Numbers, Pieces(Number(limits=at_least(0)))] = 0.0
+    slip: Annotated[Numbers, Pieces(Slip())] = (0.0, 0.0)
     begins: Annotated[Length, Limits()] = 0.0
     has_arm: bool = True
     law: ContactLaw | None = None
@@ -243,9 +285,6 @@ class TubeWall(_Confined, LineAction):
 
     def validate(self):
         super().validate()
-        store(self, radius=pieces(self, "radius", self.radius, "m", least=0.0))
-        store(self, contact_radius=pieces(self, "contact_radius", self.contact_radius, "m", least=0.0))
-        store(self, friction=pieces(self, "friction", self.friction, "1"), slip=slip_pieces(self, self.slip))
         if isinstance(self.rod, Rod):
             self._check_inside()
 
@@ -276,7 +315,7 @@ class TubeWall(_Confined, LineAction):
         return clearance, arm if self.has_arm else np.zeros_like(arm), self._smooth(self.friction, md)
 
     def _smooth(self, given, md):
-        """(n,) values of `pieces` along the axis, linear over a short length at a jump: the contact there would
+        """(n,) values of `Pieces` along the axis, linear over a short length at a jump: the contact there would
         alternate."""
         ends, values = np.array([end for end, _ in given[:-1]]), np.array([value for _, value in given])
         half = _RAMP * min(radius for _, radius in self.radius)
@@ -328,16 +367,12 @@ class TubeRing(_Confined, PointAction):
     contact_radius: Length
     stiffness: Annotated[Stiffness, positive()] = 1e9
     friction: Annotated[float, Number(limits=at_least(0))] = 0.0
-    slip: Numbers = (0.0, 0.0)
+    slip: Annotated[Numbers, Pieces(Slip())] = (0.0, 0.0)
     begins: Annotated[Length, Limits()] = 0.0
     law: ContactLaw | None = None
     stage: Stage = field(default_factory=Stage, init=False, repr=False, compare=False)
 
     unit = "N/m"
-
-    def validate(self):
-        super().validate()
-        store(self, slip=slip_pieces(self, self.slip))
 
     def tube(self):
         """See `Action`: as long as it is wide."""
@@ -349,55 +384,6 @@ class TubeRing(_Confined, PointAction):
         return tuple(np.full(len(s), x) for x in (self.clearance, self.contact_radius, self.friction))
 
 
-def pieces(owner, name, value, unit, least=None):
-    """((end, value), ..) with ascending ends, the last infinite, of a number or of pairs.
-
-    Args:
-        least: values must exceed it; None where they may be zero, not less.
-    """
-    expected = f"a number {'of zero or more' if least is None else f'above {least:g}'} ({unit}), or pairs (end, number)"
-
-    def checked(x):
-        return number(owner, name, x, expected, lambda x: (x >= 0 if least is None else x > least) and np.isfinite(x))
-
-    if not isinstance(value, list | tuple):
-        return ((np.inf, checked(value)),)
-    return _of_pairs(owner, name, value, expected, checked)
-
-
-def slip_pieces(owner, value):
-    """((end, (c_a, c_r)), ..) of one direction or of pairs."""
-    expected = "a unit vector (c_a, c_r), or (0, 0), or pairs (end, vector)"
-
-    def checked(x):
-        slip = vector(owner, "slip", x, "1", 2)
-        if slip != (0.0, 0.0) and abs(np.hypot(*slip) - 1) > 1e-9:
-            refuse(owner, "slip", x, expected)
-        return slip
-
-    if not isinstance(value, list | tuple) or not all(isinstance(x, list | tuple) for x in value):
-        return ((np.inf, checked(value)),)
-    return _of_pairs(owner, "slip", value, expected, checked)
-
-
-def _of_pairs(owner, name, value, expected, checked):
-    found, last = [], 0.0
-    for piece in value:
-        if not isinstance(piece, list | tuple) or len(piece) != 2 or np.ndim(piece[0]):
-            refuse(owner, name, value, expected)
-        end = number(owner, name, piece[0], "ends (m) that ascend from above zero", lambda x, last=last: x > last)
-        found.append((end, checked(piece[1])))
-        last = end
-    if not found:
-        refuse(owner, name, value, expected)
-    return (*found[:-1], (np.inf, found[-1][1]))
-
-
-def value_at(given, x):
-    """(n, ..) values of `pieces` at x (n,); at an end that of the piece before it."""
-    return np.array([value for _, value in given])[np.searchsorted([end for end, _ in given], x)]
-
-
 #: A tube near points of a rod: measured depth (n,), m; point of the axis (n, 3), m, inertial; unit tangent (n, 3);
 #: clearance (n,), m; radius of the rod's surface where friction acts (n,), m; friction coefficient (n,).
 Around = namedtuple("Around", "md position tangent clearance arm friction")
@@ -407,7 +393,7 @@ Around = namedtuple("Around", "md position tangent clearance arm friction")
 class _InMotion:
     """Shared by walls of motions."""
 
-    slip: Numbers = field(default=(0.0, 0.0), init=False, repr=False, compare=False)
+    slip: Numbers = field(default=((np.inf, (0.0, 0.0)),), init=False, repr=False, compare=False)
     law: None = field(default=None, init=False, repr=False, compare=False)
     damping: Annotated[float, Number(limits=at_least(0))] = 0.0
     kinetic: Annotated[float, Number(limits=between(0, 1))] = 1.0

@@ -131,10 +131,9 @@ def _chain(owner, field, file, segments, closed):
     if not ends and not closed:
         refuse(owner, field, str(file), "a polyline with two ends, or closed = true for this ring")
     firsts = {a for a, _ in segments}
-    previous, node = None, next((end for end in ends if end in firsts), (ends or [segments[0][0]])[0])
-    following = segments[0][1] if not ends else neighbours[node][0]
-    chain, start = [node], node
-    while following is not None and following != start:
+    node = next((end for end in ends if end in firsts), (ends or [segments[0][0]])[0])
+    chain, following = [node], neighbours[node][0]
+    while following not in (None, chain[0]):
         previous, node = node, following
         chain.append(node)
         following = next((other for other in neighbours[node] if other != previous), None)

@@ -22,10 +22,10 @@ from pathlib import Path
 import numpy as np
 from numpy.polynomial.legendre import legvander
 
-from cosserat_fenicsx.checks import instance
+from cosserat_fenicsx.checks import store
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.numerics import gauss
-from cosserat_fenicsx.scene.sections import Material, Section, Stiffness
+from cosserat_fenicsx.scene.sections import Material, Section, Stiffness, isotropic
 from cosserat_fenicsx.scene.stresses import Stress
 
 _TABLE = Path(__file__).with_name("rolled_profiles.csv")
@@ -65,15 +65,14 @@ class Profile(Section):
 
     name: str
 
-    def __post_init__(self):
-        instance(self, "name", self.name, str, "a name such as 'IPE 200'")
+    def validate(self):
         plain = "".join(self.name.upper().split())
         if plain.startswith("HE") and plain[2:3].isdigit():  # HE 160 A
             plain = f"HE{plain[-1]}{plain[2:-1]}"
         known = {name.replace(" ", ""): name for name in _table()}
         if plain not in known:
             raise SceneError(f"Profile.name = {self.name!r}: {_near(plain)}")
-        object.__setattr__(self, "name", known[plain])
+        store(self, name=known[plain])
 
     height = property(lambda self: _table()[self.name][0])
     width = property(lambda self: _table()[self.name][1])
@@ -142,16 +141,8 @@ class Profile(Section):
 
     def stiffness(self, material: Material) -> Stiffness:
         """The section's `Stiffness` in a material."""
-        A, (I1, I2), rho = self.area, self.second_moments, material.density
-        return Stiffness(
-            shear=tuple(material.G * area for area in self.shear_areas),
-            axial=material.E * A,
-            bending=(material.E * I1, material.E * I2),
-            torsion=material.G * self.torsion_constant,
-            mass=None if rho is None else rho * A,
-            outline=self.outline(),
-            inertia=None if rho is None else (rho * I1, rho * I2, rho * (I1 + I2)),
-        )
+        J, shear_areas = self.torsion_constant, self.shear_areas
+        return isotropic(material, self.area, self.second_moments, J, shear_areas, self.outline())
 
     def stresses(self, material, force, moment):
         """The `Stress` for contact forces and moments (..., 3), N and N m, along d_1, d_2, d_3: normal stresses at the

@@ -56,7 +56,7 @@ def arguments_of(section, material, line, unit):
     """Arguments of `Stiffness.offset`, or of `Stiffness` where there is no offset; see `Stiffness.from_section`."""
     unit = positive(_WHERE, "unit", unit, "m")
     try:
-        found = _with_materials(section, material) if section.is_composite() else _of_shape(section, material, unit)
+        found = _computed(section, material, unit)
         centroid, shear_centre, angle = section.get_c(), section.get_sc(), math.radians(section.get_phi())
     except AttributeError as missing:
         refuse(_WHERE, "section", section, f"a Section of sectionproperties, or another with its methods ({missing})")
@@ -102,27 +102,33 @@ def _principal_shear(found, angle):
     return (stiff[0, 0], stiff[1, 1]), stiff[0, 1]
 
 
-def _of_shape(section, material, unit):
-    """The `_Computed` of a section without materials, in a `Material`."""
-    instance(_WHERE, "material", material, Material, "a Material, since the section has none of its own")
-    E, G = material.E * unit**2, material.G * unit**2
-    rho = None if material.density is None else material.density * unit**3
-    *about, product = section.get_ic()
-    return _Computed(
-        E * section.get_area(),
-        [E * I for I in about],
-        E * product,
-        [E * I for I in section.get_ip()],
-        [G * A for A in section.get_as()],
-        [G * A for A in section.get_as_p()],
-        G * section.get_j(),
-        None if rho is None else rho * section.get_area(),
-        None if rho is None else rho / E,
+def _computed(section, material, unit):
+    """The `_Computed` of a section with its own materials, or of one without, in a `Material`."""
+    if section.is_composite():
+        _check_composite(section, material)
+        E, G_over_E, prefix = 1.0, section.get_g_eff() / section.get_e_eff(), "get_e"
+        axial, mass = section.get_ea(), section.get_mass()
+        heaviness = {part.density / part.elastic_modulus for part in section.materials}
+    else:
+        instance(_WHERE, "material", material, Material, "a Material, since the section has none of its own")
+        E, G_over_E, prefix = material.E * unit**2, 1 / (2 * (1 + material.nu)), "get_"
+        axial = E * section.get_area()
+        rho = None if material.density is None else material.density * unit**3
+        mass, heaviness = (None, ()) if rho is None else (rho * section.get_area(), [rho / E])
+
+    def stiffness(name, factor=E):
+        return factor * np.array(getattr(section, prefix + name)())
+
+    *about, product = stiffness("ic").tolist()
+    principal, shear, principal_shear = (
+        stiffness(name, factor).tolist() for name, factor in (("ip", E), ("as", G_over_E * E), ("as_p", G_over_E * E))
     )
+    torsion = float(stiffness("j", G_over_E * E))
+    only = next(iter(heaviness)) if len(heaviness) == 1 else None
+    return _Computed(axial, about, product, principal, shear, principal_shear, torsion, mass, only)
 
 
-def _with_materials(section, material):
-    """The `_Computed` of a section that has its own materials."""
+def _check_composite(section, material):
     if material is not None:
         refuse(_WHERE, "material", material, "None, since the section has materials of its own")
     ratios = {part.poissons_ratio for part in section.materials}
@@ -132,20 +138,6 @@ def _with_materials(section, material):
             f"{_WHERE}: its materials have the Poisson's ratios {known}: expected one for all, since torsion and shear "
             "are weighted by Young's modulus"
         )
-    G_over_E = section.get_g_eff() / section.get_e_eff()
-    heaviness = {part.density / part.elastic_modulus for part in section.materials}
-    *about, product = section.get_eic()
-    return _Computed(
-        section.get_ea(),
-        about,
-        product,
-        section.get_eip(),
-        [G_over_E * EA for EA in section.get_eas()],
-        [G_over_E * EA for EA in section.get_eas_p()],
-        G_over_E * section.get_ej(),
-        section.get_mass(),
-        heaviness.pop() if len(heaviness) == 1 else None,
-    )
 
 
 def _centre_of_mass(section):
@@ -340,8 +332,26 @@ class Stiffness(Section):
         return None
 
 
+class _Round(Section):
+    """Circles and tubes, by their outer and inner `_diameters`, m."""
+
+    def stiffness(self, material: Material) -> Stiffness:
+        """The section's `Stiffness` in a material."""
+        (D, d), nu = self._diameters, material.nu
+        A, I = math.pi * (D**2 - d**2) / 4, math.pi * (D**4 - d**4) / 64
+        m2 = (d / D) ** 2
+        cowper = 6 * (1 + nu) * (1 + m2) ** 2 / ((7 + 6 * nu) * (1 + m2) ** 2 + (20 + 12 * nu) * m2)
+        area = (self.shear_factor or cowper) * A
+        return isotropic(material, A, (I, I), 2 * I, (area, area), _circle(D / 2))
+
+    def stresses(self, material, force, moment):
+        """The `Stress` for contact forces and moments (..., 3), N and N m, along d_1, d_2, d_3."""
+        outer, inner = self._diameters
+        return round_stress(outer / 2, inner / 2, material.nu, force, moment)
+
+
 @dataclass(frozen=True)
-class Circle(Section):
+class Circle(_Round):
     """A solid circular section.
 
     Args:
@@ -355,20 +365,11 @@ class Circle(Section):
     diameter: parts.Diameter
     shear_factor: ShearFactor | None = None
 
-    def stiffness(self, material: Material) -> Stiffness:
-        """The section's `Stiffness` in a material."""
-        nu = material.nu
-        A, I = math.pi * self.diameter**2 / 4, math.pi * self.diameter**4 / 64
-        k = self.shear_factor or 6 * (1 + nu) / (7 + 6 * nu)
-        return _isotropic(material, A, (I, I), 2 * I, k, _circle(self.diameter / 2))
-
-    def stresses(self, material, force, moment):
-        """The `Stress` for contact forces and moments (..., 3), N and N m, along d_1, d_2, d_3."""
-        return round_stress(self.diameter / 2, 0.0, material.nu, force, moment)
+    _diameters = property(lambda self: (self.diameter, 0.0))
 
 
 @dataclass(frozen=True)
-class Tube(Section):
+class Tube(_Round):
     """A circular tube.
 
     Args:
@@ -384,22 +385,11 @@ class Tube(Section):
     inner_diameter: parts.Diameter
     shear_factor: ShearFactor | None = None
 
+    _diameters = property(lambda self: (self.outer_diameter, self.inner_diameter))
+
     def validate(self):
         if self.inner_diameter >= self.outer_diameter:
             refuse(self, "inner_diameter", self.inner_diameter, f"less than outer_diameter = {self.outer_diameter}")
-
-    def stiffness(self, material: Material) -> Stiffness:
-        """The section's `Stiffness` in a material."""
-        D, d, nu = self.outer_diameter, self.inner_diameter, material.nu
-        A, I = math.pi * (D**2 - d**2) / 4, math.pi * (D**4 - d**4) / 64
-        m2 = (d / D) ** 2
-        cowper = 6 * (1 + nu) * (1 + m2) ** 2 / ((7 + 6 * nu) * (1 + m2) ** 2 + (20 + 12 * nu) * m2)
-        k = self.shear_factor or cowper
-        return _isotropic(material, A, (I, I), 2 * I, k, _circle(D / 2))
-
-    def stresses(self, material, force, moment):
-        """The `Stress` for contact forces and moments (..., 3), N and N m, along d_1, d_2, d_3."""
-        return round_stress(self.outer_diameter / 2, self.inner_diameter / 2, material.nu, force, moment)
 
 
 @dataclass(frozen=True)
@@ -422,9 +412,10 @@ class Rectangle(Section):
     def stiffness(self, material: Material) -> Stiffness:
         """The section's `Stiffness` in a material."""
         b, h, nu = self.width, self.height, material.nu
-        k = self.shear_factor or 10 * (1 + nu) / (12 + 11 * nu)
+        area = (self.shear_factor or 10 * (1 + nu) / (12 + 11 * nu)) * (b * h)
         corners = ((b / 2, h / 2), (-b / 2, h / 2), (-b / 2, -h / 2), (b / 2, -h / 2))
-        return _isotropic(material, b * h, (b * h**3 / 12, h * b**3 / 12), _rectangle_torsion(b, h), k, corners)
+        moments = b * h**3 / 12, h * b**3 / 12
+        return isotropic(material, b * h, moments, _rectangle_torsion(b, h), (area, area), corners)
 
     def stresses(self, material, force, moment):
         """The `Stress` for contact forces and moments (..., 3), N and N m, along d_1, d_2, d_3."""
@@ -476,10 +467,11 @@ def _circle(radius, corners=24):
     return tuple((radius * math.cos(a), radius * math.sin(a)) for a in angles)
 
 
-def _isotropic(material, A, I, J, k, outline):
+def isotropic(material, A, I, J, shear_areas, outline):
+    """The `Stiffness` of a shape in a material, from its properties (m^2, m^4)."""
     rho = material.density
     return Stiffness(
-        shear=(k * material.G * A, k * material.G * A),
+        shear=tuple(material.G * area for area in shear_areas),
         axial=material.E * A,
         bending=(material.E * I[0], material.E * I[1]),
         torsion=material.G * J,

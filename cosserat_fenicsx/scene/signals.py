@@ -19,7 +19,7 @@ from typing import Annotated
 
 import numpy as np
 
-from cosserat_fenicsx.checks import File, Numbers, Rows, call, number, refuse, store, text_of, vector
+from cosserat_fenicsx.checks import File, Numbers, Rows, call, finite_array, number, refuse, store, text_of, vector
 from cosserat_fenicsx.dimensions import LARGEST
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.kinds import Either
@@ -184,23 +184,12 @@ class Table(FunctionOfTime):
         if isinstance(self.times, list | tuple) and any(isinstance(t, str) for t in self.times):
             times = [number(self, f"times[{i}]", t, "a time (s)", math.isfinite) for i, t in enumerate(self.times)]
             store(self, times=tuple(times))
-        times = self._array("times", 1)
-        if not (np.diff(times) > 0).all():
-            refuse(self, "times", self.times, "ascending times (s)")
-        rows = self.values if _as_text(self.values) else self._array("values", 2)
-        if len(rows) != len(times):
+        times = _ascending(self, "times", "ascending times (s)")
+        rows = self.values
+        if not _as_text(rows):
+            rows = finite_array(self, "values", rows, "finite numbers, one row a time")
+        if np.ndim(rows) not in (1, 2) or len(rows) != len(times):
             refuse(self, "values", self.values, f"one vector for each of the {len(times)} times")
-
-    def _array(self, field, dimensions):
-        try:
-            array = np.asarray(getattr(self, field), dtype=float)
-            if field == "values" and array.ndim == 1:
-                array = array[:, None]  # numbers
-        except (ValueError, TypeError, OverflowError):
-            array = np.empty(0)
-        if array.ndim != dimensions or len(array) == 0 or not np.isfinite(array).all():
-            refuse(self, field, getattr(self, field), "finite numbers, one row a time")
-        return array
 
     @property
     def jumps(self):
@@ -220,8 +209,18 @@ class Table(FunctionOfTime):
 
 def _as_text(rows):
     """Whether rows of a table contain text with units, which the owner of the table converts."""
-    inner = [x for row in rows for x in (row if isinstance(row, list | tuple) else (row,))] if np.ndim(rows) else ()
-    return any(isinstance(x, str) for x in inner)
+    if not isinstance(rows, list | tuple):
+        return False
+    return any(isinstance(x, str) for row in rows for x in (row if isinstance(row, list | tuple) else (row,)))
+
+
+def _ascending(owner, field, expected):
+    """The array (n,) of a field that holds ascending numbers."""
+    given = getattr(owner, field)
+    array = finite_array(owner, field, given, expected)
+    if array.ndim != 1 or not len(array) or not (np.diff(array) > 0).all():
+        refuse(owner, field, given, expected)
+    return array
 
 
 def _times(factor, value):
@@ -399,18 +398,14 @@ class AlongTable(FunctionAlong):
     values: Rows | None = None
 
     def __post_init__(self):
-        s, values = self.s, self.values
-        if values is None:
-            table = _read(s)
-            s, values = table[:, 0], table[:, 1:]
-        try:
-            s, values = np.asarray(s, dtype=float), np.asarray(values, dtype=float)
-        except (ValueError, TypeError):
-            refuse(self, "values", self.values, "finite numbers, one row an arc length")
-        if s.ndim != 1 or not len(s) or not np.isfinite(s).all() or not (np.diff(s) > 0).all():
-            refuse(self, "s", self.s, "ascending arc lengths (m)")
-        if values.shape != (len(s), 3) or not np.isfinite(values).all():
-            refuse(self, "values", self.values, f"three finite numbers for each of the {len(s)} arc lengths")
+        if self.values is None:
+            table = _read(self.s)
+            store(self, s=table[:, 0], values=table[:, 1:])
+        s = _ascending(self, "s", "ascending arc lengths (m)")
+        expected = f"three finite numbers for each of the {len(s)} arc lengths"
+        values = finite_array(self, "values", self.values, expected)
+        if values.shape != (len(s), 3):
+            refuse(self, "values", self.values, expected)
         store(self, s=tuple(s.tolist()), values=tuple(map(tuple, values.tolist())))
 
     @property
