@@ -1,4 +1,4 @@
-"""Springs, elastic beds, dashpots and point masses: what holds, damps and loads a station or a rod in place."""
+"""Springs, elastic beds, dashpots and point masses."""
 
 from dataclasses import dataclass
 from typing import Annotated

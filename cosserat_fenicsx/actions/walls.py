@@ -1,4 +1,4 @@
-"""Walls around rods, such as that of a borehole.
+"""Walls around rods, such as the wall of a borehole.
 
 `Wall` is straight and has no friction; `TubeWall` and `TubeRing` have friction in a known direction of slip; `HoleWall`
 and `HoleRing`, in motions, set-valued friction.
@@ -119,7 +119,7 @@ _LENGTHS = Pieces(Number("length", positive()))
 
 
 def value_at(given, x):
-    """(n, ..) values of `Pieces` at x (n,); at an end that of the piece before it."""
+    """(n, ..) values of `Pieces` at x (n,); at an end the value of the piece before it."""
     return np.array([value for _, value in given])[np.searchsorted([end for end, _ in given], x)]
 
 
@@ -142,7 +142,7 @@ class Wall(_Pressing, LineAction):
 
     Args:
         rod: the rod.
-        point: a point of the axis, m, inertial; direction: that of the axis.
+        point: a point of the axis, m, inertial; direction: of the axis.
         clearance: radius of the hole minus that of the rod, m.
         stiffness: kp, N/m^2. The penetration is the force per unit length over kp; rock and steel have 1e9 and more.
         law: None, or a `ContactLaw` in place of the pressure in proportion to the penetration.
@@ -182,9 +182,12 @@ class Wall(_Pressing, LineAction):
         return *axis, *sizes, *self._law_data()
 
     def holds(self, scene):
-        """See `Action`: it confines the rod across the axis."""
-        across = np.linalg.svd(np.array([self.direction]))[2][1:]
-        return [(station, np.r_[row, 0, 0, 0]) for station in (self.rod.start, self.rod.end) for row in across]
+        return _held_across(self.rod.start, self.direction) + _held_across(self.rod.end, self.direction)
+
+
+def _held_across(station, axis):
+    """See `Action.holds`: a wall confines a rod across the axis (3,) of the wall."""
+    return [(station, np.r_[row, 0, 0, 0]) for row in np.linalg.svd(np.reshape(axis, (1, 3)))[2][1:]]
 
 
 @dataclass
@@ -335,13 +338,9 @@ class TubeWall(_Confined, LineAction):
         return self.path.nearest(None, md).position, self.sizes(s, md)[0]
 
     def holds(self, scene):
-        """See `Action`: it confines the rod across the axis."""
-        held = []
-        for station in (self.rod.start, self.rod.end):
-            near = self.path.nearest(None, np.array([station.s + self.begins]))
-            across = np.linalg.svd(near.tangent)[2][1:]
-            held += [(station, np.r_[row, 0, 0, 0]) for row in across]
-        return held
+        ends = self.rod.start, self.rod.end
+        tangents = self.path.nearest(None, np.array([end.s for end in ends]) + self.begins).tangent
+        return [row for end, tangent in zip(ends, tangents, strict=True) for row in _held_across(end, tangent)]
 
 
 @dataclass(frozen=True)

@@ -1,1 +1,1 @@
-"""Scenes: rods, supports, joints and actions, and what follows from these data alone (mechanisms, planes)."""
+"""Scenes: rods, supports, joints and actions; properties of scenes alone (mechanisms, planes)."""

@@ -12,7 +12,7 @@ def describe(item):
     return f"{type(item).__name__} on {item.rod.name}" if item.rod is not None else type(item).__name__
 
 
-def name_of(item):
+def _name_of(item):
     """A part of a scene in messages: as `describe`, or by its name or class."""
     return describe(item) if hasattr(item, "station") else getattr(item, "name", type(item).__name__)
 
@@ -25,8 +25,8 @@ def actions_in_words(scene):
         ("Permanent loads, applied in full before", [x for x in scene.loads if x.permanent]),
         ("Not multiplied by the load factor", [x for x in scene.loads if not x.scaled and not x.permanent]),
     )
-    told = [f"{what}: {', '.join(map(describe, items))}." for what, items in groups if items]
-    return "\n".join(told) or "Loads: none."
+    lines = [f"{title}: {', '.join(map(describe, items))}." for title, items in groups if items]
+    return "\n".join(lines) or "Loads: none."
 
 
 def unpicklable(scene):
@@ -35,7 +35,7 @@ def unpicklable(scene):
         return ""
     for group in ("rods", "loads", "supports", "velocities"):  # all other parts only refer to rods
         items = list(enumerate(getattr(scene, group)))
-        names = [f"{group}[{i}] ({name_of(item)})" for i, item in items if not _pickles(item)]
+        names = [f"{group}[{i}] ({_name_of(item)})" for i, item in items if not _pickles(item)]
         if names:
             return ", ".join(names)
     return "the scene"

@@ -26,7 +26,7 @@ class _WeightOffAxis(LineAction):
 
     Args:
         rod: a rod with an eccentricity.
-        gravity, permanent: as those of the `Weight`, whose force it leaves out.
+        gravity, permanent: of the `Weight`, which applies the force.
     """
 
     rod: Rod
@@ -216,7 +216,7 @@ class Weight(Load, LineAction):
         return (action.vector(rod.stiffness_at(s).mass[..., None] * np.asarray(self.gravity), "N/m"),)
 
     def companions(self, scene):
-        """The weights of the point masses, and the moments of that of eccentric rods about their axes."""
+        """The weights of the point masses, and the moments of the weight of eccentric rods about their axes."""
         masses = [(x, x.inertia(x.station.rod)) for x in scene.loads if x.station is not None]
         weights = tuple(
             Force(x.station, tuple(found[0] * g for g in self.gravity), permanent=self.permanent)

@@ -107,7 +107,7 @@ def parameter_of(scene, given):
     scene file), "loads[1].force[2]", "supports[0].displacement[0]".
 
     Raises:
-        SceneError: there is no such number (names the nearest), or it is 0 and nothing tells its size.
+        SceneError: there is no such number (names the nearest), or it is 0 and its scale is unknown.
     """
     if isinstance(given, Parameter):
         return given
@@ -124,7 +124,7 @@ def parameter_of(scene, given):
     unit = _UNITS.get(f"{type(owner).__name__}.{field}", _UNITS.get(field, "its SI unit"))
     if isinstance(owner, Curve) and unit == "m":  # places change by parts of the curve, wherever its origin lies
         size = _extent(owner)
-    elif isinstance(owner, Tube) and field != "shear_factor":  # a thin wall is gone where a diameter changes little
+    elif isinstance(owner, Tube) and field != "shear_factor":  # small changes of a diameter remove a thin wall
         size = owner.outer_diameter - owner.inner_diameter
     elif size is not None:  # a component that is 0, or rounding of it: as large as the vector
         whole = math.hypot(*size) if all(isinstance(x, numbers.Real) for x in size) else math.inf
@@ -169,7 +169,7 @@ def _find(scene, name):
             continue
         if not isinstance(here, tuple | list | np.ndarray) or not isinstance(token, int) or token >= len(here):
             holds = f"{len(here)} items, numbered from 0" if isinstance(here, tuple | list | np.ndarray) else "no parts"
-            raise SceneError(f"parameter '{name}': what is before '{token}' has {holds}")
+            raise SceneError(f"parameter '{name}': the part before '{token}' has {holds}")
         keys, here = [*keys, token], here[token]
     if owner is scene:
         raise SceneError(f"parameter '{name}' is {_kind(here)}: expected the name of a number{_inside(here, name)}")
@@ -213,7 +213,7 @@ class _Rebuilding:
     """Copies of objects that hold, directly or not, one that is replaced; all others are kept.
 
     Args:
-        known: {id of an object: what replaces it}.
+        known: {id of an object: its replacement}.
     """
 
     def __init__(self, known):

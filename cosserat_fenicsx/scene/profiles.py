@@ -54,7 +54,7 @@ class InPieces(Kind):
     """A value of another kind, or pieces (s_end, value) along a rod.
 
     Attributes:
-        key: that of the value in the table of a piece, beside "to"; "" where the value is itself the table.
+        key: the key of the value in the table of a piece, beside "to"; "" where the value is itself the table.
     """
 
     inner: Kind = Kind()
@@ -225,7 +225,7 @@ SectionsAlong = Annotated[
 _SAMPLES = 33
 _DIAGONAL = 10  # numbers (GA1, GA2, EA, EI1, EI2, GJ, mass, inertia) of a section; the 36 of its matrix follow
 _NUMBERS = _DIAGONAL + 36
-_UNKNOWN = [np.nan] * _NUMBERS  # stands for a piece given by a function
+_UNKNOWN = [np.nan] * _NUMBERS  # the row of a piece given by a function
 
 
 class Sections:
@@ -328,9 +328,9 @@ class Sections:
         groups = [(int(i), np.flatnonzero(index == i)) for i in np.unique(index)]
         alike = [(i, part) for i, own in groups for part in (own[:, None] if self._law[i] else [own])]
         for i, here in alike:
-            told = self._piece(float(s[here[0]]), i).stresses(self.material, force[..., here, :], moment[..., here, :])
-            if told is not None:
-                found[..., here] = told
+            own = self._piece(float(s[here[0]]), i).stresses(self.material, force[..., here, :], moment[..., here, :])
+            if own is not None:
+                found[..., here] = own
         return Stress(*found)
 
     def _index(self, s, side):

@@ -7,9 +7,9 @@ flanges counts in all properties.
 - Torsion constant: El Darwish & Johnston, J. Struct. Div. ASCE 91 (1965) ST1, 203, as in the tables of EN 10365; -2.4
   to +4.3 % from finite elements.
 - Shear areas: I^2/(integral of S^2/t), with the shear flow V S/I of Jourawski over the thickness t, in the flanges
-  along both axes. They are those of Timoshenko's stiffness, V^2/(2 G A_s) the energy, and not the areas A_v of EN 1993
-  for the resistance to shear. Poisson's ratio is not in them. Of ten sizes they are 3 to 5 % above finite elements
-  along d_1 with nu = 0, and up to 6.6 % with nu = 0.3; along d_2 0 to 4.4 % with either.
+  along both axes. They belong to Timoshenko's stiffness, with the energy V^2/(2 G A_s), and are not the areas A_v of
+  EN 1993 for the resistance to shear. They do not depend on Poisson's ratio. For ten sizes they exceed finite elements
+  along d_1 by 3 to 5 % with nu = 0 and up to 6.6 % with nu = 0.3; along d_2 by 0 to 4.4 % with either.
 """
 
 import csv
@@ -154,11 +154,11 @@ class Profile(Section):
 
 
 def _flow(pieces):
-    """The integral of S^2/t over half a section, m^5, from its edge to its axis, S the first moment of what is outside.
+    """The integral of S^2/t over half a section, m^5, from its edge to its axis; S: first moment of the part outside.
 
     Args:
-        pieces: (distance of the outer end from the axis, thickness as a function of the distance, and that over which
-            the shear flow spreads where it is another), from the edge inwards.
+        pieces: (distance of the outer end from the axis, thickness as a function of the distance, and the thickness over
+            which the shear flow spreads where it differs), from the edge inwards.
     """
     rule = gauss(_POINTS)
     inner = legvander(rule.points, _POINTS) @ rule.integral

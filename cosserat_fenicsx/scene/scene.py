@@ -12,7 +12,7 @@ from typing import Annotated
 
 import numpy as np
 
-from cosserat_fenicsx.checks import instance, warn
+from cosserat_fenicsx.checks import instance, store, warn
 from cosserat_fenicsx.errors import SceneError, nearest
 from cosserat_fenicsx.parts import Items, Object, Part
 from cosserat_fenicsx.scene.action import Action, powers
@@ -143,7 +143,7 @@ class Scene(Part):
             value = getattr(self, field)
             if not isinstance(value, list | tuple):
                 raise SceneError(f"Scene.{field} = {value!r}: expected a list")
-            object.__setattr__(self, field, tuple(value))
+            store(self, **{field: tuple(value)})
         if not self.rods:
             raise SceneError("Scene.rods is empty: expected at least one Rod")
         for i, rod in enumerate(self.rods):
@@ -151,12 +151,11 @@ class Scene(Part):
         for name, count in Counter(rod.name for rod in self.rods).items():
             if count > 1:
                 raise SceneError(f"Scene.rods: {count} rods are named '{name}': expected one each")
-        object.__setattr__(self, "_numbers", {rod: i for i, rod in enumerate(self.rods)})
-        object.__setattr__(self, "_given", self.supports)
-        rods = {rod.name: rod for rod in self.rods}
-        for field in ("supports", "loads", "joints", "velocities"):
-            items = [with_names(f"Scene.{field}[{i}]", x, rods) for i, x in enumerate(getattr(self, field))]
-            object.__setattr__(self, field, tuple(items))
+        by_name, numbers = {rod.name: rod for rod in self.rods}, {rod: i for i, rod in enumerate(self.rods)}
+        store(self, _by_name=by_name, _numbers=numbers, _given=self.supports)
+        for field in _PARTS:
+            items = [with_names(f"Scene.{field}[{i}]", x, by_name) for i, x in enumerate(getattr(self, field))]
+            store(self, **{field: tuple(items)})
         for field, (kind, expected) in _PARTS.items():
             for i, item in enumerate(getattr(self, field)):
                 instance("Scene", f"{field}[{i}]", item, kind, expected)
@@ -168,7 +167,7 @@ class Scene(Part):
                     f"Scene.velocities[{i}] is the second of rod '{velocity.rod.name}': expected one a rod"
                 )
         check_held_once(self)
-        object.__setattr__(self, "_leaders", self._find_leaders())
+        store(self, _leaders=self._find_leaders())
 
     def __repr__(self):
         counts = (f"{len(getattr(self, part))} {part}" for part in ("supports", "loads", "joints"))
@@ -225,7 +224,7 @@ class Scene(Part):
         scene = copy.copy(self)
         for name in ("flatness", "magnitudes"):
             scene.__dict__.pop(name, None)
-        object.__setattr__(scene, "horizon", duration)
+        store(scene, horizon=duration)
         return scene
 
     @cached_property
@@ -352,10 +351,10 @@ class Scene(Part):
         Raises:
             SceneError: there is none of that name.
         """
-        return station_named("station", name, {rod.name: rod for rod in self.rods})
+        return station_named("station", name, self._by_name)
 
     def supports_of(self, which: Support | StationOrName) -> list[int]:
-        """Indices of the supports that `which` stands for.
+        """Indices of the supports meant by `which`.
 
         Args:
             which: one of `supports`, as it was given or as it is listed; or a station or its name, for all that act
@@ -384,7 +383,6 @@ class Scene(Part):
         Raises:
             SceneError: there is none of that name.
         """
-        for rod in self.rods:
-            if rod.name == name:
-                return rod
-        raise SceneError(f"no rod is named {name!r}, {nearest(name, [rod.name for rod in self.rods])}")
+        if name not in self._by_name:
+            raise SceneError(f"no rod is named {name!r}, {nearest(name, self._by_name)}")
+        return self._by_name[name]

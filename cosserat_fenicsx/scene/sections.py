@@ -92,7 +92,7 @@ def arguments_of(section, material, line, unit):
 
 
 def _principal_shear(found, angle):
-    """GA along the principal axes of bending, which are not those of shear, and their coupling.
+    """GA along the principal axes of bending, which differ from the principal axes of shear, and their coupling.
 
     The flexibilities along both pairs of axes are the diagonals of one tensor, which gives its product term.
     """
@@ -484,7 +484,7 @@ def isotropic(material, A, I, J, shear_areas, outline):
 def _rectangle_torsion(b, h):
     """Saint-Venant's torsion constant, m^4.
 
-    The series of tanh(n x)/n^5 over odd n is summed as that of 1/n^5, exactly, less that of (1 - tanh(n x))/n^5.
+    The series of tanh(n x)/n^5 over odd n is the exact sum of 1/n^5 minus the fast series of (1 - tanh(n x))/n^5.
     """
     long, short = max(b, h), min(b, h)
     x = math.pi * long / (2 * short)

@@ -319,7 +319,7 @@ def at(item, t):
 
 
 def values_at(item, t):
-    """{field: value} at the time t (s) of what depends on time in a load or a support."""
+    """{field: value} at the time t (s) of the time-dependent fields of a load or a support."""
     return {name: signal(t) for name, signal in signals_of(item).items()}
 
 

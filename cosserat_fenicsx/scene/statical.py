@@ -1,5 +1,5 @@
-"""Whether supports and joints are redundant or leave a mechanism, by small motions of the reference: groups of what is
-connected (union-find), and the motions that constraints leave free (null spaces)."""
+"""Whether supports and joints are redundant or leave a mechanism, by small motions of the reference: connected groups
+(union-find), and motions that constraints leave free (null spaces)."""
 
 import contextlib
 import dataclasses
@@ -62,10 +62,10 @@ MOST = 64
 def null_space(row, column, value, shape):
     """An orthonormal basis of the vectors that a matrix maps to zero.
 
-    A small matrix is decomposed into singular values. Of others the right singular vectors of the smallest singular
-    values are found by iterations with the inverse of A^T A + shift I on a block of vectors V, and the singular values
-    are those of A V: forming A^T A loses half of the digits of these, A V does not. The block grows until it holds all
-    singular values below `_GAP`, so that one that is small but not zero is told from zero as in a dense decomposition.
+    A small matrix is decomposed into singular values. For others, the right singular vectors of the smallest singular
+    values are found by iterations with the inverse of A^T A + shift I on a block of vectors V. The singular values are
+    taken from A V, since forming A^T A would lose half of their digits. The block grows until it holds all singular
+    values below `_GAP`, which separates small values from zero as well as a dense decomposition.
 
     Args:
         row, column, value: the entries; those at the same place are added.
