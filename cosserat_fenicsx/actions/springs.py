@@ -48,6 +48,36 @@ class Directed:
         return np.eye(6)[:3] if self.direction is None else [np.r_[self.direction, 0, 0, 0]]
 
 
+def alike(point, test, k):
+    """Virtual work of -k u."""
+    return -k * ufl.dot(point.u, test.phi_r)
+
+
+def along(point, test, k, n):
+    """Virtual work of -k (u.n) n."""
+    return -k * ufl.dot(point.u, n) * ufl.dot(n, test.phi_r)
+
+
+def _turned(point, test, c):
+    return -c * ufl.dot(point.theta, test.phi)
+
+
+def _sprung(point, test, k, c):
+    return alike(point, test, k) + _turned(point, test, c)
+
+
+def _sprung_along(point, test, k, c, n):
+    return along(point, test, k, n) + _turned(point, test, c)
+
+
+def _resisted(point, test, b, d):
+    return -b * ufl.dot(point.r_t, test.phi_r) - d * ufl.dot(point.omega, test.phi)
+
+
+def _resisted_along(point, test, b, d, n):
+    return -b * ufl.dot(point.r_t, n) * ufl.dot(n, test.phi_r) - d * ufl.dot(point.omega, test.phi)
+
+
 @dataclass(frozen=True)
 class Foundation(Directed, LineAction):
     """An elastic (Winkler) foundation bonded to a rod: a force -k u per unit of reference length, u the displacement
@@ -69,27 +99,13 @@ class Foundation(Directed, LineAction):
     stiffness: WallStiffness
     direction: UnitVector | None = None
 
-    scaled = False
-
-    @property
-    def works(self):
-        return alike, along
+    scaled, works = False, (alike, along)
 
     def data(self, rod, s):
         return self._with_direction(scalar(self.stiffness, "N/m^2"))
 
     def holds(self, scene):
         return [(self.rod.at(share * self.rod.length), row) for share in (0.0, 0.5, 1.0) for row in self._held()]
-
-
-def alike(point, test, k):
-    """Virtual work of -k u."""
-    return -k * ufl.dot(point.u, test.phi_r)
-
-
-def along(point, test, k, n):
-    """Virtual work of -k (u.n) n."""
-    return -k * ufl.dot(point.u, n) * ufl.dot(n, test.phi_r)
 
 
 @dataclass(frozen=True)
@@ -116,11 +132,7 @@ class Spring(Directed, PointAction):
     rotational: TorsionalStiffness = 0.0
     direction: UnitVector | None = None
 
-    scaled = False
-
-    @property
-    def works(self):
-        return _sprung, _sprung_along
+    scaled, works = False, (_sprung, _sprung_along)
 
     def validate(self):
         require_one(self, ("stiffness", "rotational"), "a stiffness (N/m), or a rotational one (N m/rad)")
@@ -131,18 +143,6 @@ class Spring(Directed, PointAction):
     def holds(self, scene):
         rows = [*(self._held() if self.stiffness else ()), *(np.eye(6)[3:] if self.rotational else ())]
         return [(self.station, row) for row in rows]
-
-
-def _turned(point, test, c):
-    return -c * ufl.dot(point.theta, test.phi)
-
-
-def _sprung(point, test, k, c):
-    return alike(point, test, k) + _turned(point, test, c)
-
-
-def _sprung_along(point, test, k, c, n):
-    return along(point, test, k, n) + _turned(point, test, c)
 
 
 @dataclass(frozen=True)
@@ -167,25 +167,13 @@ class Dashpot(Directed, PointAction):
     rotational: TorsionalDamping = 0.0
     direction: UnitVector | None = None
 
-    scaled = False
-
-    @property
-    def works(self):
-        return _resisted, _resisted_along
+    scaled, works = False, (_resisted, _resisted_along)
 
     def validate(self):
         require_one(self, ("damping", "rotational"), "a damping (N s/m), or a rotational one (N m s/rad)")
 
     def data(self, rod, s):
         return self._with_direction(scalar(self.damping, "N s/m"), scalar(self.rotational, "N m s/rad"))
-
-
-def _resisted(point, test, b, d):
-    return -b * ufl.dot(point.r_t, test.phi_r) - d * ufl.dot(point.omega, test.phi)
-
-
-def _resisted_along(point, test, b, d, n):
-    return -b * ufl.dot(point.r_t, n) * ufl.dot(n, test.phi_r) - d * ufl.dot(point.omega, test.phi)
 
 
 @dataclass(frozen=True)

@@ -75,8 +75,7 @@ class InPieces(Kind):
             rest = {name: value for name, value in piece.items() if name != "to"}
             if self.key and rest.keys() != {self.key}:
                 other = next((name for name in rest if name != self.key), None)
-                words = f"'{self.key}' is missing" if other is None else f"unknown key '{other}', did you mean"
-                words += "" if other is None else f" '{self.key}'?"
+                words = f"unknown key '{other}', did you mean '{self.key}'?" if other else f"'{self.key}' is missing"
                 raise misplaced((*place, other) if other else place, f"{spoken(place)}: {words}")
             pieces.append((piece.get("to"), self.inner.read(place, rest[self.key] if self.key else rest, reading)))
         return pieces
