@@ -67,7 +67,7 @@ REFUSED = {
     "two velocities": (lambda: moving(cf.InitialVelocity(ROD), cf.InitialVelocity(ROD)), "the second of rod 'rod'"),
     "a velocity elsewhere": (lambda: moving(cf.InitialVelocity(OTHER)), "Scene.velocities[0] acts at"),
     "velocity of NaN": (lambda: moving(cf.InitialVelocity(ROD, lambda s: (0, 0, 1 / s if s else math.nan))),
-                        "at s = 0 m"),
+                        "InitialVelocity.linear(0) = (0, 0, nan): expected 3 finite numbers (m/s)"),
     "about with a function": (lambda: cf.InitialVelocity(ROD, lambda s: (0, 0, 0), about=(0, 0, 0)),
                               "InitialVelocity.about"),
     "a support that jumps": (lambda: cf.simulate(cf.Scene([ROD], [cf.Prescribed(ROD.end, (0, 0, 1))]), 1.0),

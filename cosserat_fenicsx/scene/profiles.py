@@ -8,10 +8,11 @@ from typing import Annotated
 
 import numpy as np
 
-from cosserat_fenicsx.checks import Numbers, call, instance, number, refuse, vector
+from cosserat_fenicsx.checks import Numbers, instance, number, refuse, vector
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.parts import Kind, Object, Several, misplaced, spoken
 from cosserat_fenicsx.scene.sections import Section, Stiffness, inverse, representative
+from cosserat_fenicsx.scene.signals import vector_at
 from cosserat_fenicsx.scene.stresses import Stress
 
 
@@ -142,7 +143,7 @@ class MassCentre:
         for k, offset in enumerate(self._offsets):
             here = index == k
             if callable(offset):
-                values = [self._of(offset, float(x)) for x in s[here]]
+                values = [vector_at(self._where, "eccentricity", offset, float(x), "m", 2) for x in s[here]]
                 offsets[here, :2] = np.reshape(values, (-1, 2))
             else:
                 offsets[here, :2] = offset
@@ -160,10 +161,6 @@ class MassCentre:
         if not isinstance(offset, list | tuple | np.ndarray):
             refuse(self._where, field, offset, _EXPECTED)
         return vector(self._where, field, offset, "m", size=2)
-
-    def _of(self, function, s):
-        given = call(function, s, f"{self._where}.eccentricity", f" at s = {s:g} m")
-        return vector(self._where, f"eccentricity({s:g})", given, "m", size=2)
 
 
 def mass_centre_of(rod):

@@ -19,7 +19,19 @@ from typing import Annotated
 
 import numpy as np
 
-from cosserat_fenicsx.checks import File, Numbers, Rows, call, finite_array, number, refuse, store, text_of, vector
+from cosserat_fenicsx.checks import (
+    File,
+    Numbers,
+    Rows,
+    call,
+    finite_array,
+    name_of,
+    number,
+    refuse,
+    store,
+    text_of,
+    vector,
+)
 from cosserat_fenicsx.dimensions import LARGEST
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.kinds import Either
@@ -351,6 +363,12 @@ _MOST_BREAKS = 64
 _SAMPLES = 33
 
 
+def vector_at(owner, field, function, s, unit, size=3):
+    """The vector that a user's function of the arc length returns at s, m; its errors become `SceneError`s."""
+    given = call(function, s, f"{name_of(owner)}.{field}", f" at s = {s:g} m")
+    return vector(owner, f"{field}({s:g})", given, unit, size)
+
+
 @dataclass(frozen=True)
 class Along(FunctionAlong):
     """A function of the arc length.
@@ -371,10 +389,7 @@ class Along(FunctionAlong):
         Raises:
             SceneError: the function raised, or returned something else than three finite numbers.
         """
-        values = []
-        for x in np.asarray(s, dtype=float).tolist():
-            given = call(self.function, x, "Along.function", f" at s = {x:g} m")
-            values.append(vector("Along", f"function({x:g})", given, "per length"))
+        values = [vector_at("Along", "function", self.function, x, "per length") for x in np.asarray(s, float).tolist()]
         return np.array(values).reshape(-1, 3)
 
     def check(self, length):

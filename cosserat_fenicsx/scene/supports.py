@@ -15,7 +15,7 @@ from cosserat_fenicsx.checks import Numbers, NumbersInTime, direction, refuse, s
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.parts import Part, Several, UnitVector
 from cosserat_fenicsx.scene.rod import RodOrName, Station, StationOrName
-from cosserat_fenicsx.scene.signals import VectorInTime, at
+from cosserat_fenicsx.scene.signals import VectorInTime, at, vector_at
 
 #: direction . (r_a - r_b) = its value in the reference + rate times the load factor (m).
 PositionTie = namedtuple("PositionTie", "a b direction rate")
@@ -266,10 +266,4 @@ class InitialVelocity(Part):
         value = getattr(self, field)
         if not callable(value):
             return np.tile(value, (len(s), 1))
-        rows = []
-        for x in s:
-            try:
-                rows.append(vector(self, field, value(float(x)), unit))
-            except SceneError as problem:
-                raise SceneError(f"{problem}, at s = {x:g} m") from None
-        return np.array(rows)
+        return np.array([vector_at(self, field, value, float(x), unit) for x in s])
