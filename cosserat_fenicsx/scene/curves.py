@@ -19,7 +19,7 @@ from numpy.polynomial import legendre
 from cosserat_fenicsx.checks import File, Numbers, Rows, positive, refuse, store, text_of, vector
 from cosserat_fenicsx.dimensions import LARGEST
 from cosserat_fenicsx.errors import SceneError
-from cosserat_fenicsx.numerics import gauss
+from cosserat_fenicsx.numerics import directors, gauss
 from cosserat_fenicsx.parts import FileName, Limits, Number, Part, Several
 
 # Smallest distance of neighbouring points, relative to the extent of all: closer ones make the curvature inaccurate.
@@ -201,12 +201,6 @@ def _skew(w):
     a, b, c = np.moveaxis(w, -1, 0)
     zero = np.zeros_like(a)
     return np.stack([zero, -c, b, c, zero, -a, -b, a, zero], axis=-1).reshape(*np.shape(w)[:-1], 3, 3)
-
-
-def rotation(q):
-    """The rotation matrix (3, 3) of a unit quaternion, scalar first."""
-    V = _skew(np.asarray(q[1:]))
-    return np.eye(3) + 2 * q[0] * V + 2 * V @ V
 
 
 _GAUSS = gauss(20)
@@ -578,7 +572,7 @@ class UniformCurvature(_Uniform):
             refuse(self, "frame", frame, "a quaternion of length 1, scalar first")
         if abs(np.linalg.norm(q) - 1) > 1e-15:  # a unit quaternion stays the same to the last digit
             q /= np.linalg.norm(q)
-        store(self, quaternion=tuple(q.tolist()), _frame=rotation(q), _curvature=np.array(self.curvature))
+        store(self, quaternion=tuple(q.tolist()), _frame=directors(q[None])[0], _curvature=np.array(self.curvature))
 
     def arguments(self):
         return {"frame" if name == "quaternion" else name: value for name, value in super().arguments().items()}
