@@ -22,7 +22,7 @@ from pathlib import Path
 import numpy as np
 from numpy.polynomial.legendre import legvander
 
-from cosserat_fenicsx.checks import store
+from cosserat_fenicsx.checks import instance, store
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.numerics import gauss
 from cosserat_fenicsx.scene.sections import Material, Section, Stiffness, isotropic
@@ -65,7 +65,8 @@ class Profile(Section):
 
     name: str
 
-    def validate(self):
+    def __post_init__(self):
+        instance(self, "name", self.name, str, "a name such as 'IPE 200'")
         plain = "".join(self.name.upper().split())
         if plain.startswith("HE") and plain[2:3].isdigit():  # HE 160 A
             plain = f"HE{plain[-1]}{plain[2:-1]}"
