@@ -256,7 +256,10 @@ def test_a_torque_that_falls_too_fast():
     ("call", "words"),
     [
         (lambda: cf.drilling.stability(pipe_and_collars(), [0.0]), "speeds\\[0\\] = 0.0: expected a positive number"),
-        (lambda: cf.drilling.stability(pipe_and_collars(), [1.0], [-1.0]), "weights\\[0\\] = -1.0: expected a positive"),
+        (
+            lambda: cf.drilling.stability(pipe_and_collars(), [1.0], [-1.0]),
+            "weights\\[0\\] = -1.0: expected a positive",
+        ),
         (lambda: cf.drilling.stability(pipe_and_collars(bit=None), [1.0], [1e4]), "expected a BitOnRock"),
         (lambda: cf.drilling.stability(pipe_and_collars(), [1.0], modes=0), "modes = 0"),
         (lambda: cf.drilling.stability(replace(cutting(), hook=None), [1.0]), "or a Hook whose speed"),
