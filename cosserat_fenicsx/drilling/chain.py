@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cosserat_fenicsx.drilling.wall_friction import law_of, scene_pieces, static_weight
+from cosserat_fenicsx.well.pieces import down_along
 
 
 # Least and largest share of an element's mass that couples its nodes.
@@ -159,9 +160,8 @@ def _against_the_wall(drilling, depths):
     middle, length = (cuts[:-1] + cuts[1:]) / 2, np.diff(cuts)
     of = np.searchsorted(pieces.bottom, middle)
     t, n, b, k, w = (getattr(pieces, name)[of] for name in ("t", "n", "b", "curvature", "weight"))
-    up = pieces.bottom[of] - middle
     # the piece's own height above and below its middle: the chord of an arc
-    slope, normal = t * np.cos(k * up) - n * np.sin(k * up), n * np.cos(k * up) + t * np.sin(k * up)
+    slope, normal = down_along(t, n, k * (pieces.bottom[of] - middle))
     pull = w * slope * length * np.sinc(k * length / 2 / np.pi)
     below = np.cumsum(pull[::-1])[::-1] - weight
     tension = below - pull / 2

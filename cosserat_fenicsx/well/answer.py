@@ -17,7 +17,7 @@ from cosserat_fenicsx.well.contacts import WallContact, contacts_of, high_side, 
 from cosserat_fenicsx.well.differentiated import Differentiated
 from cosserat_fenicsx.well.hole import Borehole, Mud
 from cosserat_fenicsx.well.operations import Operation
-from cosserat_fenicsx.well.pieces import Sections, sections_of, stretch, true_tension, von_mises
+from cosserat_fenicsx.well.pieces import Sections, down_along, sections_of, stretch, true_tension, von_mises
 from cosserat_fenicsx.well.softstring import UP_TO
 
 # A torque below this share of the largest tension times the contact radius is nothing that errors are compared with.
@@ -325,8 +325,7 @@ class TorqueAndDrag(Differentiated, Result):
         """Curvature, and weight along normal and binormal, at `md`."""
         names = "curvature", "weight", "t", "n", "b", "bottom"
         k, weight, t, n, b, bottom = (self._of_piece(getattr(self.pieces, name)) for name in names)
-        angle = k * (bottom - self.md)
-        return k, weight * (n * np.cos(angle) + t * np.sin(angle)), weight * b
+        return k, weight * down_along(t, n, k * (bottom - self.md))[1], weight * b
 
     def critical_load(self, criterion: str) -> np.ndarray:
         """Compression (N) at `md` at which the string buckles, by a criterion of `well/criteria.py`.

@@ -21,13 +21,11 @@ from cosserat_fenicsx.quantities import Quantity
 from cosserat_fenicsx.well import criteria
 from cosserat_fenicsx.well.calibrate import readings_of
 from cosserat_fenicsx.well.components import Bit, Stabiliser
-from cosserat_fenicsx.well.contacts import high_side, name_of_side, stretches
+from cosserat_fenicsx.well.contacts import VERTICAL, high_side, name_of_side, quantile, stretches
 
 #: Colours of the sides of the hole, the same in all pictures.
 SIDES = {"low": "tab:blue", "high": "tab:red", "left": "tab:green", "right": "tab:orange", "wall": "dimgray"}
 
-#: Inclinations (rad) below this have no high side.
-VERTICAL = 1e-9
 # What remains is cut off beyond so many times what this part of the string has.
 _USUAL, _MOSTLY = 1.5, 0.995
 
@@ -72,11 +70,7 @@ def usual_side_force(answer, force, md):
     most = float(force[known].max(initial=0.0))
     if answer.model != "rod" or not most > 0:
         return most
-    values, lengths = force[known], np.gradient(md)[known]
-    order = np.argsort(values)
-    so_far = np.cumsum(lengths[order])
-    at = min(int(np.searchsorted(so_far, _MOSTLY * so_far[-1])), len(order) - 1)
-    return min(most, _USUAL * float(values[order][at]))
+    return min(most, _USUAL * quantile(force[known], np.gradient(md)[known], _MOSTLY))
 
 
 # Loads beyond so many times the median are not what the axis is for.
@@ -84,7 +78,7 @@ _UNUSUAL = 10.0
 _HOOK = Quantity("hook load", unit="N", shown="kN")
 _SURFACE = Quantity("surface torque", unit="N m", shown="kN m")
 _BIT_DEPTH = Quantity("measured depth of the bit", unit="m", shown="m", dimension="length")
-_DEPTH = Quantity("measured depth", unit="m", shown="m", dimension="length")
+DEPTH = Quantity("measured depth", unit="m", shown="m", dimension="length")
 # Heights of panels over the depth, inches.
 _HEIGHT = 7.5
 
@@ -222,8 +216,8 @@ _ACROSS = Quantity("across", unit="m", shown="mm", dimension="diameter")
 _TENSION = Quantity("tension", unit="N", shown="kN")
 _TORQUE = Quantity("torque", unit="N m", shown="kN m")
 _BENDING = Quantity("bending moment", unit="N m", shown="kN m")
-_SIDE = Quantity("side force per length", unit="N/m", shown="N/m", dimension="force per length")
-_AT_POINTS = Quantity("forces at points", unit="N", shown="kN")
+SIDE_FORCE = Quantity("side force per length", unit="N/m", shown="N/m", dimension="force per length")
+AT_POINTS = Quantity("forces at points", unit="N", shown="kN")
 # Stretches that are buckled: colours and names.
 _BUCKLED = {criteria.SNAKE: ("gold", "sinusoidal buckling"), criteria.HELIX: ("tab:pink", "helical buckling")}
 _PARTS = ("0.55", "0.75")
@@ -239,7 +233,7 @@ def answer_figure(answer, between=None):
     draws = [_string, _tension, *([_torque] if turns else []), _side_force]
     draws += [*([_at_points] if points else []), *([_bending] if bends else [])]
     widths = [2.7 * {_string: 0.8, _at_points: 1.15}.get(drawn, 1.0) for drawn in draws]
-    figure, panels, unit, length = over_depth(widths, _DEPTH)
+    figure, panels, unit, length = over_depth(widths, DEPTH)
     room = 0.01 * (bottom - top)
     panels[0].set_ylim((bottom + room) / length, (top - room) / length)
     rows = rows_between(answer.md, top, bottom)
@@ -282,7 +276,7 @@ def _string(panel, answer, rows, depth):
     """The string in the hole, seen across its plane of high and low side, or across north where it is vertical."""
     unit, size = unit_of(_ACROSS)
     md, hole = answer.md[rows], answer.hole.at(answer.md[rows], "diameter") / 2 / size
-    length = unit_of(_DEPTH)[1]
+    length = unit_of(DEPTH)[1]
     high = high_side(answer.hole.path.tangent(md))
     vertical = not high.any()
     across = answer.offset[rows][:, 0] if vertical else (answer.offset[rows] * high).sum(axis=1)
@@ -363,8 +357,8 @@ def _bending(panel, answer, rows, depth):
 
 def _side_force(panel, answer, rows, depth):
     """Per length, without the peaks by which the rod has forces at points."""
-    heading, size = scale(_SIDE)
-    unit = unit_of(_SIDE)[0]
+    heading, size = scale(SIDE_FORCE)
+    unit = unit_of(SIDE_FORCE)[0]
     force, sides = answer.distributed_force[rows], sides_along(answer)[rows]
     for side, colour in SIDES.items():
         if (sides == side).any():
@@ -386,8 +380,8 @@ def _words(side):
 
 def _at_points(panel, answer, *_):
     """Forces at points, with their numbers beside them."""
-    (heading, size), unit = scale(_AT_POINTS), unit_of(_AT_POINTS)[0]
-    length_unit, length = unit_of(_DEPTH)
+    (heading, size), unit = scale(AT_POINTS), unit_of(AT_POINTS)[0]
+    length_unit, length = unit_of(DEPTH)
     bottom, top = panel.get_ylim()
     points = [(md / length, force / size, side)
               for md, force, side in points_between(answer, top * length, bottom * length)]  # fmt: skip
@@ -424,7 +418,7 @@ def side_figure(answer, length=None):
     top = max(0.0, answer.depth - (length or answer.depth))
     figure = empty_figure(11, 5.5)
     axes = figure.subplots()
-    (along, metre), (across, size) = scale(_DEPTH), scale(_TOWARDS_HIGH_SIDE)
+    (along, metre), (across, size) = scale(DEPTH), scale(_TOWARDS_HIGH_SIDE)
     md = np.linspace(top, answer.depth, 801)
     wall, at = answer.hole.at(md, "diameter") / 2 / size, md / metre
     width = 2 * wall.max()
@@ -435,12 +429,13 @@ def side_figure(answer, length=None):
     pad = 0.025 * (answer.depth - top)
     axes.set(xlim=((top - pad) / metre, (answer.depth + 2 * pad) / metre), ylim=(-_LOW * width, _HIGH * width))
     axes.set(xlabel=along, ylabel=across)
-    high = np.interp(md, answer.md, _towards_high_side(answer))
+    towards_high_side = (answer.offset * high_side(answer.hole.path.tangent(answer.md), north=True)).sum(axis=1)
+    high = np.interp(md, answer.md, towards_high_side)
     for i, place in enumerate(answer.laid):
         if place.bottom > top:
             _draw_component(axes, place, md, high, _NAMES[i % 2] * width)
     _draw_forces(axes, answer, top, width)
-    (unit, _), (weight_unit, weight) = unit_of(_DEPTH), unit_of(_HOOK)
+    (unit, _), (weight_unit, weight) = unit_of(DEPTH), unit_of(_HOOK)
     operation = answer.operation
     figure.suptitle(
         f"{operation.name}, weight on bit {operation.weight / weight:.4g} {weight_unit}, bit at "
@@ -449,16 +444,9 @@ def side_figure(answer, length=None):
     return figure
 
 
-def _towards_high_side(answer):
-    """(n,) distance of the string from the hole's axis towards the high side (north, where there is none), m."""
-    high = high_side(answer.hole.path.tangent(answer.md))
-    high[~high.any(axis=1)] = (1.0, 0.0, 0.0)
-    return (answer.offset * high).sum(axis=1)
-
-
 def _draw_component(axes, place, md, high, name):
     """Its body along the string, blades or a bit over it, and its name at a height of the chart."""
-    (_, metre), (_, size) = unit_of(_DEPTH), unit_of(_TOWARDS_HIGH_SIDE)
+    (_, metre), (_, size) = unit_of(DEPTH), unit_of(_TOWARDS_HIGH_SIDE)
     part, here = place.component, (md >= place.top) & (md <= place.bottom)
     at = np.concatenate([[max(place.top, md[0])], md[here], [place.bottom]])
     middle, at = np.interp(at, md, high) / size, at / metre
@@ -474,7 +462,7 @@ def _draw_component(axes, place, md, high, name):
 
 def _draw_forces(axes, answer, top, width):
     """Arrows of the forces at points, from the wall to the string, and lines where it lies on the wall."""
-    (unit, force_size), (length_unit, metre) = unit_of(_AT_POINTS), unit_of(_DEPTH)
+    (unit, force_size), (length_unit, metre) = unit_of(AT_POINTS), unit_of(DEPTH)
     shown = [contact for contact in answer.contacts if contact.bottom >= top and contact.force > 0]
     most = max((x.force for x in shown if x.at_point and x.side in ("high", "low")), default=0.0)
     for contact in shown:

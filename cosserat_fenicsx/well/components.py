@@ -30,21 +30,19 @@ _TABLE = Path(__file__).with_name("standard_sizes.csv")
 @functools.cache
 def standard_sizes():
     """{kind: {name: what `standard_size` returns}}."""
-    with _TABLE.open(encoding="utf-8", newline="") as stream:
-        rows = list(csv.DictReader(stream))
     sizes = {}
-    for row in rows:
-        inches = (row["outer_diameter_in"], row["inner_diameter_in"], row["tool_joint_in"])
-        outer, inner, joint = (float(x) * units.inch if x else None for x in inches)
-        mass = float(row["weight_lb_per_ft"]) * units.lb_per_ft if row["weight_lb_per_ft"] else None
-        found = {
+    for row in csv.DictReader(_TABLE.read_text(encoding="utf-8").splitlines()):
+
+        def read(column, unit, row=row):
+            return float(row[column]) * unit if row[column] else None
+
+        sizes.setdefault(row["kind"], {})[row["name"]] = {
             "size": row["name"],
-            "outer_diameter": outer,
-            "inner_diameter": inner,
-            "tool_joint": joint,
-            "mass": mass,
+            "outer_diameter": read("outer_diameter_in", units.inch),
+            "inner_diameter": read("inner_diameter_in", units.inch),
+            "tool_joint": read("tool_joint_in", units.inch),
+            "mass": read("weight_lb_per_ft", units.lb_per_ft),
         }
-        sizes.setdefault(row["kind"], {})[row["name"]] = found
     return sizes
 
 

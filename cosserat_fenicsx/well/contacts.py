@@ -9,6 +9,8 @@ from cosserat_fenicsx.well.softstring import UP_TO
 
 #: Forces at points are rough where their estimated error is above this part of them.
 ROUGH = 5e-3
+#: Inclinations (rad) below this have no high side.
+VERTICAL = 1e-9
 _SIDES = ("high", "right", "low", "left")
 
 
@@ -45,18 +47,18 @@ class WallContact(_Stretch):
 def side_in_space(tangents, outward):
     """(n,) angles of directions across the hole (n, 3), rad clockwise from its high side, looking down it; from the
     first axis, north, where it is vertical. tangents: (n, 3) of the hole's axis."""
-    high = high_side(tangents)
-    vertical = ~high.any(axis=1)
-    high[vertical] = np.array([1.0, 0.0, 0.0]) - tangents[vertical, :1] * tangents[vertical]
+    high = high_side(tangents, north=True)
     right = np.cross(tangents, high)
     return np.arctan2((outward * right).sum(axis=1), (outward * high).sum(axis=1))
 
 
-def high_side(tangents):
-    """(n, 3) unit vectors to the high side of a hole with tangents (n, 3), zero where it is vertical."""
+def high_side(tangents, north=False):
+    """(n, 3) unit vectors to the high side of a hole with tangents (n, 3); zero where it is vertical, or to the
+    north."""
     high = tangents * tangents[:, 2:] - (0.0, 0.0, 1.0)
     size = np.linalg.norm(high, axis=1, keepdims=True)
-    return np.where(size > 1e-9, high / np.where(size > 1e-9, size, 1.0), 0.0)
+    vertical = np.array([1.0, 0.0, 0.0]) - tangents[:, :1] * tangents if north else 0.0
+    return np.where(size > 1e-9, high / np.where(size > 1e-9, size, 1.0), vertical)
 
 
 def stretches(md, where):
@@ -80,6 +82,13 @@ def sides_of(pieces, solved, climbing):
     for end, beside in ((0, 1), (-1, -2)):  # a bend that starts vertically presses to one side from its first point on
         side[:, end] = np.where(leans[:, end], side[:, end], side[:, beside])
     return side
+
+
+def quantile(values, weights, share):
+    """The value (n,) below which a share of the weights (n,) lies."""
+    order = np.argsort(values)
+    up_to = np.cumsum(weights[order])
+    return float(values[order[min(np.searchsorted(up_to, share * up_to[-1]), len(order) - 1)]])
 
 
 def name_of_side(side):

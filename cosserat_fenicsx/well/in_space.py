@@ -10,9 +10,17 @@ from cosserat_fenicsx.pictures.charts import unit_of
 from cosserat_fenicsx.pictures.drawing import colour_bar, load_pyvista, stage
 from cosserat_fenicsx.pictures.plot import deliver
 from cosserat_fenicsx.pictures.view import Axis, Labels, View, draw_axes, round_step, text_of
-from cosserat_fenicsx.quantities import Quantity
 from cosserat_fenicsx.ranks import world
-from cosserat_fenicsx.well.charts import SIDES, depths_between, points_between, rows_between, usual_side_force
+from cosserat_fenicsx.well.charts import (
+    AT_POINTS,
+    DEPTH,
+    SIDE_FORCE,
+    SIDES,
+    depths_between,
+    points_between,
+    rows_between,
+    usual_side_force,
+)
 
 # Pixels: height of the drawing, bounds of its width, margins at the left (numbers of depths), right (colour bar), above
 # (title) and below (names of axes).
@@ -32,9 +40,6 @@ _SPHERE, _LINE = 0.35, 4
 # Radii of the hole in the picture that a well goes down at least, which is not horizontal.
 _SLENDER = 10
 _FIELD = "side force"
-_SIDE_FORCE = Quantity("side force", unit="N/m", shown="N/m", dimension="force per length")
-_AT_POINT = Quantity("force at a point", unit="N", shown="kN")
-_DEPTH = Quantity("depth", unit="m", shown="m", dimension="length")
 
 
 def draw_in_space(answer, file, enlarge, between, units):
@@ -75,7 +80,7 @@ def _draw(answer, enlarge, top, bottom):
     draw_axes(plotter, pyvista, axes, view, labels)
     _add_names(plotter, pyvista, answer, labels, view, (md, axis, line, enlarge * radius), (top, bottom))
     labels.draw(plotter, pyvista)
-    unit, size = unit_of(_DEPTH)
+    unit, size = unit_of(DEPTH)
     part = "" if whole else f", from {top / size:g} to {bottom / size:g} {unit}"
     _add_title(plotter, answer, enlarge, part, view.window)
     view.place(plotter)
@@ -106,7 +111,7 @@ def _axes_of(points, room):
         high[2] = points[:, 2].max()  # the surface
     thin = np.maximum(_THIN * (high - low).max() - (high - low), 0.0) * (1, 1, 0) / 2
     low, high = low - thin, high + thin
-    (most, least), (unit, size) = _INTERVALS, unit_of(_DEPTH)
+    (most, least), (unit, size) = _INTERVALS, unit_of(DEPTH)
     found = []
     for name, a, b, sign in zip(("east", "north", "depth"), low, high, (1, 1, -1), strict=True):
         step = min(round_step(float((high - low).max()) / size, most), round_step(float(b - a) / size, least)) * size
@@ -144,7 +149,7 @@ def _view_of(points, axes):
 def _add_string(plotter, pyvista, answer, md, line, radius, tube):
     """As a tube, or as a line where a tube were thinner than a pixel."""
     distributed = answer.distributed_force
-    unit, size = unit_of(_SIDE_FORCE)
+    unit, size = unit_of(SIDE_FORCE)
     force, rows = _at(md, answer, distributed) / size, rows_between(answer.md, md[0], md[-1])
     string = pyvista.MultipleLines(line)
     string[_FIELD], string["radius"] = force, radius
@@ -196,7 +201,7 @@ def _add_names(plotter, pyvista, answer, labels, view, lines, ends):
     def at(depth, curve):
         return np.array([np.interp(depth, md, curve[:, i]) for i in range(3)])
 
-    (unit, length), (force_unit, force_size) = unit_of(_DEPTH), unit_of(_AT_POINT)
+    (unit, length), (force_unit, force_size) = unit_of(DEPTH), unit_of(AT_POINTS)
     points = sorted(points_between(answer, *ends), key=lambda point: -point[1])
     for k, (depth, force, side) in enumerate(points):
         centre, on = at(depth, axis), at(depth, line)
@@ -220,7 +225,7 @@ def _add_names(plotter, pyvista, answer, labels, view, lines, ends):
 
 def _add_title(plotter, answer, enlarge, part, window):
     how = f"radii and clearance {enlarge:g} times as large" if enlarge != 1 else "radii and clearance as they are"
-    unit, size = unit_of(_DEPTH)
+    unit, size = unit_of(DEPTH)
     straight = answer.model != "rod" and answer.helical.any()
     lines = [
         f"{answer.operation.name}, bit at {answer.depth / size:g} {unit}, {answer.words}{part}",

@@ -210,8 +210,8 @@ def _levers(path, pieces, solved, groups, EI, clearance):
     md, n = pieces.bottom[::-1], len(groups)
     wide = np.maximum(np.append(EI[1:], 0.0), np.append(0.0, EI[:-1]))  # of neighbours
     EI = np.where(pieces.bottom[::-1] - pieces.top[::-1] < _SET.short, np.minimum(EI, wide), EI) if n > 1 else EI
-    below = np.append(0.0, EI[:-1])[:, None] * path.curvature(md)
-    moment = np.linalg.norm(EI[:, None] * path.curvature(np.maximum(md - 1e-6, 0.0)) - below, axis=1)
+    above, below = _beside(path, md)
+    moment = np.linalg.norm(EI[:, None] * above - np.append(0.0, EI[:-1])[:, None] * below, axis=1)
     known = (moment > 0) & (EI > 0)
     moment, stiff = np.where(known, moment, 0.0), np.where(known, EI, 1.0)
     apart = np.maximum(np.sqrt(8 * clearance * stiff / np.where(known, moment, 1.0)), _SET.nearest)
@@ -222,13 +222,18 @@ def _jumps(path, pieces, tension, EI):
     """Wall force (N) that is missed where pieces meet, from below, and EI dk^2 (N m)."""
     md, up = pieces.bottom[:-1], slice(None, None, -1)
     t, down = path.tangent(md), np.array([0.0, 0.0, 1.0])
-    k = path.curvature(np.maximum(md - 1e-6, 0.0)), path.curvature(md)  # above and below
+    k = _beside(path, md)
     offsets = []
     for i, curvature in ((slice(None, -1), k[0]), (slice(1, None), k[1])):
         q = tension[up, None] * curvature + pieces.weight[i, None] * (down - t * t[:, 2:])
         offsets.append((pieces.hole - pieces.radius)[i, None] * _unit(q, 1))
     jump, away = np.linalg.norm(k[1] - k[0], axis=1), np.linalg.norm(offsets[1] - offsets[0], axis=1)
     return np.abs(tension) * np.sqrt(2 * away * jump)[up], np.minimum(EI[1:], EI[:-1]) * jump[up] ** 2
+
+
+def _beside(path, md):
+    """Curvature vectors just above and below measured depths."""
+    return path.curvature(np.maximum(md - 1e-6, 0.0)), path.curvature(md)
 
 
 def _unit(vectors, axis):

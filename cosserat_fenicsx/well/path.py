@@ -303,60 +303,41 @@ def checked_survey(md, inc, azi, degrees):
         if len(columns[name]) != len(columns["md"]):
             refuse(who, name, values, f"{len(columns['md'])} numbers, as many as there are measured depths")
     md, inc, azi = columns.values()
-    _check_depths(md)
+    if md[0] != 0:
+        refuse(who, "md[0]", float(md[0]), "0 m: add the station (0, 0, azimuth) where the well starts vertically")
+    if md[-1] > _DEEPEST:
+        refuse(who, "md[-1]", float(md[-1]), f"at most {_DEEPEST:g} m")
+    for i in np.flatnonzero(np.diff(md) < _APART) + 1:
+        refuse(who, f"md[{i}]", float(md[i]), f"more than the station before, {md[i - 1]:g} m (ascending depths)")
     if degrees is not False:
         _doubt_degrees(inc, azi, degrees)
         inc, azi = np.radians(inc), np.radians(azi)
     unit, one = ("rad", 1.0) if degrees is False else ("degrees", math.radians(1))
     for name, values, least, most in (("inc", inc, 0.0, math.pi), ("azi", azi, -_FULL, _FULL)):
-        bad = np.flatnonzero((values < least) | (values > most * (1 + 1e-12)))
-        if len(bad):
-            refuse(who, f"{name}[{bad[0]}]", float(columns[name][bad[0]]),
-                   f"{least / one:g} to {most / one:.6g} ({unit}), at md = {md[bad[0]]:g} m")  # fmt: skip
+        for i in np.flatnonzero((values < least) | (values > most * (1 + 1e-12))):
+            refuse(who, f"{name}[{i}]", float(columns[name][i]),
+                   f"{least / one:g} to {most / one:.6g} ({unit}), at md = {md[i]:g} m")  # fmt: skip
     inc = np.minimum(inc, math.pi)
-    _check_doglegs(md, inc, azi)
+    for i in np.flatnonzero(_curvatures(inc, azi, np.diff(md))[0] > _MOST_DOGLEG):
+        raise SceneError(
+            f"WellPath: the hole turns by 180 degrees between md = {md[i]:g} and {md[i + 1]:g} m: expected less (no "
+            "arc is defined by two opposite directions)"
+        )
     return md, inc, azi
-
-
-def _check_depths(md):
-    if md[0] != 0:
-        refuse(
-            "WellPath", "md[0]", float(md[0]), "0 m: add the station (0, 0, azimuth) where the well starts vertically"
-        )
-    if md[-1] > _DEEPEST:
-        refuse("WellPath", "md[-1]", float(md[-1]), f"at most {_DEEPEST:g} m")
-    bad = np.flatnonzero(np.diff(md) < _APART)
-    if len(bad):
-        i = bad[0] + 1
-        refuse(
-            "WellPath", f"md[{i}]", float(md[i]), f"more than the station before, {md[i - 1]:g} m (ascending depths)"
-        )
 
 
 def _doubt_degrees(inc, azi, degrees):
     """Refuse angles that are radians by all appearance, or warn where the user says that they are degrees."""
     if not 0 < inc.max() <= math.pi or np.abs(azi).max() > _FULL:
         return
-    text = (
-        f"all inclinations are below {inc.max():.4g} and all azimuths within +-{max(np.abs(azi).max(), 0):.4g}: these "
-        "look like radians"
-    )
+    text = f"all inclinations are below {inc.max():.4g} and all azimuths within +-{np.abs(azi).max():.4g}: these look"
+    text += " like radians"
     if degrees:
         warn(f"WellPath: {text}; they are taken as degrees, as degrees=True says")
     else:
         raise SceneError(
             f"WellPath: {text}. Say degrees=False if they are, degrees=True if they are not (in a scene file "
             "degrees = false and degrees = true)"
-        )
-
-
-def _check_doglegs(md, inc, azi):
-    half = np.sin(np.diff(inc) / 2) ** 2 + np.sin(inc[:-1]) * np.sin(inc[1:]) * np.sin(np.diff(azi) / 2) ** 2
-    bad = np.flatnonzero(half > math.sin(_MOST_DOGLEG / 2) ** 2)
-    if len(bad):
-        raise SceneError(
-            f"WellPath: the hole turns by 180 degrees between md = {md[bad[0]]:g} and {md[bad[0] + 1]:g} m: expected "
-            "less (no arc is defined by two opposite directions)"
         )
 
 

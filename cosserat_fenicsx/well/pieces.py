@@ -202,6 +202,12 @@ def _downward(path, section, bottom):
     return down, across, binormal, curvature
 
 
+def down_along(t, n, angle):
+    """Downward components of tangent and normal of arcs, turned by an angle (rad) up the hole."""
+    cos, sin = np.cos(angle), np.sin(angle)
+    return t * cos - n * sin, n * cos + t * sin
+
+
 def _check_widths(hole, laid):
     above = 0.0
     for section in hole.sections:

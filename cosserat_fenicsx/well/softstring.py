@@ -33,6 +33,7 @@ from scipy.optimize import brentq
 
 from cosserat_fenicsx.errors import NotConverged
 from cosserat_fenicsx.numerics import gauss
+from cosserat_fenicsx.well.pieces import down_along
 
 _POINTS = 8  # Gauss points a piece
 _ITERATIONS, _ROUNDS = 60, 60
@@ -68,9 +69,7 @@ class Chain(NamedTuple):
 
     def down(self, u):
         """Downward components of tangent and normal at distances u (m) above the lower ends."""
-        angle = self.curvature * u
-        cos, sin = np.cos(angle), np.sin(angle)
-        return self.t * cos - self.n * sin, self.n * cos + self.t * sin
+        return down_along(self.t, self.n, self.curvature * u)
 
     def height(self, u):
         """Height (m) of places at distances u (m) above the lower ends."""
@@ -213,7 +212,7 @@ class _Friction:
 
     def unseen(self):
         """Errors of forces (N) by sharp turns of the load between two points, which comparisons may miss."""
-        (below, _), (above, _) = self._end_loads()
+        below, above = self._end_loads()
         load = np.concatenate([below[:, None], self.points, above[:, None]], axis=1)
         steps, widths = np.abs(np.diff(load, axis=1)), np.diff(AT) * self._length[:, None]
         sharp = np.sqrt(self._b2) < steps
@@ -231,9 +230,8 @@ class _Friction:
         return error.sum(axis=1)
 
     def _end_loads(self):
-        """(V, place) at the lower and the upper ends of pieces."""
-        for T, i in ((self.tension[:-1], 0), (self.tension[1:], -1)):
-            yield self._k[:, 0] * T + self._across[:, i], AT[i]
+        """V at the lower and at the upper ends of pieces."""
+        return [self._k[:, 0] * T + self._across[:, i] for T, i in ((self.tension[:-1], 0), (self.tension[1:], -1))]
 
     def on_halves(self):
         """P at the points of the halves of all pieces, by interpolation."""
@@ -243,7 +241,7 @@ class _Friction:
         """Where pieces are cut, as shares of their lengths (NaN: not): in the middle, and round a sharp turn of q."""
         cuts = np.full((len(split), 7), np.nan)
         cuts[split, 0] = 0.5
-        (below, _), (above, _) = self._end_loads()
+        below, above = self._end_loads()
         for i in np.flatnonzero(split & (below * above < 0)):
             zero = _zero(below[i], self.points[i], above[i])
             width = 2 * np.sqrt(self._b2[i, 0]) / abs(above[i] - below[i])
@@ -282,11 +280,11 @@ def _zero(below, inside, above):
     """Where a load changes its sign on a piece, as a share of it, from its values at the ends and at the points."""
     signs = np.sign(np.concatenate([[below], inside, [above]]))
     j = int(np.flatnonzero(np.diff(signs))[0])
-    at, series = np.concatenate([[0.0], _X, [1.0]]), _RULE.series @ inside
-    values = legval(2 * at[j : j + 2] - 1, series)
+    series = _RULE.series @ inside
+    values = legval(2 * AT[j : j + 2] - 1, series)
     if values[0] * values[1] >= 0:
-        return at[j + int(abs(values[1]) < abs(values[0]))]
-    return brentq(lambda x: legval(2 * x - 1, series), at[j], at[j + 1], xtol=1e-15)
+        return AT[j + int(abs(values[1]) < abs(values[0]))]
+    return brentq(lambda x: legval(2 * x - 1, series), AT[j], AT[j + 1], xtol=1e-15)
 
 
 def _cut(chain, places):

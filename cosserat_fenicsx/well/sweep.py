@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from cosserat_fenicsx.checks import File, Numbers, finite_array, refuse
+from cosserat_fenicsx.checks import File, Numbers, finite_array, instance, refuse
 from cosserat_fenicsx.errors import NotConverged, SceneError
 from cosserat_fenicsx.parts import from_data, members, to_data, use
 from cosserat_fenicsx.progress import Progress
@@ -194,8 +194,7 @@ def depth_sweep(
     if not operations:
         refuse("depth_sweep", "operations", operations, "at least one operation")
     for operation in operations:
-        if not isinstance(operation, Operation):
-            refuse("depth_sweep", "operations", operation, "operations, such as TripOut()")
+        instance("depth_sweep", "operations", operation, Operation, "operations, such as TripOut()")
     depths = np.atleast_1d(finite_array("depth_sweep", "depths", depths, "measured depths (m)"))
     if not len(depths):
         refuse("depth_sweep", "depths", depths, "at least one measured depth (m)")
@@ -218,7 +217,8 @@ def depth_sweep(
             for number, (i, j, k) in enumerate(missing.tolist(), start=1):
                 found = _answer(holes[j], string, operations[i], float(depths[k]), settings)
                 _put(sweep, (i, j, k), *found)
-                store.keep(_row((i, j, k), *found), sweep)
+                row = zip((*_CASES, *KEPT, "note"), (i, j, k, *map(float, found[0]), found[1]), strict=True)
+                store.keep(dict(row), sweep)
                 bar.reached(number)
     return sweep
 
@@ -246,11 +246,12 @@ def _empty(operations, depths, friction):
 
 def _as_data(about):
     """The arguments of `depth_sweep` as data."""
-    parts = {name: about[name] and to_data(about[name]) for name in _PARTS}
-    listed = {"operations": [{"is": type(x).__name__, "data": to_data(x)} for x in about["operations"]]}
-    listed["depths"] = about["depths"].tolist()
-    listed["friction"] = [np.asarray(x).tolist() for x in about["friction"]]
-    return {**about, **parts, **listed}
+    listed = {
+        "operations": [{"is": type(x).__name__, "data": to_data(x)} for x in about["operations"]],
+        "depths": about["depths"].tolist(),
+        "friction": [np.asarray(x).tolist() for x in about["friction"]],
+    }
+    return {**about, **{name: about[name] and to_data(about[name]) for name in _PARTS}, **listed}
 
 
 def _asked(store):
@@ -285,10 +286,6 @@ def _mark(about):
             f"depth_sweep.folder: a {problem} cannot be compared with what the folder holds: expected objects of the "
             "package, or dataclasses of numbers and texts, or no folder"
         ) from None
-
-
-def _row(place, numbers, note):
-    return {**dict(zip((*_CASES, *KEPT), (*place, *map(float, numbers)), strict=True)), "note": note}
 
 
 def _answer_in(row, shape):

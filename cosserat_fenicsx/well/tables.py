@@ -125,10 +125,6 @@ def more_in_words(answer, units):
     yield f"{answer.model}: {'; '.join(answer.why)}."
 
 
-def _known(value, factor, form):
-    return "-" if math.isnan(value) else format(value * factor, form)
-
-
 def _estimate(answer):
     """The estimated error of the model in words."""
     left_out = f" (it leaves out {answer._leaves_out})" if answer._leaves_out else ""

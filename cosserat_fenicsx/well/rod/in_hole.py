@@ -70,33 +70,43 @@ class InHole:
         self.string, self.path, self.scene, self.factor = string, path, path.scene, factor
         self.steps, self.negative_modes = int(path.iterations[0]), int(path.negative_modes[0])
         self.estimates, self.errors, self.error, self.of_stiffness = None, {}, np.inf, np.inf
-        self._coarser, self._mesh_before = None, None
+        self._mesh_before = None
 
     def estimate(self, values, before):
         """Set the errors.
 
         Args:
-            values: {factor: {name: value}} in walls of several stiffnesses on this mesh; before: the `InHole` on the
-                mesh before, or None; ignored where its mesh is no coarser.
+            values: {factor: {name: value}} in walls of several stiffnesses on this mesh, see `RodErrors`; before: the
+                `InHole` on the mesh before, or None; ignored where its mesh is no coarser.
         """
-        coarser = before if before and before.path.elements[0] < self.path.elements[0] else None
-        self.estimates = found = errors_of(self, values, coarser and coarser.estimates)
-        self.errors, self.error, self.of_stiffness = found.errors, found.error, found.of_stiffness
         if before:
             self.steps += before.steps
-        self._mesh_before = coarser
-        if coarser:
-            self._coarser = before.s, {name: getattr(before, name) for name in _ALONG}
+            if before.path.elements[0] < self.path.elements[0]:
+                self._mesh_before = before
+        string = self.string
+        arm = max(radius for _, radius in string.wall.contact_radius)
+        least = _ERRORS.least_load * (np.diff(string.ends, prepend=0.0) @ string.weight)
+        wall = max(self.wall_force, least)
+        scales = {
+            "hook_load": max(abs(self.hook_load), least),
+            "surface_torque": max(abs(self.surface_torque), _ERRORS.least_torque * arm * wall),
+            "wall_force": wall,
+        }
+        rounding = {name: self.balance * (arm if name == "surface_torque" else 1.0) for name in NAMES}
+        counted = ("hook_load", "surface_torque") if string.turns else ("hook_load",)
+        coarser = self._mesh_before and self._mesh_before.estimates
+        self.estimates = found = RodErrors(values, scales, rounding, counted, coarser, string.stiffest_rings)
+        self.errors, self.error, self.of_stiffness = found.errors, found.error, found.of_stiffness
 
     @cached_property
     def errors_along(self):
         """See the class; infinite where there is no mesh before."""
-        if self._coarser is None:
+        other = self._mesh_before
+        if other is None:
             return dict.fromkeys(_ALONG, np.inf)
-        s, coarser = self._coarser
         return {
-            name: apart_mostly(getattr(self, name), np.interp(self.s, s, values), self.node_length)
-            for name, values in coarser.items()
+            name: apart_mostly(getattr(self, name), np.interp(self.s, other.s, getattr(other, name)), self.node_length)
+            for name in _ALONG
         }
 
     @property
@@ -482,29 +492,3 @@ def _changes(there, here, scales, counted):
     own = {name: abs(here[name] - there[name]) / scales[name] for name in NAMES}
     largest = max(own[name] for name in {*counted, "wall_force"})
     return {name: max(largest, change) for name, change in own.items()}
-
-
-def errors_of(answer, values, before=None):
-    """The `RodErrors` of an `InHole`.
-
-    Args:
-        values: {factor: {name: value}} on its mesh, see `RodErrors`. before: the `RodErrors` on the mesh before.
-    """
-    string = answer.string
-    weight = np.diff(string.ends, prepend=0.0) @ string.weight
-    arm = max(radius for _, radius in string.wall.contact_radius)
-    least = _ERRORS.least_load * weight
-    wall = max(answer.wall_force, least)
-    scales = {
-        "hook_load": max(abs(answer.hook_load), least),
-        "surface_torque": max(abs(answer.surface_torque), _ERRORS.least_torque * arm * wall),
-        "wall_force": wall,
-    }
-    rounding = {name: answer.balance * (arm if name == "surface_torque" else 1.0) for name in NAMES}
-    counted = ("hook_load", "surface_torque") if string.turns else ("hook_load",)
-    return RodErrors(values, scales, rounding, counted, before, string.stiffest_rings)
-
-
-def values_of(answer):
-    """{name: value} of an `InHole`."""
-    return {name: getattr(answer, name) for name in NAMES}

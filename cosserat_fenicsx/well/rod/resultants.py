@@ -21,6 +21,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cosserat_fenicsx.well.contacts import quantile
+
 #: A resultant of the wall on the rod: from one arc length to another, m (equal for a concentrated force); force, N; the
 #: side on which it touches, rad, see `InHole.side`; and the error of a concentrated force, N.
 Contact = namedtuple("Contact", "start end force side error", defaults=(np.nan,))
@@ -276,9 +278,7 @@ def _peaks(s, sizes, pressure, inside, layer):
 
 
 def _median(values, weights):
-    order = np.argsort(values)
-    up_to = np.cumsum(weights[order])
-    return float(values[order][np.searchsorted(up_to, up_to[-1] / 2)]) if len(values) else 0.0
+    return quantile(values, weights, 0.5) if len(values) else 0.0
 
 
 #: A force at the end of a contact: see `_force_at_end`; the length that holds its peak, m; its error, N.
@@ -384,7 +384,4 @@ def along_elements(mean, sizes, nodes):
 
 def apart_mostly(here, there, lengths):
     """The difference of two arrays that `MOSTLY` of the length is below; lengths: those that the places stand for."""
-    apart = np.abs(here - there)
-    order = np.argsort(apart)
-    so_far = np.cumsum(lengths[order])
-    return float(apart[order[np.searchsorted(so_far, MOSTLY * so_far[-1])]])
+    return quantile(np.abs(here - there), lengths, MOSTLY)

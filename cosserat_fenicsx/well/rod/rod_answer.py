@@ -18,13 +18,10 @@ from cosserat_fenicsx.errors import NotConverged, SceneError
 from cosserat_fenicsx.well import criteria
 from cosserat_fenicsx.well.answer import TorqueAndDrag, scales_of, share
 from cosserat_fenicsx.well.components import weight_in_mud
-from cosserat_fenicsx.well.contacts import WallContact, name_of_side
+from cosserat_fenicsx.well.contacts import VERTICAL, WallContact, name_of_side
 from cosserat_fenicsx.well.pieces import is_ring, ring_of
 from cosserat_fenicsx.well.rod.resultants import MOSTLY
 from cosserat_fenicsx.well.rod.string_scene import energy_of_helix, turns_of_helix
-
-# Inclinations (rad) below this have no high side.
-_VERTICAL = 1e-9
 
 
 def _of_rod(name, doc=""):
@@ -111,14 +108,14 @@ class RodInContact(TorqueAndDrag):
     @cached_property
     def contact_side(self):
         """The side of the hole that the string touches, rad clockwise from its high side; NaN where it touches none."""
-        known = self.solved.touches & (self.inclination > _VERTICAL)
+        known = self.solved.touches & (self.inclination > VERTICAL)
         return np.where(known, self.solved.side % (2 * np.pi), np.nan)
 
     @cached_property
     def contacts(self):
         """See `TorqueAndDrag`: forces at points, and the contact between them."""
         depths = [np.interp([x.start, x.end], self.solved.s, self.md) for x in self.solved.contacts]
-        leans = [self.hole.path.inclination_at(ends.mean()) > _VERTICAL for ends in depths]
+        leans = [self.hole.path.inclination_at(ends.mean()) > VERTICAL for ends in depths]
         return [WallContact(float(a), float(b), x.force, name_of_side(x.side if leaning else np.nan), x.error)
                 for (a, b), x, leaning in zip(depths, self.solved.contacts, leans, strict=True)]  # fmt: skip
 

@@ -18,7 +18,7 @@ from cosserat_fenicsx.results.path import Path
 from cosserat_fenicsx.statics.circulatory import conservative_along
 from cosserat_fenicsx.statics.problem import record_of, solvers_of
 from cosserat_fenicsx.statics.settling import BACK, DECADES, LAST, LAST_TWO, settle, stages_from
-from cosserat_fenicsx.well.rod.in_hole import UNSEEN, InHole, values_of
+from cosserat_fenicsx.well.rod.in_hole import NAMES, UNSEEN, InHole
 from cosserat_fenicsx.well.rod.string_scene import in_helix, on_axis, string_in
 
 
@@ -228,7 +228,7 @@ def _on_mesh(string, layout, stages, factor, start, before, job):
                     raise
                 return answer  # in the wall before
             answer, steps = found, found.steps
-            values |= {each.factor: values_of(each) for each in (*softer, answer)}
+            values |= {each.factor: {name: getattr(each, name) for name in NAMES} for each in (*softer, answer)}
             answer.estimate(values, before)
             if answer.of_stiffness <= _WALLS.too_soft * job.tol or factor >= job.stiffest:
                 return answer
