@@ -78,7 +78,7 @@ _QUANTITIES = by_name(
 
 @dataclass(frozen=True, eq=False, repr=False)
 class TorqueAndDrag(Differentiated, Result):
-    """What a string in its hole carries, from `torque_and_drag`. SI units; depths are measured depths.
+    """Loads of a string in its hole, from `torque_and_drag`. SI units; depths are measured depths.
 
     Arrays run down the hole along `md`, which repeats a depth where something jumps: the value above it, then that
     below. A string of components that are given by numbers has no true tension and no von Mises stress (NaN).
@@ -99,7 +99,7 @@ class TorqueAndDrag(Differentiated, Result):
 
     words = property(lambda self: f"{self.model} string", doc="What was solved, for titles.")
     distributed_force = property(lambda self: self.side_force, doc="`side_force` (N/m) without forces at points.")
-    # Which bending moment it has; and what the model leaves out for all that is estimated.
+    # For the tables: how the bending moment was found, and effects that no error estimate includes.
     _quantities, _rows_axis, _beside = _QUANTITIES, "place", MappingProxyType({"_contacts": "contact"})
     _on_screen = ("md", "component_name", "inclination", "tension", "torque", "distributed_force", "bending_moment",
                   "von_mises", "state")  # fmt: skip
@@ -139,7 +139,7 @@ class TorqueAndDrag(Differentiated, Result):
 
     @cached_property
     def drag(self) -> float:
-        """Hook load less that of the same string without friction, N."""
+        """Hook load less the hook load of the same string without friction, N."""
         return self.hook_load + self.operation.weight - self._gravity
 
     @cached_property
@@ -173,7 +173,7 @@ class TorqueAndDrag(Differentiated, Result):
 
     @cached_property
     def tension(self) -> np.ndarray:
-        """Effective tension, N: that of the string with the buoyed weight. Compression is negative."""
+        """Effective tension, N, which balances the buoyed weight. Compression is negative."""
         return self._down(self.solved.tension)
 
     @cached_property
@@ -299,7 +299,7 @@ class TorqueAndDrag(Differentiated, Result):
 
     @property
     def neutral_point(self) -> float:
-        """The lowest of these, m: what is below is in compression. NaN where there is none."""
+        """The lowest of `neutral_points`, m: the string below is in compression. NaN where there is none."""
         return float(self.neutral_points[-1]) if len(self.neutral_points) else np.nan
 
     @cached_property
@@ -381,7 +381,7 @@ class TorqueAndDrag(Differentiated, Result):
         """
         from cosserat_fenicsx.well import charts
 
-        return charts.draw_chart(lambda: charts.answer_figure(self, between), file, self._ranks, units=units, width=width)
+        return charts.drawn(self, charts.answer_figure, file, between, units=units, width=width)
 
     def plot_from_side(
         self,
@@ -406,7 +406,7 @@ class TorqueAndDrag(Differentiated, Result):
 
         if self.model != "rod":
             raise SceneError(f"plot_from_side: a {self.words} lies on the axis: expected an answer of model = 'rod'")
-        return charts.draw_chart(lambda: charts.side_figure(self, length), file, self._ranks, units=units, width=width)
+        return charts.drawn(self, charts.side_figure, file, length, units=units, width=width)
 
     def plot_3d(
         self,
@@ -437,7 +437,7 @@ class TorqueAndDrag(Differentiated, Result):
 
 
 def scales_of(solved, pieces):
-    """What errors of hook load and surface torque are relative to: the largest tension (N) and torque (N m) along the
+    """Scales of the relative errors of hook load and surface torque: the largest tension (N) and torque (N m) along the
     string, and for the torque at least a little of that tension times the contact radius."""
     tension = np.abs(solved.tension).max()
     return tension, max(np.abs(solved.torque).max(), _LITTLE * tension * pieces.radius.max())

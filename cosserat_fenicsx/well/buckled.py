@@ -40,9 +40,6 @@ _Start = namedtuple("_Start", "EI clearance known load")
 def buckled_string(soft, pieces, sections, tol):
     """The `Solved` with helices, from the soft string without them; None if it has none.
 
-    Args:
-        soft: a `Solved`; pieces: `Pieces`; sections: `Sections` of the components; tol: see `torque_and_drag`.
-
     Raises:
         LockUp: the string locks up.
         NotConverged: the tolerance was not reached.
@@ -145,7 +142,8 @@ class _March:
         piece = Chain(*(array[i].item() for array in self._soft.chain))
         done, helical = 0.0, None
         for _ in range(_SET.changes):
-            part = _rest(piece, done)
+            t, n = map(float, piece.down(done))
+            part = piece._replace(length=piece.length - done, t=t, n=n)  # without what is done
             equations = _Equations(part, self._start, i, self._scale)
             helical = equations.over(0.0, tension) > 0 if helical is None else not helical
             end, tension, torque, row = self._integrate(equations, helical, tension, torque, self._depth[i] - done)
@@ -163,8 +161,8 @@ class _March:
 
         def rates(u, y):
             F = scale * math.tan(y[0])
-            side = equations.side(u, -F, helical)
-            slope = -equations.weight_along(u) - piece.drag * side
+            along, side = equations.loads(u, -F, helical)
+            slope = -along - piece.drag * side
             return slope * scale / (scale**2 + F**2), piece.turn * side
 
         def change(u, y):
@@ -187,7 +185,7 @@ class _March:
         u = self._soft.at * end
         x, moments = found.sol(u)
         tensions = -scale * np.tan(x)
-        side = np.array([equations.side(*place, helical) for place in zip(u, tensions, strict=True)])
+        side = np.array([equations.loads(*place, helical)[1] for place in zip(u, tensions, strict=True)])
         part = piece._replace(length=end)
         row = part, tensions, moments, side / piece.climb, float(UP_TO[-1] @ side) * end / piece.climb, helical
         return end, float(tensions[-1]), float(moments[-1]), row
@@ -200,26 +198,19 @@ class _Equations:
         self.piece, self._load, self._scale = piece, start.load, scale
         self._EI, self._clearance, self._known = start.EI[i], start.clearance[i], start.known[i]
 
-    def weight_along(self, u):
-        angle = self.piece.curvature * u
-        return self.piece.weight * (self.piece.t * math.cos(angle) - self.piece.n * math.sin(angle))
-
-    def side(self, u, tension, helical):
-        """Load across the hole, and the force of a helix, per length."""
+    def loads(self, u, tension, helical):
+        """Weight along the hole, and load across it with the force of a helix, per length."""
         piece, angle = self.piece, self.piece.curvature * u
-        across = piece.weight * (piece.n * math.cos(angle) + piece.t * math.sin(angle))
-        plain = math.hypot(piece.curvature * tension + across, piece.weight * piece.b)
-        return plain + criteria.helix_side(self._EI, self._clearance, tension) if helical else plain
+        cos, sin = math.cos(angle), math.sin(angle)
+        across = piece.curvature * tension + piece.weight * (piece.n * cos + piece.t * sin)
+        side = math.hypot(across, piece.weight * piece.b)
+        if helical:
+            side += criteria.helix_side(self._EI, self._clearance, tension)
+        return piece.weight * (piece.t * cos - piece.n * sin), side
 
     def over(self, u, tension):
         """Positive where the string is a helix, over the scale of its tension."""
         if not self._known:
             return -1.0
-        load = self._load(self._EI, self._clearance, self.piece.weight, self.side(u, tension, False))
+        load = self._load(self._EI, self._clearance, self.piece.weight, self.loads(u, tension, False)[1])
         return float(-tension - load) / self._scale
-
-
-def _rest(piece, done):
-    """A piece without its lower part."""
-    t, n = map(float, piece.down(done))
-    return piece._replace(length=piece.length - done, t=t, n=n)

@@ -40,14 +40,14 @@ _SET = _Fit()
 
 @dataclass(frozen=True)
 class RigMeasurement(Part):
-    """What was read at the rig at one depth of the bit.
+    """Readings at the rig at one depth of the bit.
 
     Args:
         depth: measured depth of the bit, m.
         operation: with weight and torque on bit.
-        hook_load: N, as the indicator shows it; None where it was not read. The weight of block and top drive that it
-            includes is the `block_weight` of `calibrate_friction`, which is zero unless given, or found.
-        torque: at the surface, N m; None where it was not read.
+        hook_load: N, as the indicator shows it; None if not read. It includes the weight of block and top drive, the
+            `block_weight` of `calibrate_friction`, which is zero unless given or fitted.
+        torque: at the surface, N m; None if not read.
         hook_load_sd, torque_sd: their standard deviations, N and N m: the weights of the readings.
 
     Raises:
@@ -88,7 +88,7 @@ class FrictionFit(Result):
         friction: (n,) of its sections. interval: (n, 2) confidence intervals; 0 where a coefficient is at this bound.
         block_weight: N, as given or found; block_interval: (2,), NaN where it was given.
         confidence: of the intervals, such as 0.95.
-        correlation: (m, m) of the estimates: close to 1 or -1 where the readings tell sums or differences alone.
+        correlation: (m, m) of the estimates: close to 1 or -1 where the readings determine only sums or differences.
         standard_error: (m,) of the coefficients, and of the block's weight (N) where it was found: the root of the
             diagonal of the covariance, scaled by the misfit.
         residuals: (k,) measured less computed over the standard deviations, hook loads before torques.
@@ -123,7 +123,7 @@ class FrictionFit(Result):
         """
         from cosserat_fenicsx.well import charts
 
-        return charts.draw_chart(lambda: charts.fit_figure(self), file, self._ranks, units=units, width=width)
+        return charts.drawn(self, charts.fit_figure, file, units=units, width=width)
 
     _rows_axis = "section"
     _quantities = by_name(
@@ -252,12 +252,8 @@ def calibrate_friction(
 
 
 def _causes(readings, apart, misfit, with_block):
-    """Sentences on why readings may not fit.
-
-    Args:
-        readings: [`Reading`]; apart: (n,) by how much they exceed what is computed; with_block: fits the block's weight
-            too, None where it was fitted.
-    """
+    """Sentences on why readings may not fit, from their differences (n,) to the computed values; `with_block` fits the
+    block's weight too, None where it was fitted."""
     hooks = [(x.at, x.value - more) for x, more in zip(readings, apart, strict=True) if x.query == "hook_load"]
     sizes = sum(abs(m.hook_load) for m, _ in hooks), sum(abs(computed) for _, computed in hooks)
     if hooks and not sizes[1] / _SET.other_unit < sizes[0] < sizes[1] * _SET.other_unit:

@@ -26,9 +26,6 @@ from cosserat_fenicsx.well.contacts import VERTICAL, high_side, name_of_side, qu
 #: Colours of the sides of the hole, the same in all pictures.
 SIDES = {"low": "tab:blue", "high": "tab:red", "left": "tab:green", "right": "tab:orange", "wall": "dimgray"}
 
-# What remains is cut off beyond so many times what this part of the string has.
-_USUAL, _MOSTLY = 1.5, 0.995
-
 
 def depths_between(where, between, depth):
     """(top, bottom), m, of the depths that a picture shows, at most from 0 to the depth of the bit.
@@ -70,23 +67,24 @@ def usual_side_force(answer, force, md):
     most = float(force[known].max(initial=0.0))
     if answer.model != "rod" or not most > 0:
         return most
-    return min(most, _USUAL * quantile(force[known], np.gradient(md)[known], _MOSTLY))
+    return min(most, 1.5 * quantile(force[known], np.gradient(md)[known], 0.995))
 
 
-# Loads beyond so many times the median are not what the axis is for.
-_UNUSUAL = 10.0
 _HOOK = Quantity("hook load", unit="N", shown="kN")
 _SURFACE = Quantity("surface torque", unit="N m", shown="kN m")
 _BIT_DEPTH = Quantity("measured depth of the bit", unit="m", shown="m", dimension="length")
 DEPTH = Quantity("measured depth", unit="m", shown="m", dimension="length")
-# Heights of panels over the depth, inches.
-_HEIGHT = 7.5
+
+
+def drawn(result, make, file, *given, **look):
+    """The chart `make(result, *given)`, see `draw_chart`."""
+    return draw_chart(lambda: make(result, *given), file, result._ranks, **look)
 
 
 def over_depth(widths, quantity):
     """A Figure, panels of some widths (inches) in rows that share the depth, which runs downwards and has this label,
     and the unit of lengths with its size."""
-    figure, panels, rows = beside(widths, _HEIGHT)
+    figure, panels, rows = beside(widths, 7.5)
     panels[0].invert_yaxis()
     for row in rows:
         row[0].set_ylabel(scale(quantity)[0])
@@ -133,9 +131,10 @@ def _usual_range(loads):
     """Ends of the axis of loads; infinite where all of them are of a usual size. Before it locks up a string may take a
     thrust far beyond all others."""
     known = np.abs(loads[np.isfinite(loads)])
-    if not len(known) or known.max() <= _UNUSUAL * np.median(known):
+    most = 10 * np.median(known) if len(known) else np.inf
+    if known.max(initial=0.0) <= most:
         return -np.inf, np.inf
-    usual = loads[np.isfinite(loads) & (np.abs(loads) <= _UNUSUAL * np.median(known))]
+    usual = loads[np.isfinite(loads) & (np.abs(loads) <= most)]
     room = 0.15 * np.ptp(usual)
     return min(usual.min(), 0.0) - room, max(usual.max(), 0.0) + room
 
@@ -206,12 +205,10 @@ def fit_figure(fit):
     return figure
 
 
-# A torque below this part of the largest tension times the contact radius is not drawn.
-_LITTLE_TORQUE = 1e-4
 # Smallest ranges of the axes: side force (N/m), forces at points and moment (N, N m).
 _LEAST_SIDE, _LEAST = 1.0, 100.0
-# Most forces at points with numbers; distance of labels over the size of their font.
-_LABELS, _LINE = 20, 1.5
+# Most forces at points with numbers.
+_LABELS = 20
 _ACROSS = Quantity("across", unit="m", shown="mm", dimension="diameter")
 _TENSION = Quantity("tension", unit="N", shown="kN")
 _TORQUE = Quantity("torque", unit="N m", shown="kN m")
@@ -228,12 +225,12 @@ def answer_figure(answer, between=None):
     and at points where there are such forces; bending moment where it is known; see `TorqueAndDrag.plot`."""
     top, bottom = depths_between("plot", between, answer.depth)
     points = points_between(answer, top, bottom)
-    turns = np.abs(answer.torque).max() > _LITTLE_TORQUE * np.abs(answer.tension).max() * answer.pieces.radius.max()
+    turns = np.abs(answer.torque).max() > 1e-4 * np.abs(answer.tension).max() * answer.pieces.radius.max()
     bends = np.nanmax(answer.bending_moment, initial=0.0) > 0
     draws = [_string, _tension, *([_torque] if turns else []), _side_force]
     draws += [*([_at_points] if points else []), *([_bending] if bends else [])]
     widths = [2.7 * {_string: 0.8, _at_points: 1.15}.get(drawn, 1.0) for drawn in draws]
-    figure, panels, unit, length = over_depth(widths, DEPTH)
+    figure, panels, _, length = over_depth(widths, DEPTH)
     room = 0.01 * (bottom - top)
     panels[0].set_ylim((bottom + room) / length, (top - room) / length)
     rows = rows_between(answer.md, top, bottom)
@@ -242,18 +239,30 @@ def answer_figure(answer, between=None):
         for state, (colour, name) in _BUCKLED.items():
             for a, b in stretches(answer.md / length, _to_next(answer.buckling == state)):
                 panel.axhspan(a, b, color=colour, alpha=0.25, linewidth=0, label=name)
-    for section in answer.hole.sections[:-1]:
-        if top < section.to < bottom:
-            _shoe(panels, section.to / length, f"{section.name or 'section'} ends, {section.to / length:g} {unit}")
+    for depth, name in shoes_between(answer, top, bottom):
+        _shoe(panels, depth / length, name)
     legend(*panels)
-    part = "" if (top, bottom) == (0.0, answer.depth) else f", from {top / length:g} to {bottom / length:g} {unit}"
     (force_unit, force), (moment_unit, moment) = unit_of(_HOOK), unit_of(_SURFACE)
     figure.suptitle(
-        f"{answer.operation.name}, bit at {answer.depth / length:g} {unit}, {answer.words}{part}\n"
+        f"{title_of(answer, top, bottom)}\n"
         f"hook load {answer.hook_load / force:.1f} {force_unit}, "
         f"surface torque {round(answer.surface_torque / moment, 2) + 0.0:.2f} {moment_unit}"
     )
     return figure
+
+
+def title_of(answer, top, bottom):
+    """Text: the operation, the depth of the bit, the model and the measured depths (m) that are shown."""
+    unit, size = unit_of(DEPTH)
+    part = "" if (top, bottom) == (0.0, answer.depth) else f", from {top / size:g} to {bottom / size:g} {unit}"
+    return f"{answer.operation.name}, bit at {answer.depth / size:g} {unit}, {answer.words}{part}"
+
+
+def shoes_between(answer, top, bottom):
+    """[(md, text)] of the ends of sections of the hole, m."""
+    unit, size = unit_of(DEPTH)
+    return [(section.to, f"{section.name or 'section'} ends, {section.to / size:g} {unit}")
+            for section in answer.hole.sections[:-1] if top < section.to < bottom]  # fmt: skip
 
 
 def _shoe(panels, depth, words):
@@ -308,15 +317,13 @@ def _apart(places, panel):
     """Depths of labels near places, ascending or descending, so far apart that they can be read."""
     (bottom, top), order = panel.get_ylim(), np.argsort(places, kind="stable")
     height = 72 * panel.figure.get_figheight() * panel.get_subplotspec().get_position(panel.figure).height
-    line = _LINE * SMALL / height * (bottom - top)
+    line = 1.5 * SMALL / height * (bottom - top)
     found = np.array(places, dtype=float)[order]
-    for k in range(1, len(found)):
-        found[k] = max(found[k], found[k - 1] + line)
+    steps = line * np.arange(len(found))
+    found = np.maximum.accumulate(found - steps) + steps
     found[-1:] = np.minimum(found[-1:], bottom - line / 2)
-    for k in range(len(found) - 1, 0, -1):
-        found[k - 1] = min(found[k - 1], found[k] - line)
     result = np.empty(len(found))
-    result[order] = found
+    result[order] = np.minimum.accumulate((found - steps)[::-1])[::-1] + steps
     return result
 
 
@@ -332,7 +339,7 @@ def _tension(panel, answer, rows, depth):
     in_hole = np.where(inclined, answer.critical_load("He-Kyllingstad"), 0.0)
     critical = -np.maximum(in_hole, answer.critical_load("Lubinski"))[rows]
     far = critical <= low
-    critical = np.where(far, np.nan, critical)  # a picture of what is near
+    critical = np.where(far, np.nan, critical)  # beyond the range that is shown
     if np.isfinite(critical).any():
         label = "tension at which it buckles (He-Kyllingstad, Lubinski)"
         label += ", elsewhere it is farther left" if far.any() else ""
@@ -348,8 +355,7 @@ def _torque(panel, answer, rows, depth):
 
 
 def _bending(panel, answer, rows, depth):
-    heading, size = scale(_BENDING)
-    moment = answer.bending_moment[rows]
+    (heading, size), moment = scale(_BENDING), answer.bending_moment[rows]
     panel.plot(moment / size, depth, color="black")
     panel.set_xlim(0.0, max(1.05 * np.nanmax(moment, initial=0.0), _LEAST) / size)
     panel.set_xlabel(heading)
@@ -407,8 +413,6 @@ _ROCK, _BODY, _BLADES, _BIT, _FORCE = "#e4d3bd", "#9db4cc", "#5f7f9f", "#4d5b6b"
 # Length of the longest arrow, heights of the names, in turn, and of the picture's edges, over the width of the hole.
 _ARROW, _NAMES, _LOW, _HIGH = 0.35, (1.1, 1.32), 1.1, 1.6
 _TOWARDS_HIGH_SIDE = Quantity("from the hole's axis towards its high side", unit="m", shown="mm", dimension="diameter")
-# Forces below this share of the largest one have no arrow.
-_LITTLE_FORCE = 0.01
 
 
 def side_figure(answer, length=None):
@@ -476,7 +480,7 @@ def _draw_forces(axes, answer, top, width):
             words = f"{told:.3g} {unit} from {at:.1f} to {end:.1f} {length_unit}"
             if side in ("high", "low"):
                 axes.text((begin + end) / 2, wall + sign * 0.05 * width, words, fontsize=SMALL, **note)
-        elif side in ("high", "low") and force > _LITTLE_FORCE * most:
+        elif side in ("high", "low") and force > 0.01 * most:
             tail = wall + sign * _ARROW * width * max(force / most, 0.3)
             axes.annotate("", (at, wall), (at, tail), arrowprops={"arrowstyle": "-|>", "color": _FORCE, "lw": 2})
             axes.text(at, tail + sign * 0.02 * width, f"{told:.2f} {unit}", **note)

@@ -70,8 +70,6 @@ def _plain(name):
 
 #: Drill-pipe steel: E = 30 million psi, as in API RP 7G.
 STEEL = Material(E=206.8e9, nu=0.3, density=7850.0)
-# Default diameter of a bit's body, over the bit's diameter.
-_BIT_BODY = 0.7
 
 
 class StringPart(Part, family="component of a string"):
@@ -161,12 +159,11 @@ class _Tubular(StringPart):
         """Fill in missing fields from the standard size or from the body."""
         store(self, name=self.name or type(self)._called)
         if self.size is not None:
-            given = ("outer_diameter", "inner_diameter", "mass")
-            changed = any(getattr(self, name) is not None for name in given)
-            for field, value in standard_size(type(self).__name__, self.size).items():
-                # another section has another weight
-                if field == "size" or (getattr(self, field) is None and not (field == "mass" and changed)):
-                    store(self, **{field: value})
+            known = standard_size(type(self).__name__, self.size)
+            if any(getattr(self, name) is not None for name in ("outer_diameter", "inner_diameter", "mass")):
+                known = {**known, "mass": self.mass}  # another section has another weight
+            missing = ["size", *(name for name in known if getattr(self, name) is None)]
+            store(self, **{name: known[name] for name in missing})
         positive("Material", "density", self.material.density, "kg/m^3, for the weight")
         for field in ("outer_diameter", "inner_diameter"):
             if getattr(self, field) is None:
@@ -270,7 +267,7 @@ class Bit(StringPart):
     def validate(self):
         """Fill in missing fields from the diameter."""
         if self.body_diameter is None:
-            store(self, body_diameter=_BIT_BODY * self.diameter)
+            store(self, body_diameter=0.7 * self.diameter)
         if self.body_diameter > self.diameter:
             refuse(self, "body_diameter", self.body_diameter, f"at most the bit's, {self.diameter:g} m")
         if self.mass is None:
@@ -364,8 +361,7 @@ class DrillString(Part):
         places, bottom = [], depth
         for part in self.components:
             top = 0.0 if part.length is None else bottom - part.length
-            if abs(top) < 1e-9 * depth:
-                top = 0.0
+            top = 0.0 if abs(top) < 1e-9 * depth else top
             if top < 0 or bottom <= 0:
                 raise SceneError(
                     f"DrillString: {part.name} reaches {-top:.6g} m above the surface at the depth {depth:.6g} m: "

@@ -103,15 +103,10 @@ def side_force_up_to(solved):
 
 
 def contacts_of(md, side_force, side, up_to):
-    """The `WallContact`s, see `TorqueAndDrag.contacts`.
-
-    Args:
-        up_to: (n,) integral of the side force over the depth, from anywhere, N.
-    """
+    """The `WallContact`s, see `TorqueAndDrag.contacts`; up_to: (n,) integral of the side force over the depth, N."""
+    quadrant = np.where(side_force > 0, 4, 5)
     touched = np.isfinite(side)
-    quadrant = np.where(
-        touched, np.round(np.where(touched, side, 0.0) / (np.pi / 2)) % 4, np.where(side_force > 0, 4, 5)
-    )
+    quadrant[touched] = np.round(side[touched] / (np.pi / 2)) % 4
     ends = np.flatnonzero(np.diff(quadrant)) + 1
     found = []
     for stretch in np.split(np.arange(len(md)), ends):

@@ -23,8 +23,8 @@ r F^2/(4 EI) to the wall force per length.
 
 The last three numbers belong to weight on the lower end of a string in a vertical hole. Taken at each place they leave
 out the uppermost turn of a helix, from 5.55 down to 0.14 (EI w^2)^(1/3), and hold for compression that friction built
-up farther below as well. What this may change is in the estimate of the model's error, for which the string is a helix
-as early as one is known to be possible, `earliest_helix_load`.
+up farther below as well. The estimate of the model's error includes the possible effect: there the string is a helix
+from the lowest load at which one is known, `earliest_helix_load`.
 """
 
 import numpy as np

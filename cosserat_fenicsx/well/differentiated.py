@@ -35,7 +35,7 @@ class Differentiated:
         if rod or self.solved.helical.any():
             why = "by the rod in contact" if rod else "for a string with a helix"
             raise SceneError(
-                f"sensitivity: this answer is {why} (model = '{self.model}'), of which no derivatives are known: "
+                f"sensitivity: this answer is {why} (model = '{self.model}'), which has no derivatives: "
                 "expected the answer of torque_and_drag(..., model='soft')"
             )
         if query not in _QUERIES:

@@ -18,13 +18,6 @@ from cosserat_fenicsx.scene.rod import Rod
 from cosserat_fenicsx.scene.sections import Circle, Tube
 from cosserat_fenicsx.well.path import WellPath
 
-# Survey and sections that differ by more than this part end at different depths.
-_APART = 1e-3
-# Diameters (m) above this are probably in another unit.
-_WIDEST = 1.5
-# Densities (kg/m^3) between these are neither a gas's nor a liquid's, and no mud is heavier than the last.
-_NO_FLUID, _HEAVIEST = (5.0, 300.0), 2700.0
-
 
 @dataclass(frozen=True)
 class HoleSection(Part):
@@ -47,7 +40,7 @@ class HoleSection(Part):
 
     def validate(self):
         """Warn of a diameter that is probably in another unit."""
-        if self.diameter > _WIDEST:
+        if self.diameter > 1.5:
             warn(f"HoleSection.diameter = {self.diameter:g} m is wider than holes are: 8.5 in are "
                           "8.5 * units.inch = 0.2159")  # fmt: skip
 
@@ -135,7 +128,7 @@ class Borehole(Part):
             if section.to <= above:
                 raise SceneError(f"HoleSection.to = {section.to:g}: expected more than {above:g} m, the section above")
             above = section.to
-        if abs(self.path.length - above) > _APART * self.length:
+        if abs(self.path.length - above) > 1e-3 * self.length:
             ratio = max(self.path.length, above) * units.foot / self.length
             feet = ": 3.28 times as deep, as feet are that are taken for metres" if abs(ratio - 1) < 0.05 else ""
             warn(f"Borehole: the survey ends at {self.path.length:.6g} m and the sections at {above:.6g} m; "
@@ -194,7 +187,8 @@ class Mud(Part):
         """Take the same mud inside by default; warn of a density that is probably in another unit."""
         if self.inside is None:
             store(self, inside=self.density)
-        if _NO_FLUID[0] < self.density < _NO_FLUID[1] or 0.5 < self.density < 3 or self.density > _HEAVIEST:
+        # neither a gas nor a liquid; relative densities; heavier than any mud
+        if 5 < self.density < 300 or 0.5 < self.density < 3 or self.density > 2700:
             warn(
                 f"Mud.density = {self.density:g} kg/m^3 is hardly that of a mud: 1.2 g/cm^3 are 1200, 10 pounds per US "
                 "gallon 10 * units.ppg = 1198"
@@ -211,24 +205,23 @@ class Mud(Part):
         Raises:
             SceneError: a diameter that is not positive, or not given where a section is neither `Circle` nor `Tube`.
         """
-        actions = []
+        actions, across = [], []
         if self.added_mass is not None:
-            pieces = [(end, *self._diameters(rod, section, outer, inner)) for end, section in rod.profile.pieces]
-            across = [(end, self._moving(*both)) for end, *both in pieces]
-            if any(mass for _, mass in across):
-                actions.append(AddedMass(rod, across if len(across) > 1 else across[0][1]))
+            for end, section in rod.profile.pieces:
+                outside, inside = self._diameters(rod, section, outer, inner)
+                mass = self.added_mass * self.density * outside**2 + self.inside * inside**2
+                across.append((end, math.pi / 4 * mass))
+        if any(mass for _, mass in across):
+            actions.append(AddedMass(rod, across if len(across) > 1 else across[0][1]))
         if self.drag:
             actions.append(LinearDrag(rod, self.drag))
         return tuple(actions)
 
-    def _moving(self, outer, inner):
-        return math.pi / 4 * (self.added_mass * self.density * outer**2 + self.inside * inner**2)
-
     def _diameters(self, rod, section, outer, inner):
-        if isinstance(section, Circle):
-            own = section.diameter, 0.0
-        else:
-            own = (section.outer_diameter, section.inner_diameter) if isinstance(section, Tube) else (None, 0.0)
+        """Outer and inner diameter of a section of a rod, m: those asked for, else its own."""
+        own = section.diameter if isinstance(section, Circle) else None, 0.0
+        if isinstance(section, Tube):
+            own = section.outer_diameter, section.inner_diameter
         if outer is None and own[0] is None:
             refuse("Mud.along", "outer", None, f"the diameter of rod '{rod.name}' (m), which its section does not give")
         outer = own[0] if outer is None else positive("Mud.along", "outer", outer, "m")

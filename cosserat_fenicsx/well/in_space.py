@@ -12,34 +12,14 @@ from cosserat_fenicsx.pictures.plot import deliver
 from cosserat_fenicsx.pictures.view import Axis, Labels, View, draw_axes, round_step, text_of
 from cosserat_fenicsx.ranks import world
 from cosserat_fenicsx.well.charts import (
-    AT_POINTS,
-    DEPTH,
-    SIDE_FORCE,
-    SIDES,
-    depths_between,
-    points_between,
-    rows_between,
+    AT_POINTS, DEPTH, SIDE_FORCE, SIDES, depths_between, points_between, rows_between, shoes_between, title_of,
     usual_side_force,
-)
+)  # fmt: skip
 
-# Pixels: height of the drawing, bounds of its width, margins at the left (numbers of depths), right (colour bar), above
-# (title) and below (names of axes).
-_HEIGHT, _WIDTHS, _MARGINS = 1000, (560, 1300), (240, 230, 130, 130)
-# Radius of the hole in the picture, over the extent of what is shown: of the whole string, and of a part.
-_HOLE, _HOLE_OF_PART = 0.015, 0.045
-# Smallest extent of the box along any axis, over the largest one; most intervals of numbers along the longest axis, and
-# at least along the others; of the colour bar.
-_THIN, _INTERVALS, _BAR = 0.15, (6, 3), 8
-# The camera looks across the well's main direction, turned and raised by these angles.
-_TURNED, _RAISED = math.radians(25), math.radians(14)
-# Most points along the string, and some that it has at least; of its shadow. Forces at points with numbers, of the
-# whole string and of a part.
-_POINTS, _BETWEEN, _SHADOW, _NUMBERED = 20000, 400, 300, (3, 8)
-# Radius of the sphere of a force at a point over that of the hole; width of lines, pixels.
-_SPHERE, _LINE = 0.35, 4
-# Radii of the hole in the picture that a well goes down at least, which is not horizontal.
-_SLENDER = 10
-_FIELD = "side force"
+# Height of the drawing and bounds of its width, pixels.
+_HEIGHT, _WIDTHS = 1000, (560, 1300)
+# Margins, pixels: left (numbers of depths), right (colour bar), top (title), bottom (names of axes).
+_MARGINS = (240, 230, 130, 130)
 
 
 def draw_in_space(answer, file, enlarge, between, units):
@@ -57,7 +37,8 @@ def _draw(answer, enlarge, top, bottom):
     whole = (top, bottom) == (0.0, answer.depth)
     size = float(np.ptp(axis, axis=0).max())
     if enlarge is None:
-        enlarge = max(1.0, float(f"{(_HOLE if whole else _HOLE_OF_PART) * size / radius.max():.1g}"))
+        shown = (0.015 if whole else 0.045) * size  # radius of the hole in the picture
+        enlarge = max(1.0, float(f"{shown / radius.max():.1g}"))
     axes = _axes_of(axis, enlarge * radius.max())
     view = _view_of(axis, axes)
     plotter = stage(pyvista, view.window, smooth=None)
@@ -80,17 +61,15 @@ def _draw(answer, enlarge, top, bottom):
     draw_axes(plotter, pyvista, axes, view, labels)
     _add_names(plotter, pyvista, answer, labels, view, (md, axis, line, enlarge * radius), (top, bottom))
     labels.draw(plotter, pyvista)
-    unit, size = unit_of(DEPTH)
-    part = "" if whole else f", from {top / size:g} to {bottom / size:g} {unit}"
-    _add_title(plotter, answer, enlarge, part, view.window)
+    _add_title(plotter, answer, enlarge, title_of(answer, top, bottom), view.window)
     view.place(plotter)
     return plotter
 
 
 def _places(md, top, bottom):
     """Measured depths that are shown, m: from top to bottom, those of the answer and some between."""
-    found = np.unique(np.concatenate([md[(md > top) & (md < bottom)], np.linspace(top, bottom, _BETWEEN)]))
-    return found[np.unique(np.linspace(0, len(found) - 1, min(len(found), _POINTS)).astype(int))]
+    found = np.unique(np.concatenate([md[(md > top) & (md < bottom)], np.linspace(top, bottom, 400)]))
+    return found[np.unique(np.linspace(0, len(found) - 1, min(len(found), 20000)).astype(int))]
 
 
 def _at(md, answer, values):
@@ -107,11 +86,11 @@ def _picture(rows):
 def _axes_of(points, room):
     """Three `Axis` around points (n, 3), m, with room beside them: to the east, to the north, and depth."""
     low, high = points.min(axis=0) - room, points.max(axis=0) + room
-    if low[2] + _SLENDER * room < high[2]:
+    if low[2] + 10 * room < high[2]:  # not horizontal
         high[2] = points[:, 2].max()  # the surface
-    thin = np.maximum(_THIN * (high - low).max() - (high - low), 0.0) * (1, 1, 0) / 2
+    thin = np.maximum(0.15 * (high - low).max() - (high - low), 0.0) * (1, 1, 0) / 2  # to a minimum aspect of the box
     low, high = low - thin, high + thin
-    (most, least), (unit, size) = _INTERVALS, unit_of(DEPTH)
+    (unit, size), most, least = unit_of(DEPTH), 6, 3  # intervals of the longest axis, and of the others at least
     found = []
     for name, a, b, sign in zip(("east", "north", "depth"), low, high, (1, 1, -1), strict=True):
         step = min(round_step(float((high - low).max()) / size, most), round_step(float(b - a) / size, least)) * size
@@ -125,9 +104,10 @@ def _view_of(points, axes):
     """The `View` whose window is as large as the drawing of a box needs."""
     main = points[-1, :2] - points[0, :2]
     main = main if np.linalg.norm(main) > 1e-9 else np.array([1.0, 0.0])
-    across = math.atan2(main[1], main[0]) - math.pi / 2 + _TURNED  # its end is at the right
-    to_camera = np.array([math.cos(across) * math.cos(_RAISED), math.sin(across) * math.cos(_RAISED),
-                          math.sin(_RAISED)])  # fmt: skip
+    # across the main direction, whose end is at the right, turned and raised
+    across, raised = math.atan2(main[1], main[0]) - math.pi / 2 + math.radians(25), math.radians(14)
+    level = math.cos(raised)
+    to_camera = np.array([math.cos(across) * level, math.sin(across) * level, math.sin(raised)])
     up = np.array([0.0, 0.0, 1.0])
     right = np.cross(up, to_camera)
     right /= np.linalg.norm(right)
@@ -139,10 +119,7 @@ def _view_of(points, axes):
     pixel = max(wide / width, high / _HEIGHT)
     height = max(high / pixel, _WIDTHS[0])
     window = round(width + left + beside), round(height + over + below)
-    middle = (
-        (corners @ right).mean() * right + (corners @ above).mean() * above + (corners @ to_camera).mean() * to_camera
-    )
-    focus = middle + pixel * ((beside - left) / 2 * right + (over - below) / 2 * above)
+    focus = corners.mean(axis=0) + pixel * ((beside - left) / 2 * right + (over - below) / 2 * above)
     return View(to_camera, right, above, up, focus, pixel * window[1] / 2, window)
 
 
@@ -152,9 +129,9 @@ def _add_string(plotter, pyvista, answer, md, line, radius, tube):
     unit, size = unit_of(SIDE_FORCE)
     force, rows = _at(md, answer, distributed) / size, rows_between(answer.md, md[0], md[-1])
     string = pyvista.MultipleLines(line)
-    string[_FIELD], string["radius"] = force, radius
+    string["side force"], string["radius"] = force, radius
     usual = usual_side_force(answer, distributed[rows], answer.md[rows]) / size or force.max(initial=0.0)
-    step = round_step(usual, _BAR) if usual > 0 else 1.0
+    step = round_step(usual, 8) if usual > 0 else 1.0
     most = math.ceil(usual / step - 1e-9) * step or step
     labels = round(most / step) + 1
     (width, height), beside = plotter.window_size, _MARGINS[1]
@@ -163,8 +140,8 @@ def _add_string(plotter, pyvista, answer, md, line, radius, tube):
     bar = colour_bar(f"side force\n({unit}){more}", round(height / 60), labels, step, box)
     if tube:
         string = string.tube(scalars="radius", absolute=True, n_sides=24)
-    shading = {"smooth_shading": tube, "lighting": tube, "line_width": _LINE}
-    plotter.add_mesh(string, scalars=_FIELD, cmap="viridis", clim=(0.0, most), **shading, scalar_bar_args=bar)
+    shading = {"smooth_shading": tube, "lighting": tube, "line_width": 4}
+    plotter.add_mesh(string, scalars="side force", cmap="viridis", clim=(0.0, most), **shading, scalar_bar_args=bar)
 
 
 def _add_hole(plotter, pyvista, answer, md, axis, radius):
@@ -187,7 +164,7 @@ def _add_surroundings(plotter, pyvista, axes, axis, surface):
         corners = np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1], [x0, y0]])
         outline = np.column_stack([corners, np.full(5, high)])
         plotter.add_mesh(pyvista.lines_from_points(outline), color="darkseagreen", line_width=2)
-    some = axis[np.unique(np.linspace(0, len(axis) - 1, _SHADOW).astype(int)), :2]
+    some = axis[np.unique(np.linspace(0, len(axis) - 1, 300).astype(int)), :2]
     if np.ptp(some, axis=0).max() > 0:
         shadow = pyvista.lines_from_points(np.column_stack([some, np.full(len(some), low)]))
         plotter.add_mesh(shadow, color="silver", line_width=2)
@@ -205,17 +182,15 @@ def _add_names(plotter, pyvista, answer, labels, view, lines, ends):
     points = sorted(points_between(answer, *ends), key=lambda point: -point[1])
     for k, (depth, force, side) in enumerate(points):
         centre, on = at(depth, axis), at(depth, line)
-        size = max(_SPHERE * float(np.interp(depth, md, radius)), 4 * view.pixel)
+        size = max(0.35 * float(np.interp(depth, md, radius)), 4 * view.pixel)
         away = on - centre
         centre = on + away / (np.linalg.norm(away) or 1.0) * size
         plotter.add_mesh(pyvista.Sphere(radius=size, center=centre), color=SIDES[side].removeprefix("tab:"))
-        if k < _NUMBERED[ends != (0.0, answer.depth)]:
+        if k < (3 if ends == (0.0, answer.depth) else 8):
             told = f"{force / force_size:.3g} {force_unit} at {depth / length:.5g} {unit}"
             labels.near(told, centre, away, size=font)
-    for section in answer.hole.sections[:-1]:
-        if ends[0] < section.to < ends[1]:
-            name = f"{section.name or 'section'} ends, {section.to / length:g} {unit}"
-            labels.near(name, at(section.to, axis), view.right, size=font, colour="saddlebrown")
+    for depth, name in shoes_between(answer, *ends):
+        labels.near(name, at(depth, axis), view.right, size=font, colour="saddlebrown")
     if ends != (0.0, answer.depth):
         for place in answer.laid:
             a, b = max(place.top, ends[0]), min(place.bottom, ends[1])
@@ -223,13 +198,9 @@ def _add_names(plotter, pyvista, answer, labels, view, lines, ends):
                 labels.near(place.component.name, at((a + b) / 2, axis), view.above, size=font, colour="dimgrey")
 
 
-def _add_title(plotter, answer, enlarge, part, window):
+def _add_title(plotter, answer, enlarge, title, window):
     how = f"radii and clearance {enlarge:g} times as large" if enlarge != 1 else "radii and clearance as they are"
-    unit, size = unit_of(DEPTH)
-    straight = answer.model != "rod" and answer.helical.any()
-    lines = [
-        f"{answer.operation.name}, bit at {answer.depth / size:g} {unit}, {answer.words}{part}",
-        how + ("; its helix is drawn straight" if straight else ""),
-    ]
+    straight = "; its helix is drawn straight" if answer.model != "rod" and answer.helical.any() else ""
+    lines = [title, how + straight]
     size = round(min(window[1] / 80, window[0] / (0.62 * max(map(len, lines))) / 1.5))
     plotter.add_text("\n".join(lines), font_size=size, color="black", position="upper_left")

@@ -49,7 +49,7 @@ _SET = _Estimate()
 
 
 class ModelError(NamedTuple):
-    """Effects that the soft string leaves out, on the hook load (N), or on the torque (N m) of a rotating string."""
+    """Effects that the soft string neglects, on the hook load (N), or on the torque (N m) of a rotating string."""
 
     clearance: float
     bending: float
@@ -65,8 +65,7 @@ def model_errors(path, pieces, soft, solved, sections, rings=()):
     """`ModelError` of the hook load and of the surface torque.
 
     Args:
-        path: a `WellPath`; pieces: `Pieces`; soft, solved: the `Solved` without and with buckling; sections: `Sections`
-            of the components; rings: [`Ring`] from the bit up.
+        soft, solved: the `Solved` without and with buckling. rings: [`Ring`] from the bit up.
 
     Returns:
         infinite parts for snakes with which the string may lock up.

@@ -31,9 +31,6 @@ Sections = namedtuple("Sections", "start position tangent curvature length")
 #: Measured depth (n,), position (n, 3), tangent (n, 3) and curvature vector (n, 3, 1/m) of points of the axis.
 Nearest = namedtuple("Nearest", "md position tangent curvature")
 
-# Pairs of a point and an arc that are compared at a time, in a search along the whole axis.
-_PAIRS = 1 << 20
-
 
 @dataclass(frozen=True, eq=False)
 class WellPath(Part):
@@ -99,8 +96,7 @@ class WellPath(Part):
     ) -> "WellPath":
         """The axis from a .csv file with one row of names, separated by commas, semicolons or tabs.
 
-        What stands above that row is passed over. Units that the file names, as in "MD (ft)" or in a row below the
-        names, are taken.
+        Lines above that row are skipped. Units in the file are used, as in "MD (ft)" or in a row below the names.
 
         Args:
             file: its path.
@@ -156,7 +152,7 @@ class WellPath(Part):
         rows = points.reshape(-1, 3)
         if near is None:
             found = np.empty(len(rows))
-            many = max(1, _PAIRS // len(self.sections.length))
+            many = max(1, (1 << 20) // len(self.sections.length))  # bounds the memory for pairs of point and arc
             for a in range(0, len(rows), many):
                 found[a : a + many] = self._on_the_whole(rows[a : a + many])
         else:
@@ -285,10 +281,6 @@ _ANGLES = {
     **dict.fromkeys(("rad", "radian", "radians"), False),
 }
 _UNITS = {*_LENGTHS, *_ANGLES}
-# Largest measured depth, and least distance of stations, m.
-_DEEPEST, _APART = 1e6, 1e-6
-# Doglegs (rad) above this are refused: rounding errors would decide the plane of the arc.
-_MOST_DOGLEG = math.pi - 1e-6
 
 
 def checked_survey(md, inc, azi, degrees):
@@ -305,9 +297,9 @@ def checked_survey(md, inc, azi, degrees):
     md, inc, azi = columns.values()
     if md[0] != 0:
         refuse(who, "md[0]", float(md[0]), "0 m: add the station (0, 0, azimuth) where the well starts vertically")
-    if md[-1] > _DEEPEST:
-        refuse(who, "md[-1]", float(md[-1]), f"at most {_DEEPEST:g} m")
-    for i in np.flatnonzero(np.diff(md) < _APART) + 1:
+    if md[-1] > 1e6:
+        refuse(who, "md[-1]", float(md[-1]), "at most 1e+06 m")
+    for i in np.flatnonzero(np.diff(md) < 1e-6) + 1:
         refuse(who, f"md[{i}]", float(md[i]), f"more than the station before, {md[i - 1]:g} m (ascending depths)")
     if degrees is not False:
         _doubt_degrees(inc, azi, degrees)
@@ -318,7 +310,8 @@ def checked_survey(md, inc, azi, degrees):
             refuse(who, f"{name}[{i}]", float(columns[name][i]),
                    f"{least / one:g} to {most / one:.6g} ({unit}), at md = {md[i]:g} m")  # fmt: skip
     inc = np.minimum(inc, math.pi)
-    for i in np.flatnonzero(_curvatures(inc, azi, np.diff(md))[0] > _MOST_DOGLEG):
+    # rounding errors would decide the plane of such an arc
+    for i in np.flatnonzero(_curvatures(inc, azi, np.diff(md))[0] > math.pi - 1e-6):
         raise SceneError(
             f"WellPath: the hole turns by 180 degrees between md = {md[i]:g} and {md[i + 1]:g} m: expected less (no "
             "arc is defined by two opposite directions)"
@@ -327,7 +320,7 @@ def checked_survey(md, inc, azi, degrees):
 
 
 def _doubt_degrees(inc, azi, degrees):
-    """Refuse angles that are radians by all appearance, or warn where the user says that they are degrees."""
+    """Refuse angles that look like radians, or warn where the user says that they are degrees."""
     if not 0 < inc.max() <= math.pi or np.abs(azi).max() > _FULL:
         return
     text = f"all inclinations are below {inc.max():.4g} and all azimuths within +-{np.abs(azi).max():.4g}: these look"
@@ -342,10 +335,7 @@ def _doubt_degrees(inc, azi, degrees):
 
 
 def read_columns(file, md, inc, azi, degrees, length_unit):
-    """Three columns of a .csv file, see `WellPath.from_csv`: depths (m), inclinations, azimuths; and its `degrees`.
-
-    What stands above the row of names is passed over; units may follow the names, or stand in a row below them.
-    """
+    """Three columns of a .csv file, see `WellPath.from_csv`: depths (m), inclinations, azimuths; and its `degrees`."""
     who = "WellPath.from_csv"
     file = Path(instance(who, "file", file, str | os.PathLike, "the name of a .csv file"))
     for field, name in (("md", md), ("inc", inc), ("azi", azi)):
@@ -395,7 +385,17 @@ def _heading(file, lines, wanted):
         heading = _cells(file, i, line, separator)
         columns = [_columns(heading, name) for name in wanted]
         if all(columns):
-            return k, separator, heading, _one_each(file, i, heading, wanted, columns)
+            for name, found in zip(wanted, columns, strict=True):
+                if len(found) > 1:
+                    raise SceneError(
+                        f"{file}: line {i}: columns {' and '.join(str(x + 1) for x in found)} are both named '{name}' "
+                        f"({', '.join(heading[x].strip() for x in found)}): expected one, or that columns (in Python "
+                        "md, inc, azi) say which, with its unit"
+                    )
+            one = [found[0] for found in columns]
+            if len(set(one)) < len(one):
+                raise SceneError(f"{file}: {', '.join(wanted)}: expected three columns, each of another name")
+            return k, separator, heading, one
         if sum(_is_number(cell) for cell in heading) > 1:
             break
         if likely is None or len(heading) > len(likely):
@@ -409,21 +409,6 @@ def _heading(file, lines, wanted):
         "names of the columns of measured depth, inclination and azimuth: columns = ['...', '...', '...'] in a scene "
         "file, md=, inc=, azi= in Python"
     )
-
-
-def _one_each(file, i, heading, wanted, columns):
-    """The column of each name, of lists of those that have it."""
-    for name, found in zip(wanted, columns, strict=True):
-        if len(found) > 1:
-            raise SceneError(
-                f"{file}: line {i}: columns {' and '.join(str(x + 1) for x in found)} are both named '{name}' "
-                f"({', '.join(heading[x].strip() for x in found)}): expected one, or that columns (in Python md, inc, "
-                "azi) say which, with its unit"
-            )
-    one = [found[0] for found in columns]
-    if len(set(one)) < len(one):
-        raise SceneError(f"{file}: {', '.join(wanted)}: expected three columns, each of another name")
-    return one
 
 
 def _columns(heading, name):

@@ -14,21 +14,21 @@ from cosserat_fenicsx.checks import warn
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.well.components import weight_in_mud
 
-#: Arrays over the components of a string, from the bit up; NaN where a component does not tell. EI (N m^2), EA (N), GJ
+#: Arrays over the components of a string, from the bit up; NaN where unknown. EI (N m^2), EA (N), GJ
 #: (N m^2), poisson; outer, inner: radii of the body (m).
 Sections = namedtuple("Sections", "EI EA GJ poisson outer inner")
 
 
 def sections_of(components):
     """The `Sections` of components."""
-    rows = []
-    for part in components:
-        S, material = part.stiffness, getattr(part, "material", None)
-        stiff = (np.nan,) * 3 if S is None or S.matrix is not None else (min(S.bending), S.axial, S.torsion)
-        known = part.outer_diameter is not None
-        sizes = (material.nu, part.outer_diameter / 2, part.inner_diameter / 2) if known else (np.nan,) * 3
-        rows.append((*stiff, *sizes))
-    return Sections(*np.array(rows).T)
+    found = np.full((len(components), 6), np.nan)
+    for row, part in zip(found, components, strict=True):
+        S = part.stiffness
+        if S is not None and S.matrix is None:
+            row[:3] = min(S.bending), S.axial, S.torsion
+        if part.outer_diameter is not None:
+            row[3:] = part.material.nu, part.outer_diameter / 2, part.inner_diameter / 2
+    return Sections(*found.T)
 
 
 def areas(sections):
@@ -107,7 +107,7 @@ def free_span(EI, d, q):
 
 
 def prying(rings, depth, along):
-    """What a soft string leaves out at its rings, as sums of sizes.
+    """Effects that a soft string neglects at its rings, as sums of absolute values.
 
     Args:
         rings: [`Ring`] from the bit up. depth: of the string's end, m. along: function of two measured depths (m) that
@@ -134,7 +134,7 @@ def prying(rings, depth, along):
 
 
 def _span(length, largest, clearance):
-    """The `_Span` of so much string beside a ring with a clearance."""
+    """The `_Span` of a length of string beside a ring with a clearance."""
     q, compression, curvature, room, EI = largest
     if not EI > 0 or not q > 0 or length < _NONE:
         return _Span(length, q, 0.0, 0.0, q * length / 2)

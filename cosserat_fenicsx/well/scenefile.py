@@ -99,7 +99,7 @@ def _given(settings):
 
 @dataclass(frozen=True)
 class WellScene(Part):
-    """A string in its hole and what is done with it, from `read`.
+    """A string in its hole and its operations, from `read`.
 
     Args:
         well: the `Borehole`. string: the `DrillString`. operations: in the order of the file.

@@ -78,7 +78,7 @@ class Chain(NamedTuple):
         return self.t * u * np.sinc(angle / np.pi) - bent
 
 
-#: What is found on a chain. at: (m,) places on a piece, as shares of its length from its lower end; tension (N), torque
+#: Solution on a chain. at: (m,) places on a piece, as shares of its length from its lower end; tension (N), torque
 #: (N m), side (wall force per length, N/m): (n, m) there; side_force: of each piece (N); error, torque_error: estimates
 #: for the uppermost values (N, N m); helical: (n,) True where the string is buckled into a helix.
 Solved = namedtuple("Solved", "chain at tension torque side side_force error torque_error helical")
@@ -254,14 +254,8 @@ class _Friction:
 
 
 def _integrated(slope, source, length):
-    """P with P' = slope P + source, from 0 at the lower end of the lowest piece, by its integrating factor.
-
-    Args:
-        slope, source: (n, points) at Gauss's points of pieces of a length (n,), m.
-
-    Returns:
-        P at the lower ends of the pieces and the upper end of the last, (n + 1,), and at the points.
-    """
+    """P with P' = slope P + source, from 0 at the lower end of the lowest piece, by its integrating factor: at the
+    ends of pieces (n + 1,) and, as slope and source, at their Gauss points."""
     A, gain = (slope @ POINTS_TO.T) * length[:, None], np.exp((slope @ WEIGHTS) * length)
     decay = source * np.exp(-A)
     starts = chained(gain, gain * (decay @ WEIGHTS) * length)
@@ -305,14 +299,7 @@ Change = namedtuple("Change", "weight friction tension torque")
 
 
 def rates_of(solved, pieces, change, coulomb):
-    """Derivatives of tension and torque.
-
-    Args:
-        solved: the `Solved` of a soft string; pieces: its `Pieces`; change: the `Change`; coulomb: see `chain_of`.
-
-    Returns:
-        (tension, torque), (n, m) each, at the places of `solved`, per unit of the parameter.
-    """
+    """Derivatives of tension and torque by the parameter of a `Change`, (n, m) each, at the places of a `Solved`."""
     chain, at = solved.chain, solved.at
     rows, dw = chain.columns, change.weight[chain.origin][:, None]
     k, length, weight, drag = rows.curvature, rows.length, rows.weight, rows.drag

@@ -25,8 +25,6 @@ _NO_ROD = (
     "the exact rod in contact is not tried: beyond helical buckling there are many equilibria, and it may return "
     "another one than the string's; use model='rod' to force it"
 )
-# Tension that strains a string by more than this is beyond what any pipe carries.
-_BREAKS = 0.01
 
 
 def torque_and_drag(
@@ -62,8 +60,8 @@ def torque_and_drag(
 
     Returns:
         a `TorqueAndDrag`. Its `enough` is False where the accuracy asked for is beyond the model, or where `model` is
-        "auto" and the rod could not be solved as accurately, or not at all: its answer, or that of the soft string, is
-        then returned, and `why` says so.
+        "auto" and the rod could not be solved as accurately, or not at all: its answer, or the soft string's, is then
+        returned, and `why` says so.
 
     Raises:
         SceneError: a string that does not fit the hole, missing mud, an unknown model, a string that locks up (with the
@@ -75,12 +73,9 @@ def torque_and_drag(
     instance("torque_and_drag", "operation", operation, Operation, "an operation, such as TripOut()")
     instance("torque_and_drag", "mud", mud, (Mud, type(None)), "Mud(density), or None where weights are in mud")
     tol = check_settings(model, tol, torque_convention)
-    depth = (
-        hole.length
-        if depth is None
-        else number("torque_and_drag", "depth", depth, "a measured depth (m), positive", lambda x: x > 0)
-    )
-
+    if depth is None:
+        depth = hole.length
+    depth = number("torque_and_drag", "depth", depth, "a measured depth (m), positive", lambda x: x > 0)
     pieces, laid = pieces_of(hole, string, operation, mud, depth)
     given = hole, string, operation, mud, depth
     flexible, why = _flexible(given, model, tol, torque_convention, pieces, laid)
@@ -135,7 +130,7 @@ def _flexible(given, model, tol, torque_convention, pieces, laid):
     why += [*_on_buckling(model, soft, solved, sections), *_on_what_is_left_out(used, left_out, shares), *locked]
     EA = sections.EA[pieces.component[solved.chain.origin]][:, None]
     strain = float(np.nan_to_num(np.abs(solved.tension) / EA).max())
-    if strain > _BREAKS:
+    if strain > 0.01:
         why.append(f"BEYOND WHAT ANY PIPE CARRIES: the tension strains it by {100 * strain:.3g} %")
     beyond = [what for what, part in shares.items() if part > tol - error]
     whole = [*why, *(f"NOT ENOUGH for tol = {tol:g} in the {what}" for what in beyond)]

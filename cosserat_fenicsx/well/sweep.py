@@ -50,10 +50,10 @@ class DepthSweep(Result):
     """Surface loads over the depth of the bit, from `depth_sweep`.
 
     Attributes:
-        operations, depths (m), friction: as asked for; friction is (None,) for that of the hole.
+        operations, depths (m), friction: as asked for; friction is (None,) for the hole's own.
         values: {name: array (operations, friction, depths)} of "hook_load" (N), "surface_torque" (N m), "error" and
             "model_error" (see `TorqueAndDrag`), "locked" (m): where the string locks up, which leaves the others NaN,
-            and "model", from which `models` follows. What is not computed yet is NaN.
+            and "model", from which `models` follows. NaN: not computed yet.
         notes: {(operation, friction, depth): text}, by indices, of the answers to look at: why there is none (the
             string locks up, no equilibrium was found), or why it is not as accurate as asked.
     """
@@ -144,7 +144,7 @@ class DepthSweep(Result):
         """
         from cosserat_fenicsx.well import charts
 
-        return charts.draw_chart(lambda: charts.sweep_figure(self), file, self._ranks, units=units, width=width)
+        return charts.drawn(self, charts.sweep_figure, file, units=units, width=width)
 
     def __repr__(self):
         names = ", ".join(operation.name for operation in self.operations)
@@ -255,11 +255,7 @@ def _as_data(about):
 
 
 def _asked(store):
-    """The arguments of `depth_sweep` in a folder.
-
-    Raises:
-        SceneError: they are not stored.
-    """
+    """The arguments of `depth_sweep` in a folder."""
     data = store.head["scene"]
     if "missing" in data:
         raise SceneError(
@@ -289,11 +285,7 @@ def _mark(about):
 
 
 def _answer_in(row, shape):
-    """(indices, numbers, note) of a stored row.
-
-    Raises:
-        ValueError, LookupError, TypeError: it is none of a sweep of this shape.
-    """
+    """(indices, numbers, note) of a stored row; ValueError, LookupError or TypeError if it does not fit the shape."""
     place = tuple(row[name] for name in _CASES)
     if not all(type(i) is int and 0 <= i < count for i, count in zip(place, shape, strict=True)):
         raise ValueError(f"{place}: expected indices below {shape}")

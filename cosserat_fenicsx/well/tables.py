@@ -11,12 +11,8 @@ from cosserat_fenicsx.well import criteria
 from cosserat_fenicsx.well.components import DrillPipe
 from cosserat_fenicsx.well.contacts import ROUGH, stretches
 
-# Notes of a sweep that are shown; more are counted.
-_NOTES = 12
-# Sentences with words in capitals are warnings.
+# A sentence with a word in capitals is a warning.
 _WARNS = re.compile(r"\b[A-Z]{4,}\b")
-# Places of rough forces that are told.
-_PLACES = 8
 
 
 def along(answer, units, rows):
@@ -112,8 +108,9 @@ def more_in_words(answer, units):
         )
         rough = getattr(answer.solved, "rough", ())
         if rough:
-            places = ", ".join(f"{np.interp(x.start, answer.solved.s, answer.md):.5g}" for x in rough[:_PLACES])
-            more = f" and {len(rough) - _PLACES} more" if len(rough) > _PLACES else ""
+            most = 8
+            places = ", ".join(f"{np.interp(x.start, answer.solved.s, answer.md):.5g}" for x in rough[:most])
+            more = f" and {len(rough) - most} more" if len(rough) > most else ""
             which = f"of these forces, those at md = {places}{more} m"
             if len(rough) == len(at_points):
                 which = "all of these forces"
@@ -149,10 +146,10 @@ def _on_bit(answer, units):
 def sweep_in_words(sweep):
     """Sentences: what was found, notes, and the largest error of a model."""
     yield f"{len(sweep)} of {sweep.done.size} answers over {len(sweep.depths)} depths of the bit."
-    notes = sweep.noted()
-    yield from notes[:_NOTES]
-    if len(notes) > _NOTES:
-        yield f"and {len(notes) - _NOTES} more, see `notes`"
+    notes, most = sweep.noted(), 12
+    yield from notes[:most]
+    if len(notes) > most:
+        yield f"and {len(notes) - most} more, see `notes`"
     told = sweep.values["model_error"]
     if not np.isnan(told).all():
         i, j, k = np.unravel_index(np.nanargmax(told), told.shape)

@@ -15,10 +15,6 @@ from cosserat_fenicsx.well.contacts import ROUGH, side_in_space
 from cosserat_fenicsx.well.rod.resultants import along_elements, apart_mostly, contacts_along, with_errors
 from cosserat_fenicsx.well.rod.string_scene import is_round
 
-# Distances from the axis below this share of the clearance have no direction.
-_CENTRED = 1e-9
-# Forces below this part of the largest one are none.
-_ROUNDING = 1e-10
 # Fields with an error estimate.
 _ALONG = ("side_force", "bending_moment")
 
@@ -63,10 +59,6 @@ class InHole:
     """
 
     def __init__(self, string, path, factor=1.0):
-        """
-        Args:
-            string: a `StringScene`; path: see there; factor: stiffness of the wall over that in the scene.
-        """
         self.string, self.path, self.scene, self.factor = string, path, path.scene, factor
         self.steps, self.negative_modes = int(path.iterations[0]), int(path.negative_modes[0])
         self.estimates, self.errors, self.error, self.of_stiffness = None, {}, np.inf, np.inf
@@ -85,7 +77,7 @@ class InHole:
                 self._mesh_before = before
         string = self.string
         arm = max(radius for _, radius in string.wall.contact_radius)
-        least = _ERRORS.least_load * (np.diff(string.ends, prepend=0.0) @ string.weight)
+        least = _ERRORS.least_load * string.whole_weight
         wall = max(self.wall_force, least)
         scales = {
             "hook_load": max(abs(self.hook_load), least),
@@ -111,7 +103,6 @@ class InHole:
 
     @property
     def wall_stiffness(self):
-        """N/m^2, with which it was solved."""
         return self.factor * self.string.wall.stiffness
 
     # -- along the string --------------------------------------------------------------------------------------------
@@ -138,7 +129,6 @@ class InHole:
 
     @cached_property
     def offset(self):
-        """(n, 3) from the axis to the rod, across the hole, m."""
         away = self.position - self._near.position
         return away - (away * self._near.tangent).sum(axis=1)[:, None] * self._near.tangent
 
@@ -149,7 +139,7 @@ class InHole:
     @cached_property
     def _outward(self):
         """(n, 3) unit vectors from the axis to the rod; zero where it is centred."""
-        clear = self.distance > _CENTRED * self.string.clearance
+        clear = self.distance > 1e-9 * self.string.clearance
         return np.where(clear[:, None], self.offset / np.where(clear, self.distance, 1.0)[:, None], 0.0)
 
     @cached_property
@@ -160,14 +150,12 @@ class InHole:
 
     @cached_property
     def clearance(self):
-        """(n,) m: radius of the hole less the string's, at a ring less the ring's."""
         found = self.string.wall.sizes(self.s, self.md)[0]
         found[self._ring_nodes] = [ring.clearance for ring in self.string.rings]
         return found
 
     @cached_property
     def standoff(self):
-        """(n,) the part of the clearance that is left; 0 where there is none."""
         clear = self.clearance > 0
         return np.where(clear, 1 - self.distance / np.where(clear, self.clearance, 1.0), 0.0)
 
@@ -179,7 +167,6 @@ class InHole:
 
     @cached_property
     def touches(self):
-        """(n,) whether the string touches the wall, or a ring does."""
         found = self.node_force > 0
         found[self._ring_nodes] |= self._pressed
         return found
@@ -272,7 +259,6 @@ class InHole:
 
     @cached_property
     def node_length(self):
-        """(n,) lengths that the nodes stand for, m: the weights of integrals along the string."""
         return self._summed(self._of_nodes)
 
     @cached_property
@@ -331,7 +317,7 @@ class InHole:
         """[`Contact`] above rounding size; errors of forces at points also by the mesh before, see
         `with_errors`."""
         largest = max((x.force for x in self._resultants[0]), default=0.0)
-        known = [x for x in self._resultants[0] if x.force > _ROUNDING * largest]
+        known = [x for x in self._resultants[0] if x.force > 1e-10 * largest]
         other = self._mesh_before
         reach = other and 2 * float(other._layer.max()) + float(np.ptp(other.s[other._nodes], axis=1).max())
         rings = [ring.station.s for ring in self.string.rings]
@@ -342,7 +328,6 @@ class InHole:
 
     @property
     def rough(self):
-        """[`Contact`] at points whose error is above `ROUGH` of the force."""
         return [x for x in self.contacts if x.start == x.end and x.error > ROUGH * x.force]
 
     @cached_property
@@ -368,24 +353,21 @@ class InHole:
     @cached_property
     def balance(self):
         string = self.string
-        weight = np.array([0.0, 0.0, np.diff(string.ends, prepend=0.0) @ string.weight])
+        weight = np.array([0.0, 0.0, string.whole_weight])
         wall = (self._wall_density * self._of_nodes[..., None]).sum(axis=(0, 1)) + self.ring_forces.sum(axis=0)
         return float(np.linalg.norm(self.reaction[0] + weight + string.bottom + wall))
 
     @property
     def scale(self):
         """Size of the forces that are balanced, N."""
-        string = self.string
-        weight = np.diff(string.ends, prepend=0.0) @ string.weight
-        return self.wall_force + weight + float(np.linalg.norm(string.bottom))
+        return self.wall_force + self.string.whole_weight + float(np.linalg.norm(self.string.bottom))
 
     # -- deformations outside the equilibrium -----------------------------------------------------------------------
 
     def _integral(self, values, of_section):
         """Integral over the string of values at the nodes over a stiffness of the sections."""
-        at = np.minimum(np.searchsorted(self.string.ends, self.s, side="left"), len(self.string.ends) - 1)
         found = np.array([np.nan if x.matrix is not None else of_section(x) for x in self.string.sections])
-        return float((self.node_length * values / found[at]).sum())
+        return float((self.node_length * values / found[self.string.section_at(self.s)]).sum())
 
     @property
     def stretch(self):

@@ -90,10 +90,10 @@ def contacts_along(s, sizes, pressure, side, layer, rings=(), kinks=()):
 def with_errors(contacts, coarser, reach, layer, rings=()):
     """The `Contact`s with estimated errors of the forces at points from those in a rigid wall, N.
 
-    The largest of what the length that holds the peak changes, and of what is left of the change from the coarser mesh;
-    and what is left of the wall's softness, 2.5 times the square of the layer over the free span beside the force, of a
-    ring over the distance to the next part of the wall: other rings do not give way. The factors were chosen by forces
-    of reference strings and of a few wells; they are no bounds, and most errors are a tenth of them and less.
+    The larger of the change with the length that holds the peak and of the remaining change from the coarser mesh, plus
+    the remaining effect of the wall's softness: 2.5 times the square of the layer over the free span beside the force,
+    of a ring over the distance to the next part of the wall, since other rings do not give way. The factors fit forces
+    of reference strings and of a few wells; they are no bounds, and most errors are at most a tenth of them.
 
     Args:
         contacts: from `contacts_along`; coarser: those on the coarser mesh, or None without one. reach: distance in
@@ -121,7 +121,7 @@ def with_errors(contacts, coarser, reach, layer, rings=()):
     return found
 
 
-#: What is known at the nodes, see `contacts_along`, and the number of the element.
+#: Arrays over the nodes, see `contacts_along`, with the number of the element.
 _Along = namedtuple("_Along", "s sizes pressure side element layer")
 #: Nodes of one contact, the first and the last; the `_Peak`s that have split from its two ends, or None; how far peaks
 #: that have split are off if they are taken for themselves, N.
@@ -286,12 +286,8 @@ _AtEnd = namedtuple("_AtEnd", "place begins force line width error")
 
 
 def _at_end(x, along, shortest, usual, bound, jumps):
-    """The `_AtEnd` of the force at x = 0, None without one.
-
-    Args:
-        x: (n,) distances into the contact, m. shortest, usual, bound: lengths that may hold the peak, m. jumps:
-            distances of the kinks, ascending, m.
-    """
+    """The `_AtEnd` of the force at x = 0, None without one, by lengths that may hold the peak; `jumps`: ascending
+    distances of the kinks."""
     jump = jumps[0] if len(jumps) and jumps[0] > 0 else np.inf
     width = usual if jump >= (1 + _SET.beside) * usual else max(shortest, jump / (1 + _SET.beside))
     found = _force_at_end(x, along, width)

@@ -9,11 +9,11 @@ import contextlib
 from dataclasses import dataclass, fields
 from functools import cached_property
 from operator import attrgetter
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
-from cosserat_fenicsx.checks import File, refuse
+from cosserat_fenicsx.checks import refuse
 from cosserat_fenicsx.errors import NotConverged, SceneError
 from cosserat_fenicsx.well import criteria
 from cosserat_fenicsx.well.answer import TorqueAndDrag, scales_of, share
@@ -31,7 +31,7 @@ def _of_rod(name, doc=""):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class RodInContact(TorqueAndDrag):
-    """What a string in its hole carries as an exact rod in contact; the places of the arrays are the rod's nodes.
+    """Loads of a string in its hole as an exact rod in contact; the places of the arrays are the rod's nodes.
 
     `error` is relative to hook load and surface torque themselves, the latter only where the string turns;
     `model_error` is not estimated (NaN), except the effect of buckling on a string that would buckle. `solved` is the
@@ -176,8 +176,8 @@ def rod_in_contact(flexible, decided, progress=None, exact=True):
     """The `RodInContact` of the same string in the same hole as a soft one.
 
     Args:
-        flexible: the `TorqueAndDrag` by the soft string; decided: sentences on why it is not enough; progress: see
-            `solve`. exact: False for an answer that may be less accurate than asked, and says so.
+        decided: sentences on why the soft string is not enough. exact: False for an answer that may be less accurate
+            than asked, and says so.
 
     Raises:
         SceneError: a component without stiffness, or as wide as the hole; a weight in mud that is not positive;
@@ -251,14 +251,7 @@ def _of_hand(solved):
 
 
 def check_rod(hole, laid, operation, mud, torque_convention):
-    """Refuse a string that cannot be a rod in contact.
-
-    Args:
-        laid: the components in their places; the others: see `torque_and_drag`.
-
-    Raises:
-        SceneError: see `rod_in_contact`.
-    """
+    """Refuse components in their places that cannot be a rod in contact, see `rod_in_contact`."""
     turns = any(operation.direction(place.component.contact_radius)[1] for place in laid)
     if torque_convention != "coulomb" and turns:
         refuse("torque_and_drag", "torque_convention", torque_convention,

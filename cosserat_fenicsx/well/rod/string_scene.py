@@ -52,7 +52,6 @@ class StringScene:
         sections: the true `Stiffness` of each section; ends: (n,) their lower ends, m.
         weight: (n,) N/m; bottom: force at the lower end (3,), N.
         clearance: the smallest one of the wall, m. torque: at the lower end, against the rotation of drilling, N m.
-        turns: whether torque is applied, or friction exerts one.
         words: the simplifications, as text.
     """
 
@@ -68,12 +67,21 @@ class StringScene:
     bottom: np.ndarray
     clearance: float
     torque: float
-    turns: bool
     words: str
 
     def section_at(self, s):
         """(n,) indices of the sections at arc lengths s (n,)."""
         return np.searchsorted(self.ends[:-1], s)
+
+    @property
+    def whole_weight(self):
+        """N."""
+        return float(np.diff(self.ends, prepend=0.0) @ self.weight)
+
+    @property
+    def turns(self):
+        """Whether torque is applied, or friction exerts one."""
+        return bool(self.torque or any(across for _, (_, across) in self.wall.slip))
 
     @property
     def hand(self):
@@ -197,9 +205,8 @@ def string_in(path, lengths, stiffness, weight, contact_radius, wall_stiffness, 
         ring.stage.most = max(1.0, min(_SET.most, _SET.rounding / (np.finfo(float).eps * length)) / ring.stiffness)
     support = Clamp(rod.start) if hinge is None else Hinge(rod.start, hinge)
     words = "the string's lengths are those under load" if not extensible else "the string stretches"
-    turns = bool(torque or any(across for _, (_, across) in wall.slip))
     return StringScene(path, Scene([rod], [support], [*loads, wall, *around]), rod, support, wall, around, sections,
-                       ends, weight, pull * t, wall.clearance, torque, turns, words)  # fmt: skip
+                       ends, weight, pull * t, wall.clearance, torque, words)  # fmt: skip
 
 
 def _numbers(name, value, count, expected, accept):
