@@ -69,13 +69,13 @@ class RigMeasurement(Part):
 
 #: One number that was read: its `RigMeasurement`; the name of what it is in `TorqueAndDrag`; its value and standard
 #: deviation, N or N m.
-Reading = namedtuple("Reading", "at query value sd")
+_Reading = namedtuple("_Reading", "at query value sd")
 
 
-def readings_of(measurements):
-    """[`Reading`] of measurements, hook loads before torques."""
-    loads = [Reading(m, "hook_load", m.hook_load, m.hook_load_sd) for m in measurements]
-    torques = [Reading(m, "surface_torque", m.torque, m.torque_sd) for m in measurements]
+def _readings_of(measurements):
+    """[`_Reading`] of measurements, hook loads before torques."""
+    loads = [_Reading(m, "hook_load", m.hook_load, m.hook_load_sd) for m in measurements]
+    torques = [_Reading(m, "surface_torque", m.torque, m.torque_sd) for m in measurements]
     return [x for x in loads + torques if x.value is not None]
 
 
@@ -139,6 +139,8 @@ class FrictionFit(Result):
     )  # fmt: skip
     _on_screen = ("section", "to", "friction", "interval")
 
+    _readings = property(lambda self: _readings_of(self.measurements))
+
     def __len__(self):
         return len(self.friction)
 
@@ -190,7 +192,7 @@ def calibrate_friction(
     confidence = number("calibrate_friction", "confidence", confidence, "a number between 0 and 1", lambda x: 0 < x < 1)
     settings = {"mud": mud, "model": model, "tol": _SET.tol, "torque_convention": torque_convention}
     unknown_block, sections = block_weight is None, len(hole.sections)
-    readings, wanted = readings_of(measurements), sections + unknown_block
+    readings, wanted = _readings_of(measurements), sections + unknown_block
     excess = len(readings) - wanted
     if excess <= 0:
         raise SceneError(f"calibrate_friction: {len(readings)} readings for {wanted} unknowns: expected more")

@@ -19,7 +19,6 @@ from cosserat_fenicsx.pictures.charts import (
 from cosserat_fenicsx.pictures.view import round_step
 from cosserat_fenicsx.quantities import Quantity
 from cosserat_fenicsx.well import criteria
-from cosserat_fenicsx.well.calibrate import readings_of
 from cosserat_fenicsx.well.components import Bit, Stabiliser
 from cosserat_fenicsx.well.contacts import VERTICAL, high_side, name_of_side, quantile, stretches
 
@@ -175,7 +174,7 @@ def _without_answer(axes, sweep, i, j, limits, colour):
 
 def fit_figure(fit):
     """Measured loads and those computed with the coefficients found, over the depth of the bit."""
-    rows = list(zip(readings_of(fit.measurements), fit.residuals, strict=True))
+    rows = list(zip(fit._readings, fit.residuals, strict=True))
     quantities = {"hook_load": _HOOK, "surface_torque": _SURFACE}
     queries = list(dict.fromkeys(reading.query for reading, _ in rows))
     operations = list(dict.fromkeys(m.operation for m in fit.measurements))
