@@ -15,14 +15,26 @@ from cosserat_fenicsx.drilling.wall_friction import law_of, scene_pieces, static
 from cosserat_fenicsx.well.pieces import down_along
 
 
-# Least and largest share of an element's mass that couples its nodes.
-_COUPLING = (1 / 12, 0.235)
-# Defaults: longest step (s), and elements without a step; least and largest number of elements for a given step.
-_LONGEST, _ELEMENTS, _FEWEST, _MOST = 0.01, 250, 40, 400
-# Longest step over 1/omega of the stiffest disc; and over the time in which rock stops a bit.
-_DISC, _IMPACT = 0.1, 0.2
-# Longest step, and passing time of a wave along the lowest element, over that time, for a largest weight on bit to 1 %.
-_RESOLVED = 0.4
+@dataclass(frozen=True)
+class _Settings:
+    """Settings of elements and steps of a string."""
+
+    coupling: tuple[float, float] = (
+        1 / 12,
+        0.235,
+    )  # least and largest share of an element's mass that couples its nodes
+    longest: float = 0.01  # default step, s
+    elements: int = 250  # default number without a step
+    fewest: int = 40  # elements for a given step
+    most: int = 400
+    disc: float = 0.1  # longest step over 1/omega of the stiffest disc
+    impact: float = 0.2  # default step over the time in which rock stops a bit
+    # Longest step, and passing time of a wave along the lowest element, over that time, for a largest weight on bit to
+    # 1 %.
+    resolved: float = 0.4
+
+
+_SET = _Settings()
 
 
 @dataclass(frozen=True)
@@ -76,15 +88,15 @@ _NO_WALL = Wall(*[np.zeros(0, dtype=np.int32)] * 3, *[np.zeros(0)] * 8)
 
 def usual_step(scene, elements: int | None, axial: bool) -> float:
     """The time step (s) of a `Drilling` for so many elements, where none is asked for."""
-    longest = min(_LONGEST, _IMPACT * time_of_impact(scene)) if axial else _LONGEST
+    longest = min(_SET.longest, _SET.impact * time_of_impact(scene)) if axial else _SET.longest
     if scene.discs:
         discs, shortest = scene.discs, math.inf
         for inertias, springs in ((discs.inertias, discs.stiffnesses), (discs.masses, discs.axial_stiffnesses)):
             if inertias is not None:
                 around = np.append(springs, 0.0) + np.append(0.0, springs)
                 shortest = min(shortest, float(np.sqrt(np.array(inertias) / around).min()))
-        return min(longest, _DISC * shortest)
-    return min(longest, _travel_time(scene) / (elements or _ELEMENTS))
+        return min(longest, _SET.disc * shortest)
+    return min(longest, _travel_time(scene) / (elements or _SET.elements))
 
 
 def _travel_time(scene):
@@ -96,7 +108,7 @@ def chain_of(scene, dt: float, elements: int | None, axial: bool) -> Chain:
     if scene.discs:
         return _chain_of_discs(scene.discs, axial, static_weight(scene) if axial else 0.0)
     if elements is None:
-        elements = min(max(_travel_time(scene) / dt, _FEWEST), _MOST)
+        elements = min(max(_travel_time(scene) / dt, _SET.fewest), _SET.most)
     return _chain_of_string(scene, dt, elements, axial)
 
 
@@ -137,7 +149,7 @@ def _chain_of_string(drilling, dt, elements, axial):
     for inertia, stiffness, rate in kinds:
         mass, spring = of(inertia) * lengths, of(stiffness) / lengths
         courant = dt * np.sqrt(spring / mass)
-        share = np.minimum(_COUPLING[0] + courant**2 / 6, _COUPLING[1])
+        share = np.minimum(_SET.coupling[0] + courant**2 / 6, _SET.coupling[1])
         diagonal = np.zeros(len(depths))
         diagonal[:-1] += (0.5 - share) * mass
         diagonal[1:] += (0.5 - share) * mass
@@ -198,7 +210,7 @@ def passing_time(scene, depths) -> float:
 def unresolved(scene, depths, dt) -> str:
     """A sentence where the steps (s) or the elements are too long for impacts, or ""."""
     impact, passing = time_of_impact(scene), passing_time(scene, depths)
-    longest = _RESOLVED * impact
+    longest = _SET.resolved * impact
     if max(dt, passing) <= longest:
         return ""
     most = longest * scene.segments[-1].axial_speed if passing > longest else 0.0

@@ -22,6 +22,7 @@ time is at most 0.16 dt (omega dt)^2.
 
 import math
 from collections import namedtuple
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -35,15 +36,22 @@ from cosserat_fenicsx.drilling.wall_friction import law_of, wall_of
 from cosserat_fenicsx.well.components import DrillString
 
 
-# Misfits of travel times to whole numbers of steps that are rounding, and that are reported, steps.
-_EXACT, _MISFIT = 1e-9, 0.01
-# Shortest travel time of a part with its own cells, steps.
-_SHORTEST = 1.5
-# Shortest step tried so that travel times fit, over the one asked for; step over the longest one for which a law of
-# friction has one answer.
-_LEAST_STEP, _NARROWER = 0.75, 0.9
-# Cells without a step: their usual and least number, and least length (m); their largest number in any case.
-_CELLS, _FEWEST, _LENGTH, _MOST = 300, 40, 5.0, 1e5
+@dataclass(frozen=True)
+class _Settings:
+    """Settings of cells and steps of torsional waves."""
+
+    exact: float = 1e-9  # misfit of a travel time to whole steps that is rounding, steps
+    misfit: float = 0.01  # misfit that is reported, steps
+    shortest: float = 1.5  # travel time of a part with its own cells, steps
+    least_step: float = 0.75  # shortest step tried so that travel times fit, over the given one
+    narrower: float = 0.9  # step over the longest one for which a law of friction has one answer
+    cells: int = 300  # default number
+    fewest: int = 40
+    length: float = 5.0  # of a default cell, at least, m
+    most: float = 1e5  # cells
+
+
+_SET = _Settings()
 #: A uniform part: travel time (s), impedance (N m s/rad), measured depths of its ends (m).
 Part = namedtuple("Part", "time impedance top bottom")
 #: dt: s. depths: (n + 1,) of the nodes, m. impedance, time: (n,) of the cells. turn: (n,) coefficients of the filters,
@@ -82,9 +90,9 @@ def cells_of(segments, dt):
 def _delays(steps):
     """Travel times of the cells of a part, in steps, and the coefficient of the filter of the longest one."""
     whole = round(steps)
-    if abs(steps - whole) <= _EXACT * max(1.0, steps):
+    if abs(steps - whole) <= _SET.exact * max(1.0, steps):
         return np.ones(whole), 0.0
-    short = math.floor(steps - _SHORTEST)
+    short = math.floor(steps - _SET.shortest)
     delays, extra = np.ones(short + 1), steps - short - 1
     delays[short // 2] += extra
     return delays, (1 - extra) / (1 + extra)
@@ -92,19 +100,21 @@ def _delays(steps):
 
 def _step(times, dt):
     """The step from 0.75 dt to dt for which travel times of so many seconds are nearest to whole numbers of steps."""
-    times = np.array([time for time in times if time >= _SHORTEST * dt])
+    times = np.array([time for time in times if time >= _SET.shortest * dt])
     tried = [dt]
     for time in times:
-        tried.append(time / np.arange(math.ceil(time / dt * (1 - 1e-12)), math.floor(time / (_LEAST_STEP * dt)) + 1))
+        tried.append(
+            time / np.arange(math.ceil(time / dt * (1 - 1e-12)), math.floor(time / (_SET.least_step * dt)) + 1)
+        )
     tried = np.unique(np.concatenate([np.atleast_1d(x) for x in tried]))[::-1]
     steps = times[:, None] / tried
     off = np.abs(steps - np.round(steps)).max(axis=0, initial=0.0)  # of none where all are short
-    return float(tried[np.argmax(off <= max(off.min(), _EXACT) * (1 + 1e-6))])
+    return float(tried[np.argmax(off <= max(off.min(), _SET.exact) * (1 + 1e-6))])
 
 
 def _fits(part, dt):
     steps = part.time / dt
-    return steps >= _SHORTEST or abs(steps - 1) <= _EXACT
+    return steps >= _SET.shortest or abs(steps - 1) <= _SET.exact
 
 
 def _joined(a, b):
@@ -180,22 +190,24 @@ class TorsionWaves(StringModel):
             dt = positive("TorsionWaves", "dt", dt, "s")
         if elements is not None:
             dt = min(time / positive("TorsionWaves", "elements", elements, "cells"), dt or math.inf)
-        asked = dt = dt or time / min(max(scene.bit_depth / _LENGTH, _FEWEST), _CELLS)
-        if time / dt > _MOST:
-            refuse("TorsionWaves", "dt", dt, f"at least {1 / _MOST:g} of the travel time of the string, {time:.4g} s")
+        asked = dt = dt or time / min(max(scene.bit_depth / _SET.length, _SET.fewest), _SET.cells)
+        if time / dt > _SET.most:
+            refuse(
+                "TorsionWaves", "dt", dt, f"at least {1 / _SET.most:g} of the travel time of the string, {time:.4g} s"
+            )
         factor, at_bit = 1.0, False
         while factor >= 1:
-            if time / dt > _MOST:
+            if time / dt > _SET.most:
                 if at_bit:
                     refuse("BitOnRock", "law", scene.bit.law, "a torque that falls more slowly with the speed, or a "
-                           f"larger inertia of the bit than {scene.bit.inertia:g} kg m^2: with {_MOST:g} cells the "
+                           f"larger inertia of the bit than {scene.bit.inertia:g} kg m^2: with {_SET.most:g} cells the "
                            "speed of the bit is not determined")  # fmt: skip
                 refuse("Drilling", "friction", scene.friction, "a friction that decays more slowly with the "
-                       f"speed: with {_MOST:g} cells the speed at every place is not determined")  # fmt: skip
+                       f"speed: with {_SET.most:g} cells the speed at every place is not determined")  # fmt: skip
             self.cells = cells = cells_of(scene.segments, dt)
             self._set_nodes(drag)
             factor, at_bit = self._steepness()
-            dt = cells.dt * min(_NARROWER / factor if factor else 1.0, _NARROWER)
+            dt = cells.dt * min(_SET.narrower / factor if factor else 1.0, _SET.narrower)
         self.dt, self.depths = cells.dt, cells.depths
         self._signal = scene.drive.signal()
         self.why = tuple(self._reasons(asked))
@@ -239,7 +251,7 @@ class TorsionWaves(StringModel):
                 f"{cells.joined} part{' is' if cells.joined == 1 else 's are'} shorter than 1.5 cells, and joined with "
                 "pieces of the neighbours, with the same inertia and compliance"
             )
-        if cells.unfit > _MISFIT:
+        if cells.unfit > _SET.misfit:
             yield (
                 f"travel times of parts differ from whole numbers of steps by up to {cells.unfit:.2g} steps: the rest "
                 "is made up by filters that are exact for slow waves; jumps are smeared over some steps"

@@ -15,14 +15,23 @@ import numpy as np
 from cosserat_fenicsx.errors import NotConverged
 
 
-# Contours: largest change of phase between points, rad; its largest misfit to the derivatives, rad; largest step over
-# the distance of a single root with the same derivative; distance of a root, over their size, at which they are moved.
-_TURN, _MISMATCH, _REACH, _NEAR = 1.0, 0.3, 1.5, 1e-9
-# Newton's method: most steps, relative step at which it stops, and where steps no longer fall.
-_STEPS, _SETTLED, _ROUNDING = 60, 1e-14, 1e-11
-# Roots that move by more than this share of their distance are followed in halved steps, so often at most; roots nearer
-# to each other than the last share of their size are one.
-_FAR, _HALVINGS, _SAME = 0.25, 7, 1e-8
+@dataclass(frozen=True)
+class _Settings:
+    """Settings of the search for roots."""
+
+    turn: float = 1.0  # largest change of phase between points of a contour, rad
+    mismatch: float = 0.3  # its largest misfit to the derivatives, rad
+    reach: float = 1.5  # largest step over the distance of a single root with the same derivative
+    near: float = 1e-9  # distance of a root, over the size of a contour, at which the contour is moved
+    steps: int = 60  # of Newton's method
+    settled: float = 1e-14  # relative step at which it stops
+    rounding: float = 1e-11  # relative step at which it stops where steps no longer fall
+    far: float = 0.25  # roots that move by more than this share of their distance are followed in halved steps
+    halvings: int = 7
+    same: float = 1e-8  # roots nearer to each other than this share of their size are one
+
+
+_SET = _Settings()
 
 
 @dataclass(frozen=True)
@@ -72,7 +81,7 @@ def turns(f, corners, spacing):
     for a, b in zip(corners[:-1], corners[1:], strict=True):
         s = a + (b - a) * _shares(a, b, spacing)
         value, derivative = f(s)
-        least = _NEAR * max(abs(x - y) for x in corners for y in corners)
+        least = _SET.near * max(abs(x - y) for x in corners for y in corners)
         while True:
             if not np.all(value != 0):
                 raise OnContour
@@ -83,8 +92,8 @@ def turns(f, corners, spacing):
             # beside two close roots the phase turns by 2 pi, which is not visible at points on both sides: the size of
             # the logarithmic derivative says how near roots are
             near = np.abs(log - _rate(f, s))
-            rough = (np.abs(change) > _TURN) | (np.abs(change - predicted) > _MISMATCH)
-            rough |= np.maximum(near[1:], near[:-1]) * np.abs(step) > _REACH
+            rough = (np.abs(change) > _SET.turn) | (np.abs(change - predicted) > _SET.mismatch)
+            rough |= np.maximum(near[1:], near[:-1]) * np.abs(step) > _SET.reach
             if not rough.any():
                 break
             where = np.flatnonzero(rough)
@@ -133,7 +142,7 @@ def each(f, starts, stride):
     """
     s = np.array(starts, dtype=complex)
     size, open_ = np.full(len(s), np.inf), np.arange(len(s))
-    for _ in range(_STEPS):
+    for _ in range(_SET.steps):
         if not open_.size:
             break
         here = s[open_]
@@ -146,9 +155,9 @@ def each(f, starts, stride):
         s[open_] = here + step * np.minimum(1.0, longest / np.maximum(length, 1e-300))
         size[open_] = length
         scale = np.maximum(np.abs(here), stride * 1e-3)
-        done = (length <= _SETTLED * scale) | ((length <= _ROUNDING * scale) & (length >= before / 4))
+        done = (length <= _SET.settled * scale) | ((length <= _SET.rounding * scale) & (length >= before / 4))
         open_ = open_[~done]
-    return np.where(size <= _ROUNDING * np.maximum(np.abs(s), stride * 1e-3), s, np.nan)
+    return np.where(size <= _SET.rounding * np.maximum(np.abs(s), stride * 1e-3), s, np.nan)
 
 
 def _rate(f, s):
@@ -299,15 +308,15 @@ def _moved(equation, start, end, roots, spacing, depth=0):
     new = each(equation(end), old, spacing / 2)
     new = np.where(new.imag < 0, new.conj(), new)
     apart = np.abs(new[:, None] - new[None, :]) + np.diag(np.full(len(new), np.inf))
-    safe = np.isfinite(new) & (np.abs(new - old) < _FAR * np.maximum(spacing, np.abs(old.real)))
-    safe &= ~(apart < _SAME * np.abs(new)[:, None]).any(axis=1)
+    safe = np.isfinite(new) & (np.abs(new - old) < _SET.far * np.maximum(spacing, np.abs(old.real)))
+    safe &= ~(apart < _SET.same * np.abs(new)[:, None]).any(axis=1)
     moved = {name: s for name, s, good in zip(names, new, safe, strict=True) if good}
     rest = {name: roots[name] for name in names if name not in moved}
-    if rest and depth < _HALVINGS:
+    if rest and depth < _SET.halvings:
         middle = (start + end) / 2
         half = _moved(equation, start, middle, rest, spacing, depth + 1)
         for name, s in _moved(equation, middle, end, half, spacing, depth + 1).items():
-            if all(abs(s - other) > _SAME * abs(s) for other in moved.values()):
+            if all(abs(s - other) > _SET.same * abs(s) for other in moved.values()):
                 moved[name] = s
     return moved
 
