@@ -1,11 +1,10 @@
 """Contact of nodes with walls in a time step: set-valued friction, on the compliance of the moving rods.
 
-Every Newton iteration has a tangent of the rods without contact. By its inverse the nodes that may touch respond
-linearly to their forces: with this compliance the laws of all nodes are solved exactly (algebra/contact.c), before the
-step is taken. So Newton's method sees smooth equations alone, whatever sticks, slips, touches or lifts off, and a
-tangent is kept through all of these. Where many nodes may touch, the compliance of neighbours alone is taken, by one
-solution for nodes that are far from each other; forces act on all nodes all the same, and what is neglected is made up
-for by the next iteration.
+Every Newton iteration has a tangent of the rods without contact, by whose inverse, the compliance, the nodes that may
+touch respond linearly to their forces. With it the laws of all nodes are solved exactly (algebra/contact.c) before the
+step is taken. So Newton's method sees smooth equations alone, whatever sticks, slips, touches or lifts off, and its
+tangent stays valid. Where many nodes may touch, the compliance couples neighbours alone; the next iteration corrects
+the rest.
 """
 
 import math
@@ -45,13 +44,11 @@ class TouchingNodes:
         self._rows = rows[self._mine] - numbering.first
         self._clamped = rows < 0
         self._shared = len(np.unique(self._rows)) < len(self._rows)
+        self._problem, self._load, self._response = problem, numbering.vector(), numbering.vector()
+        self._fixed = np.where(self._clamped, self.of_local(problem.state), 0.0)
 
     def _sum(self, values):
         return self._comm.allreduce(values) if self._comm.size > 1 else values
-
-    def hold(self, state):
-        """Take the unknowns of clamped nodes from local degrees of freedom."""
-        self._fixed = np.where(self._clamped, self.of_local(state), 0.0)
 
     def of_local(self, numbers):
         """(n, 7) values of local degrees of freedom at the nodes."""
@@ -80,6 +77,14 @@ class TouchingNodes:
         else:  # much faster
             b[self._rows] -= rows[self._mine]
 
+    def response(self, forces):
+        """Change of this rank's unknowns by forces and moments (n, 6), by the current tangent; valid until the next
+        call."""
+        self._load.set(0.0)
+        self.subtract(-forces, self._load.array_w)
+        self._problem.solve(self._load, self._response)
+        return self._response.array_r
+
 
 def motion_between(before, after):
     """(n, 6) displacements and rotations from nodal unknowns (n, 7) to others, by the mean rotation: with them the work
@@ -89,13 +94,12 @@ def motion_between(before, after):
     return np.concatenate([change[:, :3], turned[..., 0]], axis=1)
 
 
-# Up to so many nodes the compliance of all by all is taken; of more, that of so many neighbours on each side.
+# Number of nodes up to which the compliance is complete; of more, neighbours on each side that it couples.
 _FEW, _NEIGHBOURS = 16, 8
-# The compliance, which differs little from step to step, is found again where it misses this many times the share of a
-# response that it has missed at best, or more than the second number. Smaller responses than the third number
-# (dimensionless) may be rounding.
+# The compliance, which differs little from step to step, is updated where its relative error exceeds the second number
+# and this many times its smallest error. Responses below the third number (dimensionless) may be rounding.
 _WORSE, _MISSED, _ROUNDING = 10.0, 1e-3, 1e-9
-# Sweeps over the nodes, and changes of the motion that end them: over the first one, and dimensionless.
+# Sweeps over the nodes: largest number, and changes of the motion that end them, over the first one and dimensionless.
 _MOST, _SHARE, _SMALLEST = 200, 1e-6, 1e-16
 
 
@@ -116,7 +120,6 @@ class NodalContact(Pointers):
         self._nodes = nodes = TouchingNodes(problem, slots[order])
         self._slots = np.empty(len(order), dtype=int)  # of the walls' nodes in turn: their places here
         self._slots[order] = np.arange(len(order))
-        nodes.hold(problem.state)
         self._origin = np.concatenate([np.tile(p.origin, (len(p.slots), 1)) for p in touched])[order]
         n, self._coupled = nodes.count, nodes.count - 1 if nodes.count <= _FEW else _NEIGHBOURS
         # nodes at the same point have the same neighbours: how they share a force would matter otherwise
@@ -141,7 +144,6 @@ class NodalContact(Pointers):
             setattr(contact, name, self.doubles(array))
         self._usual = np.inf
         self._known_for = np.nan  # length of the steps that the compliance is of
-        self._load, self._response = problem.numbering.vector(), problem.numbering.vector()
 
     # -- a step ------------------------------------------------------------------------------------------------------
 
@@ -196,13 +198,10 @@ class NodalContact(Pointers):
         self._lib.settle(self.c)
         if (before == vectors["force"]).all():
             return
-        load = self._load
-        load.set(0.0)
-        self._nodes.subtract(vectors["force"] - before, load.array_w)
-        self._problem.solve(load, self._response)
-        change += self._response.array_r
+        response = self._nodes.response(before - vectors["force"])
+        change += response
         foretold = vectors["moved"][:, :3] - free[:, :3]
-        size, missed = np.abs(foretold), np.abs(foretold + self._nodes.of_vector(self._response.array_r)[:, :3])
+        size, missed = np.abs(foretold), np.abs(foretold + self._nodes.of_vector(response)[:, :3])
         if size.max() > _ROUNDING:
             share = missed.max() / size.max()
             self._usual = min(self._usual, max(share, _MISSED))
@@ -218,9 +217,8 @@ class NodalContact(Pointers):
     def _find_compliance(self):
         """Find the compliance by the current tangent."""
         self._known_for, self._usual = self.c.h, np.inf
-        nodes, problem = self._nodes, self._problem
-        n, reach = self.c.nodes, self.c.reach
-        turning = small_rotations(nodes.of_local(problem.state)[:, 3:])
+        nodes, n, reach = self._nodes, self.c.nodes, self.c.reach
+        turning = small_rotations(nodes.of_local(self._problem.state)[:, 3:])
         apart = min(2 * reach + 1, n)
         for first in range(apart):
             sources = np.arange(first, n, apart)
@@ -229,11 +227,8 @@ class NodalContact(Pointers):
             inside &= np.abs(nodes.points[j] - nodes.points[sources, None]) <= self._coupled
             for component in range(6):
                 force = np.zeros((n, 6))
-                force[sources, component] = -1.0
-                self._load.set(0.0)
-                nodes.subtract(force, self._load.array_w)
-                problem.solve(self._load, self._response)
-                found = nodes.of_vector(self._response.array_r)
+                force[sources, component] = 1.0
+                found = nodes.of_vector(nodes.response(force))
                 turned = (turning @ found[:, 3:, None])[..., 0]
                 moved = np.concatenate([found[:, :3], turned], axis=1)
                 self._compliance[sources, :, :, component] = np.where(inside[..., None], moved[j], 0.0)
@@ -329,6 +324,8 @@ class SpinLaw(Pointers):
     d3 in a step is a linear function of the torque, by the tangent of Newton's method, and with it the law is solved
     exactly before Newton's step is taken. The node sticks as long as a torque up to the static one can keep it.
 
+    Its methods are those of `NodalContact`.
+
     Args:
         problem: a `StepProblem`, loaded; action: the action.
     """
@@ -337,28 +334,22 @@ class SpinLaw(Pointers):
         super().__init__()
         self._problem, self._action, model = problem, action, problem.model
         self._nodes = TouchingNodes(problem, np.array([model.slot_of(action.station)]))
-        self._nodes.hold(problem.state)
         self._at_rest = action.station.rod.curve.frame(action.station.s)[:, 2]
         self._time, self._moment = model.time, model.scales.force * model.scales.length
-        self._load, self._response = problem.numbering.vector(), problem.numbering.vector()
-        self._torque, self._axis, self._turned = 0.0, self._at_rest, 0.0
-        self._begun, self._unit = 0.0, None
+        self._torque, self._axis, self._unit = 0.0, self._at_rest, None
 
     def begin(self, h):
-        """See `NodalContact`."""
         self._before, self._h = self._nodes.of_local(self._problem.state), h
         self._begun, self._unit = self._torque, None
 
     def give_up(self):
-        """See `NodalContact`."""
         self._torque = self._begun
 
-    def _acting(self):
-        return np.concatenate([np.zeros(3), self._torque * self._axis])[None]
+    def _acting(self, torque):
+        return np.concatenate([np.zeros(3), torque * self._axis])[None]
 
     def add_forces(self, b):
-        """See `NodalContact`."""
-        self._nodes.subtract(self._acting(), b)
+        self._nodes.subtract(self._acting(self._torque), b)
 
     def _motion(self, after):
         """Rotation about the axis in the step, and the axis in its middle."""
@@ -367,24 +358,15 @@ class SpinLaw(Pointers):
         return float(motion_between(self._before, after)[0, 3:] @ self._axis)
 
     def meet(self, x, change):
-        """See `NodalContact`."""
         after = self._nodes.unknowns(x, change)
         turned = self._motion(after)
         if self._unit is None:
-            self._find_compliance(after)
+            self._unit = self._nodes.response(self._acting(1.0)).copy()
+            found = self._nodes.of_vector(self._unit)[0, 3:]
+            self._compliance = float(small_rotations(after[0, 3:]) @ found @ self._axis)
         before = self._torque
         self._torque = self._solved(turned - self._compliance * before)
         change -= self._unit * (self._torque - before)
-
-    def _find_compliance(self, after):
-        torque, self._torque = self._torque, -1.0
-        self._load.set(0.0)
-        self._nodes.subtract(self._acting(), self._load.array_w)
-        self._torque = torque
-        self._problem.solve(self._load, self._response)
-        self._unit = self._response.array_r.copy()
-        found = self._nodes.of_vector(self._unit)[0, 3:]
-        self._compliance = float(small_rotations(after[0, 3:]) @ found @ self._axis)
 
     def _solved(self, free):
         """The torque by the law, from the rotation in the step without it; dimensionless."""
@@ -413,13 +395,10 @@ class SpinLaw(Pointers):
         return torque / self._moment, slope / (self._moment * self._time)
 
     def books(self):
-        """See `NodalContact`."""
         return 0.0, -self._torque * self._motion(self._nodes.of_local(self._problem.state))
 
     def memory(self):
-        """See `NodalContact`."""
         return {"torque": self._torque, "axis": np.array(self._axis)}
 
     def recall(self, memory):
-        """See `NodalContact`."""
         self._torque, self._axis = float(memory["torque"]), memory["axis"].copy()

@@ -1,9 +1,8 @@
 """Step size control: fixed steps, and adaptive ones, which resolve loads and prescribed motions.
 
 The error estimate of the motion does not detect aliasing: a load whose period is close to the step, sampled once a
-step, looks like a slower load, or like a constant one that accelerates a free body. So each function of time is sampled
-within every step before the step is made, at points without a common spacing, so that no frequency aliases at all of
-them.
+step, looks like a slower or a constant load. So each function of time is sampled within every step before the step is
+made, at points without a common spacing, so that no frequency aliases at all of them.
 
 Two conditions limit the step:
 - Within the step the function differs from the straight line between its ends by a small share of its range at most. A
@@ -15,7 +14,6 @@ Two conditions limit the step:
 """
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -47,22 +45,13 @@ class Fixed:
         return True
 
     def failed(self, h):
-        """Newton's method failed in a step of length h (s).
-
-        Returns:
-            True where the step is to be repeated with the shorter `length`; False where it is to be halved, without an
-            error test of the halves.
-        """
+        """Newton's method failed in a step of length h (s): True to repeat it with the shorter `length`, False to halve
+        it without error tests."""
         return False
 
     def watch(self, scene, duration, load_factor, impulse_error):
-        """Take the loads and the prescribed motions of a scene into account.
-
-        Args: as of `Resolution`.
-
-        Returns:
-            warnings, a list of sentences.
-        """
+        """Take the loads and the prescribed motions of a scene into account, arguments as of `Resolution`; warnings, a
+        list of sentences."""
         warning = unresolved_by_fixed_steps(scene, duration, self._dt)
         return [warning] if warning else []
 
@@ -86,22 +75,17 @@ class Adaptive(Fixed):
         tol: see `simulate`; duration: s.
     """
 
-    #: factor on the step after a jump; the first step of a motion over the duration
-    _AFTER_JUMP, _INITIAL = 1 / 8, 1e-4
-    #: share of the allowed local error that steps aim at; the error per unit of time is proportional to h^2
-    _SAFETY = 0.5
-    #: the length is kept where the best one lies between these factors of it; one change is limited to the other two
+    _AFTER_JUMP = 1 / 8  #: factor on the step after a jump
+    _INITIAL = 1e-4  #: first step of a motion over the duration
+    _SAFETY = 0.5  #: share of the allowed local error that steps aim at; the error per unit of time grows as h^2
+    #: range of the best length over the current one in which the latter is kept; limits of one change
     _KEEP_BELOW, _KEEP_ABOVE, _LARGEST_GROWTH, _LARGEST_CUT = 1.2, 0.9, 4.0, 0.25
-
-    #: `Stepper.error` is a difference over many steps, and hardly shows what starts suddenly: a step whose end differs
-    #: from the predictor by more than the first number times tol is rejected, unless it is shorter than the second
-    #: number times the duration
+    #: `Stepper.error`, a difference over many steps, hardly shows sudden changes: a step is rejected whose end differs
+    #: from the predictor by more than the first number times tol, unless it is shorter than the second times the
+    # duration
     _PREDICTION, _ALWAYS_ACCEPTED = 0.06, 1e-7
-
-    #: steps shorter than this share of the duration are tiny; more than so many of them in a row are too many
-    _TINY, _MANY = 1e-6, 5000
-    #: number of steps that the length does not grow for after a load has required a shorter one
-    _HOLD = 24
+    _TINY, _MANY = 1e-6, 5000  #: length of tiny steps, over the duration; number of them in a row that is too large
+    _HOLD = 24  #: steps without growth after a load has required a shorter one
 
     def __init__(self, tol, duration):
         super().__init__(duration * self._INITIAL)
@@ -176,52 +160,34 @@ def _even(left, dt):
 _SAMPLE_POINTS = np.array([1e-6, 0.137, 0.311, 0.5, 0.647, 0.871, 1 - 1e-6])
 
 
-@dataclass(frozen=True)
-class Sampling:
-    """How loads and prescribed motions are sampled, and what of them steps resolve.
-
-    Attributes:
-        deviation: largest deviation from the straight line over the range of the function; a sine with ten steps a
-            period has 0.024.
-        range_samples, fewest_range_samples: samples that estimate the range of a function beforehand: over the whole
-            motion, and at least between two jumps.
-        negligible: a load is ignored where acting in resonance all the time would move its rod by less than this share
-            of the allowed error.
-        share: of the tolerance for the errors of impulses.
-        decay, sudden_drop: the step requirement found in a step decays by the first factor per later step, since the
-            impulse errors of equal steps cancel best. It is halved per step instead where the requirement has dropped
-            below the second share of it, as after a jump that the user did not name.
-        tested_steps, warning_share: number of fixed steps that are tested, and the share of dt below which the longest
-            resolving step causes a warning.
-    """
-
-    deviation: float = 0.02
-    range_samples: int = 512
-    fewest_range_samples: int = 16
-    negligible: float = 0.1
-    share: float = 0.5
-    decay: float = 0.99
-    sudden_drop: float = 1e-3
-    tested_steps: int = 200
-    warning_share: float = 0.85
-
-
-_SAMPLING = Sampling()
+# Largest deviation of a function of time from a straight line within a step, over its range; a sine with ten steps a
+# period has 0.024.
+_DEVIATION = 0.02
+# Samples that estimate the range of a function beforehand: over the whole motion, and at least between two jumps.
+_RANGE_SAMPLES, _FEWEST_RANGE_SAMPLES = 512, 16
+# A load is ignored where acting in resonance all the time would move its rod by less than this share of the allowed
+# error.
+_NEGLIGIBLE = 0.1
+_SHARE = 0.5  # of the tolerance, for the errors of impulses
+# The requirement of a step decays by the first factor per later step, since the impulse errors of equal steps cancel
+# best. It is halved per step instead where it has dropped below the second share, as after a jump that is not declared.
+_DECAY, _SUDDEN_DROP = 0.99, 1e-3
+# Fixed steps that are tested, and the share of dt below which the longest resolving step causes a warning.
+_TESTED_STEPS, _WARNING_SHARE = 200, 0.85
 # Multiples of the golden ratio modulo 1 are evenly distributed in [0, 1] without a common spacing.
 _GOLDEN = (math.sqrt(5) - 1) / 2
 
 
 class Resolution:
-    """The longest steps that resolve the functions of time of a scene.
+    """The longest steps that resolve the functions of time of a `Scene`.
 
     Args:
-        scene: a `Scene`; duration: s; tol: see `simulate`.
-        load_factor: of all loads; impulse_error: see `Stepper.impulse_error`.
+        duration: s; tol: see `simulate`; load_factor: of all loads; impulse_error: see `Stepper.impulse_error`.
     """
 
     def __init__(self, scene, duration, tol, load_factor, impulse_error):
         size = max(rod.length for rod in scene.rods)
-        allowed = _SAMPLING.share * tol * size / max(24 * impulse_error * abs(load_factor), 1e-300)
+        allowed = _SHARE * tol * size / max(24 * impulse_error * abs(load_factor), 1e-300)
         persistence = _persistence(scene, duration)
         self._sampled = [
             _SampledSignal(signal, _largest_acceleration(scene, item, field), persistence, duration, allowed)
@@ -247,20 +213,17 @@ class Resolution:
 
 
 def unresolved_by_fixed_steps(scene, duration, dt):
-    """A warning about a function of time that fixed steps do not resolve, or None.
-
-    Args: as of `Resolution`; dt: s.
-    """
+    """A warning about a function of time that fixed steps (s) do not resolve in the duration (s), or None."""
     for item, field, signal in _nonlinear(scene):
         sampled = _SampledSignal(signal, None, duration, duration, 1.0)
         steps = max(1, math.ceil(duration / dt - 1e-9))
-        for t in sorted({dt * int(steps * x) for x in np.arange(_SAMPLING.tested_steps) * _GOLDEN % 1}):
+        for t in sorted({dt * int(steps * x) for x in np.arange(_TESTED_STEPS) * _GOLDEN % 1}):
             h = min([dt, *(x - t for x in signal.jumps if x > t + 1e-6 * dt)])
-            if sampled.longest(t, h) < _SAMPLING.warning_share * h:
+            if sampled.longest(t, h) < _WARNING_SHARE * h:
                 return (
                     f"{type(item).__name__}.{field} changes faster than steps of {dt:g} s can follow, such as at "
-                    f"t = {t:.4g} s: fewer than about ten steps a period, or a rise within a step. The answer may be "
-                    "wrong without any other sign of it. Try a smaller dt, or tol"
+                    f"t = {t:.4g} s: fewer than about ten steps a period, or a rise within a step. The result may be "
+                    "wrong without any other warning. Try a smaller dt, or tol"
                 )
     return None
 
@@ -281,7 +244,7 @@ class _SampledSignal:
     Args:
         signal: a `Signal`.
         acceleration: the largest that it gives its rod, m/s^2 per unit of the load; None for a prescribed motion.
-        persistence: how long a velocity that it gives persists, s; duration: s.
+        persistence: see `_persistence`, s; duration: s.
         allowed: displacement that errors of its impulse may cause, m.
 
     Attributes:
@@ -299,7 +262,7 @@ class _SampledSignal:
 
     def enter(self, begin, end):
         """Estimate its range and mean slope in the interval between two jumps (s)."""
-        count = max(_SAMPLING.fewest_range_samples, _SAMPLING.range_samples // len(self._marks))
+        count = max(_FEWEST_RANGE_SAMPLES, _RANGE_SAMPLES // len(self._marks))
         shares = np.concatenate([[1e-6, 1 - 1e-6], (np.arange(count) * _GOLDEN) % 1])
         values = self._at(begin + (end - begin) * shares)
         self.piece, self.range, self.required = (begin, end), float(np.ptp(values, axis=0).max()), 0.0
@@ -316,25 +279,24 @@ class _SampledSignal:
             )
             self.enter(before, after)
         before, now = self.required, self._required_in(t, h)
-        self.required = max(now, before * (_SAMPLING.decay if now > _SAMPLING.sudden_drop * before else 0.5))
+        self.required = max(now, before * (_DECAY if now > _SUDDEN_DROP * before else 0.5))
         while self.required * h**2 > 1 and h > self._shortest:
             h = max(h / 4, 0.95 / math.sqrt(self.required), self._shortest)
             self.required = max(self.required, self._required_in(t, h))
         return h
 
     def _required_in(self, t, h):
-        """1/h_max^2, 1/s^2: h_max is the longest step that meets both conditions for the function as it is in (t, t +
-        h)."""
+        """1/h_max^2, 1/s^2, with the longest step h_max that meets both conditions for the function in (t, t + h)."""
         values = self._at(t + h * _SAMPLE_POINTS)
         self.range = max(self.range, float(np.ptp(values, axis=0).max()))
-        if self._resonance * self.range <= _SAMPLING.negligible:
+        if self._resonance * self.range <= _NEGLIGIBLE:
             return 0.0
         deviation = np.abs(values - values[0] - np.outer(_SAMPLE_POINTS, values[-1] - values[0])).max()
         if deviation <= 1e-5 * self.range:
             return 0.0
         slopes = np.diff(values, axis=0) / np.diff(_SAMPLE_POINTS * h)[:, None]
         impulse_error = h**2 / 24 * np.linalg.norm(slopes - self._slope, axis=1).max()
-        return max(deviation / (_SAMPLING.deviation * self.range), self._drift * impulse_error) / h**2
+        return max(deviation / (_DEVIATION * self.range), self._drift * impulse_error) / h**2
 
     def _at(self, times):
         values = []
@@ -347,8 +309,8 @@ class _SampledSignal:
 
 
 def _largest_acceleration(scene, item, field):
-    """The largest acceleration that a load gives the end of a rod that it acts on, taken as free and rigid, m/s^2 per
-    unit of the load; None for a prescribed motion."""
+    """The largest acceleration of the end of a free, rigid rod by a load, m/s^2 per unit; None for prescribed
+    motions."""
     if not hasattr(item, "data"):  # a prescribed motion
         return None
     turns = getattr(item, field).unit.startswith("N m")
@@ -367,8 +329,8 @@ def _largest_acceleration(scene, item, field):
 
 
 def _persistence(scene, duration):
-    """How long a velocity that a load gives persists, s: the duration; where clamps hold all rods, about half the
-    period of the slowest mode."""
+    """How long a velocity due to a load persists, s: the duration; where clamps hold all rods, about half the period of
+    the slowest mode."""
     clamped = {scene.leader(support.station.rod) for support in scene.supports if support.clamps}
     if not clamped.issuperset(map(scene.leader, scene.rods)) or not all(joint.rigid for joint in scene.joints):
         return duration

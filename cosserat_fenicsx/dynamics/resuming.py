@@ -1,8 +1,9 @@
-"""A motion of rods in a folder: it is read, and gone on with; `read_history` also reads a saved file."""
+"""Read and continue a motion of rods in a folder; `read_history` also reads a saved file."""
 
 import cosserat_fenicsx.compat  # noqa: F401, I001  first: its message says what is missing where dolfinx is
 
 import os
+from operator import itemgetter
 from pathlib import Path as FilePath
 
 import numpy as np
@@ -91,13 +92,8 @@ def read(store, scene):
     """The states that a motion has saved so far."""
     scene = _opened(store, scene)
     history = _history(store, scene)
-    store.check_rows(times_of)
+    store.check_rows(itemgetter("time"))
     return history
-
-
-def times_of(rows):
-    """The times of saved states, s."""
-    return rows["time"]
 
 
 def read_history(folder: File, scene: Scene | None = None, *, comm: MPI.Comm | None = None) -> History:

@@ -1,4 +1,4 @@
-"""Schemes in time: one step from t to t + h. A new one is a class here, or anywhere, with its forms."""
+"""Schemes in time: one step from t to t + h. A new scheme is a class, here or elsewhere, and its forms."""
 
 from typing import NamedTuple
 
@@ -9,6 +9,7 @@ from cosserat_fenicsx.algebra.newton import Solved
 from cosserat_fenicsx.dynamics.step_problem import MovingTies, StepProblem
 from cosserat_fenicsx.dynamics.stepper import Stepper
 from cosserat_fenicsx.errors import SceneError
+from cosserat_fenicsx.numerics import small_rotations
 
 
 class Momentum(Stepper):
@@ -75,28 +76,18 @@ class TurnedStepProblem(StepProblem):
             self.matrices += self._live_tangent.matrices()
 
 
+# (12, 4): (3, 4) matrices T with T_ij = (e_i q)_j/2 for every component of q, with the product e_i q of quaternions.
+_TURNING = small_rotations(np.eye(4)).transpose(1, 2, 0).reshape(12, 4) / 4
+
+
 def _turning(q):
     """(nodes, 3, 4): maps residuals of q to those of a rotation: the transpose of phi -> phi q/2."""
-    v = q[:, 1:]
-    turning = np.zeros((len(q), 3, 4))
-    turning[:, :, 0] = -v
-    turning[:, [0, 1, 2], [1, 2, 3]] = q[:, :1]
-    turning[:, 0, 2], turning[:, 0, 3] = -v[:, 2], v[:, 1]
-    turning[:, 1, 1], turning[:, 1, 3] = v[:, 2], -v[:, 0]
-    turning[:, 2, 1], turning[:, 2, 2] = -v[:, 1], v[:, 0]
-    return turning / 2
+    return (q @ _TURNING.T).reshape(-1, 3, 4)
 
 
 def _turning_of(R):
     """(nodes, 3, 4): the derivative of `_turning`((q_0 + q)/2) R with respect to q, for residuals R (nodes, 4) of q."""
-    v = R[:, 1:]
-    change = np.zeros((len(R), 3, 4))
-    change[:, :, 0] = v
-    change[:, [0, 1, 2], [1, 2, 3]] = -R[:, :1]
-    change[:, 0, 2], change[:, 0, 3] = v[:, 2], -v[:, 1]
-    change[:, 1, 1], change[:, 1, 3] = -v[:, 2], v[:, 0]
-    change[:, 2, 1], change[:, 2, 2] = v[:, 1], -v[:, 0]
-    return change / 4
+    return np.einsum("ijk,nj->nik", _TURNING.reshape(3, 4, 4), R) / 2
 
 
 class Energy(Stepper):
@@ -155,10 +146,8 @@ class TripleJump(Momentum):
         return Solved(True, iterations, "converged")
 
 
-# Loads at the end of a step are evaluated this share of the step earlier, i.e. before a jump at its end.
-_BEFORE_END = 1e-6
-# Initial accelerations are those at the end of a trial step, whose length is this share of the first step's.
-_TRIAL_STEP = 0.1
+_BEFORE_END = 1e-6  # loads at the end of a step are evaluated this share of the step earlier, before a jump there
+_TRIAL_STEP = 0.1  # length of the trial step that gives initial accelerations, over the first step's
 
 
 class Rule(NamedTuple):
@@ -250,12 +239,10 @@ class CollocationProblem(StepProblem):
         return super().clamp_forces()
 
     def free_velocities(self, t, h):
-        """Let supports and joints keep the current velocities in the step from t to t + h, s, instead of correcting
-        them.
+        """Let supports and joints keep the current velocities in the step from t to t + h, s.
 
-        The constraints c at the end get the value c(t) + h c'(t), by three points of uniform motion, instead of 0.
-        Small violations by the velocities, left by the scheme or by a kink of a prescribed motion, would otherwise
-        cause large accelerations.
+        The constraints c at the end get the value c(t) + h c'(t), by three points of uniform motion, instead of 0,
+        since the correction of small violations by the velocities would take large accelerations.
         """
         if not self.ties:
             return
@@ -296,8 +283,7 @@ class GeneralisedAlpha(Stepper):
         self.kink()
 
     def kink(self):
-        """See `Stepper`: the auxiliary acceleration b lags behind a, and momenta would vary for some steps after loads
-        end."""
+        """See `Stepper`: b lags behind a, and momenta would vary for some steps after the end of a load."""
         self._accelerations_known = False
 
     def step(self, t, h):
@@ -316,11 +302,8 @@ class GeneralisedAlpha(Stepper):
         return Solved(solved.converged, iterations + solved.iterations, solved.reason)
 
     def _settle(self, t):
-        """Before the step length changes, correct velocities to those that supports and joints require.
-
-        After a step of length h they are off by O(h^2); correcting that within a shorter step would take an
-        acceleration that grows as the step shrinks.
-        """
+        """Before the step length changes, correct the O(h^2) errors of velocities at supports and joints, which would
+        take large accelerations in a shorter step."""
         self.drive(t)
         self._start[:] = self._state
         self.problem.model.follow_velocities()

@@ -151,9 +151,7 @@ def simulate(
 
 
 def pace_of(duration, *, tol=None, dt=None, scheme="momentum", save_every=None, elements=ELEMENTS):
-    """The step size control of `simulate`, `Fixed` or `Adaptive`.
-
-    Args: those of `simulate`.
+    """The step size control, `Fixed` or `Adaptive`, from arguments of `simulate`.
 
     Raises:
         SceneError: one of them is outside its range.
@@ -183,27 +181,14 @@ def pace_of(duration, *, tol=None, dt=None, scheme="momentum", save_every=None, 
 
 
 def positive_time(name, value, owner="simulate"):
-    """A positive time (s), checked, in a range where ratios of two do not overflow.
-
-    Raises:
-        SceneError: it is something else.
-    """
+    """A positive time (s), checked, in a range where ratios of two do not overflow."""
     return number(owner, name, value, "a positive number (s), from 1e-30 to 1e30", lambda x: 1e-30 <= x <= 1e30)
 
 
 def check_counts(owner, duration, dt, save_every):
-    """Refuse absurd numbers of steps or of saved states.
-
-    Args:
-        owner: the function that messages name; the others are those of `simulate`, checked.
-
-    Raises:
-        SceneError: naming the two arguments that do not fit together.
-    """
-    for name, apart, most, what in (
-        ("dt", dt, MOST_STEPS, "steps"),
-        ("save_every", save_every, MOST_SAVED, "saved states"),
-    ):
+    """Refuse absurd numbers of steps or of saved states, by checked arguments of `owner`."""
+    given = ("dt", dt, MOST_STEPS, "steps"), ("save_every", save_every, MOST_SAVED, "saved states")
+    for name, apart, most, what in given:
         if apart is not None and duration / apart > most:
             raise SceneError(
                 f"{owner}: duration = {duration:g} s and {name} = {apart:g} s: expected at most {most:g} {what}"
@@ -230,10 +215,7 @@ _MODELS = {
 
 
 def chosen_model(scene, model, scheme, start=None):
-    """The model's name, and the reason for its choice.
-
-    Args:
-        scene, model, scheme: as `simulate` takes them; start: None, a Path or (Path, k).
+    """The model's name, and the reason for its choice, from arguments of `simulate`; start: None, a Path or (Path, k).
 
     Raises:
         SceneError: an unknown model, or one that the scene does not fit.

@@ -17,12 +17,9 @@ from cosserat_fenicsx.statics.solve import solve
 # Largest violation of supports and joints by the initial state: positions over the unit of length, rotations in rad,
 # velocities over the largest one.
 _LARGEST_VIOLATION = 1e-6
-# Interval of the forward difference that gives prescribed velocities, over the unit of time.
-_DIFFERENCE = 1e-6
-# Dimensionless velocities below this are zero.
-_ZERO_VELOCITY = 1e-9
-# Components out of a plane below this, relative to all, are rounding.
-_OUT_OF_PLANE = 1e-10
+_DIFFERENCE = 1e-6  # interval of the forward difference of prescribed motions, over the unit of time
+_ZERO_VELOCITY = 1e-9  # rounding of dimensionless velocities
+_OUT_OF_PLANE = 1e-10  # rounding of components out of a plane, over all
 
 
 def put_start(model, start):
@@ -129,11 +126,7 @@ def _velocities(model, rq):
 
 
 def drive(model, t):
-    """At a kink of a prescribed motion at the time t (s), give the nodes that it moves its velocity after t; see
-    `_driven`.
-
-    The velocities of all other nodes stay the same, up to rounding.
-    """
+    """At a kink of a prescribed motion at the time t (s), give the nodes that it moves its velocity after t."""
     if not model.ties:
         return
     nodal, _ = model.snapshot()
@@ -146,12 +139,8 @@ def drive(model, t):
 
 
 def _driven(model, rq, rates, t=0.0):
-    """(N, 6) velocities where the nodes that prescribed motions move have the velocity of the motion after the time t
-    (s).
-
-    Without that the velocities and reactions there would alternate from step to step without decay, by the trapezoidal
-    rule.
-    """
+    """(N, 6) velocities with those of prescribed motions after the time t (s) at their nodes; else velocities and
+    reactions there would alternate from step to step without decay, by the trapezoidal rule."""
     off, gradient, _ = _off(model, rq, rates, t)
     at = model.tied_slots
     change = np.linalg.lstsq(gradient.reshape(len(off), -1), -off, rcond=None)[0]
@@ -176,13 +165,10 @@ def _off(model, rq, rates, t=0.0):
 
 def _check_velocities(model, rq, rates):
     """Refuse initial velocities `rates` (N, 6) that supports or joints do not allow."""
-    scene, layout = model.scene, model.layout
-    size = np.abs(rates).max()
+    scene, size = model.scene, np.abs(rates).max()
 
     def of(station):
-        rod, vertex = layout.vertex(scene, station)
-        nodes = np.array(layout.counts[:rod], dtype=int) * model.signature.degree + 1
-        return rates[int(nodes.sum()) + vertex * model.signature.degree]
+        return rates[model.slot_of(station)]
 
     for i, support in enumerate(scene.supports):
         if support.clamps and np.abs(of(support.station)).max() > _LARGEST_VIOLATION * size:

@@ -1,6 +1,5 @@
-"""One time step of a moving model for PETSc: residual and tangent in the solver's unknowns, and the constraints of
-supports and joints, which hold at its end while their reactions act at mid-step.
-"""
+"""Residual and tangent of one time step of a moving model in the solver's unknowns; the constraints of supports and
+joints hold at its end, and their reactions act at mid-step."""
 
 import numpy as np
 from dolfinx import fem
@@ -111,8 +110,7 @@ class StepProblem(Equations):
         )
 
     def _pack_form(self, form):
-        """A form for assembly, or a tuple of them for their sum, all of whose data may change in time; None where there
-        is none."""
+        """A form, or the sum of a tuple of forms, for assembly, with data that may change in time; None for None."""
         if not form:
             return None
         model, actions = self.model, self.model.actions
@@ -121,8 +119,7 @@ class StepProblem(Equations):
         return self._packed[-1]
 
     def _refresh(self, share=None):
-        """Evaluate data that depend on the position at this share of the way from the start of the step to the
-        state."""
+        """Evaluate data that depend on the position, at this share of the step."""
         if not self._refreshes:
             return
         share = self.acting_share if share is None else share

@@ -13,8 +13,8 @@ from cosserat_fenicsx.progress import Progress
 from cosserat_fenicsx.results.records import Instant, Ledger
 from cosserat_fenicsx.scene.signals import signals_of
 
-# Number of times that a failing step is halved before the motion is given up.
-_HALVINGS = 12
+_HALVINGS = 12  # times that a failing step is halved before the motion is given up
+_REMEMBERED = "t", "first", "h", "count", "steps", "iterations", "saved"  # numbers of a `TimeLoop` for its continuation
 
 
 class TimeLoop:
@@ -34,25 +34,21 @@ class TimeLoop:
 
     def memory(self):
         """All that a motion needs to be continued from between two steps, see `Stepper.memory`."""
-        names = ("_t", "_first", "_h", "_count", "_steps", "_iterations", "_saved")
-        counts = {name.removeprefix("_"): getattr(self, name) for name in names}
+        counts = {name: getattr(self, f"_{name}") for name in _REMEMBERED}
         return {**counts, "pace": self._pace.memory(), "stepper": self._stepper.memory(), "nodes": self.model.slots}
 
     def recall(self, memory):
         """Restore what `memory` returned."""
-        for name in ("t", "first", "h", "count", "steps", "iterations", "saved"):
+        for name in _REMEMBERED:
             setattr(self, f"_{name}", memory[name])
         self._pace.recall(memory.get("pace", {}))
         self._stepper.recall(memory["stepper"])
 
     def over(self, marks, save_all, progress):
-        """Compute the motion from its current time to the last of the `Mark`s.
+        """Compute the motion from its current time to the last of the `Mark`s; the history.
 
         Args:
-            marks: `Mark`s, the first at the start; save_all: whether every step is saved; progress: see `simulate`.
-
-        Returns:
-            the history.
+            marks: the first at the start; save_all: whether every step is saved; progress: see `simulate`.
         """
         comm, model = self.model.comm, self.model
         try:
@@ -90,9 +86,9 @@ class TimeLoop:
             if self._pace.stuck:
                 self._lose(
                     self._t,
-                    f"steps of {self._h:.3g} s do not get longer again: something oscillates or jumps faster than the "
-                    "tolerance allows to resolve. Try a fixed dt, a larger tol, damping, scheme='generalised-alpha', "
-                    "or `jumps` where a load is not smooth.",
+                    f"steps stay as short as {self._h:.3g} s: something oscillates or jumps too fast for the "
+                    "tolerance. Try a fixed dt, a larger tol, damping, scheme='generalised-alpha', or `jumps` where a "
+                    "load is not smooth.",
                 )
             wanted = self._pace.length(self._t, end - self._t)
             if abs(wanted - self._h) > 1e-9 * wanted:  # times are count * h, so that rounding does not accumulate
@@ -162,8 +158,7 @@ class TimeLoop:
                                     rates=rates, steps=self._steps, ledger=ledger, **held))  # fmt: skip
 
 
-# Interval over which a jump is detected, as a share of the duration; changes below the second number, relative to the
-# largest value, may be rounding.
+# Interval over which a jump is detected, over the duration; relative rounding of a signal.
 _JUMP_INTERVAL, _ROUNDING = 1e-9, 1e-13
 
 
@@ -230,10 +225,8 @@ def _check_driven(scene, duration):
 
 
 def _jumps_at(signal, t, until):
-    """Whether the value of a signal jumps at the time t (s), not only its slope; `until` (s) is the end of the motion.
-
-    A continuous signal changes by half as much over half the interval; a discontinuous one by as much.
-    """
+    """Whether the value of a signal, not only its slope, jumps at the time t (s): over half an interval it then changes
+    by as much. The motion ends at `until` (s)."""
     rise = _rise(signal, t, _JUMP_INTERVAL * until, until)
     if rise <= 0.75 * _rise(signal, t, 2 * _JUMP_INTERVAL * until, until):
         return False
