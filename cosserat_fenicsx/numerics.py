@@ -4,6 +4,7 @@ Quaternions are unit quaternions in numpy, scalar first; for UFL see forms/rotat
 eighth order, of data that Python computes from numbers; results of iterations are never differenced.
 """
 
+import math
 from functools import cache, cached_property
 from typing import NamedTuple
 
@@ -176,6 +177,11 @@ _SMALL_ROTATIONS = np.array(
     ],
     dtype=float,
 ).reshape(4, 12)
+
+
+def lagrange(places, at):
+    """Weights of Lagrange's interpolation at `at` from values at different places."""
+    return [math.prod([(at - b) / (a - b) for b in places if b != a]) for a in places]
 
 
 #: Multiples of the step at which the function is evaluated.

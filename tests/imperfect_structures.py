@@ -194,6 +194,7 @@ def small_steps(given, length, elements=_ELEMENTS):
         def record(point):
             truth.path.append(record_of(problem, point.load_factor, point.negative_modes, 0, 0))
 
+        track.begin_here()
         here = track.here
         track.set_tangent(here, track.slope(), (0 * here.numbers[0], 1.0), weight)
         record(here)
@@ -205,7 +206,7 @@ def small_steps(given, length, elements=_ELEMENTS):
             if solved.converged:
                 point = track.point(solved)
                 chord = point.numbers[0] - here.numbers[0], point.load_factor - here.load_factor
-                track.set_tangent(point, track.slope_found(), chord, weight)
+                track.set_tangent(point, track.bordered.slope, chord, weight)
                 sharp = max(angle((x.along, x.rise), chord) for x in (here, point)) > _ANGLE
                 if sharp or (_bifurcates(here, point) and step > _SHORT * length):
                     point = None

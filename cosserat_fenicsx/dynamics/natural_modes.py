@@ -14,7 +14,6 @@ from cosserat_fenicsx.errors import NotConverged, SceneError
 from cosserat_fenicsx.models.rod_data import check_inertia, nodal_inertia
 from cosserat_fenicsx.models.traits import traits_of
 from cosserat_fenicsx.numerics import directors, lobatto_weights
-from cosserat_fenicsx.progress import MeshProgress
 from cosserat_fenicsx.ranks import communicator
 from cosserat_fenicsx.results.modes import Modes
 from cosserat_fenicsx.results.shapes import Equilibrium
@@ -23,15 +22,14 @@ from cosserat_fenicsx.scene.describe import describe
 from cosserat_fenicsx.scene.scene import Scene, check_magnitudes
 from cosserat_fenicsx.scene.statical import without_mechanism
 from cosserat_fenicsx.statics.circulatory import circulatory_part
-from cosserat_fenicsx.statics.meshes import FIRST_ELEMENTS, layers_of, until_two_meshes_agree
+from cosserat_fenicsx.statics.meshes import layers_of, until_two_meshes_agree
 from cosserat_fenicsx.statics.path.follower import standing
 from cosserat_fenicsx.statics.problem import solvers_of
 from cosserat_fenicsx.statics.solve import check_arguments
 from cosserat_fenicsx.statics.stability import shapes_of
 
 _MOST_ELEMENTS = 128
-# Newton iterations allowed after the added constraints of a mechanism are removed.
-_CORRECTIONS = 10
+_CORRECTIONS = 10  # Newton iterations after the added constraints of a mechanism are removed
 
 
 def modes(
@@ -88,23 +86,11 @@ def modes(
         check_magnitudes(scene, load_factor)
     comm = communicator(comm)
 
-    def apart(fine, coarse):
-        return np.abs(fine - coarse) / np.where(fine == 0, np.inf, np.abs(fine))
-
-    with MeshProgress("modes", tol, progress, comm) as bar:
-        (squares, _, rounding, shapes, negative, state, conservative), error, _ = until_two_meshes_agree(
-            scene,
-            lambda layout: _on_mesh(scene, layout, count, load_factor, degree, comm),
-            apart,
-            tol,
-            first=FIRST_ELEMENTS,
-            most=_MOST_ELEMENTS,
-            elements=elements,
-            degree=degree,
-            progress=bar,
-            advice="a larger tol or fewer modes",
-            gains=True,
-        )
+    (squares, _, rounding, shapes, negative, state, conservative), error = until_two_meshes_agree(
+        "modes", scene, lambda layout: _on_mesh(scene, layout, count, load_factor, degree, comm), tol,
+        most=_MOST_ELEMENTS, elements=elements, degree=degree, advice="a larger tol or fewer modes", progress=progress,
+        comm=comm, gains=True,
+    )  # fmt: skip
     error = np.maximum(error, rounding)  # NaN stays
     if (error > tol).any():
         raise NotConverged(
@@ -150,8 +136,8 @@ def _on_mesh(scene, layout, count, load_factor, degree, comm):
 def _loaded(scene, layout, load_factor, degree, comm):
     """Context manager that gives the problem, in equilibrium at a load factor, and its `NegativeModes`.
 
-    A mechanism that its loads stabilise has no path from the unloaded state. Its equilibrium is first computed with
-    added constraints (`without_mechanism`), then corrected by Newton's method without these.
+    A mechanism that its loads stabilise has no path from the unloaded state: its equilibrium is computed with added
+    constraints (`without_mechanism`), then corrected without them.
     """
     loaded = load_factor or has_permanent(scene)
     held = without_mechanism(scene) if loaded else scene
@@ -178,10 +164,8 @@ def _loaded(scene, layout, load_factor, degree, comm):
 
 
 def _stiffness(problem):
-    """K (sparse), the row numbers of all nodes (N, 6), -1 where clamped, and the constraint gradients.
-
-    The gradients (equations, size) are those of the constraints of supports and joints.
-    """
+    """K (sparse), the row numbers of all nodes (N, 6), -1 where clamped, and the gradients (equations, size) of the
+    constraints of supports and joints."""
     model = problem.model
     (variation,) = model.second_variations
     tied = variation.tied
@@ -204,13 +188,9 @@ def _mass(model, rows, size, unit):
     """M over `unit` (sparse, one diagonal 6 x 6 block per node), by Lobatto quadrature with the nodes as points."""
     scene, layout, scales, p = model.scene, model.layout, model.scales, model.signature.degree
     q = model.snapshot()[0][:, 3:]
-    first = 0
     weights, sizes = lobatto_weights(model.nodes), layout.sizes(scene) / scales.length
-    slots = []
-    for cells in layout.counts:
-        slots.append(first + p * np.arange(cells)[:, None] + np.arange(p + 1))
-        first = slots[-1][-1, -1] + 1
-    slots = np.concatenate(slots)
+    first = p * np.arange(sum(layout.counts)) + np.repeat(np.arange(len(layout.counts)), layout.counts)
+    slots = first[:, None] + np.arange(p + 1)
     at_nodes = nodal_inertia(scene, layout, model.nodes)
     T = directors(q[slots.ravel()]).reshape(at_nodes.frames.shape) @ at_nodes.frames
     w = sizes[:, None] * weights / unit
@@ -228,12 +208,8 @@ def _mass(model, rows, size, unit):
 
 
 def _off_axis(block, at_nodes, R, w, length):
-    """Add to the mass matrices of nodes what mass centres off the axis contribute: z x rotation to their velocities.
-
-    Args:
-        block: (elements, nodes, 6, 6); at_nodes: the `NodalInertia`; R: rotations of the nodes; w: (elements, nodes)
-            quadrature weights; length: the unit.
-    """
+    """Add the contribution of mass centres off the axis to the mass matrices of nodes, block (elements, nodes, 6, 6):
+    z x rotation to their velocities; at_nodes: the `NodalInertia`; R: rotations of the nodes; w: quadrature weights."""
     z, more = np.einsum("...ij,...j->...i", R, at_nodes.offset) / length, R @ at_nodes.apart @ R.swapaxes(2, 3)
     mass, across = block[..., 0, 0][..., None, None], np.cross(np.eye(3), z[..., None, :])  # across @ v = z x v
     block[..., :3, 3:], block[..., 3:, :3] = -mass * across, mass * across

@@ -1,6 +1,4 @@
-"""Base of the implicit one-step schemes (velocities by the trapezoidal rule, whatever the forms conserve), and Newton's
-method for a step.
-"""
+"""Base of the implicit one-step schemes (velocities by the trapezoidal rule), and Newton's method for a step."""
 
 import math
 from dataclasses import dataclass
@@ -11,8 +9,9 @@ import numpy as np
 from cosserat_fenicsx.algebra.building import module
 from cosserat_fenicsx.algebra.newton import WORDS, Solved
 from cosserat_fenicsx.dynamics.start import drive
+from cosserat_fenicsx.numerics import lagrange
 
-# The error estimate takes four states, so many steps apart: this averages out unresolved, small vibrations.
+# Stride of the four states of the error estimate, which averages out small, unresolved vibrations.
 _STRIDE = 8
 #: Weight of rotations (rad) in error norms, relative to positions over the unit of length.
 ROTATION_WEIGHT = 0.1
@@ -53,7 +52,7 @@ class Stepper:
         self.jump()
 
     def jump(self):
-        """Accelerations or velocities jump at the current time: earlier states can no longer be extrapolated."""
+        """Forget earlier states: accelerations or velocities jump at the current time."""
         self._guesses = None  # those of the last step, where they are known
         self._past = []  # of the last steps: (h, state, rates, (work, dissipated)) at their starts
 
@@ -65,8 +64,7 @@ class Stepper:
         self.work += self.problem.energies()[0] - kinetic
 
     def kink(self):
-        """The slope of a load jumps at the current time, not its value: the rate of the acceleration jumps; nothing to
-        do where earlier states serve the predictor alone."""
+        """The slope of a load, and so the rate of the acceleration, jumps at the current time; predictors may stay."""
 
     def step(self, t, h):
         """Step from the time t to t + h, s.
@@ -101,10 +99,8 @@ class Stepper:
         return solved
 
     def _predicted(self, h):
-        """Predictors of the state at the end of the step: extrapolations of several orders.
-
-        First comes the order whose extrapolation of the last step was closest to its result.
-        """
+        """Predictors of the state at the end of the step: extrapolations of several orders, the best order in the last
+        step first."""
         known, last = self._past[-3:], self._guesses
         steps = [step for step, *_ in known[-2:]]
         self._guesses = guesses = _extrapolated(h, self._start, self._velocity, steps, [x[2][0] for x in known[-2:]])
@@ -194,75 +190,57 @@ def _numbered(arrays):
 
 
 def _extrapolated(h, state, velocity, steps, velocities):
-    """(orders, n) extrapolations of the state by a step h, of order 1 and one more for each earlier step.
-
-    Args:
-        steps, velocities: lengths and initial velocities of up to two steps before, the last one last.
-    """
+    """(orders, n) extrapolations of the state by a step h, of order 1 and one more for each earlier step; steps,
+    velocities: lengths and initial velocities of up to two steps before, the last one last."""
     return _weights(h, *steps) @ np.array([state, velocity, *velocities[::-1]])
 
 
 @lru_cache(maxsize=8)
 def _weights(h, *steps):
-    """Weights of the state and of the velocities, the current one first, in `_extrapolated`."""
-    orders = 1 + len(steps)
-    weights, square = np.zeros((orders, 1 + orders)), 0.5 * h * h
-    weights[:, 0], weights[:, 1] = 1.0, h
-    if steps:
-        h1 = steps[-1]
-        weights[1:, 1] += square / h1
-        weights[1:, 2] = -square / h1
-    if len(steps) == 2:
-        h2 = steps[0]
-        cubic = square * (h + h1) / (h1 + h2)  # times half the rate of the acceleration
-        weights[2, 1:] += cubic / h1, -cubic / h1 - cubic / h2, cubic / h2
+    """Weights of the state and of the velocities, the current one first, in `_extrapolated`: the trapezoidal rule for
+    the velocity now and its extrapolation by a polynomial."""
+    times = [0.0, *-np.cumsum(steps[::-1])]
+    weights = np.zeros((len(times), 1 + len(times)))
+    weights[:, 0], weights[:, 1] = 1.0, h / 2
+    for order in range(1, 1 + len(times)):
+        weights[order - 1, 1 : 1 + order] += h / 2 * np.array(lagrange(times[:order], h))
     return weights
 
 
 @dataclass(frozen=True)
 class Iteration:
-    """When Newton's method for a time step stops, and when it takes a new tangent (`stepping` in C).
+    """When Newton's method for a time step stops, and when it takes a new tangent (`stepping` in C)."""
 
-    Attributes:
-        increment: the remaining error that is allowed, over the motion in the step (root mean square, units L, 1): it
-            is the relative error of velocities and momenta, estimated from the contraction of the increments.
-        smallest: the same, absolute: the rounding of positions.
-        rounding: increments below this that no longer shrink have converged, too: the rounding of a stiff rod.
-        rate: contraction of increments with a new tangent, as measured.
-        price: of a new tangent, in iterations. Measured: from 1.3 in a plane to 5 in space, and 8 with constraint
-            equations; from 1 to 8 the time of a motion varies by a few per cent.
-        diverged, most: dimensionless increment, and iterations, that are taken as divergence.
-    """
-
+    # Allowed remaining error over the motion in the step (root mean square, units L, 1), which is the relative error of
+    # velocities and momenta, estimated from the contraction of the increments; and the same, absolute: rounding.
     increment: float = 1e-12
     smallest: float = 2e-16
-    rounding: float = 1e-10
-    rate: float = 3e-4
+    rounding: float = 1e-10  # increments below it that no longer shrink have converged, too: rounding of a stiff rod
+    rate: float = 3e-4  # contraction of increments with a new tangent, as measured
+    # Cost of a new tangent, in iterations: as measured, 1.3 in a plane, 5 in space, 8 with constraint equations. From 1
+    # to 8 the time of a motion varies by a few per cent.
     price: float = 2.0
-    diverged: float = 10.0
-    most: int = 15
+    diverged: float = 10.0  # dimensionless increment that is taken as divergence
+    most: int = 15  # iterations
 
 
 ITERATION = Iteration()
-# Times the first two where nodes may touch walls: the errors that are left there do not cancel from step to step, and
-# would add up to 1e-8 of the energy in 10 000.
+# Factor on `increment` and `smallest` where nodes may touch walls: remaining errors do not cancel from step to step
+# there, and would add up to 1e-8 of the energy in 10 000.
 _WITH_CONTACT = 0.03
 # Number of steps with a new tangent each, after a tangent that was useful for one step only.
 _STEPS_WITH_NEW_TANGENTS = 8
 
 
 class StepNewton:
-    """Newton's method for the steps of one problem: full increments, with a factorised tangent that serves many steps.
+    """Newton's method for the steps of one `StepProblem`: full increments, one factorised tangent for many steps.
 
     An iteration with an old tangent costs one residual and one back-substitution: on a fine mesh a tenth of one with a
-    new tangent. PETSc's SNES would evaluate one more residual per step, and norms that are not used. (Broyden's updates
-    of the old tangent were tried: they need as many iterations, and each costs more.)
+    new tangent. PETSc's SNES would evaluate one more residual per step, and unused norms. (Broyden's updates of the old
+    tangent need as many iterations, and each costs more.)
 
     Convergence is tested on the increments of the nodal unknowns alone: contact forces and reactions have larger
     rounding errors, and the residual of a stiff rod cannot fall below its rounding.
-
-    Args:
-        problem: a `StepProblem`.
     """
 
     def __init__(self, problem):
@@ -283,14 +261,7 @@ class StepNewton:
 
     def solve(self, guesses):
         """Newton's method from the first guess with the current tangent; where that fails, from every guess with a new
-        one.
-
-        Args:
-            guesses: predictors of the state, local arrays, the best first. Extrapolations of large rotations can fail.
-
-        Returns:
-            Solved.
-        """
+        one. Guesses are local arrays of the state, the best first: extrapolations of large rotations can fail."""
         kept, share = not self.problem.fresh, _WITH_CONTACT if self.problem.contact else 1.0
         self._c.increment, self._c.smallest = share * ITERATION.increment, share * ITERATION.smallest
         self._start[:] = self.problem.x.array_r[: self._motions]

@@ -16,7 +16,7 @@ from cosserat_fenicsx.errors import NotConverged
 from cosserat_fenicsx.models.signature import Signature
 from cosserat_fenicsx.models.spatial import CirculatoryModel
 
-# Relative size below which d omega counts as zero: rounding error over the terms that cancel in it.
+# Rounding error of d omega over the terms that cancel in it.
 _ROUNDING = 1e-10
 
 
@@ -39,10 +39,7 @@ def conservative_along(path):
 class CirculatoryPart:
     """Exterior derivative d omega of the virtual work omega of a scene's loads, see `models.circulatory`.
 
-    Matrices have the numbering of the spatial model's second variation.
-
-    Args:
-        model: a loaded `CirculatoryModel`.
+    Matrices have the numbering of the spatial model's second variation; `model` is a loaded `CirculatoryModel`.
     """
 
     def __init__(self, model):
@@ -51,12 +48,7 @@ class CirculatoryPart:
         self._form = self._variation.form and Packed(self._variation.form, (), ())
 
     def skew(self, rq, load_factor):
-        """The skew-symmetric part of the second variation, a PETSc matrix, dimensionless.
-
-        Args:
-            rq: (N, 7) positions and quaternions (r, q) of all nodes, dimensionless.
-            load_factor: the load factor.
-        """
+        """The skew-symmetric part of the second variation, a PETSc matrix, dimensionless; rq: (N, 7) of all nodes."""
         skew = self._assembled(rq, load_factor)
         skew.axpy(-1.0, skew.copy().transpose(), PETSc.Mat.Structure.DIFFERENT)
         skew.scale(-0.5)
@@ -74,10 +66,8 @@ class CirculatoryPart:
         return matrix
 
     def vanishes(self, rq, load_factor):
-        """Whether the loads have a potential in the neighbourhood of a state, for all motions that the supports allow.
-
-        Arguments as of `skew`. False for loads that depend on the history of the motion.
-        """
+        """Whether the loads have a potential in the neighbourhood of a state, for all motions that the supports allow;
+        False for loads that depend on the history of the motion."""
         if self._model.remembers:
             return False
         if not self._form:
@@ -90,18 +80,17 @@ class CirculatoryPart:
         return bool(abs(allowed @ (h - h.T) @ allowed).max() <= _ROUNDING * abs(h).max())
 
 
-# Eigenvalues computed: the first number times the requested count, plus the second. More than requested, because those
-# of the opposite load and complex ones, which are discarded, are among them.
+# Eigenvalues computed: the first number times the requested count, plus the second; complex ones and those of the
+# opposite load are discarded.
 _PER_REQUESTED, _EXTRA = 4, 12
 
 
 def static_bifurcations(slack, K, count):
-    """Changes of the load factor, from the state, at which the linearised second variation K - mu slack is singular.
+    """Changes mu of the load factor, from the state, at which the linearised second variation K - mu slack is singular.
 
     Args:
-        slack: the decrease of the second variation per unit of load factor.
-        K: the second variation at the state. Both are pairs (symmetric part, skew-symmetric part) of PETSc matrices
-            with the same numbering.
+        slack: the decrease of the second variation per unit of load factor; K: the second variation at the state. Both
+            are pairs (symmetric part, skew-symmetric part) of PETSc matrices with the same numbering.
         count: largest number of load factors to return.
 
     Returns:

@@ -1,4 +1,4 @@
-"""Derivatives of critical load factors by numbers of a scene: of linear buckling, and of limit points and bifurcations.
+"""Derivatives of critical load factors by parameters of a scene: of linear buckling, limit points and bifurcations.
 
 Linear buckling: with the second variation K at a state and its derivative K' along the path due to stresses alone, the
 critical change of the load factor is Rayleigh's quotient -phi K phi/phi K' phi, which is stationary in the mode phi:
@@ -14,13 +14,13 @@ with the residual R and its tangent K. At a limit point, where eta is stationary
 the limit load. The load factor of a bifurcation is that at which the second variation mu along the mode vanishes on the
 path, so that d eta/dp = -mu_p/mu_eta, both along the path: x follows p and eta to first order, by the direct method.
 
-K is singular at the event, and a state interpolated from its neighbours is no equilibrium to rounding. So all is
-evaluated at two equilibria a little before and behind it, and the means are taken, whose error is of second order in
-the distance.
+K is singular at the event, and a state interpolated from its neighbours is no equilibrium to rounding. So the means of
+the values at two equilibria just before and behind it are taken, whose error is of second order in their distance.
 """
 
 import itertools
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -33,10 +33,9 @@ from cosserat_fenicsx.statics.path.follower import Follower, standing
 from cosserat_fenicsx.statics.path.load_control import StepControl
 from cosserat_fenicsx.statics.sensitivity import Direct, parameters_of, sensitivity
 
-# Load factors are equal that differ by less, relative; derivatives of equal ones, likewise, with rounding.
+# Relative differences below which load factors are equal, and the derivatives of equal ones.
 _EQUAL, _PAIRED = 1e-5, 1e-5
-# Step of the load factor for K', over the critical change.
-_STEP = 1e-3
+_STEP = 1e-3  # step of the load factor for K', over the critical change
 
 
 def critical_sensitivity(buckling, parameters):
@@ -49,17 +48,19 @@ def critical_sensitivity(buckling, parameters):
     with Direct.on(scene, layout, found, degree=buckling.degree, comm=buckling.comm) as direct:
         direct.points = [(at, standing(*direct.solvers, at).problem.numbers(), None)]
         modes, pairs = _buckling_modes(buckling, direct.model.scales.length)
-        quotient = _Quotient(direct, modes, buckling.load_factors[0] - at)
-        derivatives, errors = {}, {}
+        part, step = direct.stability.whole, _STEP * (buckling.load_factors[0] - at)
+        if direct.problem.ties:
+            part.form.refresh()
+            part.assemble()  # for the springs in place of supports and joints
+        energies = Energies(direct.problem, modes, part.resistance)
+
+        def logarithms():
+            return np.log(_quotients(direct, energies, step))
+
+        critical, derivatives, errors = buckling.load_factors - at, {}, {}
         for parameter, rates in zip(found, direct.rates(), strict=True):
-            step, values = direct.step(parameter, rates), []
-            for k in PLACES:
-                direct.load_near(parameter, k * step)
-                direct.put(direct.points[0], rates[0], k * step)
-                values.append(np.log(quotient.here()))
-            relative, error = derivative(values, step)  # of the quotients, over the quotients
+            (relative,), (error,) = _by_parameter(direct, parameter, rates, logarithms)
             _check_pairs(buckling, parameter, relative, pairs)
-            critical = buckling.load_factors - at
             derivatives[parameter.name] = critical * relative[: len(critical)]
             errors[parameter.name] = critical * error[: len(critical)]
     return Sensitivity.by(found, buckling.load_factors, derivatives, errors, "load factor")
@@ -77,32 +78,42 @@ def _buckling_modes(buckling, length):
     return [*modes, *sums], pairs
 
 
-class _Quotient:
-    """Rayleigh's quotients of modes at the state of a `Direct`.
+def _quotients(direct, energies, step):
+    """(modes,) Rayleigh's quotients at the state of a `Direct`, the critical changes of the load factor; step: of the
+    load factor, for differences."""
+    point = direct.problem.load_factor, direct.problem.numbers(), None
+    direct.factor(*point[:2])
+    slope, stiff = direct.slope(), energies.here()
 
-    Args:
-        direct: the `Direct`; modes: each (N, 6); critical: change of the load factor that matters.
-    """
+    def by_stress_alone():
+        with direct.model.stress_alone():
+            return energies.here(springs=False)
 
-    def __init__(self, direct, modes, critical):
-        self._direct, self._step, part = direct, _STEP * critical, direct.stability.whole
-        if direct.problem.ties:
-            part.form.refresh()
-            part.assemble()  # for the springs in place of supports and joints
-        self._energies = Energies(direct.problem, modes, part.resistance)
+    softer = _by_load_factor(direct, point, slope, step, by_stress_alone)
+    direct.put(point, slope, 0.0)
+    return -stiff / softer
 
-    def here(self):
-        """(modes,) the critical changes of the load factor."""
-        direct, load_factor, numbers = self._direct, self._direct.problem.load_factor, self._direct.problem.numbers()
-        direct.factor(load_factor, numbers)
-        slope, stiff = direct.slope(), self._energies.here()
-        sides = []
-        for k in PLACES:
-            direct.put((load_factor + k * self._step, numbers, None), slope, k * self._step)
-            with direct.model.stress_alone():
-                sides.append(self._energies.here(springs=False))
-        direct.put((load_factor, numbers, None), slope, 0.0)
-        return -stiff / derivative(sides, self._step)[0]
+
+def _by_load_factor(direct, point, slope, step, value):
+    """The derivative of a function of the state along the path, of a slope (see `Direct.slope`), at a point."""
+    load_factor, numbers, _ = point
+    values = []
+    for k in PLACES:
+        direct.put((load_factor + k * step, numbers, None), slope, k * step)
+        values.append(value())
+    return derivative(values, step)[0]
+
+
+def _by_parameter(direct, parameter, rates, value):
+    """(points, ...) derivatives of a function of the state by a parameter, and their errors; rates: of the points."""
+    step, values = direct.step(parameter, rates), []
+    for k in PLACES:
+        direct.load_near(parameter, k * step)
+        values.append([])
+        for point, rate in zip(direct.points, rates, strict=True):
+            direct.put(point, rate, k * step)
+            values[-1].append(value())
+    return derivative(values, step)
 
 
 def _check_pairs(buckling, parameter, relative, pairs):
@@ -145,16 +156,15 @@ class Energies:
         return found
 
 
-# An event is the same where its load factor differs by less, relative.
-_SAME = 1e-4
+_SAME = 1e-4  # relative difference of the load factors of the same event
 # Distance of the two points from an event: of the load factor, relative; of the state (lengths, rad), tried in turn;
-# and how far the event may be from their middle, over their distance.
+# largest distance of the event from their middle, over their distance.
 _BESIDE, _ASIDE, _BENT = 2e-5, (1e-5, 1e-4, 1e-3), 0.1
-# Changes of the state by an imperfection have opposite signs at the two points: their difference exceeds this share of
-# their sum; below the second number (lengths, rad) they are rounding. How far a mode may violate constraint equations.
-_OPPOSITE, _NOTHING, _HELD = 0.5, 1e-6, 1e-7
-# Relative derivatives of a double bifurcation, for its modes, differ by less.
-_TOGETHER = 1e-5
+# An imperfection changes the state with opposite signs at the two points: the difference exceeds this share of the sum.
+_OPPOSITE = 0.5
+_NOTHING = 1e-6  # changes below this are rounding (lengths, rad)
+_HELD = 1e-7  # largest violation of constraint equations by a mode
+_TOGETHER = 1e-5  # largest relative difference of the derivatives of a double bifurcation
 
 
 def derivatives_of(path, query, parameters):
@@ -166,9 +176,9 @@ def derivatives_of(path, query, parameters):
 
 def _of_event(path, event, parameters):
     if not any(event is known for known in path.events):
-        raise SceneError("sensitivity: the event is none of this path's: expected one of path.events")
+        raise SceneError("sensitivity: the event does not belong to this path: expected one of path.events")
     if event.kind == "bifurcation" and not path.conservative:
-        raise SceneError("sensitivity: the loads have no potential, so that an energy does not tell of bifurcations")
+        raise SceneError("sensitivity: derivatives of bifurcations are known for loads with a potential alone")
     found = parameters_of(path.scene, parameters, critical=True)
     with Direct.along(path, found) as direct:
         track, crossing, before = _located(direct, path, event)
@@ -196,14 +206,13 @@ def _located(direct, path, event):
 
     control = "arc" if path.control == "arc" else "auto"
     follower = Follower(*direct.solvers, StepControl(), control=control, on_event=meet)
-    follower.begin()
     # the next point of the path may have been passed already at a limit point, which the last load factor lies beyond
     ends = [path.load_factors[event.after + 1 :][:1], path.load_factors[-1:], event.load_factor * np.array([1.1, 0.9])]
     load_factors = np.concatenate([path.load_factors[: event.after + 1], *ends]).tolist()
     try:
-        way = max(map(abs, load_factors))
+        follower.begin(load_factors)
         for load_factor in load_factors:
-            if load_factor != follower.track.here.load_factor and not follower.to(load_factor, way):
+            if load_factor != follower.track.here.load_factor and not follower.to(load_factor):
                 break
     except _Met as met:
         return follower.track, *met.args
@@ -266,10 +275,31 @@ def _of_bifurcation(direct, crossing, parameters, rates):
         _check_perfect(direct.model, parameter, each)
     modes = _modes(direct, crossing)
     energies = Energies(direct.problem, modes)
-    by_load = np.mean([_by_load(direct, energies, point) for point in direct.points], axis=0)
+    tied, size = np.array(modes)[:, direct.model.tied_slots], np.abs(modes).max()
+
+    def stiffness():
+        """(modes,) the second variation with the true stiffnesses where they are finite."""
+        K = direct.model.section.K
+        direct.model.stiffen(np.where(np.isfinite(K), K, direct.model.bounded_K))
+        return energies.here()
+
+    def along_path(point):
+        direct.factor(*point[:2])
+        return _by_load_factor(direct, point, direct.slope(), 0.1 * _BESIDE * point[0], stiffness)
+
+    def held_stiffness(parameter):
+        ties = direct.problem.ties
+        if ties and np.abs(np.einsum("tni,mni->tm", ties.gradients(), tied)).max() > _HELD * size:
+            raise SceneError(
+                f"parameter '{parameter.name}' turns supports or joints in which the mode moves: the derivative of "
+                "this bifurcation by it is not known"
+            )
+        return stiffness()
+
+    by_load = np.mean([along_path(point) for point in direct.points], axis=0)
     found, errors = [], []
     for parameter, each in zip(parameters, rates, strict=True):
-        slopes, error = _by_parameter(direct, energies, modes, parameter, each)
+        slopes, error = _by_parameter(direct, parameter, each, partial(held_stiffness, parameter))
         of_modes = -slopes.mean(axis=0) / by_load
         if np.ptp(of_modes) * parameter.size > _TOGETHER * abs(crossing.point.load_factor):
             raise SceneError(
@@ -287,8 +317,8 @@ def _check_perfect(model, parameter, rates):
     apart, together = model.largest(high - low), model.largest(high + low)
     if apart > _OPPOSITE * together + _NOTHING:
         raise SceneError(
-            f"parameter '{parameter.name}': with it the bifurcation is no more: it is an imperfection, on which the "
-            "load depends by a power below one. Expected one that keeps the symmetry, or a limit point"
+            f"parameter '{parameter.name}': it is an imperfection, with which the bifurcation disappears and the load "
+            "has no derivative: expected a parameter that keeps the symmetry, or a limit point"
         )
 
 
@@ -304,40 +334,3 @@ def _modes(direct, crossing):
             _, motion = bordered.response(start)
             found[k] = found[k] + np.sign(bordered.work(motion, start)) / 2 * direct.model.everywhere(motion)
     return found if crossing.partner is None else [*found, found[0] + found[1]]
-
-
-def _stiff(direct):
-    """Take the true stiffnesses where they are finite."""
-    model = direct.model
-    model.stiffen(np.where(np.isfinite(model.section.K), model.section.K, model.bounded_K))
-
-
-def _by_load(direct, energies, point):
-    """(modes,) d mu/d eta along the path."""
-    load_factor, numbers, _ = point
-    direct.factor(load_factor, numbers)
-    slope, step, values = direct.slope(), 0.1 * _BESIDE * load_factor, []
-    _stiff(direct)
-    for k in PLACES:
-        direct.put((load_factor + k * step, numbers, None), slope, k * step)
-        values.append(energies.here())
-    return derivative(values, step)[0]
-
-
-def _by_parameter(direct, energies, modes, parameter, rates):
-    """(2, modes) d mu/dp along the path at the two points, and errors."""
-    step, values, ties = direct.step(parameter, rates), [], direct.problem.ties
-    tied, size = np.array(modes)[:, direct.model.tied_slots], np.abs(modes).max()
-    for k in PLACES:
-        direct.load_near(parameter, k * step)
-        _stiff(direct)
-        values.append([])
-        for point, rate in zip(direct.points, rates, strict=True):
-            direct.put(point, rate, k * step)
-            values[-1].append(energies.here())
-            if ties and np.abs(np.einsum("tni,mni->tm", ties.gradients(), tied)).max() > _HELD * size:
-                raise SceneError(
-                    f"parameter '{parameter.name}' turns supports or joints in which the mode moves: the derivative of "
-                    "this bifurcation by it is not known"
-                )
-    return derivative(values, step)

@@ -10,7 +10,6 @@ from mpi4py import MPI
 from cosserat_fenicsx.algebra import eigen
 from cosserat_fenicsx.checks import number, whole
 from cosserat_fenicsx.errors import NotConverged
-from cosserat_fenicsx.progress import MeshProgress
 from cosserat_fenicsx.ranks import communicator
 from cosserat_fenicsx.results.modes import Buckling
 from cosserat_fenicsx.results.shapes import Equilibrium
@@ -18,27 +17,24 @@ from cosserat_fenicsx.scene.action import has_permanent
 from cosserat_fenicsx.scene.scene import Scene, check_magnitudes
 from cosserat_fenicsx.statics.circulatory import circulatory_part, static_bifurcations
 from cosserat_fenicsx.statics.critical import Energies, critical_sensitivity
-from cosserat_fenicsx.statics.meshes import FIRST_ELEMENTS, layers_of, until_two_meshes_agree
+from cosserat_fenicsx.statics.meshes import layers_of, until_two_meshes_agree
 from cosserat_fenicsx.statics.path.follower import standing
 from cosserat_fenicsx.statics.problem import solvers_of
 from cosserat_fenicsx.statics.solve import check_arguments
 from cosserat_fenicsx.statics.stability import shapes_of
 
 _MOST_ELEMENTS = 256
-# Steps of the load factor in the central difference of the second variation: displacements over the unit of length and
-# rotations are at most the first, contact forces and moments at most the second in EI/L^2 and EI/L of their rod.
+# Central difference of the second variation: largest displacement over the unit of length and rotation (rad); largest
+# contact force and moment, in EI/L^2 and EI/L of their rod.
 _MOVED, _LOADED = 1e-4, 1e-2
-# Rounding errors below this share of the tolerance stay as they are.
-_NOTHING = 1e-2
-# Bound on the error by rounding of the state, over what its sample at every Gauss point makes with one sign.
-_SAMPLED = 1.5
-# Largest share of the error of bounded stiffnesses that remains after the correction by Rayleigh's quotient: what
-# remains is of second order, this number times the square at most, unless the true stiffness is infinite.
+_NOTHING = 1e-2  # share of the tolerance below which rounding errors are not corrected
+_SAMPLED = 1.5  # bound on the error by rounding of the state, over its sample at the Gauss points with one sign
+# Largest share of the error by bounded stiffnesses after the correction by Rayleigh's quotient; and the factor on its
+# square, of second order, unless the true stiffness is infinite.
 _REMAINING, _SQUARED = 0.1, 100.0
-# Linear buckling extrapolates the state linearly. Its largest load factor is that at which r' has changed by _TURNED
-# (1: a deflection by half a right angle, or a stretch of 100 %), the contact force of a rod reaches the smallest of its
-# EA and GA (the shear-flexible column has a spurious root under tension at about GA), or the contact force or moment of
-# a rod reaches _HUGE times EI/L^2 or EI/L of that rod.
+# Linear extrapolation of the state ends where r' has changed by _TURNED (1: a deflection by half a right angle, or a
+# stretch of 100 %), the contact force of a rod reaches the smallest of its EA and GA (the shear-flexible column has a
+# spurious root under tension at about GA), or its contact force or moment reaches _HUGE times EI/L^2 or EI/L.
 _TURNED, _HUGE = 1.5, 1e8
 
 
@@ -93,22 +89,11 @@ def buckling(
     check_magnitudes(scene, max(abs(load_factor), 1.0))
     comm = communicator(comm)
 
-    def apart(fine, coarse):
-        return np.abs(fine - coarse) / np.abs(fine - load_factor)
-
-    with MeshProgress("buckling", tol, progress, comm) as bar:
-        (load_factors, _, state, shapes, shared, conservative, most), error, _ = until_two_meshes_agree(
-            scene,
-            lambda layout: _critical(scene, layout, count, load_factor, tol, degree, comm),
-            apart,
-            tol,
-            first=FIRST_ELEMENTS,
-            most=_MOST_ELEMENTS,
-            elements=elements,
-            degree=degree,
-            progress=bar,
-            advice="a larger tol",
-        )
+    (critical, _, state, shapes, shared, conservative, most), error = until_two_meshes_agree(
+        "buckling", scene, lambda layout: _critical(scene, layout, count, load_factor, tol, degree, comm), tol,
+        most=_MOST_ELEMENTS, elements=elements, degree=degree, advice="a larger tol", progress=progress, comm=comm,
+    )  # fmt: skip
+    load_factors = load_factor + critical
     softness, rounding = shared
     error = np.maximum(error, softness) + rounding  # what both meshes share; NaN stays
     if (error > tol).any():
@@ -133,9 +118,9 @@ def _critical(scene, layout, count, load_factor, tol, degree, comm):
     """The result on one mesh.
 
     Returns:
-        Load factors (n,), the lengths of boundary layers or None, the `Equilibrium`, shapes (m, N, 6), relative errors
-        (2, n) of bounded stiffnesses and of rounding, whether the loads have a potential, and the largest load factor
-        that is considered.
+        Changes of the load factor (n,), the lengths of boundary layers or None, the `Equilibrium`, shapes (m, N, 6),
+        relative errors (2, n) of bounded stiffnesses and of rounding, whether the loads have a potential, and the
+        largest load factor that is considered.
         With a potential n = m; else n = m + 1, and the bound comes first.
     """
     with (
@@ -203,12 +188,12 @@ def _critical_by(problem, newton, stability, circulatory, count, load_factor, to
     shapes = shapes_of(whole, values, model.rows_of_nodes, model.scales.length)[:count]
     state = Equilibrium.of(model, load_factor)
     errors = np.array([softness, rounding])
-    return load_factor + critical, layers, state, shapes, errors, conservative, load_factor + most
+    return critical, layers, state, shapes, errors, conservative, load_factor + most
 
 
 def _stay_at(track, at_rest):
-    """Return to the reference where it is in equilibrium: Newton's method, which actions that are not scaled begin
-    with, leaves a contact force of rounded strains there."""
+    """Return to the reference where it is in equilibrium: Newton's method for actions that are not scaled leaves a
+    contact force of rounded strains there."""
     problem = track.problem
     found = problem.numbers()
     track.put(at_rest, 0.0)
@@ -221,12 +206,8 @@ def _stay_at(track, at_rest):
 
 
 def _of_state(problem, part, vectors):
-    """(n,) relative errors of critical load factors by the rounding of the contact force at the state, from that of
-    the strains.
-
-    Args:
-        part: the `Part` of the second variation, assembled at the state, as it is again afterwards; vectors: modes.
-    """
+    """(n,) relative errors of critical load factors by the rounding of the strains at the state; part: the `Part` of
+    the second variation, assembled there; vectors: modes."""
     mismatch, numbers = problem.mismatch(), problem.numbers()
     stressed = mismatch is not None and problem.model.comm.allreduce(bool(numbers[1].any()), MPI.LOR)
     if not stressed or not vectors:
@@ -253,8 +234,7 @@ def _decrease(ahead, behind, change):
 
 
 def _extent(model, moved, slope, unit):
-    """The step of the load factor for difference quotients, and the largest change of it for which critical loads are
-    physical.
+    """The step of the load factor for difference quotients, and its largest change with physical critical loads.
 
     Args:
         moved: (step) -> fields at the Gauss points of the state there, see `Snapshots.snapshot`.
@@ -274,25 +254,22 @@ def _extent(model, moved, slope, unit):
 
 
 def _below(most, values, vectors):
-    """The eigenvalues (n,), descending, and eigenvectors with critical load factors 1/value up to `most`.
-
-    The others are zero but for rounding, or negative: those of the opposite load.
-    """
+    """The eigenvalues (n,), descending, and eigenvectors with critical load factors 1/value up to `most`; the others
+    are rounding errors, or negative, of the opposite load."""
     values = values[values * most > 1]
     return values, vectors[: len(values)]
 
 
-# Bound on the rounding error of x^T K x with an assembled K, over eps |x|^T |K| |x|.
-_SAFETY = 2.0
-# With d, the relative error of an eigenvalue of the assembled matrices, the quotient of its mode is off by this times
-# d^2; and an eigenvalue of an unsymmetric pencil by this times the d of its mode's energy.
+_SAFETY = 2.0  # bound on the rounding error of x^T K x with an assembled K, over eps |x|^T |K| |x|
+# With the relative error d of an eigenvalue of the assembled matrices: error of its mode's quotient over d^2, and of an
+# eigenvalue of an unsymmetric pencil over the d of its mode's energy.
 _OFF, _UNSYMMETRIC = 10.0, 3.0
 
 
 class Quotients(NamedTuple):
-    """Of n modes, (n,) each: Rayleigh's quotients K/slack with less of the energy of bounded stiffnesses; the shares of
-    the energies that are due to these bounds; relative rounding errors of the quotients, and of the eigenvalues of
-    assembled unsymmetric matrices."""
+    """Of n modes, (n,) each: Rayleigh's quotients K/slack, corrected for bounded stiffnesses; the shares of the
+    energies due to these bounds; relative rounding errors of the quotients, and of eigenvalues of unsymmetric
+    matrices."""
 
     values: np.ndarray
     softness: np.ndarray
@@ -303,9 +280,9 @@ class Quotients(NamedTuple):
 def quotients(problem, part, slack, vectors, small):
     """The `Quotients` of modes.
 
-    The entries of K are as large as the stiffnesses against stretch and shear, so that their rounding may exceed the
-    stiffness of a slender rod in bending by far. Where the bound on it is not small, energies are computed from small
-    strains instead; the quotients are then off by the square of the modes' errors alone.
+    The entries of K are as large as the stiffnesses against stretch and shear, and their rounding may exceed by far the
+    stiffness of a slender rod in bending. Where it is not small, energies are computed from small strains instead; the
+    errors of the quotients are then the squares of the modes' errors.
 
     Args:
         problem: a `Problem`; part: the `Part` of its second variation, assembled at the state.
@@ -349,8 +326,8 @@ def _mixed(values, off):
 
 @contextlib.contextmanager
 def _less_bounded(model):
-    """Context in which the second variation has bounded stiffnesses b less the excess of a mode's energy: b (2 - b/K),
-    so that the energy of a mode with bounded b is about that of the true one."""
+    """Context with the stiffnesses b (2 - b/K) instead of the bounded b, by which a mode of b has about the energy of
+    the true mode."""
     bound = model.bounded_stiffness()
     model.stiffen(bound * (2 - bound / model.section.K))
     try:

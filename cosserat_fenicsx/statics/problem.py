@@ -1,5 +1,5 @@
-"""The compiled static problem of a scene on one mesh, with its solvers: reused for all loads, steps and scenes of its
-signature, by one caller at a time; and what is kept of a state that they find."""
+"""The compiled static problem of a scene on one mesh, with its solvers, reused for all loads, steps and scenes of its
+signature by one caller at a time; and the record of an equilibrium."""
 
 import contextlib
 
@@ -65,11 +65,7 @@ class Problem(Equations):
         self._loaded, self.begins = None, False
 
     def load(self, scene, layout):
-        """Set the data of a scene; the state becomes its reference configuration.
-
-        Returns:
-            bool: False where the same data were loaded already.
-        """
+        """Set the data of a scene, in its reference configuration; False where the same data were loaded already."""
         model = self.model
         anew = not self._holds(scene, layout)
         if anew:
@@ -98,10 +94,7 @@ class Problem(Equations):
         self._loaded = None
 
     def _holds(self, scene, layout):
-        """Whether this scene is loaded on this mesh and its data cannot have changed.
-
-        User-defined functions and loads may give other values at every call.
-        """
+        """Whether this scene is loaded on this mesh, without user-defined functions, whose values may change."""
         if self._loaded is None or self._loaded[0] is not scene or not all(rod.profile.uniform for rod in scene.rods):
             return False
         if self._remembers or not all(type(load).__module__.startswith("cosserat_fenicsx.") for load in scene.loads):
@@ -141,11 +134,7 @@ class Problem(Equations):
         self.set_state(self.x)
 
     def begin_at(self, values, n, multipliers):
-        """Set the state from the motion and contact force of a solution on another mesh.
-
-        Args:
-            values, n: see `RodModel.set_motion`; multipliers: Lagrange multipliers of the constraint equations.
-        """
+        """Set the state from a solution on another mesh; values, n: see `RodModel.set_motion`."""
         self.model.set_motion(values, n)
         self.numbering.from_local(self._state, self.x)
         if self.ties:
@@ -153,19 +142,16 @@ class Problem(Equations):
         self.set_state(self.x)
 
     def rates(self, slope):
-        """The changes of all arrays of `numbers` along a change of the unknowns (owned entries), to first order.
-
-        The change of the carried contact force follows from the linearised strains: the small difference of two states
-        of a slender rod would lose the digits that those keep.
-        """
+        """The first-order changes of all arrays of `numbers` along a change of the unknowns (owned entries); that of
+        the carried contact force by the linearised strains, without loss of digits on slender rods."""
         if not self.c.advance:
             return [slope]
         behind, ahead = (self._advanced(step) for step in (0.0, slope))
         return [slope, ahead - behind]
 
     def mismatch(self):
-        """By how much the contact force that the strains give differs from the one that is carried, an array like the
-        latter; zero but for the rounding of strains, times the stiffness; None where no force is carried."""
+        """The contact force by the strains minus the carried one: rounding of the strains times the stiffness; None
+        where no force is carried."""
         return self._advanced(0.0) - self._live[0] if self.c.advance else None
 
     def _advanced(self, step):
@@ -197,10 +183,7 @@ class Problem(Equations):
             self.model.actions.refresh()
 
     def load_derivative(self, x):
-        """d residual/d load factor at x by a central difference, which is exact for loads, affine in the load factor.
-
-        The next call overwrites the returned vector.
-        """
+        """d residual/d load factor at x by a central difference, exact for loads; valid until the next call."""
         load_factor = self.load_factor
         change = CHANGE * max(1.0, abs(load_factor))
         for vector, ahead in zip(self._difference, (change, -change), strict=True):
@@ -237,11 +220,8 @@ class Promoted(Exception):
         self.reason, self.between = reason, between
 
     def agrees(self, before):
-        """Whether the exception on the mesh before (None where none was raised) confirms the negative modes.
-
-        On a mesh that does not resolve the contact force, its directions at the Gauss points are wrong: a taut wire
-        then seems to buckle, at a load factor that grows with mesh refinement.
-        """
+        """Whether the exception on the mesh before, or None, confirms the negative modes: on a mesh that does not
+        resolve the contact force a taut wire seems to buckle, at a load factor that grows with refinement."""
         if self.between is None:
             return True
         if before is None or before.between is None:

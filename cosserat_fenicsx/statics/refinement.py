@@ -6,7 +6,6 @@ that is the mesh on which the path was traced, it is not computed again.
 """
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -29,38 +28,18 @@ from cosserat_fenicsx.results.records import find_again, keep_confirmed
 from cosserat_fenicsx.statics.meshes import balanced, loose_edges, resolving, with_edges, with_layers, with_turns
 from cosserat_fenicsx.statics.problem import Promoted
 
-
-@dataclass(frozen=True)
-class Refinement:
-    """How meshes are refined until errors are small.
-
-    Attributes:
-        most_elements: of one rod.
-        resolved: positions that differ by less than this on two meshes, relative to the largest displacement, are on
-            the same branch: the points on the finer mesh may start from those on the coarser.
-        quarters, aim: refinement factors are multiples of one over the first, so that scenes share compiled meshes; the
-            error aimed at, over the tolerance.
-        located, for_events: smallest tolerance of the load factors of events on two meshes; largest number of finer
-            meshes that are solved for events alone, once the positions are accurate.
-        most_balancings: largest number of times that the error is equidistributed over the elements.
-        most_moves: largest number of times that element ends are moved to the edges of contact with walls, before
-            elements are halved.
-        cheap: largest number of unknowns, of all points together, that is cheaper to solve than another mesh is to
-            make.
-    """
-
-    most_elements: int = 1024
-    resolved: float = 1e-2
-    quarters: int = 4
-    aim: float = 0.8
-    located: float = 1e-6
-    for_events: int = 2
-    most_balancings: int = 4
-    most_moves: int = 3
-    cheap: int = 800
-
-
-_REFINEMENT = Refinement()
+_MOST_ELEMENTS = 1024  # of one rod
+# Positions that differ by less on two meshes, relative to the largest displacement, are on the same branch: the points
+# on the finer mesh may start from those on the coarser one.
+_RESOLVED = 1e-2
+# Refinement factors are multiples of one over this, so that scenes share compiled meshes.
+_QUARTERS = 4
+_AIM = 0.8  # the error aimed at, over the tolerance
+# Smallest tolerance of the load factors of events on two meshes; most finer meshes that are solved for events alone.
+_LOCATED, _FOR_EVENTS = 1e-6, 2
+_MOST_BALANCINGS = 4  # times that the error is equidistributed over the elements
+_MOST_MOVES = 3  # times that element ends are moved to the edges of contact, before elements are halved
+_CHEAP = 800  # unknowns, of all points together, that are cheaper to solve than another mesh is to make
 
 
 class _TooCoarse(Exception):
@@ -72,12 +51,10 @@ def refine(trace, correct, scene, layout, tol, bound, degree, usual=None):
 
     Args:
         trace: (layout, path or None) -> path followed from the unloaded state, through the points of the given path.
-        correct: (layout, path) -> the points of the path on this mesh by Newton's method from those of the given path;
-            None where that fails.
+        correct: (layout, path) -> the points of the path corrected on this mesh; None where that fails.
         scene: the scene; layout: the first mesh.
-        usual: where that one is coarser than usual, the mesh to begin with again unless the path on it is plain: load
-            control, no events, no negative modes, elements shorter than boundary layers.
-        tol: largest estimated error, relative; bound: the criteria of the user among what it bounds, see `criteria_of`.
+        usual: for a first mesh coarser than usual, the mesh to start again with unless the path is plain, see `_plain`.
+        tol: largest estimated error, relative; bound: the user's criteria among those that it bounds.
         degree: of the elements.
 
     Raises:
@@ -122,7 +99,7 @@ class _Search:
         # Assumed orders of the errors in h; refinement factor over the mesh before, None where meshes are not nested.
         self._order, self._factor = np.ones(len(NAMES) + len(bound)), 2.0
         self._failed, self._promoted, self._best = False, None, math.inf
-        self.accurate, self._meshes_for_events, self._lost_events = None, _REFINEMENT.for_events, []
+        self.accurate, self._meshes_for_events, self._lost_events = None, _FOR_EVENTS, []
         self._halved = None  # sample points on this mesh and on the one before, if this one halves its elements
         self._error_before = None  # errors of the latter
         self._layered = None  # the next mesh where the last one does not resolve the boundary layers
@@ -139,7 +116,7 @@ class _Search:
                 raise _TooCoarse from None
             promoted = isinstance(problem, Promoted)
             again = problem.agrees(self._promoted) if promoted else self._failed
-            if again or elements >= _REFINEMENT.most_elements:
+            if again or elements >= _MOST_ELEMENTS:
                 raise
             self._promoted, self._failed = (problem, self._failed) if promoted else (self._promoted, True)
             self._few = self._apart = self._halved = None
@@ -153,7 +130,7 @@ class _Search:
             if self._usual is not None and not self._plain:
                 raise _TooCoarse
         self._layered = with_layers(self._scene, found.layout, layers) or with_turns(self._scene, found)
-        if self._layered is None and self._presses and self._moved < _REFINEMENT.most_moves:
+        if self._layered is None and self._presses and self._moved < _MOST_MOVES:
             self._layered = with_edges(self._scene, found)
             self._moved += self._layered is not None
         if found.rounding > self._tol:  # refinement would increase it
@@ -161,11 +138,11 @@ class _Search:
         if np.isfinite(found.worst).all():
             reached = float(found.worst.max())
             if reached <= self._tol and found is self.whole and self._layered is None:
-                agree = all(event.error <= max(self._tol, _REFINEMENT.located) for event in found.events)
-                if agree or elements >= _REFINEMENT.most_elements or not self._meshes_for_events:
+                agree = all(event.error <= max(self._tol, _LOCATED) for event in found.events)
+                if agree or elements >= _MOST_ELEMENTS or not self._meshes_for_events:
                     return self.confirmed(found)
                 self.accurate, self._meshes_for_events = found, self._meshes_for_events - 1
-            elif elements >= _REFINEMENT.most_elements or (reached > self._best and self._best < 1e-8):
+            elif elements >= _MOST_ELEMENTS or (reached > self._best and self._best < 1e-8):
                 if found is not self.whole:
                     found = self._all_points(layout, found)
                 raise NotConverged(_not_accurate(self._tol, reached, self._best, elements, self._degree, found), found)
@@ -176,21 +153,18 @@ class _Search:
         return None
 
     def confirmed(self, path):
-        """A path without the events that were not found on two meshes, and with what rounding leaves of its bounds."""
+        """A path without events that were found on one mesh alone, and without bounds that rounding exceeds."""
         by_rounding = path.rounding_errors.max(axis=1, initial=0.0)
         hidden = [name for name in path.bounded if by_rounding[path.judged.index(name)] > self._tol]
         if hidden:
             path.bounded = tuple(name for name in path.bounded if name not in hidden)
             path.why.extend(_rounding_leaves(self._tol, name, path) for name in hidden)
-        keep_confirmed(path, max(self._tol, _REFINEMENT.located), self._lost_events if path is self.whole else [])
+        keep_confirmed(path, max(self._tol, _LOCATED), self._lost_events if path is self.whole else [])
         return path
 
     def next_after(self, layout):
-        """The next mesh.
-
-        It resolves the boundary layers or equidistributes the error where the last mesh does not. Else it has twice as
-        many elements, or fewer where these suffice by the assumed order of the error.
-        """
+        """The next mesh: one that resolves the boundary layers or equidistributes the error where the last one does
+        not; else one with twice as many elements, or as many as the order of the error requires."""
         if self._next is not None:
             (following, self._factor), self._next = self._next, None
             return following
@@ -203,8 +177,8 @@ class _Search:
         known = self._few is not None and np.isfinite(self._few.worst).all() and self._few.worst.max() > self._tol
         self._factor = 2.0
         if known:
-            above = float(self._few.worst.max()) / (_REFINEMENT.aim * self._tol)
-            if self._halved is not None and self._balancings < _REFINEMENT.most_balancings:
+            above = float(self._few.worst.max()) / (_AIM * self._tol)
+            if self._halved is not None and self._balancings < _MOST_BALANCINGS:
                 even = balanced(*self._halved, above)
                 if even is not None:
                     self._balancings += 1
@@ -219,13 +193,11 @@ class _Search:
         return layout
 
     def _found_on(self, layout):
-        """The sample points, or all points, on a mesh, with their errors where these are known.
-
-        All points on the mesh before where the sample points show that it suffices.
-        """
+        """The sample points, or all points, on a mesh, with their errors where these are known; or all points on the
+        mesh before where the sample points show that it suffices."""
         few = None if self._few is None else self._correct(layout, self._few)
         apart = None if few is None else self._judge(few, self._few, self._apart)
-        if few is None or apart[POSITION].max() > _REFINEMENT.resolved:
+        if few is None or apart[POSITION].max() > _RESOLVED:
             if self._usual is not None and self.whole is not None:
                 raise _TooCoarse
             whole, apart = self._trace(layout, self.whole), None
@@ -246,29 +218,24 @@ class _Search:
                 judged = self.whole if traced else self._all_points(coarse.layout, coarse)
                 if judged.worst.max() <= self._tol:
                     return judged
-            if (
-                few.worst.max() <= self._tol
-                and max(layout.counts) < _REFINEMENT.most_elements
-                and self._saves(few, judged)
-            ):
+            if few.worst.max() <= self._tol and max(layout.counts) < _MOST_ELEMENTS and self._saves(few, judged):
                 self._few, self._apart = coarse, None
                 return few
         return self._all_points(layout, few) if few.worst.max() <= self._tol else few
 
     def _factor_for(self, path):
         """The refinement factor, at most 2, that is to make the errors of a path small enough."""
-        above = path.by_mesh.max(axis=1) / (_REFINEMENT.aim * self._tol)
+        above = path.by_mesh.max(axis=1) / (_AIM * self._tol)
         wanted = min(2.0, float((above ** (1 / self._order))[path.bounds].max()))
-        return math.ceil(_REFINEMENT.quarters * wanted) / _REFINEMENT.quarters
+        return math.ceil(_QUARTERS * wanted) / _QUARTERS
 
     def _saves(self, few, coarse):
-        """Whether a mesh between those of two paths is accurate enough, and all points on it are cheaper; it is the
-        next one then."""
+        """Whether a mesh between those of two paths suffices and is cheaper for all points; it becomes the next one."""
         if self._presses:  # only halvings keep element ends at the edges of contact
             return False
         factor = self._factor_for(coarse)
         others = len(self.whole) - len(few)
-        if few.unknowns * ((2 - factor) / 2 * others - factor / 2 * len(few)) <= _REFINEMENT.cheap:
+        if few.unknowns * ((2 - factor) / 2 * others - factor / 2 * len(few)) <= _CHEAP:
             return False
         self._next = coarse.layout.finer(self._scene, factor), factor
         return True
@@ -303,15 +270,13 @@ class _Search:
 
 
 def _plain(path, layers):
-    """Whether a path has nothing that a coarse mesh may miss or invent: it is followed by load control, is stable, and
-    its elements are shorter than its boundary layers, and so than the half-waves of buckling under forces and moments.
-    """
+    """Whether a coarse mesh suffices: load control, no events, no negative modes, and elements shorter than boundary
+    layers and half-waves of buckling."""
     followed = path.control == "load" and not path.events and not path.negative_modes.any()
     return followed and resolves(path.layout, layers) and resolves(path.layout, winding_lengths(path))
 
 
 def _rounding_leaves(tol, name, path):
-    """`name` is "force" or "moment"."""
     which, unit = NAMES.index(name), {"force": "N", "moment": "N m"}[name]
     size = path._reference.rounding[which].max() * getattr(path.scales, name)
     return (
@@ -330,7 +295,6 @@ def _rounding_hides(tol, rounding, elements, formulation):
 
 
 def _not_accurate(tol, reached, best, elements, degree, path):
-    """`reached` and `best`: the estimated errors on the last mesh, and the least one on those before."""
     advice = "a larger tol" if degree == 4 else "a larger tol, or degree 4"
     if any(action.at_nodes for action in path.scene.actions):
         advice += " (the pressure at a wall has kinks, which meshes resolve slowly), or a softer wall"

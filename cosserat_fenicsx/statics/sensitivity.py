@@ -1,6 +1,6 @@
-"""Derivatives of the queries of a path by numbers of its scene: the direct method.
+"""Derivatives of the queries of a path by parameters of its scene: the direct method.
 
-At a point of the path the residual R(x; d) vanishes, x the unknowns and d the data that the scene is turned into, all
+At a point of the path the residual R(x; d) vanishes, with the unknowns x and the data d of the scene, all
 dimensionless. For a parameter p
 
     dx/dp = -K^-1 (R_d dd/dp),
@@ -9,7 +9,7 @@ with the tangent K as factorised by Newton's method and R_d by ufl.derivative: o
 back-substitution for each parameter. dd/dp is a central difference of eighth order of the data, which are explicit
 functions of the scene; so are the constraint equations of supports and joints at fixed x. The contact force carried at
 the Gauss points changes by the derivative of its law. A query is then differenced along (x + t dx/dp, scene(p + t)),
-which contains units, geometry and whatever else it takes from the scene. No perturbed state is solved for.
+which includes units, geometry and all else that it takes from the scene. No perturbed state is solved for.
 """
 
 import contextlib
@@ -29,16 +29,15 @@ from cosserat_fenicsx.scene.action import path_dependent
 from cosserat_fenicsx.scene.parameters import parameter_of
 from cosserat_fenicsx.statics.problem import record_of, solvers_of
 
-# Newton iterations from the recorded state to the same state, and how far it may move (lengths, rad).
+# Newton iterations from the recorded state to the same state, and its largest motion (lengths, rad).
 _ITERATIONS, _MOVED = 25, 1e-3
-# Largest motion (lengths, rad) over which queries are differenced.
-_REACH = 5e-3
-# Of data that depend on the position: motion over which they are differenced (lengths, rad), iterations, accuracy.
+_REACH = 5e-3  # largest motion (lengths, rad) over which queries are differenced
+# Data that depend on the position: motion over which they are differenced (lengths, rad), iterations, accuracy.
 _AHEAD, _FOLLOWED, _SETTLED = 1e-5, 50, 1e-7
 
 
 def sensitivity(path, query, parameters):
-    """Derivatives of a query of a path by numbers of its scene; see `Path.sensitivity`."""
+    """See `Path.sensitivity`."""
     if not callable(query):
         raise SceneError(f"query = {query!r}: expected a function of the path, lambda path: path.position('rod.end')")
     if not len(path):
@@ -63,10 +62,7 @@ def _numbers(value):
 
 
 def parameters_of(scene, given, critical=False):
-    """The `Parameter`s of a scene from one or several names or parameters.
-
-    Args:
-        critical: whether critical loads are differentiated by them.
+    """The `Parameter`s of a scene from one or several names or parameters; `critical`: of critical loads.
 
     Raises:
         SceneError: no such parameter, or loads whose derivatives are not known.
@@ -99,18 +95,12 @@ def _scenes_near(scene, parameter):
     return found
 
 
-def _same_plane(path):
-    axes = np.array(path.scene.plane.axes)
-    return lambda scene: scene.plane is not None and np.allclose(scene.plane.axes, axes, rtol=0, atol=1e-12)
-
-
 class Direct:
     """The direct method on one problem and path.
 
     Args:
-        problem, newton, stability: see `solvers_of`, loaded with the scene.
-        scene, layout: these.
-        parameters: the `Parameter`s; scenes: for each the scenes near by, see `_scenes_near`.
+        solvers: see `solvers_of`; scene, layout: of the loaded problem.
+        parameters: the `Parameter`s; scenes: see `_scenes_near`, for each.
 
     Attributes:
         points: [(load factor, numbers, `Record`)] of the states where derivatives are taken.
@@ -144,8 +134,9 @@ class Direct:
         """Context manager that gives the `Direct` of a path's mesh and model, in space where parameters move its
         plane."""
         scenes = [_scenes_near(path.scene, parameter) for parameter in parameters]
-        model = path.model
-        if model != "spatial" and path.scene.plane is not None and not all(map(_same_plane(path), sum(scenes, []))):
+        model, plane = path.model, path.scene.plane
+        near = [scene.plane for scene in sum(scenes, [])] if plane is not None else []
+        if not all(other is not None and np.allclose(other.axes, plane.axes, rtol=0, atol=1e-12) for other in near):
             model = "spatial"
         return cls.on(
             path.scene, path.layout, parameters, scenes, formulation=path.formulation, degree=path.degree,
@@ -241,19 +232,17 @@ class Direct:
         for scene in scenes:
             self._load(scene)
             data = self._by_data.data()
-            near.append([(self._refreshed(point, data), self._of_ties(point[0], point[1][0])) for point in self.points])
+            near.append([])
+            for point in self.points:
+                if self._refreshes:  # data that depend on the position
+                    self.put(point, point[1], 0.0)
+                    data = self._by_data.data()
+                near[-1].append((data, self._of_ties(point[0], point[1][0])))
         for at_point in zip(*near, strict=True):
             if whole is None or self._refreshes:
                 whole = [smooth(arrays) for arrays in zip(*(data for data, _ in at_point), strict=True)]
             found.append((whole, smooth([ties for _, ties in at_point])))
         return found
-
-    def _refreshed(self, point, data):
-        """The data at a point, where they depend on the position."""
-        if not self._refreshes:
-            return data
-        self.put(point, point[1], 0.0)
-        return self._by_data.data()
 
     def _of_ties(self, load_factor, x):
         problem, found = self.problem, np.zeros(self.problem.numbering.size)
@@ -280,8 +269,8 @@ class Direct:
         return found, clamped
 
     def _rate(self, data, of_ties):
-        """The change of the numbers with data and constraint equations; data that depend on the position follow it, by
-        iteration, where the tangent does not contain it; where it does, the first step changes nothing but rounding."""
+        """The change of the numbers with data and constraint equations; data that depend on the position follow by
+        iteration, since the tangent need not contain their change."""
         rate = self._response(*self.residual_change(data, of_ties))
         for _ in range(_FOLLOWED if self._refreshes else 0):
             moved = [a + b for a, b in zip(data, self._data_along(rate), strict=True)]
@@ -289,7 +278,7 @@ class Direct:
             if self.model.largest(rate[0] - before[0]) <= _SETTLED * self.model.largest(rate[0]):
                 return before
         if self._refreshes:
-            raise NotConverged("sensitivity: how the loads turn with the position did not converge")
+            raise NotConverged("sensitivity: the iteration for loads that turn with the position did not converge")
         return rate
 
     def _data_along(self, rate):

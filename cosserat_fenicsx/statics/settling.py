@@ -1,8 +1,8 @@
-"""A rod that is brought to rest against a wall: Newton's method from a state without contact, in stages.
+"""Bring a rod to rest against a wall by Newton's method, from a state without contact, in stages.
 
-Newton's method finds a contact only where it knows about which part of the rod touches which side. A soft spring to the
-axis in place of the wall gives a state that is right on the whole; the wall takes over while the spring goes, and is
-then made stiffer by tens, each time with the contact nearly known.
+Newton's method finds a contact only where it is known which part of the rod touches which side. A soft spring to the
+axis in place of the wall gives an approximate state; the wall then replaces the spring, and is made stiffer in factors
+of ten, each time with the contact nearly known.
 """
 
 import math
@@ -11,46 +11,42 @@ from cosserat_fenicsx.algebra.newton import LimitedNewton
 from cosserat_fenicsx.errors import NotConverged
 from cosserat_fenicsx.interrupts import obey
 
-#: From a state close to the solution, such as that of a coarser mesh: the wall as it is, or softer by ten before.
+#: Stages from a state close to the solution, such as the solution on a coarser mesh; first with a softer wall or not.
 LAST = ((1.0, 0.0, False),)
 LAST_TWO = ((0.1, 0.0, False), *LAST)
-#: The last stages of a start, from which follows how the solution depends on the wall's stiffness.
+#: The last stages of a start, which show how the solution depends on the wall's stiffness.
 DECADES = ((1e-2, 0.0, False), *LAST_TWO)
-#: From such a state where these fail.
+#: Stages from such a state where these fail.
 BACK = ((1e-3, 0.0, False), *DECADES)
-# The wall that takes over from the spring is so much stiffer; smallest spring over the wall's stiffness.
-_TAKES_OVER, _SOFTEST = 10.0, 1e-12
-# Powers of ten by which the spring fades before it is left out; factors of its steps and of those of the wall, usual
-# ones and small ones. (A spring that fades by ten at once lets a string with weight on bit buckle.)
+_TAKES_OVER = 10.0  # stiffness of the first wall over that of the spring
+_SOFTEST = 1e-12  # smallest stiffness of the spring, over the wall's
+# Powers of ten by which the spring fades before it is removed; factors of its steps and of those of the wall, usual and
+# small ones. (A spring that fades by ten at once lets a string with weight on bit buckle.)
 _FADED, _STEPS, _SMALL_STEPS = 2, (10.0 ** (2 / 3), 10.0), (2.0, 2.0)
-# Steps of a viscous motion at most; movement of a step that is wanted, over the clearance; bounds of the change of the
-# viscosity after a step, and of the viscosity, over the first one.
+# Steps of the viscous motion: largest number, intended movement over the clearance, bounds of the change of the
+# viscosity after a step, and bounds of the viscosity over the first one.
 _VISCOUS, _WANTED, _CHANGE, _BOUNDS = 300, 0.3, (0.5, 4.0), (1e-4, 30.0)
-# Longest displacement of a node in a Newton step, over the clearance, or over the longest rod, the unit of length; and
-# largest rotation, rad.
+# Newton step limits: displacement over the clearance, displacement over the longest rod, rotation (rad).
 _LONGEST, _OF_LENGTH, _WIDEST = 10.0, 1e-4, 0.5
-# A stage ends at a step below this share of the clearance: the first ones, those with full results (`careful`), the
-# last one, which is not asked for less than rounding allows, in the unit of length.
+# Step over the clearance at which a stage ends: first stages, stages with full results (`careful`), last stage; and the
+# rounding of a step, in the unit of length.
 _ROUGH, _CAREFUL, _ENOUGH, _ROUNDING = 0.1, 1e-7, 1e-8, 1e-13
-# Larger by this factor where the rod is free to turn as a whole: rounding does turn it.
-_FREE = 50.0
-# Newton steps of a stage.
-_MOST = 60
-# Newton's method alternates between two contacts where steps do not shrink by this factor, so many times: then a share
-# of a step is taken, which ends between the two.
+_FREE = 50.0  # factor on these where the rod is free to turn as a whole: rounding turns it
+_MOST = 60  # Newton steps of a stage
+# Newton's method alternates between two contacts where steps do not shrink by this factor, so many times; then shares
+# of steps are taken.
 _SLOW, _STALLED, _SHARES = 0.6, 2, (0.5, 0.35, 0.7)
-# Residual force of a node at equilibrium, over the norm of the loads.
-_BALANCED = 1e-6
+_BALANCED = 1e-6  # residual force of a node at equilibrium, over the norm of the loads
 
 
 def stages_from(spring, way="fast"):
-    """The stages of a start on the axis: (stiffness of the wall, of a spring to its axis, over the wall's own; whether
-    the rod moves as in a viscous fluid instead, see `_relax`), in turn.
+    """The stages of a start on the axis: tuples (stiffness of the wall, stiffness of a spring to its axis, both over
+    the wall's own; whether the rod moves as in a viscous fluid, see `_relax`).
 
     Args:
-        spring: the first spring, with which the loads move the rod by about the clearance.
+        spring: stiffness of the first spring, with which the loads move the rod by about the clearance.
         way: "fast"; "gentle", by small steps; "relaxed", for a rod that is compressed beyond its buckling load; or
-            "helix", for one that begins buckled, at the wall: the same without the spring to the axis.
+            "helix", for a rod that starts buckled, at the wall: as "relaxed", without the spring to the axis.
     """
     least = DECADES[0][0]
     spring = min(max(spring, _SOFTEST), least / _TAKES_OVER)
@@ -75,17 +71,16 @@ def settle(problem, walls, clearance, rounding, stages, careful=(), on_stage=Non
         walls: the `Stage`s of the scene's walls; they are left as in the last stage.
         clearance: smallest distance from the axis at which the rod touches, in the model's unit of length.
         rounding: residual force of a node that rounding may leave, in the model's unit of force.
-        stages: see `stages_from`. careful: indices of those that are to be solved more precisely.
-        on_stage: called with the index of each stage when it has been solved.
-        hold: for a rod that is free, or almost free, to turn as a whole, such as a helix in a straight tube: stiffness
-            over the wall's own of springs that lead to where it is, from step to step. They keep the tangent regular,
-            and bear nothing in the end.
+        stages: see `stages_from`. careful: indices of the stages to solve more precisely.
+        on_stage: called with the index of each solved stage.
+        hold: for a rod that is free, or almost free, to turn as a whole, such as a helix in a straight tube: stiffness,
+            over the wall's own, of springs to the last position. They keep the tangent regular, and vanish at rest.
 
     Returns:
         int: the number of Newton steps.
 
     Raises:
-        NotConverged: a stage was not solved, or what was found is no equilibrium.
+        NotConverged: a stage was not solved, or the result is no equilibrium.
     """
     newton = LimitedNewton(problem, max(_LONGEST * clearance, _OF_LENGTH), _WIDEST)
     for k, (stiffness, spring, viscous) in enumerate(stages):
@@ -127,7 +122,7 @@ def _solve_stage(newton, enough, name, walls, hold):
 
 
 def _fasten(newton, walls, stiffness):
-    """Springs to where the rod is, of a stiffness over the wall's own."""
+    """Attach springs, of a stiffness over the wall's own, to the rod's position."""
     newton.imbalance()  # with the rod's position
     for wall in walls:
         wall.fasten()
@@ -135,8 +130,8 @@ def _fasten(newton, walls, stiffness):
 
 
 def _relax(newton, walls, spring, clearance, name):
-    """Let the rod move as in a viscous fluid until it rests: at every step the spring leads to where the rod is, and so
-    resists the step alone. The steps are of an implicit scheme in time, of one Newton step each."""
+    """Let the rod move as in a viscous fluid until it rests, by an implicit scheme of one Newton step each: the spring
+    is attached to the rod's position at every step, so that it resists that step alone."""
     viscosity = spring
     for _ in range(_VISCOUS):
         obey()

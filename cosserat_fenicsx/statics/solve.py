@@ -109,16 +109,12 @@ def solve(
     check_magnitudes(scene, max(map(abs, load_factors)))
     if comm.rank == 0:
         scene.warn()
-    choice = choose(
-        scene,
-        model=model,
-        formulation=formulation,
-        degree=degree,
-        points=gauss_points,
-        follows=branch is not None or control == "arc",
-    )
+    discretised = {"formulation": formulation, "degree": degree, "points": gauss_points}
+    choice = choose(scene, model=model, follows=branch is not None or control == "arc", **discretised)
     steps = _STEPS if steps is None else instance("solve", "steps", steps, StepControl, "a StepControl")
-    follow, until = _follow_options(steps, control, branch), _until(until, free)
+    follow = _follow_options(steps, control, branch)
+    if until is not None and not (callable(until) and free):
+        raise SceneError("until: expected a function of the Path, with a pair of load factors (a, b)")
     if not steps.adaptive:
         _check_jumps(scene, load_factors)
     elif _turn(scene):
@@ -134,17 +130,9 @@ def solve(
         strayed = []
 
         @contextlib.contextmanager
-        def tracing(layout, *, from_rest=True):
-            with solvers_of(
-                scene,
-                layout,
-                formulation=formulation,
-                degree=degree,
-                points=gauss_points,
-                comm=comm,
-                model=choice.model,
-            ) as solvers:
-                tracer = Tracing(solvers, follow, choice, bar, from_rest=from_rest)
+        def tracing(layout):
+            with solvers_of(scene, layout, model=choice.model, comm=comm, **discretised) as solvers:
+                tracer = Tracing(solvers, follow, choice, bar)
                 if elements is None:
                     tracer.path.bounded, tracer.path.criteria = bounded
                 yield tracer
@@ -165,7 +153,7 @@ def solve(
         def correct(layout, coarse):
             if coarse.events or coarse.control == "arc" or not simple:
                 return None
-            with tracing(layout, from_rest=False) as tracer:
+            with tracing(layout) as tracer:
                 return tracer.corrected(coarse)
 
         if elements is not None:
@@ -184,14 +172,14 @@ def solve(
     path.why.extend(_not_located(path))
     if oscillates:
         path.why.append(
-            "with more Gauss points than the degree contact forces and moments oscillate inside elements: tol bounds "
+            "with more Gauss points than the degree, contact forces and moments oscillate inside elements: tol bounds "
             f"{' and '.join(f'{name}s' for name in bound)} alone"
         )
     return path
 
 
 def _not_located(path):
-    """Sentences on changes of the number of negative modes with fewer events than there must be."""
+    """Sentences on changes of the number of negative modes that the events do not explain."""
     # Planar models locate no events; under loads without a potential the number need not change at an event.
     if path.model != "spatial" or path.scene.follows:
         return
@@ -241,12 +229,6 @@ def _turn(scene):
     return max((math.hypot(*(getattr(x, "rotation", None) or (0.0,))) for x in scene.supports), default=0.0)
 
 
-def _until(until, free):
-    if until is not None and not (callable(until) and free):
-        raise SceneError("until: expected a function of the Path, with a pair of load factors (a, b)")
-    return until
-
-
 def _requested(load_factors):
     """([load factors], whether the solver may choose the steps between the two)."""
     if isinstance(load_factors, str) or (isinstance(load_factors, tuple) and len(load_factors) != 2):
@@ -287,7 +269,7 @@ def check_arguments(scene, tol, elements, bound=NAMES, *, owner="solve"):
 
 @per_scene
 def _check_static(scene):
-    """Refuse a scene that has no equilibrium to look for."""
+    """Refuse a scene without loads, or with parts that act in motions alone."""
     if not scene.loads and not any(isinstance(support, Prescribed) for support in scene.supports):
         raise SceneError(
             "Scene.loads is empty: expected at least one load, such as Force(rod.end, (0, 0, -1)), or a Prescribed "

@@ -5,6 +5,7 @@ dead moment in space is not conservative and makes the tangent unsymmetric; the 
 counted. In a plane model the second variation decouples into motions in the plane and motions out of it.
 """
 
+import contextlib
 import math
 from functools import cached_property
 
@@ -21,16 +22,13 @@ _LARGEST_ROW = PETSc.NormType.NORM_INFINITY
 
 
 class NegativeModes(Called):
-    """Counts the negative eigenvalues of the second variation at a problem's state.
-
-    Args:
-        problem: a `Problem`; its model carries the second variation, in parts.
+    """Counts the negative eigenvalues of the second variation at the state of a `Problem`.
 
     Attributes:
         parts: the `Part`s of the second variation.
         c: the C structure `second_variation`.
         sideways: of the last count, the number of negative eigenvalues of motions out of the plane; 0 in space.
-        logarithm: of the last count, that of the absolute value of the determinant; NaN with a neutral motion.
+        logarithm: of the absolute value of the determinant, of the last count; NaN with a neutral motion.
     """
 
     def __init__(self, problem):
@@ -59,15 +57,8 @@ class NegativeModes(Called):
         return part
 
     def count(self, *, neutral=False):
-        """Number of negative eigenvalues at the problem's state and load factor.
-
-        Args:
-            neutral: whether the eigenvalue nearest zero belongs to a neutral motion (one that leaves the energy as it
-                is) and is not counted.
-
-        Returns:
-            int, or -1 where the second variation is singular to rounding.
-        """
+        """Number of negative eigenvalues at the problem's state, or -1 where the second variation is singular to
+        rounding; `neutral`: without the eigenvalue nearest zero, of a motion that leaves the energy unchanged."""
         self.logarithm = math.nan
         if neutral:
             return self.whole.count_without_neutral()
@@ -78,16 +69,12 @@ class NegativeModes(Called):
 
 
 class Part:
-    """A diagonal block of the second variation, decoupled from the other blocks.
-
-    Args:
-        problem: a `Problem`.
-        index: of the part among its model's `second_variations`.
+    """A diagonal block of the second variation, decoupled from the others: one of its model's `second_variations`.
 
     Attributes:
         variation: the model's `SecondVariation`; form: its `Packed` form.
         elimination, interface: for counts; the latter None where nothing is to be added.
-        resistance: (tied unknowns,) the stiffnesses that springs in place of supports and joints were last scaled by.
+        resistance: (tied unknowns,) the last scales of the springs in place of supports and joints.
     """
 
     resistance = None
@@ -121,16 +108,10 @@ class Part:
         return pc
 
     def assemble(self, *, stress_alone=False):
-        """The second variation at the problem's state and load factor, in K.
-
-        Args:
-            stress_alone: geometric stiffness alone, without the stiffness of sections, supports and joints.
-        """
+        """Assemble the second variation at the problem's state and load factor in K; `stress_alone`: the geometric
+        stiffness, without the stiffness of sections, supports and joints."""
         self.K.zeroEntries()
-        if stress_alone:
-            with self.model.stress_alone():
-                self.form.add_to_matrix(self.K)
-        else:
+        with self.model.stress_alone() if stress_alone else contextlib.nullcontext():
             self.form.add_to_matrix(self.K)
         if self.problem.ties:
             if not stress_alone:
@@ -205,10 +186,7 @@ class Part:
         return abs(values[0]) < 1e-3 * abs(values[-1]) and abs(values[0]) < 30 * _ROUNDING * self.K.norm(_LARGEST_ROW)
 
     def eigenvalue(self, j):
-        """The j-th eigenvalue of the second variation at the problem's state, from 0 in ascending order.
-
-        Only eigenvalues near zero are cheap: all those between it and zero are computed.
-        """
+        """The j-th eigenvalue, from 0 in ascending order; all between it and zero are computed."""
         above = j - self.factor()  # 0: the smallest positive one, -1: the negative one nearest zero
         needed, side = (1 + above, 1) if above >= 0 else (-above, -1)
         values = self._nearest(needed, side)[0]
@@ -228,24 +206,15 @@ class Part:
         return np.array([vector.array_r.copy() for vector in vectors]).T
 
     def modes(self, count, side=0):
-        """The modes of the eigenvalues nearest zero, oriented by `oriented`.
-
-        Args:
-            count: number of modes.
-            side: 1 or -1 for positive or negative eigenvalues alone; 0 for both.
-
-        Returns:
-            Changes of the unknowns, arrays over the entries that this rank owns.
-        """
+        """The `oriented` modes of the eigenvalues nearest zero, changes of the unknowns (owned entries); side: 1 or -1
+        for positive or negative eigenvalues alone, 0 for both."""
         self.factor()
         return oriented(self.model, self._nearest(count, side)[1])
 
 
 def oriented(model, vectors):
-    """Modes of one eigenvalue as changes of the unknowns (owned entries), combined as by `orienting`.
-
-    The largest displacement of each is 1 (in the model's unit of length).
-    """
+    """Modes of one eigenvalue as changes of the unknowns (owned entries), combined by `orienting`, of the largest
+    displacement 1 (in the model's unit of length)."""
     if not vectors:  # the eigensolver has not converged
         return []
     modes = np.array([model.change_of(vector) for vector in vectors])
@@ -257,13 +226,10 @@ def oriented(model, vectors):
 
 
 def orienting(shapes):
-    """An orthogonal matrix (m, m) to combine the shapes of one eigenvalue by, in a way independent of the eigensolver.
+    """An orthogonal matrix (m, m) that makes the shapes (m, N, 3) of one eigenvalue independent of the eigensolver.
 
     The node with the largest displacement then moves along the first inertial axis possible, in the positive
-    direction, in the first shape alone; likewise for the remaining shapes. A single shape gets its sign thereby.
-
-    Args:
-        shapes: (m, N, 3) displacements of all nodes.
+    direction, in the first shape alone; likewise for the remaining shapes. This fixes the sign of a single shape.
     """
     whole = np.eye(len(shapes))
     for k in range(len(shapes)):
@@ -294,18 +260,14 @@ _TWIST = 1e-6
 
 
 def shapes_of(vectors, values, rows, length):
-    """Shapes of eigenvectors.
+    """(n, N, 6) displacements (m) and rotations (rad) of all nodes, of eigenvectors (n, size).
+
+    The largest displacement of each shape is 1, or its largest rotation times `length` where nothing is displaced.
+    Shapes of a multiple eigenvalue are combined by `orienting`.
 
     Args:
-        vectors: (n, size) eigenvectors in the numbering of the second variation.
-        values: (n,) their eigenvalues, in order.
-        rows: (N, 6) rows of all nodes, -1 where clamped, see `RodModel.rows_of_nodes`.
-        length: the model's unit of length, m.
-
-    Returns:
-        (n, N, 6) displacements (m) and rotations (rad) of all nodes: the largest displacement of each shape has length
-        1, or its largest rotation times `length` where nothing is displaced. Those of a multiple eigenvalue are
-        combined as by `orienting`.
+        vectors: in the numbering of the second variation; values: (n,) their eigenvalues, in order.
+        rows: see `RodModel.rows_of_nodes`; length: the model's unit of length, m.
     """
     found, first = np.zeros((len(vectors), *rows.shape)), 0
     if len(vectors):

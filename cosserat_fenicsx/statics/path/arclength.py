@@ -8,44 +8,26 @@ path is smooth in its arc length at limit points too.
 
 import itertools
 import math
-from dataclasses import dataclass
 
 from cosserat_fenicsx.interrupts import obey
+from cosserat_fenicsx.numerics import lagrange
 from cosserat_fenicsx.statics.path.events import UNEXPLAINED, Lost
-from cosserat_fenicsx.statics.path.track import LIMITS, bends, between, lagrange, step_control, through
+from cosserat_fenicsx.statics.path.track import LIMITS, bends, between, step_control, through
 
-
-@dataclass(frozen=True)
-class Steps:
-    """What steps of arc length are accepted, and what is recognised on the way.
-
-    Attributes:
-        bend, sure: largest distance of the corrected point from the predictor over the length of the step; the second
-            applies where the number of negative modes changes without a limit point: the step may have changed to
-            another branch.
-        beside, same: a closed path is recognised by a step that passes its first point at a distance below the first
-            number times the step's length, where the path itself passes at one below the second.
-        short, straight: a step that is shorter than the first number times the length of the path from the unloaded
-            state, and turns by less than the second (rad), is on the path whatever the number of negative modes.
-        met: largest relative difference of the load factors of two limit points that are the same one; its root for the
-            states.
-        excuses: number of plain steps in which negative modes may change without an event before their number is no
-            longer compared.
-        first: smallest first step, over the length of the path from the unloaded state.
-    """
-
-    bend: float = 0.4
-    sure: float = 0.1
-    beside: float = 0.1
-    same: float = 1e-4
-    short: float = 3e-3
-    straight: float = 0.05
-    met: float = 1e-7
-    excuses: int = 4
-    first: float = 0.02
-
-
-_STEPS = Steps()
+# Largest distance of the corrected point from the predictor over the length of the step; the second applies where the
+# number of negative modes changes without a limit point: the step may have changed to another branch.
+_BEND, _SURE = 0.4, 0.1
+# A closed path is recognised by a step that passes its first point at a distance below the first number times the
+# step's length, where the path itself passes at one below the second.
+_BESIDE, _SAME = 0.1, 1e-4
+# A step that is shorter than the first number times the length of the path from the unloaded state, and turns by less
+# than the second (rad), is on the path whatever the number of negative modes.
+_SHORT, _STRAIGHT = 3e-3, 0.05
+# Largest relative difference of the load factors of two limit points that are the same one; its root for the states.
+_MET = 1e-7
+# Plain steps in which negative modes may change without an event before their number is no longer compared.
+_EXCUSES = 4
+_FIRST = 0.02  # smallest first step, over the length of the path from the unloaded state
 _CLOSED = "the path is closed: it returned to an earlier point without reaching that load factor"
 # A path that has begun at the unloaded state returns to an earlier point only after passing that state again.
 _CHANGED = (
@@ -61,25 +43,25 @@ class ArcLength:
         track: a `Track`.
         control: a `StepControl`.
         locator: a `Locator` that finds the critical points and the load factor to land on between two points.
+        on_event: called with every `Crossing` on the way; the continuation ends there where it returns True.
     """
 
-    def __init__(self, track, control, locator):
-        self.track, self.control, self._locator = track, control, locator
+    def __init__(self, track, control, locator, on_event):
+        self.track, self.control, self._locator, self._on_event = track, control, locator, on_event
         self._step, self._branched = None, False
         self._lib, self._limits = step_control()
-        # Whether the number of negative modes may change in the next step otherwise than the critical points tell: the
-        # second variation that is counted has bounded stiffnesses, so that it may do so in a step that is plain. Where
-        # it has done so often, the number tells nothing about any step.
+        # Whether the number of negative modes may change in the next step without critical points: the second variation
+        # that is counted has bounded stiffnesses, so that this happens in plain steps, too. After a number of such
+        # steps the number is no longer compared.
         self._excused, self._excuses = False, 0
 
-    def to(self, load_factor, *, first=None, slope=None, on_step=None, on_event=None):
+    def to(self, load_factor, *, first=None, on_step=None):
         """Advance to the next point of the path with a load factor, solved at exactly that load factor.
 
         Args:
             load_factor: to land on.
-            first, slope: the first `PathPoint` on a branch, and dx/d eta there; None to stay on the path.
+            first: the first `PathPoint` on a branch, which `Track.on_plane` has just found; None to stay on the path.
             on_step: called with every accepted `PathPoint`, the last one included.
-            on_event: called with every `Crossing` on the way; the continuation ends there where it returns True.
 
         Returns:
             bool: False where the steps became too small or too many; the track's `failure` gives the reason.
@@ -88,7 +70,7 @@ class ArcLength:
         if first is None:
             self._set_out(load_factor)
         else:
-            self._branch_off(first, slope)
+            self._branch_off(first)
         begin, steps, limits, home = first, 0, [], first is not None or self._branched
         self._branched = home
         for _ in range(self.control.most_steps):
@@ -122,11 +104,11 @@ class ArcLength:
                     track.failure = _CHANGED
                     return track.restore()
                 limits += [crossing] * (crossing.kind == "limit")
-                if on_event and on_event(crossing):
+                if self._on_event(crossing):
                     track.restore()
                     return True
             self._accept(landing or point, point)
-            self._excused = self._excuses > _STEPS.excuses
+            self._excused = self._excuses > _EXCUSES
             if on_step:
                 on_step(track.here)
             if landing is not None:
@@ -137,11 +119,7 @@ class ArcLength:
     def _plain(self, point):
         """Whether a step is so short and straight that it cannot have changed to another path."""
         found = bends(self.track, self.track.here, point, self._weight)
-        return (
-            found.length < _STEPS.short * self._scale
-            and found.turn < _STEPS.straight
-            and found.corner < _STEPS.straight / 10
-        )
+        return found.length < _SHORT * self._scale and found.turn < _STRAIGHT and found.corner < _STRAIGHT / 10
 
     def _accept(self, point, end):
         """Accept a point, within the step from the last point to `end` or at its end."""
@@ -170,12 +148,12 @@ class ArcLength:
         track.set_tangent(here, slope, between(before, here), self._weight)
         last = self._length(before, here)
         self._scale = self._length(track.origin, here) or last
-        self._step = min(max(last, _STEPS.first * self._scale), 0.1 * self._scale)
+        self._step = min(max(last, _FIRST * self._scale), 0.1 * self._scale)
 
-    def _branch_off(self, first, slope):
+    def _branch_off(self, first):
         """Choose weight, direction and first step where the last point is a bifurcation."""
         track = self.track
-        here = track.here
+        here, slope = track.here, track.bordered.slope
         self._weigh(slope)
         track.set_tangent(first, slope, between(here, first), self._weight)
         here.rise = 0.0
@@ -190,10 +168,8 @@ class ArcLength:
         self._weight = self._weight or 1.0
 
     def _weigh_less(self):
-        """Reduce the weight of the load factor where the path is stiffer than before.
-
-        Otherwise the load factor would dominate the metric, and a limit point would be a sharp bend of the path.
-        """
+        """Reduce the weight of the load factor where the path is stiffer than before; else it would dominate the
+        metric, in which a limit point would be a sharp bend."""
         track = self.track
         here, weight = track.here, self._weight
         if not here.rise:
@@ -207,11 +183,8 @@ class ArcLength:
             self._scale *= shrunk
 
     def _passes(self, place, a, b):
-        """Whether the step from a to b passes through an earlier point of the path, in the path's direction there.
-
-        The path is solved for in the plane through that point, perpendicular to its direction: it must be the same
-        state under the same load factor, with as many negative modes.
-        """
+        """Whether the step from a to b passes through an earlier point of the path, in the path's direction there: the
+        solution in the plane through that point, perpendicular to the path, must be the same state."""
         track, w = self.track, self._weight
         chord, tangent = between(a, b), (place.along, place.rise)
         onward = track.dot(tangent, chord, w)
@@ -221,7 +194,7 @@ class ArcLength:
         guess = [u + share * (v - u) for u, v in zip(a.numbers, b.numbers, strict=True)]
         solved = track.on_plane(guess, a.load_factor + share * chord[1], place.along, w * place.rise)
         off = track.problem.numbers()[0] - place.numbers[0], track.problem.load_factor - place.load_factor
-        same = solved.converged and track.length(off, w) <= _STEPS.same * track.length(chord, w)
+        same = solved.converged and track.length(off, w) <= _SAME * track.length(chord, w)
         return same and track.point(solved).negative_modes == place.negative_modes
 
     def _share(self, place, a, b):
@@ -230,14 +203,14 @@ class ArcLength:
         chord, moved = between(a, b), between(a, place)
         size, along = track.dot(chord, chord, w), track.dot(moved, chord, w)
         beside = track.dot(moved, moved, w) - along**2 / size
-        return along / size if 0 <= along < size and beside < (_STEPS.beside**2) * size else None
+        return along / size if 0 <= along < size and beside < (_BESIDE**2) * size else None
 
     def _again(self, limit, other):
         """Whether two limit points are the same one, passed in the same direction."""
         track, a, b = self.track, limit.point, other.point
         apart = track.distance(a.numbers, b.numbers)
-        near = abs(a.load_factor - b.load_factor) <= _STEPS.met * max(abs(a.load_factor), abs(b.load_factor))
-        return near and apart <= _STEPS.met**0.5 and track.product(limit.direction, other.direction) > 0
+        near = abs(a.load_factor - b.load_factor) <= _MET * max(abs(a.load_factor), abs(b.load_factor))
+        return near and apart <= _MET**0.5 and track.product(limit.direction, other.direction) > 0
 
     def _length(self, a, b):
         return self.track.length(between(a, b), self._weight)
@@ -282,18 +255,18 @@ class ArcLength:
         off = track.distance(numbers, predicted)
         bend = track.length((numbers[0] - predicted[0], found - load_factor), self._weight) / length
         order = len(track.history) + 1
-        if off > LIMITS.far or bend > _STEPS.bend:
+        if off > LIMITS.far or bend > _BEND:
             track.failure = "the path bends too sharply"
             return self._shorten()
         point = track.point(solved)
-        track.set_tangent(point, track.slope_found(), between(here, point), self._weight)
+        track.set_tangent(point, track.bordered.slope, between(here, point), self._weight)
         if not bends(track, here, point, self._weight).resolved:
             track.failure = "the path bends too sharply"
             return self._shorten()
-        if point.negative_modes != here.negative_modes and point.rise * here.rise > 0 and bend > _STEPS.sure:
+        if point.negative_modes != here.negative_modes and point.rise * here.rise > 0 and bend > _SURE:
             track.failure = "the step crossed a point where stability changes"
             return self._shorten()
-        off = max(off, LIMITS.intended / _STEPS.sure * bend)
+        off = max(off, LIMITS.intended / _SURE * bend)
         growth = self._lib.step_growth(self._limits, off, order, solved.iterations)
         self._step = max(self._step, length * growth) if growth >= 1 else length * growth
         return point

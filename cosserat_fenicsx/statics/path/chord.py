@@ -6,50 +6,29 @@ coordinate is found by Newton's method in the plane perpendicular to the chord t
 
 import itertools
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
-from cosserat_fenicsx.statics.path.track import bends, between, lagrange, through
+from cosserat_fenicsx.numerics import lagrange
+from cosserat_fenicsx.statics.path.track import bends, between, through
 
-
-@dataclass(frozen=True)
-class Search:
-    """How critical points are searched for along a chord.
-
-    Attributes:
-        fine, most: relative accuracy of the load factor at which a search ends, and its largest number of iterations.
-        probes: coordinates at which a step is checked for negative modes that appear and vanish within it.
-        varies: largest change of the determinant within a step in which no eigenvalue comes close to zero.
-        nearly: largest imaginary part of the roots of a determinant that almost vanishes, and their largest distance
-            from the step, over its length.
-        often: number of iterations after which the bracket of a root is bisected instead of interpolated.
-        beside, steep: distances on both sides of a critical point at which the path is solved for, and the largest
-            length between these two points, over their distance along the chord.
-        astride: largest distance of the direction between these two points from the mean of their tangents, over the
-            angle between the tangents; on a smooth path it is of second order in their distance, while points beside
-            each other with parallel tangents lie on two paths.
-        rounding: how far they are beside each other by rounding, times their distance (rad, rod lengths): Newton's
-            method loses accuracy along the mode in inverse proportion to that.
-        apart: smallest distance of the coordinates of two interpolation points.
-        aside: offsets of the coordinate, tried in turn until Newton's method converges.
-    """
-
-    fine: float = 1e-8
-    most: int = 25
-    probes: tuple = (1 / 3, 2 / 3)
-    varies: float = 4.0
-    nearly: float = 0.35
-    often: int = 6
-    beside: tuple = (1e-3, 1e-4)
-    steep: float = 2.0
-    astride: float = 0.1
-    rounding: float = 1e-9
-    apart: float = 1e-5
-    aside: tuple = (0.0, 1e-3, -1e-3, 1e-2, -1e-2)
-
-
-_SEARCH = Search()
+# Relative accuracy of the load factor at which a search ends, and its most iterations; number of iterations after which
+# the bracket is bisected instead of interpolated.
+_FINE, _MOST, _OFTEN = 1e-8, 25, 6
+_PROBES = 1 / 3, 2 / 3  # coordinates at which a step is checked for negative modes that appear and vanish within it
+_VARIES = 4.0  # largest change of the determinant within a step in which no eigenvalue comes close to zero
+# Largest imaginary part of the roots of a determinant that almost vanishes, and distance from the step over its length.
+_NEARLY = 0.35
+# Distances on both sides of a critical point at which the path is solved for; largest length between these two points,
+# over their distance along the chord.
+_BESIDE, _STEEP = (1e-3, 1e-4), 2.0
+# Largest distance of the direction between these two points from the mean of their tangents, over the angle between the
+# tangents: on a smooth path it is of second order in their distance, while points beside each other with parallel
+# tangents lie on two paths. How far they are beside each other by rounding, times their distance (rad, rod lengths):
+# Newton's method loses accuracy along the mode in inverse proportion to that.
+_ASTRIDE, _ROUNDING = 0.1, 1e-9
+_APART = 1e-5  # smallest distance of the coordinates of two interpolation points
+_ASIDE = 0.0, 1e-3, -1e-3, 1e-2, -1e-2  # offsets of the coordinate, tried in turn until Newton's method converges
 
 
 class Chord:
@@ -65,7 +44,7 @@ class Chord:
         dips: whether the determinant of the second variation almost vanishes between, more often than the number of
             negative modes changes: two eigenvalues that change their signs together, in opposite directions, change
             neither that number nor the determinant's sign.
-        varies: whether the determinant changes by more than a factor of `_SEARCH.varies`.
+        varies: whether the determinant changes by more than a factor of `_VARIES`.
     """
 
     dips = varies = False
@@ -109,7 +88,7 @@ class Chord:
 
         Bordered solves lose accuracy very close to a singular tangent; there a point slightly beside it is taken.
         """
-        for aside in _SEARCH.aside:
+        for aside in _ASIDE:
             point = self._point(place + aside)
             if point is not None:
                 return place + aside, point
@@ -120,51 +99,47 @@ class Chord:
         solved = track.on_plane(*self.guess(place), self.normal, self._weight * self.change)
         if not solved.converged:
             return None
-        slope = track.slope_found()
         point = track.point(solved)
-        track.set_tangent(point, slope, self._step, self._weight)
+        track.set_tangent(point, track.bordered.slope, self._step, self._weight)
         self.known = sorted([*self.known, (place, point)], key=lambda item: item[0])
         return point
 
     def comes_and_goes(self):
-        """A coordinate where the number of negative modes is outside the range of its end values, or not monotonic.
-
-        It is counted at interpolated states; None where it is monotonic along the segment. Sets `dips`.
-        """
+        """A coordinate where the number of negative modes, counted at interpolated states, is not monotonic; None
+        where it is. Sets `dips` and `varies`."""
         track, (_, a), (_, b) = self.track, self.known[0], self.known[-1]
         counts, logarithms = [a.negative_modes], [a.logarithm]
-        for place in _SEARCH.probes:
+        for place in _PROBES:
             track.put(*self.guess(place))
             counts.append(track.stability.count(neutral=track.neutral is not None))
             logarithms.append(track.stability.logarithm)
         counts.append(b.negative_modes)
         logarithms.append(b.logarithm)
         self.dips = track.model.carries_force and _dips(counts, logarithms)
-        self.varies = not max(logarithms) - min(logarithms) <= math.log(_SEARCH.varies)
+        self.varies = not max(logarithms) - min(logarithms) <= math.log(_VARIES)
         changes = np.diff(counts)
         if min(counts) < 0 or (changes >= 0).all() or (changes <= 0).all():
             return None
-        return _SEARCH.probes[int(np.flatnonzero(changes)[0])]
+        return _PROBES[int(np.flatnonzero(changes)[0])]
 
     def passes(self, place, *, turning):
-        """Whether the path passes smoothly through a coordinate.
+        """Whether the path passes smoothly through a coordinate, by points close to it on both sides.
 
-        By points of the path that are solved for close to it on both sides. Where an imperfect structure turns off
-        before the bifurcation of the perfect one, these lie on two paths, or on both sides of a limit point.
+        Where an imperfect structure turns away before the bifurcation of the perfect one, these lie on two paths, or on
+        both sides of a limit point.
 
         Args:
-            place: the coordinate.
-            turning: whether the load factor turns there; else it is monotonic.
+            place: the coordinate; turning: whether the load factor has an extremum there.
         """
         if self._short:  # points at these distances would differ by little more than rounding
             return True
-        for apart in _SEARCH.beside:
+        for apart in _BESIDE:
             before, after = (self._point(place + aside) for aside in (-apart, apart))
             if before is None or after is None or (before.rise * after.rise < 0) != turning:
                 continue
             steep = bends(self.track, before, after, self._weight)
-            if steep.resolved and steep.length <= _SEARCH.steep * 2 * apart * self.length:
-                return (steep.corner - _SEARCH.astride * steep.turn) * steep.length**2 <= _SEARCH.rounding
+            if steep.resolved and steep.length <= _STEEP * 2 * apart * self.length:
+                return (steep.corner - _ASTRIDE * steep.turn) * steep.length**2 <= _ROUNDING
         return False
 
     def neighbours(self, place):
@@ -194,20 +169,20 @@ class Chord:
         middle = 0.5 if near is None else near
         low, high = min(changes, key=lambda ends: abs(ends[0] + ends[1] - 2 * middle))
         place, estimate, halve = middle, None, False
-        for k in range(1, _SEARCH.most):
+        for k in range(1, _MOST):
             places = _nearest(values, place, always=(low, high))
             place = _zero(places, [values[at] for at in places], low, high)
             load_factor = self.load_factor(place)
-            fine = _SEARCH.fine * max(abs(load_factor), abs(self.change))
+            fine = _FINE * max(abs(load_factor), abs(self.change))
             settled = estimate is not None and abs(load_factor - estimate) <= fine
-            known = min(abs(place - at) for at in values) < _SEARCH.apart
-            if settled or (known and high - low < 4 * _SEARCH.apart):
+            known = min(abs(place - at) for at in values) < _APART
+            if settled or (known and high - low < 4 * _APART):
                 break
             estimate, look = load_factor, place
-            if halve or k % _SEARCH.often == 0:
+            if halve or k % _OFTEN == 0:
                 look, halve = (low + high) / 2, False
             elif known:
-                look, halve = place + math.copysign(2 * _SEARCH.apart, low + high - 2 * place), True
+                look, halve = place + math.copysign(2 * _APART, low + high - 2 * place), True
             found = self.at(look)
             if found is None:
                 break
@@ -218,7 +193,7 @@ class Chord:
                 low = max(low, found[0])
             else:
                 high = min(high, found[0])
-            halve = halve and high - low > 4 * _SEARCH.apart
+            halve = halve and high - low > 4 * _APART
         return place
 
 
@@ -226,7 +201,7 @@ def _nearest(places, place, always=()):
     """The coordinates `always`, and up to four others nearest to a coordinate, at least `apart` from one another."""
     chosen = list(always)
     for at in sorted(places, key=lambda at: abs(at - place)):
-        if len(chosen) < 4 + len(always) and all(abs(at - other) >= _SEARCH.apart for other in chosen):
+        if len(chosen) < 4 + len(always) and all(abs(at - other) >= _APART for other in chosen):
             chosen.append(at)
     return chosen
 
@@ -236,8 +211,8 @@ def _dips(counts, logarithms):
     if min(counts) < 0 or not np.isfinite(logarithms).all():
         return False
     values = (-1.0) ** np.array(counts) * np.exp(np.array(logarithms) - max(logarithms))
-    roots = np.roots(np.polyfit([0.0, *_SEARCH.probes, 1.0], values, 3))
-    near = roots[(np.abs(roots.real - 0.5) < 0.5 + _SEARCH.nearly) & (np.abs(roots.imag) < _SEARCH.nearly)]
+    roots = np.roots(np.polyfit([0.0, *_PROBES, 1.0], values, 3))
+    near = roots[(np.abs(roots.real - 0.5) < 0.5 + _NEARLY) & (np.abs(roots.imag) < _NEARLY)]
     return len(near) > 1 + int((np.diff(np.sign(values)) != 0).sum())
 
 

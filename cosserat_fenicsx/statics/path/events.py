@@ -16,38 +16,22 @@ import numpy as np
 from cosserat_fenicsx.statics.path.chord import Chord, zero_of
 from cosserat_fenicsx.statics.path.track import PathPoint
 
-
-@dataclass(frozen=True)
-class Tolerances:
-    """What is one event, and what is none.
-
-    Attributes:
-        same: two eigenvalues vanish at the same point where one is below this times its size at the ends of the chord
-            while the other vanishes.
-        most: largest number of iterations for a requested load factor.
-        singular: largest residual of an event, see `Crossing`.
-        alike, one_place: two events are the same where the cosine of their null vectors is above the first number and
-            their coordinates on the chord differ by less than the second.
-        level: relative difference of two load factors that may be rounding.
-        bordered: largest change of the logarithm of the bordered tangent's determinant within a step without a
-            bifurcation.
-    """
-
-    same: float = 1e-5
-    most: int = 25
-    singular: float = 1e-5
-    alike: float = 0.7
-    one_place: float = 1e-2
-    level: float = 1e-10
-    bordered: float = math.log(30.0)
-
-
-_TOLERANCES = Tolerances()
+# Two eigenvalues vanish at the same point where one is below this times its size at the ends of the chord while the
+# other vanishes.
+_SAME = 1e-5
+_MOST = 25  # iterations for a requested load factor
+_SINGULAR = 1e-5  # largest residual of an event, see `Crossing`
+# Two events are the same where the cosine of their null vectors is above the first number and their coordinates on the
+# chord differ by less than the second.
+_ALIKE, _ONE_PLACE = 0.7, 1e-2
+_LEVEL = 1e-10  # relative difference of two load factors that may be rounding
+# Largest change of the logarithm of the bordered tangent's determinant within a step without a bifurcation.
+_BORDERED = math.log(30.0)
 #: Why a step is shortened, in words.
-UNEXPLAINED = "the number of negative modes changes otherwise than the critical points that were located tell"
-NEARLY = "two modes are almost neutral together"
+UNEXPLAINED = "the number of negative modes does not change as the located critical points require"
+NEARLY = "two modes are almost neutral at once"
 EXCHANGED = "a negative mode is exchanged for another one"
-ASIDE = "the path turns off just before the tangent becomes singular"
+ASIDE = "the path turns away just before the tangent becomes singular"
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,7 +89,7 @@ class Locator:
             load_factor: to land on.
             weight: of the load factor in the metric.
             probe: whether to check for negative modes that appear and vanish between them.
-            explained: whether the number of negative modes must change as the critical points tell.
+            explained: whether the number of negative modes must change as the critical points require.
             short: whether the step is too short to lead to another path unnoticed.
 
         Returns:
@@ -114,7 +98,7 @@ class Locator:
 
         Raises:
             Lost: the point to land on was not found, negative modes appear and vanish between a and b, or their number
-                changes otherwise than the critical points tell.
+                does not change as the critical points require.
         """
         chord = Chord(self.track, a, b, weight, short=short)
         place = chord.comes_and_goes() if probe else None
@@ -144,17 +128,14 @@ class Locator:
         """Whether two points agree with the critical points between them.
 
         The load factor turns at a limit point alone, and elsewhere changes in the direction of the path. Each critical
-        point changes the number of negative modes by one; under loads without a potential the number tells nothing
-        about them.
+        point changes the number of negative modes by one, unless the loads have no potential.
         """
         limits = [crossing.point for crossing in crossings if crossing.kind == "limit"]
         if (a.rise * b.rise < 0) != bool(limits):
             return False
         parts = [(a, limits[0], a.rise), (limits[0], b, b.rise)] if limits else [(a, b, a.rise)]
         for begin, end, rise in parts:
-            if (end.load_factor - begin.load_factor) * math.copysign(1.0, rise) < -_TOLERANCES.level * abs(
-                end.load_factor
-            ):
+            if (end.load_factor - begin.load_factor) * math.copysign(1.0, rise) < -_LEVEL * abs(end.load_factor):
                 return False
         return self.counts_agree(a, b, crossings)
 
@@ -174,7 +155,7 @@ class Locator:
         """
         limits = self.limits(chord) if limits is None else limits
         found = [*limits, *self.bifurcations(chord, limits)]
-        return _in_order([crossing for crossing in found if crossing.residual <= _TOLERANCES.singular])
+        return _in_order([crossing for crossing in found if crossing.residual <= _SINGULAR])
 
     def limits(self, chord):
         """[the `Crossing` at the extremum of the load factor], whatever its residual; an empty list without one.
@@ -210,7 +191,7 @@ class Locator:
             place = chord.root(lambda at, v=motion: self.track.response(at.numbers, at.load_factor, v)[0], near)
             if place is not None:
                 here = self._singular("bifurcation", chord, place, modes)
-                here = [x for x in here if x.residual <= _TOLERANCES.singular and not self._known(x, (*limits, *found))]
+                here = [x for x in here if x.residual <= _SINGULAR and not self._known(x, (*limits, *found))]
                 if here and not chord.passes(place, turning=False):
                     raise Lost(0.5, ASIDE)
                 found += here
@@ -218,8 +199,8 @@ class Locator:
 
     def _known(self, crossing, others):
         """Whether one of other `Crossing`s has the same null vector at the same point."""
-        near = [other for other in others if abs(other.place - crossing.place) < _TOLERANCES.one_place]
-        return any(abs(self.track.work(other.null, crossing.null)) > _TOLERANCES.alike for other in near)
+        near = [other for other in others if abs(other.place - crossing.place) < _ONE_PLACE]
+        return any(abs(self.track.bordered.work(other.null, crossing.null)) > _ALIKE for other in near)
 
     def _by_count(self, chord, counts, limits):
         """(coordinate, `PathPoint`, modes) of the eigenvalues of the second variation that change their sign.
@@ -270,8 +251,8 @@ class Locator:
         """The modes whose eigenvalues change sign at a coordinate.
 
         In a structure with a very soft member other eigenvalues may be as close to zero. Then the mode is taken from
-        the nearest point where its eigenvalue is negative, also by the factors that give modes: next to a singular
-        point, rounding may hide from them what the count has found.
+        the nearest point where its eigenvalue is negative by the count and by the factors that give modes, which
+        differ by rounding next to a singular point.
         """
         track, stability = self.track, self.track.stability.whole
         track.put(point.numbers, point.load_factor)
@@ -311,7 +292,7 @@ class Locator:
         together = 1
         while j + together < last:
             ends = max(abs(eigenvalue(end, j + together)) for _, end in (chord.known[0], chord.known[-1]))
-            if abs(eigenvalue(point, j + together)) > _TOLERANCES.same * ends:
+            if abs(eigenvalue(point, j + together)) > _SAME * ends:
                 break
             together += 1
         return place, point, together
@@ -319,7 +300,7 @@ class Locator:
     def _land(self, chord, low, high, before, after, load_factor):
         """(coordinate, `PathPoint`) at a load factor between two coordinates, by Newton's method."""
         track = self.track
-        for _ in range(_TOLERANCES.most):
+        for _ in range(_MOST):
             place = zero_of(lambda at: chord.load_factor(at) - load_factor, low, high)
             predicted, _ = chord.guess(place)
             solved = track.at_load(predicted, load_factor)
@@ -342,13 +323,12 @@ class Locator:
 
 
 def _near_bifurcation(a, b):
-    """Whether the tangent bordered with the path's direction comes close to singular at one of two points, or not from
-    the other one's distance: its determinant, that of the tangent over the rise of the load factor, is regular at limit
-    points."""
+    """Whether a bifurcation is close to one of two points: the determinant of the tangent bordered with the path's
+    direction, which is the tangent's over the rise of the load factor, changes much; at limit points it is regular."""
     if not a.rise or not b.rise:
         return False
     change = b.logarithm - a.logarithm - math.log(abs(b.rise / a.rise))
-    return abs(change) > _TOLERANCES.bordered  # not where it is unknown
+    return abs(change) > _BORDERED  # not where it is unknown
 
 
 def _in_order(crossings):

@@ -25,8 +25,8 @@ def standing(problem, newton, stability, load_factor):
         NotConverged: no equilibrium was found there.
     """
     follower = Follower(problem, newton, stability, StepControl(), control="load")
-    follower.begin()
-    if load_factor and not follower.to(load_factor, abs(load_factor)):
+    follower.begin([load_factor])
+    if load_factor and not follower.to(load_factor):
         raise NotConverged(f"no equilibrium was found at the load factor {load_factor:g}: {follower.track.failure}")
     return follower.track
 
@@ -41,7 +41,6 @@ class Follower:
         control: "auto", "load" or "arc".
         branch: 1 or -1 to leave the path at the first bifurcation; 0 to stay on it.
         on_event: called with every `Crossing`.
-        from_rest: see `Track`.
 
     Attributes:
         track: the `Track`.
@@ -49,15 +48,15 @@ class Follower:
         used: "arc" once arc length was used, else "load".
     """
 
-    def __init__(self, problem, newton, stability, steps, *, control="auto", branch=0, on_event=None, from_rest=True):
+    def __init__(self, problem, newton, stability, steps, *, control="auto", branch=0, on_event=None):
         most = steps.max_iterations or (10 if problem.model.carries_force else 30)
-        self.track = Track(problem, newton, stability, most, from_rest=from_rest)
-        self._steps, self._control, self._branch, self._on_event = steps, control, branch, on_event
-        self._sign = branch
+        self.track = Track(problem, newton, stability, most)
+        self._steps, self._control, self._on_event = steps, control, on_event
+        self._branch = self._sign = branch
         self._load = Continuation(self.track, steps, self._watch)
         self._auto = control == "auto" and steps.adaptive
         self.fork, self.left, self.used = None, False, "load"
-        self._begun, self._sweep = False, None
+        self._sweep = None
 
     @cached_property
     def locator(self):
@@ -66,45 +65,44 @@ class Follower:
 
     @cached_property
     def _arc(self):
-        return ArcLength(self.track, self._steps, self.locator)
+        return ArcLength(self.track, self._steps, self.locator, self._meet)
 
     @property
     def smallest(self):
-        """The smallest step of the load factor that was allowed on the way to the last load factor."""
+        """The smallest step of the load factor that was allowed."""
         return self._load.c.smallest
 
-    def begin(self):
-        """Apply the permanent loads in steps and solve for the equilibrium at load factor 0; once, at the first call.
+    def begin(self, load_factors):
+        """Begin the path at the problem's state: apply the permanent loads in steps, and solve at load factor 0.
+
+        Args:
+            load_factors: of the path to follow.
 
         Raises:
             NotConverged: no equilibrium was found.
         """
         problem, track = self.track.problem, self.track
-        kinds = problem.model.signature.terms if not self._begun else ()
-        self._begun = True
+        self._load.reach = float(max(map(abs, load_factors))) or 1.0
+        track.begin_here()
         if problem.begins:
-            if track.history:
-                steps = replace(self._steps, first=None, largest=None, adaptive=True)
-                if not Continuation(track, steps).to(1.0, 1.0):
-                    share = track.here.load_factor
-                    raise NotConverged(
-                        f"no equilibrium under the permanent loads was found beyond {share:.3g} of them: "
-                        f"{track.failure}"
-                    )
+            steps = replace(self._steps, first=None, largest=None, adaptive=True)
+            if not Continuation(track, steps).to(1.0):
+                raise NotConverged(
+                    f"no equilibrium under the permanent loads was found beyond {track.here.load_factor:.3g} of them: "
+                    f"{track.failure}"
+                )
             problem.end_beginning()
-            if track.history:
-                track.begin_here()
-        if track.history and any(kind.scaled == "full" for kind in kinds):
+            track.begin_here()
+        if any(kind.scaled == "full" for kind in problem.model.signature.terms):
             if not track.at_load(track.here.numbers, 0.0).converged:
                 raise NotConverged(f"no equilibrium was found at the load factor 0: {track.failure}")
             track.begin_here()
 
-    def to(self, load_factor, way, *, on_step=None, once=False):
-        """Advance to a load factor, which is reached exactly.
+    def to(self, load_factor, *, on_step=None, once=False):
+        """Advance to a load factor, which is reached exactly; the path has begun.
 
         Args:
             load_factor: to reach.
-            way: range of the load factor over the whole path, to which steps of the load factor are relative.
             on_step: called with every accepted `PathPoint`.
             once: whether to return after the first accepted step of load control.
 
@@ -112,17 +110,15 @@ class Follower:
             bool: False where the path could not be continued; `track.failure` gives the reason, and the state is that
             of `track.here`.
         """
-        self.begin()
         track, here = self.track, self.track.here
-        done = self._advance(load_factor, way, on_step, once)
+        done = self._advance(load_factor, on_step, once)
         if self.fork and not self.left:
             self.left, self._branch, self.used = True, 0, "arc"
             first = self._onto(self.fork)
             if first is not None:
-                slope = track.slope_found()
-                done = self._arc.to(load_factor, first=first, slope=slope, on_step=on_step, on_event=self._meet)
+                done = self._arc.to(load_factor, first=first, on_step=on_step)
         if not done and self._auto and track.here is here:  # arc length made no step: load control down to its smallest
-            return self._load.to(load_factor, way, on_step=on_step)
+            return self._load.to(load_factor, on_step=on_step)
         if done and self.used == "arc" and len(track.history) > 1:
             before, here = track.history[-2:]
             self._load.c.step = abs(here.load_factor - before.load_factor)
@@ -130,8 +126,8 @@ class Follower:
 
     @property
     def sweeps(self):
-        """Whether steps from here on may be taken in C (`Sweep`): load control of one process, where Python has no say
-        in a step that is accepted."""
+        """Whether the next steps may be taken in C (`Sweep`): load control of one process, without Python code in
+        accepted steps."""
         track, model = self.track, self.track.model
         unsure = track.here.negative_modes and track.without_potential
         return (
@@ -139,28 +135,27 @@ class Follower:
             and not (unsure or model.actions.memory or model.signature.lives_along_rods)
         )  # fmt: skip
 
-    def sweep(self, load_factors, way, fields, *, every, counted):
-        """Advance as far as steps are accepted at once, see `Sweep.along`; the path has begun."""
-        self._load.begin(way)
+    def sweep(self, load_factors, fields, *, every, counted):
+        """`Sweep.along` from the last point, after `begin`."""
+        self._load.begin()
         if self._sweep is None:
             self._sweep = Sweep(self.track, fields)
         return self._sweep.along(load_factors, self._load, _PATIENCE, every=every, counted=counted)
 
-    def to_fork(self, load_factor, way):
+    def to_fork(self, load_factor):
         """Advance towards a load factor up to the first bifurcation; whether one was found."""
-        self.begin()
-        self._advance(load_factor, way, None)
+        self._advance(load_factor, None)
         return self.fork is not None
 
-    def _advance(self, load_factor, way, on_step, once=False):
+    def _advance(self, load_factor, on_step, once=False):
         """Advance to the load factor; False where the path fails or is to be left for a branch before."""
         if self._control != "arc":
             patience = _PATIENCE if self._auto else None
-            done = self._load.to(load_factor, way, on_step=on_step, patience=patience, once=once)
+            done = self._load.to(load_factor, on_step=on_step, patience=patience, once=once)
             if done or not self._auto or (self.fork and not self.left):
                 return done
         self.used = "arc"
-        return self._arc.to(load_factor, on_step=on_step, on_event=self._meet)
+        return self._arc.to(load_factor, on_step=on_step)
 
     def _meet(self, crossing):
         """Report a `Crossing`; True where the path is to be left there."""
@@ -191,10 +186,8 @@ class Follower:
         return not any(self._meet(crossing) for crossing in crossings)
 
     def _onto(self, fork):
-        """The first `PathPoint` on the branch at a bifurcation, or None where none is found.
-
-        The point is displaced along the mode, and corrected in the plane perpendicular to the mode.
-        """
+        """The first `PathPoint` on the branch at a bifurcation, displaced along the mode and corrected in the plane
+        perpendicular to it; None where none is found."""
         track = self.track
         base = fork.point
         track.history = [base]

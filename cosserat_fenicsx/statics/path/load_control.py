@@ -3,7 +3,7 @@
 A slender rod has several equilibria under one load, and Newton's method from the straight state often converges to an
 unstable one (the eccentric column jumps to the opposite side in one step at eta = 1.1). So a step is accepted only if
 Newton's method converged near the predictor, not against its direction, and if no new negative mode appeared. A
-negative mode that appears in steps of a thousandth of the way too is one of the path, which has lost its stability.
+negative mode that appears in steps of a thousandth of the path too is one of the path, which has lost its stability.
 
 `Sweep` advances in C (algebra/sweep.c) as long as every step is accepted at once, or halved.
 """
@@ -25,12 +25,12 @@ from cosserat_fenicsx.statics.problem import CHANGE
 # Number of rejected steps from the first point after which the step is limited by the stiffness there.
 _FIRST_REJECTIONS = 3
 # Largest distance from the predictor, over the step's length, at which the number of negative modes may change; the
-# second once steps are below a thousandth of the way: the path is smooth there, so that it crosses a bifurcation
-# without a change of branch.
+# second in steps below a thousandth of the reach, in which a smooth path crosses a bifurcation without a change of
+# branch.
 _SMOOTH, _NEAR = 0.01, 0.3
 # The same distance below which such a change is accepted although no event explains it.
 _EXPECTED = 1e-4
-# Why `judge_step` or `_jumped` rejects a step, by what the former says.
+# Why a step is rejected, by the result of `judge_step` in C.
 _REASONS = {
     "TOO_FAR": "the equilibrium jumped away from the path",
     "OPPOSITE": "the equilibrium lies opposite to the direction of the path",
@@ -84,30 +84,31 @@ class Continuation:
     Args:
         track: a `Track`.
         control: a `StepControl`.
-        watch: called as watch(a, b, plain) with the two points of a step, before b is accepted, and whether b is where
-            the path was expected although the number of negative modes changes; False ends the continuation at a, None
-            rejects the step.
+        watch: called as watch(a, b, plain) before the point b after a is accepted; plain: whether b is close to its
+            predictor although the number of negative modes changes. False ends the continuation at a, None rejects
+            the step.
+        reach: largest size of the load factors of the path, to which steps are relative.
 
     Attributes:
+        reach: see above.
         c: C's `step_control`, which a `Sweep` shares: its `step` is 0 where it is still to be chosen, its `rejections`
             are those just before the next call of `to`.
     """
 
-    def __init__(self, track: Track, control: StepControl, watch=None):
-        self.track, self.control, self._watch = track, control, watch
+    def __init__(self, track: Track, control: StepControl, watch=None, *, reach=1.0):
+        self.track, self.control, self._watch, self.reach = track, control, watch, reach
         self._lib, self.c = step_control(largest=control.largest or math.inf)
 
-    def begin(self, way):
-        """Choose the step where none is known; `way`: see `to`."""
-        self.c.step = self.c.step or self.control.first or way / 10
-        self.c.smallest = self.control.smallest * way
+    def begin(self):
+        """Choose the step where none is known."""
+        self.c.step = self.c.step or self.control.first or self.reach / 10
+        self.c.smallest = self.control.smallest * self.reach
 
-    def to(self, load_factor, way, *, on_step=None, patience=None, once=False):
+    def to(self, load_factor, *, on_step=None, patience=None, once=False):
         """Advance to a load factor, which is reached exactly.
 
         Args:
             load_factor: to reach.
-            way: range of the load factor over the whole path, to which steps are relative.
             on_step: called with every accepted `PathPoint`.
             patience: number of rejected steps, without two successive accepted ones between, after which to stop;
                 None to go on to the `StepControl`'s smallest step.
@@ -120,7 +121,7 @@ class Continuation:
         control, track, c = self.control, self.track, self.c
         if not control.adaptive:
             return self._attempt(load_factor, guard=False, on_step=on_step)
-        self.begin(way)
+        self.begin()
         self._refused, first = False, len(track.history) == 1
         c.patience, c.accepted = patience or _ENDLESS, False
         done = True
@@ -129,7 +130,7 @@ class Continuation:
             goal = self._lib.step_goal(c, here, load_factor)
             taken = abs(goal - here)
             # A new negative mode counts as one of the path itself once the step is this small.
-            if self._attempt(goal, guard=taken > 1e-3 * way, on_step=on_step):
+            if self._attempt(goal, guard=taken > 1e-3 * self.reach, on_step=on_step):
                 first = False
                 if once:
                     break
@@ -145,11 +146,8 @@ class Continuation:
         return done
 
     def _linear_step(self):
-        """The step of the load factor that moves or rotates the linearised structure as intended; infinite where its
-        tangent is singular.
-
-        The first step must be of that order where the structure is very soft, as a straight wire is against bending.
-        """
+        """The step of the load factor that moves the linearised structure as intended, for very soft structures such
+        as a straight wire; infinite where the tangent is singular."""
         track = self.track
         try:
             moved = track.model.largest(track.slope())
@@ -196,12 +194,7 @@ class Continuation:
         return track.product(off, off) <= share**2 * track.product(move, move) + NOTHING**2
 
     def _near(self, found, predicted, off, load_factor):
-        """Whether a step whose corrected point differs from the predictor is still one along the path.
-
-        Args:
-            found, predicted: numbers of the corrected point and of the predictor; off: their distance.
-            load_factor: of the step.
-        """
+        """Whether a step to a corrected point, at a distance `off` from the predictor, is one along the path."""
         track = self.track
         here, sizes = track.here.numbers, (0.0, 0.0, 0.0)
         move, increment = found[0] - here[0], predicted[0] - here[0]
@@ -216,10 +209,8 @@ class Continuation:
         return False
 
     def _jumped(self, move, change):
-        """Whether a step is longer than twice the mean slope of its two ends times the change of the load factor.
-
-        Then it has jumped over a limit point to another part of the path.
-        """
+        """Whether a step has jumped over a limit point to another part of the path: it is longer than twice the mean
+        slope of its two ends times the change of the load factor."""
         track = self.track
         end, load_factor = track.problem.numbers(), track.problem.load_factor
         slopes = track.slope()
@@ -229,7 +220,7 @@ class Continuation:
         return track.product(slopes, slopes) * change**2 < track.product(move, move)
 
     def _predict(self, load_factor):
-        """Predictor at a load factor: the polynomial through the last points (constant, secant, quadratic)."""
+        """Predictor at a load factor: the polynomial through the last points."""
         known = self.track.history
         places = [point.load_factor for point in known]
         if len(set(places)) < len(places):  # the path returned to a load factor: use its last point there
@@ -326,7 +317,7 @@ class Sweep(Pointers):
                 return sweep.next, sweep.iterations
 
     def _follow(self):
-        """Let the track follow: its last points, number of steps and load factor."""
+        """Take C's last points, number of steps and load factor over to the track."""
         track, sweep = self._track, self.c
         parts = np.cumsum([track.problem.numbering.size, *(len(x) for x in track.here.numbers[1:])])[:-1]
         if sweep.steps == track.steps:

@@ -27,7 +27,7 @@ from cosserat_fenicsx.statics.path.follower import Follower
 from cosserat_fenicsx.statics.path.track import NOTHING
 from cosserat_fenicsx.statics.problem import Promoted, record_of
 
-# Loads over EA, about the axial strain that they cause, above which a mistake in the units is suggested.
+# Loads over EA (about the axial strain) above which messages ask for the units.
 _ENORMOUS = 1.0
 # Factor from `StepControl.smallest` to the value advised where no first step was accepted.
 _SHORTER = 1e-3
@@ -35,7 +35,7 @@ _SHORTER = 1e-3
 _RESOLVED = 100.0
 # Bounds for a point corrected from a coarser mesh: Newton iterations, and motion (lengths, rad).
 _CORRECTIONS, _NEAR = 6, 0.1
-# Largest distance of a point from the same one on a coarser mesh, over that of the latter's two neighbours.
+# Largest distance of a point from the same one on a coarser mesh, over the distance of the latter's neighbours.
 _ASIDE = 0.3
 
 
@@ -51,18 +51,17 @@ class Tracing:
         follow: arguments of `Follower`.
         choice: the `Choice` of the model.
         bar: a `Progress`.
-        from_rest: whether the path starts at the unloaded state; False where it is only `corrected`.
     """
 
-    def __init__(self, solvers, follow, choice, bar, *, from_rest=True):
+    def __init__(self, solvers, follow, choice, bar):
         self.problem, _, self.stability = solvers
         self.model, self._options, self._choice, self._bar = self.problem.model, follow, choice, bar
         why = [*choice.why, self.model.signature.formulation.words]
         self.path = Path.of(self.model, why, conservative_along, derivatives_of)
         if choice.model == "spatial":
-            self._follower = Follower(*solvers, on_event=self._meet, from_rest=from_rest, **follow)
+            self._follower = Follower(*solvers, on_event=self._meet, **follow)
         else:  # planar models: load control without events; the spatial model takes over where more is needed
-            self._follower = Follower(*solvers, from_rest=from_rest, **{**follow, "control": "load"})
+            self._follower = Follower(*solvers, **{**follow, "control": "load"})
         self.track = self._follower.track
         self._counted, self._until, self._stable_at = 0, None, 0.0
         bar.start(f"{self.path.model}, {self.model.unknowns} unknowns")
@@ -124,17 +123,16 @@ class Tracing:
             NotConverged, Interrupted: with the path so far.
         """
         track = self.track
-        way = max(abs(load_factor) for load_factor in load_factors) or 1.0
         try:
-            self._follower.begin()
+            self._follower.begin(load_factors)
             k = 0
-            while (k := self._swept_from(k, load_factors, free, way, until)) < len(load_factors):
+            while (k := self._swept_from(k, load_factors, free, until)) < len(load_factors):
                 load_factor, between = load_factors[k], free and k == 1
                 self._until = until if between else None
                 on_step = (lambda point: (self._watch(point), self._record(point))) if between else self._watch
                 at_start = k == 0 and track.here.load_factor == load_factor
                 # within a range C takes over again after a step
-                if not (at_start or self._follower.to(load_factor, way, on_step=on_step, once=between)):
+                if not (at_start or self._follower.to(load_factor, on_step=on_step, once=between)):
                     here = track.here.load_factor
                     if self._choice.promoted and self._options["control"] == "auto":
                         raise Promoted(f"load control ends at the load factor {here:.4g}, because {track.failure}")
@@ -158,14 +156,14 @@ class Tracing:
             self.path.control, self.path.left = self._follower.used, self._follower.left
         return self.path
 
-    def _swept_from(self, k, load_factors, free, way, until):
-        """Advance from the k-th load factor on in C as far as every step is accepted; the number of the next one."""
+    def _swept_from(self, k, load_factors, free, until):
+        """Advance from the k-th load factor on in C while steps are accepted; the index of the next load factor."""
         between, here = free and k == 1, self.track.here
         watched = self._choice.promoted and here.negative_modes
         if k == len(load_factors) or watched or (between and until) or not self._follower.sweeps:
             return k
         wanted = load_factors[k:] if not free or between else load_factors[:1]
-        sweep = self._follower.sweep(wanted, way, self.problem.fields, every=between,
+        sweep = self._follower.sweep(wanted, self.problem.fields, every=between,
                                      counted=self.track.iterations - self._counted)  # fmt: skip
         try:
             while True:
@@ -173,7 +171,7 @@ class Tracing:
         except StopIteration as end:
             done, left = end.value
         self._counted, self._stable_at = self.track.iterations - left, self.track.here.load_factor
-        return self._swept_from(1, load_factors, free, way, until) if free and k < done else k + done
+        return self._swept_from(1, load_factors, free, until) if free and k < done else k + done
 
     def _record_all(self, swept):
         self._bar.at(self.track.here)
@@ -225,7 +223,8 @@ class Tracing:
             Interrupted: with the path so far.
         """
         problem, track, path = self.problem, self.track, self.path
-        self._follower.begin()
+        if problem.begins:
+            problem.end_beginning()
         track.max_iterations = _CORRECTIONS
         try:
             for point, values, n in self._starts(coarse):
@@ -251,15 +250,13 @@ class Tracing:
         return zip(coarse._records, self.model.unknowns_of(rq), n, strict=True)
 
     def again(self, coarse):
-        """The points of a path on a coarser mesh, corrected on this mesh.
-
-        Each is solved in the plane through its coarse state, perpendicular to the path; the two ends at their load
-        factors.
+        """The points of a path on a coarser mesh, corrected on this mesh in the plane perpendicular to the path, the
+        two ends at their load factors.
 
         Raises:
             NotConverged: one of them was not found.
         """
-        self._follower.begin()
+        self._follower.begin(coarse.load_factors)
         problem, track, last = self.problem, self.track, len(coarse) - 1
         guesses = []
         for point, values, n in self._starts(coarse):
@@ -311,8 +308,7 @@ class Tracing:
         """Locate the events up to the bifurcation where the path was left; index of the last point before that."""
         known = list(itertools.takewhile(lambda event: event.kind != "bifurcation", coarse.events))
         known.append(coarse.events[len(known)])
-        load_factor, way = float(coarse.load_factors[-1]), float(np.abs(coarse.load_factors).max())
-        found = self._follower.to_fork(load_factor, way)
+        found = self._follower.to_fork(float(coarse.load_factors[-1]))
         if not found or len(self.path.events) != len(known):
             raise NotConverged("the bifurcation was not found on a finer mesh", self.path)
         events = zip(self.path.events, known, strict=True)

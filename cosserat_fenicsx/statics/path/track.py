@@ -1,4 +1,4 @@
-"""The current position of a continuation on an equilibrium path, and the correctors that find its next point."""
+"""The points of a continuation on an equilibrium path, and the correctors that find the next one."""
 
 import math
 from dataclasses import dataclass, field
@@ -8,33 +8,25 @@ import numpy as np
 
 from cosserat_fenicsx.algebra.building import module
 from cosserat_fenicsx.algebra.newton import Newton
+from cosserat_fenicsx.numerics import lagrange
 from cosserat_fenicsx.statics.stability import NegativeModes
 
 # Smallest cosine of the angle between the negative modes of two neighbouring points.
 _SAME_MODE = 0.5
-#: Motions below this are rounding (rad, rod lengths): an inextensible column does not move until it buckles.
+#: Motions below this are rounding (rad, rod lengths).
 NOTHING = 1e-8
 
 
 @dataclass(frozen=True)
 class Limits:
-    """Which steps of a continuation are accepted, and how long the next one is (`step_control` in C).
+    """Which steps of a continuation are accepted, and how long the next one is (`step_control` in C)."""
 
-    Attributes:
-        far: largest distance of the corrected point of a step from the predictor (rad, rod lengths).
-        intended: the distance that step control aims at.
-        slight: the distance below which direction and length of a step are not checked.
-        leap: distance from the predictor, over the predicted increment, above which a step may have jumped over a limit
-            point.
-        easy, hard: Newton iterations of a step beyond which the next one does not grow, and from which on it is halved.
-    """
-
-    far: float = 0.5
-    intended: float = 0.1
-    slight: float = 1e-3
-    leap: float = 1.0
-    easy: int = 5
-    hard: int = 9
+    far: float = 0.5  # largest distance of a corrected point from the predictor (rad, rod lengths)
+    intended: float = 0.1  # the distance that step control aims at
+    slight: float = 1e-3  # the distance below which direction and length of a step are not checked
+    leap: float = 1.0  # distance over the predicted increment above which a limit point may have been jumped over
+    easy: int = 5  # Newton iterations of a step beyond which the next one does not grow,
+    hard: int = 9  # and from which on it is halved
 
 
 LIMITS = Limits()
@@ -78,25 +70,22 @@ class Track:
         problem: a loaded `Problem`.
         newton, stability: the problem's Newton solver and its `NegativeModes`.
         max_iterations: Newton iterations allowed in a step.
-        from_rest: whether the path begins at the problem's state, the unloaded one.
 
     Attributes:
-        origin: the first `PathPoint` of the path.
+        origin: the first `PathPoint` of the path, from `begin_here` on.
         history: the last points, at most three.
         iterations: Newton iterations so far, those of rejected steps included.
         steps: number of accepted steps so far.
         failure: the reason why the last step was rejected, in words.
-        neutral: owned entries of a neutral motion, which leaves the energy unchanged (such as the rotation of a buckled
-            round column about its axis), or None.
+        neutral: owned entries of a motion that leaves the energy unchanged, such as the rotation of a buckled round
+            column about its axis; or None.
     """
 
-    def __init__(self, problem, newton: Newton, stability: NegativeModes, max_iterations, *, from_rest=True):
+    def __init__(self, problem, newton: Newton, stability: NegativeModes, max_iterations):
         self.problem, self.model = problem, problem.model
         self.newton, self.stability, self.max_iterations = newton, stability, max_iterations
         self.iterations, self.steps, self.failure, self.neutral = 0, 0, "", None
         self.origin, self.history = None, []
-        if from_rest:
-            self.begin_here()
 
     def begin_here(self):
         """Begin the path at the problem's state and load factor."""
@@ -109,7 +98,7 @@ class Track:
         return self.history[-1]
 
     def keep(self, point):
-        """Accept a point, the problem's state; path-dependent loads update their history variables."""
+        """Accept the problem's state as a point of the path; path-dependent loads update their history variables."""
         self.problem.commit()
         self.steps += 1
         self.history = [*self.history[-2:], point]
@@ -139,10 +128,10 @@ class Track:
         Both x and eta are unknowns. Returns a `Solved` and sets `failure`.
         """
         self.put(numbers, load_factor)
-        self.newton.bordered.stay_in_plane(normal, weight, self.neutral)
-        solved = self._solve(self.newton.bordered)
+        self.bordered.stay_in_plane(normal, weight, self.neutral)
+        solved = self._solve(self.bordered)
         if solved.converged:
-            self.neutral = self.newton.bordered.neutral
+            self.neutral = self.bordered.neutral
         return solved
 
     def _solve(self, newton):
@@ -153,13 +142,14 @@ class Track:
             self.failure = solved.reason
         return solved
 
+    @property
+    def bordered(self):
+        """The `BorderedNewton` of the problem; its `slope` is dx/d eta at the point that `on_plane` has found."""
+        return self.newton.bordered
+
     def slope(self):
         """Owned entries of dx/d eta at the state."""
-        return self.newton.bordered.slope_here(self.neutral)
-
-    def slope_found(self):
-        """Owned entries of dx/d eta at the point that `on_plane` has found."""
-        return self.newton.bordered.slope
+        return self.bordered.slope_here(self.neutral)
 
     def point(self, solved):
         """The state as a `PathPoint`, with its negative modes."""
@@ -177,11 +167,8 @@ class Track:
         point.along = point.rise * slope
 
     def keeps_modes(self, a, b):
-        """Whether the negative modes of two points are the same motions, apart from those that the point with more of
-        them has in addition.
-
-        Where two eigenvalues change their signs in opposite directions, a mode is exchanged for another one.
-        """
+        """Whether the negative modes of one of two points are among those of the other; where two eigenvalues change
+        their signs in opposite directions, a mode is exchanged for another one."""
         shared = min(a.negative_modes, b.negative_modes)
         if shared < 1 or self.neutral is not None:
             return True
@@ -197,26 +184,18 @@ class Track:
     # -- where the tangent is singular ---------------------------------------------------------------------------------
 
     def motion_at(self, point, change):
-        """(nodes, 6) displacements and rotations of a change of the unknowns (owned entries) at a `PathPoint`.
-
-        See `BorderedNewton.motion_of`. The component along the neutral motion is removed.
-        """
+        """`BorderedNewton.motion_of` a change of the unknowns at a `PathPoint`, without its neutral component."""
         self.put(point.numbers, point.load_factor)
-        bordered = self.newton.bordered
-        motion = bordered.motion_of(change)
+        motion = self.bordered.motion_of(change)
         if self.neutral is None:
             return motion
-        neutral = bordered.motion_of(self.neutral)
-        return motion - self.work(motion, neutral) * neutral
+        neutral = self.bordered.motion_of(self.neutral)
+        return motion - self.bordered.work(motion, neutral) * neutral
 
     def response(self, numbers, load_factor, motion):
         """(stiffness of the tangent at a state against a motion, null vector): see `BorderedNewton.response`."""
         self.put(numbers, load_factor)
-        return self.newton.bordered.response(motion)
-
-    def work(self, a, b):
-        """Inner product of two motions of the nodes."""
-        return self.newton.bordered.work(a, b)
+        return self.bordered.response(motion)
 
     @property
     def without_potential(self):
@@ -252,22 +231,8 @@ def between(a, b):
     return b.numbers[0] - a.numbers[0], b.load_factor - a.load_factor
 
 
-def lagrange(places, at):
-    """Lagrange's weights of values at different places for the value of their polynomial at another one."""
-    return [math.prod([(at - b) / (a - b) for b in places if b != a]) for a in places]
-
-
 def through(points, places, at):
-    """Lagrange interpolation of points of a path.
-
-    Args:
-        points: up to four `PathPoint`s.
-        places: their coordinates along the path, all different.
-        at: coordinate at which to evaluate.
-
-    Returns:
-        (numbers, load factor).
-    """
+    """(numbers, load factor) by Lagrange interpolation of up to four `PathPoint`s, `places` their coordinates."""
     weights = lagrange(places, at)
     numbers = [weights[0] * values for values in points[0].numbers]
     for weight, point in zip(weights[1:], points[1:], strict=True):
@@ -278,7 +243,7 @@ def through(points, places, at):
 
 @dataclass(frozen=True)
 class Bends:
-    """How a step leads from a point of a path to another one.
+    """How much a step between two points of a path turns.
 
     Attributes:
         turn: angle between the tangents of the path at the two ends, rad.
