@@ -180,7 +180,7 @@ class NodalContact(Pointers):
         return np.cumsum([len(place.slots) for place in self._walls])[:-1]
 
     def give_up(self):
-        """The step has failed: the forces are those at its start again."""
+        """Undo a failed step: restore the forces at its start."""
         self._vectors["force"][:], self._vectors["law"][:] = self._begun, self._law_begun
         self._slip[:] = self._slip_begun
 
@@ -189,7 +189,8 @@ class NodalContact(Pointers):
         self._nodes.subtract(self._vectors["force"], b)
 
     def meet(self, x, change):
-        """Change Newton's step by that of the forces: arrays of this rank's unknowns; `change` is subtracted from x."""
+        """Add the change of the forces to Newton's step `change` of this rank's unknowns, which is subtracted from
+        x."""
         vectors = self._vectors
         if np.isnan(self._known_for):
             self._find_compliance()
@@ -210,7 +211,7 @@ class NodalContact(Pointers):
 
     @property
     def broken(self):
-        """Whether forces do not follow from the motion at the problem's state, so that this is none."""
+        """Whether the forces violate the laws of contact at the problem's state."""
         self._vectors["moved"][:] = motion_between(self._before, self._nodes.of_local(self._problem.state))
         return bool(self._lib.broken(self.c))
 
@@ -236,12 +237,12 @@ class NodalContact(Pointers):
     # -- books -------------------------------------------------------------------------------------------------------
 
     def accept(self):
-        """Take the step: friction in the next one has the coefficients of its slip speeds."""
+        """Accept the step; its slip speeds give the coefficients of friction of the next one."""
         self._lib.slips(self.c, self._ffi.from_buffer("double[]", self._slip))
         self._slip /= self.c.h
 
     def books(self):
-        """Increase of the stored energy in the step, and energy dissipated by friction and damping; dimensionless."""
+        """Stored and dissipated energy of the step, dimensionless."""
         vectors = self._vectors
         vectors["moved"][:] = motion_between(self._before, self._nodes.of_local(self._problem.state))
         gained = self._lib.stored(self.c, 0) - self._lib.stored(self.c, 1)
@@ -251,7 +252,7 @@ class NodalContact(Pointers):
 
     @property
     def count(self):
-        """Number of nodes that may touch, once for each wall."""
+        """Number of nodes that may touch, counted for each wall."""
         return self.c.nodes
 
     def of_step(self):
@@ -259,14 +260,12 @@ class NodalContact(Pointers):
         return self._vectors["law"][self._slots]
 
     def memory(self):
-        """What later steps depend on."""
         kept = {name: self._vectors[name].copy() for name in ("force", "law")}
         md = np.concatenate([place.md for place in self._walls])
         kept |= {"md": md, "slip": self._slip.copy(), "compliance": self._compliance.copy()}
         return {**kept, "known_for": self._known_for, "usual": self._usual}
 
     def recall(self, memory):
-        """Restore what `memory` returned."""
         for name in ("force", "law"):
             self._vectors[name][:] = memory[name]
         self._compliance[:], self._slip[:] = memory["compliance"], memory["slip"]

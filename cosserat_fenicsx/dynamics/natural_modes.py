@@ -101,7 +101,7 @@ def modes(
 
 
 def _left_out(scene):
-    """What depends on velocities in a scene, in words."""
+    """The parts of a scene that depend on velocities, in words."""
     damped = [rod for rod in scene.rods if rod.damping is not None and np.any(rod.damping.sizes)]
     acting = [x for x in scene.actions if x.touches or x.resists or traits_of(x, scene.rods).rates]
     return (*(f"Damping of {rod.name}" for rod in damped), *map(describe, acting))

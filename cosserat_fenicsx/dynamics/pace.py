@@ -201,7 +201,6 @@ class Resolution:
         return h
 
     def memory(self):
-        """The state that later steps depend on, see `Stepper.memory`."""
         return {"pieces": np.array([(*x.piece, x.range, x.required) for x in self._sampled]).reshape(-1, 4)}
 
     def recall(self, memory):
@@ -269,7 +268,6 @@ class _SampledSignal:
         self._slope = (values[1] - values[0]) / (end - begin)
 
     def longest(self, t, h):
-        """See `Resolution`."""
         begin, end = self.piece
         if not begin <= t + 1e-6 * h < end:
             before = max((x for x in self._marks if x <= t + 1e-6 * h), default=0.0)

@@ -27,7 +27,7 @@ from cosserat_fenicsx.storage.stored_history import KIND, StoredHistory
 
 
 def go_on(store, scene, duration, progress):
-    """`resume` of a motion of rods; see there."""
+    """`resume` of a motion of rods."""
     if duration is not None:
         positive_time("duration", duration, "resume")
     scene, head = _opened(store, scene, duration), store.head
@@ -63,7 +63,7 @@ def _check_plane(store, scene, until):
 
 
 def _over(store, scene, until, progress):
-    """Compute what is missing up to a time, s."""
+    """Continue the motion to a time, s."""
     asked, durations = store.head["asked"], store.head["durations"]
     marks = marks_of(scene, until, asked["save_every"], [t for t in durations if t < until])
     scene_over, layout = scene.over(asked["duration"]), Layout.of(scene, asked["elements"])
@@ -89,7 +89,6 @@ def _over(store, scene, until, progress):
 
 
 def read(store, scene):
-    """The states that a motion has saved so far."""
     scene = _opened(store, scene)
     history = _history(store, scene)
     store.check_rows(itemgetter("time"))

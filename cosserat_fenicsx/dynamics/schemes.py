@@ -151,7 +151,7 @@ _TRIAL_STEP = 0.1  # length of the trial step that gives initial accelerations, 
 
 
 class Rule(NamedTuple):
-    """The coefficients of the scheme."""
+    """The coefficients of Chung & Hulbert."""
 
     alpha_m: float
     alpha_f: float
@@ -160,7 +160,6 @@ class Rule(NamedTuple):
 
     @classmethod
     def of(cls, rho_inf):
-        """The coefficients of Chung & Hulbert."""
         alpha_m, alpha_f = (2 * rho_inf - 1) / (rho_inf + 1), rho_inf / (rho_inf + 1)
         return cls(alpha_m, alpha_f, (1 + alpha_f - alpha_m) ** 2 / 4, 0.5 + alpha_f - alpha_m)
 

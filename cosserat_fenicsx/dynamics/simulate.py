@@ -1,4 +1,4 @@
-"""`simulate`: the motion of a scene in time, by the compiled problem and stepper of its scheme."""
+"""`simulate`: the motion of a scene in time."""
 
 import cosserat_fenicsx.compat  # noqa: F401, I001  first: its message says what is missing where dolfinx is
 
@@ -253,7 +253,6 @@ def solvers_of(scene, layout, degree, scheme, load_factor, comm, model):
 
 
 def _make(comm, signature, scheme):
-    """Problem and stepper of a signature."""
     stepper = SCHEMES[scheme]
     model = _MODELS[stepper.forms, signature.model]
     if signature.eccentric:

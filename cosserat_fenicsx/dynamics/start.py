@@ -1,4 +1,4 @@
-"""The initial state of a motion: a path's equilibrium, or one that is computed, and velocities that supports allow."""
+"""The initial state of a motion: an equilibrium, given or computed, and velocities that supports allow."""
 
 import math
 import sys

@@ -130,7 +130,6 @@ class StepProblem(Equations):
 
     @property
     def state(self):
-        """The array of the model's state."""
         return self._state
 
     def begin(self):
@@ -206,7 +205,7 @@ class StepProblem(Equations):
         return found
 
     def iterate(self, stepping):
-        """Newton's method from the guess that is set; the state follows `x`."""
+        """Newton's method from the current guess; the state follows `x`."""
         self._done(self._lib.iterate(stepping))
 
     def work(self):
@@ -235,7 +234,7 @@ class StepProblem(Equations):
         return lost + sum(part.books()[1] for part in self.touching)
 
     def accept(self):
-        """Take the step, after its books."""
+        """Accept the step; after its energies are recorded."""
         self.model.accept(self.h)
         self.model.actions.commit()
         if self.contact:
@@ -257,7 +256,7 @@ class StepProblem(Equations):
         return clamps.of_step() - clamps.loads(self.load_factor, self._acting_at)
 
     def memory(self):
-        """This rank's part of the data that later steps depend on, with the entries of a tangent that is kept."""
+        """This rank's part of the data that later steps depend on, with a tangent in use."""
         kept = {"x": self.x.array_r.copy(), "state": self._state.copy(), "fresh": bool(self.fresh)}
         if not self.fresh:
             kept["tangent"] = super().memory()
@@ -266,7 +265,6 @@ class StepProblem(Equations):
         return kept
 
     def recall(self, memory):
-        """Restore what `memory` returned."""
         self._state[:] = memory["state"]
         self.x.array_w[:] = memory["x"]
         self.set_state(self.x)

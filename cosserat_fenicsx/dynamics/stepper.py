@@ -57,7 +57,7 @@ class Stepper:
         self._past = []  # of the last steps: (h, state, rates, (work, dissipated)) at their starts
 
     def drive(self, t):
-        """See `start.drive`, t in s; the change of kinetic energy counts as work of the supports."""
+        """`start.drive` at t (s); the change of kinetic energy counts as work of the supports."""
         kinetic, _ = self.problem.energies()
         self._guesses = None
         drive(self.problem.model, t)
@@ -299,5 +299,4 @@ class StepNewton:
         return {"spent": self._spent, "served": self._served, "anew": self._anew}
 
     def recall(self, memory):
-        """Restore what `memory` returned."""
         self._spent, self._served, self._anew = memory["spent"], memory["served"], memory["anew"]

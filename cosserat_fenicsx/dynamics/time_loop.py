@@ -33,12 +33,11 @@ class TimeLoop:
         self._count = self._steps = self._iterations = self._saved = 0
 
     def memory(self):
-        """All that a motion needs to be continued from between two steps, see `Stepper.memory`."""
+        """The data that continue a motion between two steps, see `Stepper.memory`."""
         counts = {name: getattr(self, f"_{name}") for name in _REMEMBERED}
         return {**counts, "pace": self._pace.memory(), "stepper": self._stepper.memory(), "nodes": self.model.slots}
 
     def recall(self, memory):
-        """Restore what `memory` returned."""
         for name in _REMEMBERED:
             setattr(self, f"_{name}", memory[name])
         self._pace.recall(memory.get("pace", {}))
@@ -105,7 +104,7 @@ class TimeLoop:
                 self._store.checkpoint(self.memory(), self.history)
 
     def _advance(self, t, h, halvings=0):
-        """Step from t by h (s), in halves where that fails; False where a shorter step is to be tried instead."""
+        """Step from t by h (s), in halves where that fails; False to try a shorter step instead."""
         solved = self._stepper.step(t, h)
         self._iterations += solved.iterations
         if solved.converged:
@@ -132,7 +131,7 @@ class TimeLoop:
         raise NotConverged(f"the motion was lost at t = {t:.6g} s, where {why}", self.history)
 
     def _save(self, t, stepped=True):
-        """Save the state at the time t; `stepped`: whether a step that was accepted has just led there."""
+        """Save the state at the time t; `stepped`: after an accepted step."""
         model, problem, stepper = self.model, self.problem, self._stepper
         scales = model.scales
         momentum, energy = scales.force * model.time, scales.force * scales.length

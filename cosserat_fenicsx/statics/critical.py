@@ -193,11 +193,11 @@ def _of_event(path, event, parameters):
 
 
 class _Met(Exception):
-    """The event was met: its `Crossing`, and the `PathPoint` before it."""
+    """Raised with the `Crossing` of the event and the `PathPoint` before it."""
 
 
 def _located(direct, path, event):
-    """The `Track`, the `Crossing` of an event, found again as the path was, and the `PathPoint` before it."""
+    """The `Track`, the `Crossing` of an event and the `PathPoint` before it, by following the path again."""
 
     def meet(crossing):
         apart = abs(crossing.point.load_factor - event.load_factor)
@@ -237,7 +237,7 @@ def _beside(direct, track, crossing, before):
 
 
 def _one_beside(direct, track, crossing, before, side, distance):
-    """One of `_beside`, or None; distance: along the path, or None for one of the load factor."""
+    """One of `_beside`, or None; distance: along the path, or None for a step of the load factor."""
     numbers, load_factor = [values.copy() for values in crossing.point.numbers], crossing.point.load_factor
     limit = crossing.kind == "limit"
     track.neutral = None if limit else crossing.direction.copy()  # Newton's steps leave out the mode, and its branch

@@ -107,14 +107,14 @@ def _acts_evenly(scene):
 
 @per_scene
 def _turning(scene):
-    """The largest angle by which the direction of a rod's axis turns in all along it, rad."""
+    """The largest total turn of the axis of a rod, rad."""
     tangents = (rod.curve.frame(np.linspace(0, rod.length, _SAMPLES))[:, :, 2] for rod in scene.rods)
     return float(max(2 * np.arcsin(np.linalg.norm(np.diff(t, axis=0), axis=1) / 2).sum() for t in tangents))
 
 
 @per_scene
 def first_layout(scene, degree, elements=FIRST_ELEMENTS):
-    """The first mesh of so many elements per rod or more."""
+    """The first mesh, of at least so many elements per rod."""
     return resolving(scene, Layout.of(scene, elements), degree, 4 if elements >= FIRST_ELEMENTS else 1)
 
 

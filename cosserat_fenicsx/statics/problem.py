@@ -235,7 +235,6 @@ _OUTCOMES = (NotConverged, Promoted)
 
 
 def _make(comm, signature):
-    """(Problem, Newton solver, `NegativeModes`) of a signature."""
     model = _MODELS[signature.model, signature.flat](comm, signature)
     problem = Problem(model)
     return problem, Newton(problem), NegativeModes(problem)
@@ -257,7 +256,7 @@ def solvers_of(scene, layout, *, formulation="mixed", degree=4, points=None, com
 
 
 def record_of(problem, load_factor, negative_modes, iterations, steps, neutral=False):
-    """The `Record` of a problem's state, an equilibrium; see there for what is given."""
+    """The `Record` of a problem's state, an equilibrium."""
     model = problem.model
     return Record(load_factor, *model.snapshot(), negative_modes, iterations, problem.multipliers(), neutral,
                   model.densities.here(), problem.tie_forces(), model.clamps.loads(load_factor), steps)  # fmt: skip

@@ -43,7 +43,7 @@ _CHEAP = 800  # unknowns, of all points together, that are cheaper to solve than
 
 
 class _TooCoarse(Exception):
-    """The path on a first mesh that is coarser than usual is not plain."""
+    """The path on a coarse first mesh is not plain, see `_plain`."""
 
 
 def refine(trace, correct, scene, layout, tol, bound, degree, usual=None):
@@ -224,7 +224,7 @@ class _Search:
         return self._all_points(layout, few) if few.worst.max() <= self._tol else few
 
     def _factor_for(self, path):
-        """The refinement factor, at most 2, that is to make the errors of a path small enough."""
+        """The refinement factor, at most 2, for the intended errors of a path."""
         above = path.by_mesh.max(axis=1) / (_AIM * self._tol)
         wanted = min(2.0, float((above ** (1 / self._order))[path.bounds].max()))
         return math.ceil(_QUARTERS * wanted) / _QUARTERS

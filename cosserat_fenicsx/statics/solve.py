@@ -214,7 +214,7 @@ def _follow_options(steps, control, branch):
 
 
 def _check_jumps(scene, load_factors):
-    """Refuse prescribed rotations by pi or more in one step, which equal smaller ones the other way round."""
+    """Refuse prescribed rotations by pi or more in one step, which equal smaller opposite ones."""
     farthest = max(abs(b - a) for a, b in zip([0.0, *load_factors[:-1]], load_factors, strict=True))
     turn = farthest * _turn(scene)
     if turn >= math.pi:

@@ -146,7 +146,6 @@ class Part:
         chain.negative, chain.zero, chain.logarithm = int(found[0]), int(found[1]), found[2]
 
     def count_without_neutral(self):
-        """See `NegativeModes.count`."""
         return self.factor() - int(not self._zero and self._nearest(1)[0][0] < 0)
 
     def factor(self):

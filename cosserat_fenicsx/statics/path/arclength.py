@@ -160,7 +160,6 @@ class ArcLength:
         self._step = self._scale = self._length(here, first)
 
     def _weigh(self, slope):
-        """Choose the weight of the load factor in the metric."""
         track = self.track
         moved, change = between(track.origin, track.here)
         local = track.square(slope)

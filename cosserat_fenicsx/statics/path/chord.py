@@ -64,8 +64,7 @@ class Chord:
     @classmethod
     def balanced(cls, track, a, b):
         """A `Chord` with the weight that gives the unknowns and the load factor equal shares in its length."""
-        moved, change = between(a, b)
-        return cls(track, a, b, (track.square(moved) / change**2 if change else 0.0) or 1.0)
+        return cls(track, a, b, track.balance(*between(a, b)) or 1.0)
 
     def _near(self, place):
         """Up to four known coordinates nearest to a coordinate, and their points."""
@@ -79,7 +78,6 @@ class Chord:
         return through(points, places, place)
 
     def load_factor(self, place):
-        """The load factor of `guess` alone."""
         places, points = self._near(place)
         return float(np.dot(lagrange(places, place), [point.load_factor for point in points]))
 

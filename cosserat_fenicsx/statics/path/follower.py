@@ -60,7 +60,6 @@ class Follower:
 
     @cached_property
     def locator(self):
-        """The `Locator` of the track's critical points."""
         return Locator(self.track)
 
     @cached_property

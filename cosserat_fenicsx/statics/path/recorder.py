@@ -40,7 +40,7 @@ _ASIDE = 0.3
 
 
 class _Enough(Exception):
-    """The user's `until` returned True."""
+    """Raised where the user's `until` returns True."""
 
 
 class Tracing:
@@ -262,7 +262,8 @@ class Tracing:
         for point, values, n in self._starts(coarse):
             problem.begin_at(values, n, point.reactions)
             guesses.append((problem.numbers(), point.load_factor))
-        weight = min(filter(None, (self._balance(a, b) for a, b in itertools.pairwise(guesses))), default=1.0)
+        weights = (track.balance(b[0][0] - a[0][0], b[1] - a[1]) for a, b in itertools.pairwise(guesses))
+        weight = min(filter(None, weights), default=1.0)
         before, left = None, self._to_fork(coarse) if coarse.left else -1
         try:
             for k in range(last + 1):
@@ -298,11 +299,6 @@ class Tracing:
             ) from None
         for crossing in crossings:
             self._meet(crossing)
-
-    def _balance(self, a, b):
-        """The weight that gives load factor and unknowns equal shares in the distance of two guesses; 0 without one."""
-        moved, change = b[0][0] - a[0][0], b[1] - a[1]
-        return self.track.square(moved) / change**2 if change else 0.0
 
     def _to_fork(self, coarse):
         """Locate the events up to the bifurcation where the path was left; index of the last point before that."""

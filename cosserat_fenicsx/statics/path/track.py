@@ -94,7 +94,6 @@ class Track:
 
     @property
     def here(self):
-        """The last accepted point."""
         return self.history[-1]
 
     def keep(self, point):
@@ -212,6 +211,11 @@ class Track:
         """`product` of a change with itself; zero below rounding."""
         square = self.product(a, a)
         return square if square > NOTHING**2 else 0.0
+
+    def balance(self, moved, change):
+        """The weight by which a step (dx, d eta) has equal shares of the unknowns and the load factor; 0 without
+        one."""
+        return self.square(moved) / change**2 if change else 0.0
 
     def product(self, a, b):
         """Inner product of two changes of the unknowns (owned entries), over all ranks."""
