@@ -220,21 +220,19 @@ def chosen_model(scene, model, scheme, start=None):
     Raises:
         SceneError: an unknown model, or one that the scene does not fit.
     """
-    flat = ("momentum" if scheme not in SCHEMES else SCHEMES[scheme].forms, "planar") in _MODELS
     if model not in ("auto", "planar", "spatial"):
         raise SceneError(f"model = {model!r}: {nearest(model, ('auto', 'planar', 'spatial'))}")
     if model == "spatial":
         return model, "the spatial model was requested"
-    plane, reason = scene.plane, not_flat(scene)
-    plane = None if reason else plane
-    if plane is not None and any(rod.mass_centre for rod in scene.rods):
-        plane, reason = None, "the planar model has no mass centre off the axis (Rod.eccentricity)"
-    if plane is not None and not starts_in(scene, plane, start):
-        plane, reason = None, "the start leaves the plane of the rods"
-    if plane is not None and not flat:
-        plane, reason = None, f"the scheme '{scheme}' has no planar model"
-    if plane is not None:
-        return "planar", f"the whole scene moves in {plane.words}"
+    reason = not_flat(scene)
+    if not reason and any(rod.mass_centre for rod in scene.rods):
+        reason = "the planar model has no mass centre off the axis (Rod.eccentricity)"
+    if not reason and not starts_in(scene, scene.plane, start):
+        reason = "the start leaves the plane of the rods"
+    if not reason and ("momentum" if scheme not in SCHEMES else SCHEMES[scheme].forms, "planar") not in _MODELS:
+        reason = f"the scheme '{scheme}' has no planar model"
+    if not reason:
+        return "planar", f"the whole scene moves in {scene.plane.words}"
     if model == "planar":
         raise SceneError(f"model = 'planar': {reason}; expected 'spatial' or 'auto'")
     return "spatial", reason

@@ -217,8 +217,8 @@ def _located(direct, path, event):
     except _Met as met:
         return follower.track, *met.args
     raise NotConverged(
-        f"sensitivity: the {event.kind} at the load factor {event.load_factor:.6g} was not met again on the way from "
-        "rest: expected an event of a path that has not left for a branch before it"
+        f"sensitivity: the {event.kind} at the load factor {event.load_factor:.6g} was not found again on the path from "
+        "rest: expected an event before the path leaves for a branch"
     )
 
 

@@ -124,71 +124,67 @@ def _critical(scene, layout, count, load_factor, tol, degree, comm):
         With a potential n = m; else n = m + 1, and the bound comes first.
     """
     with (
-        solvers_of(scene, layout, degree=degree, comm=comm) as solvers,
+        solvers_of(scene, layout, degree=degree, comm=comm) as (problem, newton, stability),
         circulatory_part(scene, layout, degree, comm) as circulatory,
     ):
-        return _critical_by(*solvers, circulatory, count, load_factor, tol)
+        model = problem.model
+        at_rest = problem.numbers()
+        track, loaded = standing(problem, newton, stability, load_factor), load_factor or has_permanent(model.scene)
+        if not loaded:
+            _stay_at(track, at_rest)
+        here = track.here
+        layers = layers_of(model) if loaded else None
+        if here.negative_modes:
+            raise NotConverged(f"the structure is unstable at the load factor {load_factor:g}: expected a stable state")
+        conservative = circulatory.vanishes(model.snapshot()[0], load_factor or 1.0)
 
+        def skew():
+            """The skew-symmetric part of the second variation at the state; None for loads with a potential."""
+            return None if conservative else circulatory.skew(model.snapshot()[0], problem.load_factor)
 
-def _critical_by(problem, newton, stability, circulatory, count, load_factor, tol):
-    model = problem.model
-    at_rest = problem.numbers()
-    track, loaded = standing(problem, newton, stability, load_factor), load_factor or has_permanent(model.scene)
-    if not loaded:
-        _stay_at(track, at_rest)
-    here = track.here
-    layers = layers_of(model) if loaded else None
-    if here.negative_modes:
-        raise NotConverged(f"the structure is unstable at the load factor {load_factor:g}: expected a stable state")
-    conservative = circulatory.vanishes(model.snapshot()[0], load_factor or 1.0)
+        rates, unit = problem.rates(track.slope()), problem.load_derivative(problem.x).norm() or 1.0
 
-    def skew():
-        """The skew-symmetric part of the second variation at the state; None for loads with a potential."""
-        return None if conservative else circulatory.skew(model.snapshot()[0], problem.load_factor)
+        def moved(step):
+            """Put the state extrapolated linearly by a change of the load factor; its fields at Gauss points."""
+            numbers_there = [value + step * rate for value, rate in zip(here.numbers, rates, strict=True)]
+            track.put(numbers_there, load_factor + step)
+            problem.function(problem.x, problem.b)  # brings all that depends on the state up to date
+            return model.snapshot()[1]
 
-    rates, unit = problem.rates(track.slope()), problem.load_derivative(problem.x).norm() or 1.0
-
-    def moved(step):
-        """Put the state that is extrapolated linearly by a change of the load factor; its fields at Gauss points."""
-        numbers_there = [value + step * rate for value, rate in zip(here.numbers, rates, strict=True)]
-        track.put(numbers_there, load_factor + step)
-        problem.function(problem.x, problem.b)  # brings all that depends on the state up to date
-        return model.snapshot()[1]
-
-    change, most = _extent(model, moved, rates[0], unit)
-    sides = []
-    for step in (change, -change):
-        moved(step)
-        stability.whole.assemble(stress_alone=True)
-        sides.append((stability.whole.K.copy(), skew()))
-    slack, of_skew = (_decrease(*parts, change) for parts in zip(*sides, strict=True))
-    moved(0.0)
-    stability.whole.assemble()
-    symmetric, modes = _below(most, *eigen.largest_of_pencil(slack, stability.whole.K, count + 2, 1 / most))
-    if conservative:
-        values, vectors = symmetric, modes
-        critical, corrected = values[:count], np.ones(len(values[:count]), dtype=bool)
-    else:
-        whole = (slack, of_skew), (stability.whole.K, skew())
-        found = static_bifurcations(*whole, count) if len(symmetric) else (symmetric, modes)
-        values, vectors = _below(most, *found)
-        critical = np.append(symmetric[:1], values)
-        corrected = np.arange(len(critical)) < 1
-    chosen = [*([] if conservative else modes[:1]), *vectors][: len(critical)]
-    found = quotients(problem, stability.whole, slack, chosen, _NOTHING * tol)
-    of_state = _of_state(problem, stability.whole, chosen)
-    # For a symmetric pencil, Rayleigh's quotient is more accurate than the eigenvalue.
-    critical = np.where(corrected, found.values, 1 / critical)
-    rounding = np.where(corrected, found.rounding, found.of_unsymmetric) + of_state
-    remaining = _REMAINING
-    if np.isfinite(model.section.K).all():
-        remaining = np.minimum(_REMAINING, _SQUARED * found.softness)
-    softness = np.where(corrected, remaining, 1.0) * found.softness
-    whole = [np.concatenate(model.comm.allgather(vector.array_r)) for vector in vectors]
-    shapes = shapes_of(whole, values, model.rows_of_nodes, model.scales.length)[:count]
-    state = Equilibrium.of(model, load_factor)
-    errors = np.array([softness, rounding])
-    return critical, layers, state, shapes, errors, conservative, load_factor + most
+        change, most = _extent(model, moved, rates[0], unit)
+        sides = []
+        for step in (change, -change):
+            moved(step)
+            stability.whole.assemble(stress_alone=True)
+            sides.append((stability.whole.K.copy(), skew()))
+        slack, of_skew = (_decrease(*parts, change) for parts in zip(*sides, strict=True))
+        moved(0.0)
+        stability.whole.assemble()
+        symmetric, modes = _below(most, *eigen.largest_of_pencil(slack, stability.whole.K, count + 2, 1 / most))
+        if conservative:
+            values, vectors = symmetric, modes
+            critical, corrected = values[:count], np.ones(len(values[:count]), dtype=bool)
+        else:
+            whole = (slack, of_skew), (stability.whole.K, skew())
+            found = static_bifurcations(*whole, count) if len(symmetric) else (symmetric, modes)
+            values, vectors = _below(most, *found)
+            critical = np.append(symmetric[:1], values)
+            corrected = np.arange(len(critical)) < 1
+        chosen = [*([] if conservative else modes[:1]), *vectors][: len(critical)]
+        found = quotients(problem, stability.whole, slack, chosen, _NOTHING * tol)
+        of_state = _of_state(problem, stability.whole, chosen)
+        # For a symmetric pencil, Rayleigh's quotient is more accurate than the eigenvalue.
+        critical = np.where(corrected, found.values, 1 / critical)
+        rounding = np.where(corrected, found.rounding, found.of_unsymmetric) + of_state
+        remaining = _REMAINING
+        if np.isfinite(model.section.K).all():
+            remaining = np.minimum(_REMAINING, _SQUARED * found.softness)
+        softness = np.where(corrected, remaining, 1.0) * found.softness
+        whole = [np.concatenate(model.comm.allgather(vector.array_r)) for vector in vectors]
+        shapes = shapes_of(whole, values, model.rows_of_nodes, model.scales.length)[:count]
+        state = Equilibrium.of(model, load_factor)
+        errors = np.array([softness, rounding])
+        return critical, layers, state, shapes, errors, conservative, load_factor + most
 
 
 def _stay_at(track, at_rest):

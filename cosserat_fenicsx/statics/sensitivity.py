@@ -47,8 +47,8 @@ def sensitivity(path, query, parameters):
     with Direct.along(path, found) as direct:
         direct.find(path)
         for parameter, rate in zip(found, direct.rates(), strict=True):
-            step, paths = direct.paths(path, parameter, rate)
-            values = [_numbers(query(each)) for each in paths]
+            step = direct.step(parameter, rate)
+            values = [_numbers(query(direct.moved(path, parameter, rate, k * step))) for k in PLACES]
             derivatives[parameter.name], errors[parameter.name] = derivative(values, step)
     return Sensitivity.by(found, value, derivatives, errors)
 
@@ -313,11 +313,6 @@ class Direct:
 
     # -- results -----------------------------------------------------------------------------------------------------
 
-    def paths(self, path, parameter, rates):
-        """(step, `PerturbedPath`s beside a path at `PLACES` times the step)."""
-        step = self.step(parameter, rates)
-        return step, [self._moved(path, parameter, rates, k * step) for k in PLACES]
-
     def step(self, parameter, rates):
         """A change of a parameter by which the state moves little."""
         fastest = max(self.model.largest(rate[0]) for rate in rates)
@@ -335,7 +330,8 @@ class Direct:
         if self._refreshes:
             self.model.actions.refresh()
 
-    def _moved(self, path, parameter, rates, change):
+    def moved(self, path, parameter, rates, change):
+        """The `PerturbedPath` beside a path by a change of a parameter."""
         self.load_near(parameter, change)
         found = PerturbedPath.beside(path, self.model)
         for point, rate in zip(self.points, rates, strict=True):
