@@ -217,8 +217,8 @@ def _located(direct, path, event):
     except _Met as met:
         return follower.track, *met.args
     raise NotConverged(
-        f"sensitivity: the {event.kind} at the load factor {event.load_factor:.6g} was not found again on the path from "
-        "rest: expected an event before the path leaves for a branch"
+        f"sensitivity: the {event.kind} at the load factor {event.load_factor:.6g} was not found again on the path "
+        "from rest: expected an event before the path leaves for a branch"
     )
 
 
@@ -288,13 +288,13 @@ def _of_bifurcation(direct, crossing, parameters, rates):
         return _by_load_factor(direct, point, direct.slope(), 0.1 * _BESIDE * point[0], stiffness)
 
     def held_stiffness(parameter):
-        ties = direct.problem.ties
+        found, ties = stiffness(), direct.problem.ties
         if ties and np.abs(np.einsum("tni,mni->tm", ties.gradients(), tied)).max() > _HELD * size:
             raise SceneError(
                 f"parameter '{parameter.name}' turns supports or joints in which the mode moves: the derivative of "
                 "this bifurcation by it is not known"
             )
-        return stiffness()
+        return found
 
     by_load = np.mean([along_path(point) for point in direct.points], axis=0)
     found, errors = [], []

@@ -27,7 +27,6 @@ from cosserat_fenicsx.scene.curves import Line
 #: Elements per rod of the first mesh, where the mesh is not given.
 FIRST_ELEMENTS = 4
 
-
 # Where sections or loads are functions of s: relative accuracy with which the first mesh integrates flexibilities 1/EI
 # and loads.
 _INTEGRATED = 1e-3

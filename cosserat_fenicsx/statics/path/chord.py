@@ -12,8 +12,8 @@ import numpy as np
 from cosserat_fenicsx.numerics import lagrange
 from cosserat_fenicsx.statics.path.track import bends, between, through
 
-# Relative accuracy of the load factor at which a search ends, and its most iterations; number of iterations after which
-# the bracket is bisected instead of interpolated.
+# Relative accuracy of the load factor at which a search ends; largest number of its iterations; stride of those that
+# bisect the bracket.
 _FINE, _MOST, _OFTEN = 1e-8, 25, 6
 _PROBES = 1 / 3, 2 / 3  # coordinates at which a step is checked for negative modes that appear and vanish within it
 _VARIES = 4.0  # largest change of the determinant within a step in which no eigenvalue comes close to zero

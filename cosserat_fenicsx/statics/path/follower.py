@@ -12,14 +12,12 @@ from cosserat_fenicsx.statics.path.track import LIMITS, Track
 
 #: Control parameters of the continuation, see `solve`.
 CONTROLS = ("auto", "load", "arc")
-# Number of rejected steps of load control after which arc length takes over.
-_PATIENCE = 4
-# Largest number of halvings of the first step onto a branch.
-_TRIES = 8
+_PATIENCE = 4  # rejected steps of load control after which arc length takes over
+_TRIES = 8  # largest number of halvings of the first step onto a branch
 
 
 def standing(problem, newton, stability, load_factor):
-    """The `Track` of a loaded problem that load control has brought to a load factor.
+    """The `Track` of a loaded problem at a load factor, reached by load control.
 
     Raises:
         NotConverged: no equilibrium was found there.

@@ -22,8 +22,7 @@ from cosserat_fenicsx.interrupts import obey
 from cosserat_fenicsx.statics.path.track import LIMITS, NOTHING, PathPoint, Track, step_control, through
 from cosserat_fenicsx.statics.problem import CHANGE
 
-# Number of rejected steps from the first point after which the step is limited by the stiffness there.
-_FIRST_REJECTIONS = 3
+_FIRST_REJECTIONS = 3  # rejected steps from the first point after which the stiffness there limits the step
 # Largest distance from the predictor, over the step's length, at which the number of negative modes may change; the
 # second in steps below a thousandth of the reach, in which a smooth path crosses a bifurcation without a change of
 # branch.
