@@ -66,25 +66,24 @@ def simulate(
             length and of rotations (rad) over 10; steps adapt to it, and resolve loads and prescribed motions. Default
             1e-3, unless `dt` is given. The mesh does not adapt: compare with more `elements`.
         dt: fixed step, s; shortened so that steps end at jumps and saved times. A step that fails is halved.
-            History.why warns where loads change faster than such steps resolve.
+            `History.why` warns of loads that change faster than such steps resolve.
         model: "spatial"; "planar" for a scene that moves in a plane; or "auto", the cheapest one that is valid.
         scheme: "momentum" (exact linear and angular momentum, order 2); "triple-jump" (three steps of it, one back in
             time: order 4, for smooth motions without damping, fixed dt); "energy" (exact energy and linear momentum,
-            order 2, spatial model alone); "generalised-alpha" (dissipates unresolved frequencies, order 2; the balance
-            of the History shows the energy dissipated so).
+            order 2, spatial model alone); "generalised-alpha" (dissipates unresolved frequencies, order 2; the energy
+            balance of the History shows how much).
         rho_inf: of "generalised-alpha": spectral radius at infinite frequency, from 0 to 1: the factor per step on
             vibrations much faster than the steps; 1 dissipates nothing (the trapezoidal rule). Default 0.8.
         save_every: s between saved states, steps end there exactly; None saves every step.
         start: None for the reference, a `Path` for its last equilibrium, or (Path, k); rods must be the same objects. A
-            number is the load factor of an equilibrium of the scene just before t = 0 (`initial_equilibrium.before`).
+            number is the load factor of an equilibrium of the scene just before t = 0.
         load_factor: multiplies all loads and prescribed motions, as in `solve`; None for `start` where that is a
             number, otherwise 1.
         elements: elements per rod.
         degree: polynomial degree of r and q, 1 to 4.
-        folder: folder that states and checkpoints are written to during the run, for long runs: the History reads
-            states from there when they are used, and keeps none in memory. Whatever ends the run, `resume(folder)`
-            continues it to the same digits. It must not hold a motion yet, and all ranks must see it; None keeps the
-            states in memory.
+        folder: folder for states and checkpoints of long runs: the History reads states from there when they are used,
+            and keeps none in memory. Whatever ends the run, `resume(folder)` continues it with the same digits. It must
+            not hold a motion yet, and all ranks must see it; None keeps the states in memory.
         progress: True, False, or None for a bar on long runs in a terminal.
         comm: MPI communicator; default all ranks. Every rank calls, every rank gets the same History.
 

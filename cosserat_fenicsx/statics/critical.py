@@ -43,12 +43,12 @@ def critical_sensitivity(buckling, parameters):
     if not len(buckling) or not buckling.conservative:
         why = "the loads have no potential" if not buckling.conservative else "there is no critical load factor"
         raise SceneError(f"sensitivity: {why}: expected a Buckling with load factors, of loads that have a potential")
-    scene, layout, at = buckling.scene, buckling.equilibrium.layout, buckling.load_factor
+    scene, layout, load_factor = buckling.scene, buckling.equilibrium.layout, buckling.load_factor
     found = parameters_of(scene, parameters, critical=True)
     with Direct.on(scene, layout, found, degree=buckling.degree, comm=buckling.comm) as direct:
-        direct.points = [(at, standing(*direct.solvers, at).problem.numbers(), None)]
+        direct.points = [(load_factor, standing(*direct.solvers, load_factor).problem.numbers(), None)]
         modes, pairs = _buckling_modes(buckling, direct.model.scales.length)
-        part, step = direct.stability.whole, _STEP * (buckling.load_factors[0] - at)
+        part, step = direct.stability.whole, _STEP * (buckling.load_factors[0] - load_factor)
         if direct.problem.ties:
             part.form.refresh()
             part.assemble()  # for the springs in place of supports and joints
@@ -57,7 +57,7 @@ def critical_sensitivity(buckling, parameters):
         def logarithms():
             return np.log(_quotients(direct, energies, step))
 
-        critical, derivatives, errors = buckling.load_factors - at, {}, {}
+        critical, derivatives, errors = buckling.load_factors - load_factor, {}, {}
         for parameter, rates in zip(found, direct.rates(), strict=True):
             (relative,), (error,) = _by_parameter(direct, parameter, rates, logarithms)
             _check_pairs(buckling, parameter, relative, pairs)

@@ -74,10 +74,10 @@ def solve(
         tol: largest estimated error of positions, rotations, contact forces and contact moments anywhere along the
             rods, each relative to its own size at that load factor (see `Path.errors`). Elements are refined until the
             estimates are below it, unless `elements` is given.
-        bound: what `tol` bounds, of "position", "rotation", "force" and "moment", whose errors are estimated all the
-            same where they are not bounded; and of `Criterion`s of your own, see docs/accuracy.md. Forces and moments
-            are left out where rounding alone exceeds `tol`, as on very slender rods that bend, and moments on straight
-            ones: `Path.bounded` and `Path.why` tell.
+        bound: the quantities that `tol` bounds, of "position", "rotation", "force" and "moment", and `Criterion`s of
+            your own, see docs/accuracy.md; the errors of the others are estimated, too. Forces and moments are left
+            out where rounding alone exceeds `tol`, as on very slender rods that bend, and moments on straight rods: see
+            `Path.bounded` and `Path.why`.
         elements: elements per rod; fixes the mesh, and errors are then not estimated (NaN).
         degree: 1 to 4, of r and q; default 4 (2 for "displacement").
         gauss_points: per element; default `degree`, which does not lock. More of them lock (docs/models.md).

@@ -48,8 +48,8 @@ class StepControl:
         smallest: smallest step over the farthest requested value, in (0, 1); the continuation fails where a smaller
             one would be needed. Where the structure is very soft at the first point, smaller steps are allowed.
         largest: largest step of the load factor; None for no bound.
-        adaptive: False takes each requested value in one step, without checks of the branch; the negative modes of the
-            points are counted all the same.
+        adaptive: False takes each requested value in one step, without checks of the branch; negative modes are
+            counted nevertheless.
         max_iterations: Newton iterations allowed in a step; None for 10, or 30 for the formulation "displacement",
             which needs more of them.
         most_steps: steps of arc length allowed for one requested load factor, which may lie far along the path, or not
