@@ -37,13 +37,9 @@ _CHANGED = (
 
 
 class ArcLength:
-    """Advances a track in steps of arc length.
+    """Advances a `Track` in steps of arc length, by a `StepControl` and a `Locator`.
 
-    Args:
-        track: a `Track`.
-        control: a `StepControl`.
-        locator: a `Locator` that finds the critical points and the load factor to land on between two points.
-        on_event: called with every `Crossing` on the way; the continuation ends there where it returns True.
+    `on_event` is called with every `Crossing`; the continuation ends there where it returns True.
     """
 
     def __init__(self, track, control, locator, on_event):

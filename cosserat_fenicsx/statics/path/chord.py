@@ -82,10 +82,8 @@ class Chord:
         return float(np.dot(lagrange(places, place), [point.load_factor for point in points]))
 
     def at(self, place):
-        """(coordinate, `PathPoint`) of the path at or close to a coordinate; None where Newton's method fails.
-
-        Bordered solves lose accuracy very close to a singular tangent; there a point slightly beside it is taken.
-        """
+        """(coordinate, `PathPoint`) of the path at a coordinate, or beside it where the tangent is almost singular;
+        None where Newton's method fails."""
         for aside in _ASIDE:
             point = self._point(place + aside)
             if point is not None:

@@ -59,12 +59,7 @@ class Crossing:
 
 
 class Lost(Exception):
-    """A step is too long to resolve the critical points within it.
-
-    Args:
-        share: of the step to keep.
-        reason: in words.
-    """
+    """A step is too long to resolve the critical points within it; share: of the step to keep; reason: in words."""
 
     def __init__(self, share, reason="the critical points within a step could not be resolved"):
         super().__init__(reason)
@@ -72,11 +67,7 @@ class Lost(Exception):
 
 
 class Locator:
-    """Finds limit points, bifurcations and requested load factors between two points.
-
-    Args:
-        track: the `Track`.
-    """
+    """Finds limit points, bifurcations and requested load factors between two points of a `Track`."""
 
     def __init__(self, track):
         self.track = track
@@ -176,7 +167,7 @@ class Locator:
         """The `Crossing`s where the tangent becomes singular away from limit points.
 
         Raises:
-            Lost: one was located where the path does not pass: an imperfect structure turns off before it, and the
+            Lost: one was located where the path does not pass: an imperfect structure turns away before it, and the
                 chord leads from its path to another one.
         """
         counts = [point.negative_modes for _, point in (chord.known[0], chord.known[-1])]
@@ -203,10 +194,8 @@ class Locator:
         return any(abs(self.track.bordered.work(other.null, crossing.null)) > _ALIKE for other in near)
 
     def _by_count(self, chord, counts, limits):
-        """(coordinate, `PathPoint`, modes) of the eigenvalues of the second variation that change their sign.
-
-        Their number is that by which the negative modes change; those of limit points are left out.
-        """
+        """(coordinate, `PathPoint`, modes) of the eigenvalues of the second variation that change their sign, as many
+        as negative modes appear or vanish, without those of limit points."""
         first, last = counts
         if last - first == len(limits):
             return []
@@ -221,11 +210,8 @@ class Locator:
         return [(place, point, self._modes(chord, place, point, together)) for place, point, together in found]
 
     def _by_tangent(self, chord, counts, limits):
-        """(None, `PathPoint`, [mode]) for each negative mode at one end.
-
-        Under loads without a potential the tangent can be singular only where its symmetric part is indefinite, but
-        it generally is not where that part becomes singular.
-        """
+        """(None, `PathPoint`, [mode]) for each negative mode at one end: under loads without a potential the tangent
+        can be singular only where its symmetric part is indefinite."""
         if not counts[-1]:
             return []
         end = max(chord.known[0][1], chord.known[-1][1], key=lambda point: point.negative_modes)
@@ -274,10 +260,8 @@ class Locator:
         return modes
 
     def _vanishing(self, chord, j, last):
-        """Where the j-th eigenvalue vanishes: (coordinate, `PathPoint`, number of eigenvalues that vanish there).
-
-        Eigenvalues are numbered in ascending order; those from number `last` on are not considered.
-        """
+        """Where the j-th eigenvalue in ascending order vanishes: (coordinate, `PathPoint`, number of eigenvalues before
+        `last` that vanish there)."""
         track = self.track
 
         def eigenvalue(point, j=j):

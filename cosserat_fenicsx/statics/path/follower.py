@@ -33,9 +33,7 @@ class Follower:
     """Advances along the path from one requested load factor to the next.
 
     Args:
-        problem: a loaded `Problem`.
-        newton, stability: the problem's Newton solver and its `NegativeModes`.
-        steps: a `StepControl`.
+        problem, newton, stability: see `solvers_of`; steps: a `StepControl`.
         control: "auto", "load" or "arc".
         branch: 1 or -1 to leave the path at the first bifurcation; 0 to stay on it.
         on_event: called with every `Crossing`.
@@ -70,10 +68,7 @@ class Follower:
         return self._load.c.smallest
 
     def begin(self, load_factors):
-        """Begin the path at the problem's state: apply the permanent loads in steps, and solve at load factor 0.
-
-        Args:
-            load_factors: of the path to follow.
+        """Begin the path over these load factors: apply the permanent loads in steps, and solve at load factor 0.
 
         Raises:
             NotConverged: no equilibrium was found.
@@ -163,11 +158,8 @@ class Follower:
         return self.fork is not None and not self.left
 
     def _watch(self, a, b, plain):
-        """Report the bifurcations within a step of load control.
-
-        Returns:
-            False to leave the path there; None where the step is too long to tell.
-        """
+        """Report the bifurcations within a step of load control; False to leave the path there, None where the step is
+        too long to resolve them."""
         looks = a.negative_modes != b.negative_modes or (b.negative_modes > 0 and self.track.without_potential)
         if not (looks and (self._on_event or self._branch)):
             return True

@@ -78,20 +78,17 @@ class StepControl:
 
 
 class Continuation:
-    """Advances a track by load control.
+    """Advances a `Track` by load control, by a `StepControl`.
 
     Args:
-        track: a `Track`.
-        control: a `StepControl`.
         watch: called as watch(a, b, plain) before the point b after a is accepted; plain: whether b is close to its
             predictor although the number of negative modes changes. False ends the continuation at a, None rejects
             the step.
         reach: largest size of the load factors of the path, to which steps are relative.
 
     Attributes:
-        reach: see above.
-        c: C's `step_control`, which a `Sweep` shares: its `step` is 0 where it is still to be chosen, its `rejections`
-            are those just before the next call of `to`.
+        c: C's `step_control`, which a `Sweep` shares: `step` is 0 until it is chosen; `rejections` precede the next
+            call of `to`.
     """
 
     def __init__(self, track: Track, control: StepControl, watch=None, *, reach=1.0):
@@ -109,8 +106,8 @@ class Continuation:
         Args:
             load_factor: to reach.
             on_step: called with every accepted `PathPoint`.
-            patience: number of rejected steps, without two successive accepted ones between, after which to stop;
-                None to go on to the `StepControl`'s smallest step.
+            patience: rejected steps, without two successive accepted ones between, after which to stop; None for no
+                limit but the smallest step.
             once: whether to return after the first accepted step.
 
         Returns:
@@ -237,12 +234,7 @@ Swept = namedtuple("Swept", "load_factors x fields iterations steps")
 
 
 class Sweep(Pointers):
-    """The continuation in C of one problem.
-
-    Args:
-        track: a `Track`; its problem must be serial.
-        fields: the `PackedExpression` of what is recorded, or None.
-    """
+    """The continuation in C of a `Track` of one process; fields: the recorded `PackedExpression`, or None."""
 
     def __init__(self, track, fields):
         super().__init__()
@@ -271,12 +263,12 @@ class Sweep(Pointers):
             setattr(sweep, f"recorded_{name}", self.integers(getattr(self._recorded, name)))
 
     def along(self, load_factors, control, patience, *, every, counted):
-        """Advance to load factors in turn until a step needs another decision than to be accepted or halved.
+        """Advance to load factors in turn while C can decide on steps by accepting or halving them.
 
         Args:
             load_factors: to reach, in this order.
             control: the `Continuation`, whose step control is shared.
-            patience: number of rejected steps, without two successive accepted ones between, after which to stop.
+            patience: see `Continuation.to`.
             every: whether every step is recorded, or these load factors alone.
             counted: Newton iterations since the last record.
 

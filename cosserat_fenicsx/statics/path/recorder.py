@@ -47,10 +47,7 @@ class Tracing:
     """Computes and records a `Path`.
 
     Args:
-        solvers: the loaded `Problem`, its Newton solver and its `NegativeModes`.
-        follow: arguments of `Follower`.
-        choice: the `Choice` of the model.
-        bar: a `Progress`.
+        solvers: see `solvers_of`; follow: arguments of `Follower`; choice: of the model; bar: a `Progress`.
     """
 
     def __init__(self, solvers, follow, choice, bar):
@@ -215,9 +212,8 @@ class Tracing:
         return f"{where} load factors in between, more elements{softer}, or {self.model.signature.formulation.advice}."
 
     def corrected(self, coarse):
-        """The points of a path on a coarser mesh, corrected on this mesh by Newton's method at their load factors.
-
-        None where one fails to converge, moves too far or changes its number of negative modes.
+        """The points of a path on a coarser mesh, corrected on this mesh by Newton's method at their load factors; None
+        where one fails to converge, moves too far or changes its number of negative modes.
 
         Raises:
             Interrupted: with the path so far.

@@ -47,10 +47,9 @@ class PathPoint:
         numbers: see `Problem.numbers`; the first array holds the unknowns that this rank owns.
         negative_modes: see `NegativeModes.count`.
         iterations: Newton iterations of its solution.
-        rise: d eta/d arc, positive where the load factor grows along the path; None where it was not computed.
-        along: owned entries of dx/d arc; None where it was not computed.
-        logarithm: see `NegativeModes`; NaN where it was not computed.
-        space: see `Part.negative_space`; None where it was not computed.
+        rise, along: d eta/d arc and the owned entries of dx/d arc; None until they are computed.
+        logarithm: see `NegativeModes`; NaN until it is computed.
+        space: see `Part.negative_space`; None until it is computed.
     """
 
     load_factor: float
@@ -67,9 +66,7 @@ class Track:
     """The state of a loaded problem on its path.
 
     Args:
-        problem: a loaded `Problem`.
-        newton, stability: the problem's Newton solver and its `NegativeModes`.
-        max_iterations: Newton iterations allowed in a step.
+        problem, newton, stability: see `solvers_of`; max_iterations: Newton iterations allowed in a step.
 
     Attributes:
         origin: the first `PathPoint` of the path, from `begin_here` on.
@@ -122,10 +119,8 @@ class Track:
         return self._solve(self.newton)
 
     def on_plane(self, numbers, load_factor, normal, weight):
-        """Newton's method from (numbers, eta) in the plane <normal, dx> + weight d eta = 0 through them.
-
-        Both x and eta are unknowns. Returns a `Solved` and sets `failure`.
-        """
+        """Newton's method for x and eta from (numbers, eta) in the plane <normal, dx> + weight d eta = 0 through them;
+        returns a `Solved` and sets `failure`."""
         self.put(numbers, load_factor)
         self.bordered.stay_in_plane(normal, weight, self.neutral)
         solved = self._solve(self.bordered)
