@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -16,6 +17,8 @@ import cosserat_fenicsx as cf
 from cosserat_fenicsx.ranks import end_all
 
 COMM = MPI.COMM_WORLD
+DEMOS = Path(__file__).parent.parent / "demos"
+sys.path += [str(DEMOS), str(DEMOS / "evidence")]
 
 
 def pytest_addoption(parser):
@@ -64,6 +67,23 @@ def pytest_runtest_makereport(item, call):
 def tmp_path_all(tmp_path):
     """A temporary folder that all ranks share."""
     return Path(COMM.bcast(str(tmp_path)))
+
+
+def refused(words):
+    """For `with`: a `SceneError` whose message contains these words."""
+    return pytest.raises(cf.SceneError, match=re.escape(words))
+
+
+def refuses(cases, how=lambda given: given()):
+    """A test that calls `how` with what each case {name: (given, words)} gives, which is refused in these words."""
+
+    @pytest.mark.parametrize("case", cases)
+    def test(case):
+        given, words = cases[case]
+        with refused(words):
+            how(given)
+
+    return test
 
 
 def column(*, length=20.0, diameter=0.2, eccentricity=0.2, arm=False, section=None, E=210e9):

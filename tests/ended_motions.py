@@ -1,8 +1,5 @@
 """Motions that are written to a folder, and ways to end them early."""
 
-import os
-import signal
-
 import numpy as np
 import pytest
 from moving_scenes import flying_in_a_plane, flying_in_space, flying_off_axis
@@ -68,18 +65,3 @@ def part_of(case, folder, monkeypatch, step=25, apart=0.02):
     with pytest.raises(Stopped):
         run(case, folder)
     return CASES[case][0]()[1]
-
-
-def kill_in(case, step, folder):
-    """In a separate process: run a case that is killed in the middle of a step."""
-    accept, taken = Moving.accept, []
-
-    def accept_or_die(self, h):
-        accept(self, h)
-        taken.append(h)
-        if len(taken) == step:
-            os.kill(os.getpid(), signal.SIGKILL)
-
-    Moving.accept = accept_or_die
-    Store.APART, Store.SELDOM = 0.05, 0
-    run(case, folder)

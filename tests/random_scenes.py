@@ -1,11 +1,5 @@
-"""Random scenes of one clamped rod in space, as plain numbers: for the package, and for the reference in bvp.py.
+"""Random scenes of one clamped rod in space, as plain numbers: for the package, and for the reference in bvp.py."""
 
-As a script it solves them by bvp.py and prints the results: python tests/random_scenes.py [how many] [first].
-"""
-
-import sys
-import time
-from collections import Counter
 from dataclasses import dataclass
 
 import bvp
@@ -109,30 +103,3 @@ def draw(seed):
 
 def scenes(count=200, first=0):
     return [draw(seed) for seed in range(first, first + count)]
-
-
-def main(count=200, first=0):
-    kinds, spent, worst = Counter(), [], 0.0
-    print("seed  slender  |F| |M| |f|  moved/L  accuracy  nodes folds crossings index points  seconds")
-    for drawn in scenes(count, first):
-        began, problem = time.process_time(), drawn.problem()
-        loads = " ".join(f"{np.linalg.norm(problem.dimensionless[name]):.1f}" for name in ("F", "M", "f"))
-        try:
-            found = bvp.equilibrium(problem)
-        except bvp.NoTruth as error:
-            kinds["no truth"] += 1
-            print(f"{drawn.seed:4d}  {drawn.slenderness:7.0f}  {loads}  {error}")
-            continue
-        spent.append(time.process_time() - began)
-        moved = np.linalg.norm(found(drawn.length)["r"] - drawn.rest([drawn.length])) / drawn.length
-        worst = max(worst, found.accuracy)
-        kinds[found.verdict] += 1
-        print(
-            f"{drawn.seed:4d}  {drawn.slenderness:7.0f}  {loads}  {moved:.3f}  {found.accuracy:.1e}  {found.nodes:5d}"
-            f"  {found.folds} {found.crossings} {found.index} {len(found.path):4d}  {spent[-1]:.2f}  {found.verdict}"
-        )
-    print(dict(kinds), f"mean {np.mean(spent):.2f} s, longest {max(spent):.2f} s, worst accuracy {worst:.1e}")
-
-
-if __name__ == "__main__":
-    main(*map(int, sys.argv[1:]))

@@ -53,9 +53,7 @@ def rods(folder, dt=0.05):
 
 
 def string(folder, dt=0.01):
-    return cf.drilling.simulate(
-        fake_string.scene(), 5.0, dt=dt, folder=folder, profile_every=0.5, progress=False
-    )
+    return cf.drilling.simulate(fake_string.scene(), 5.0, dt=dt, folder=folder, profile_every=0.5, progress=False)
 
 
 def goes_on(folder):
@@ -85,35 +83,14 @@ class User:
 
 
 USERS = {
-    "rods": User(
-        rods,
-        goes_on,
-        cf.read_history,
-        lambda folder: rods(folder, 0.1),
-        lambda x: [np.array(x._file.rows[name]).tobytes() for name in x._file.rows.dtype.names if len(x)],
-        "simulate",
-        "motion",
-    ),
-    "string": User(
-        string,
-        goes_on,
-        cf.read,
-        lambda folder: string(folder, 0.02),
-        lambda x: [x.rows.tobytes(), x._along().tobytes()],
-        "drilling.simulate",
-        "motion of a drill-string",
-    ),
+    "rods": User(rods, goes_on, cf.read_history, lambda folder: rods(folder, 0.1),
+             lambda x: [np.array(x._file.rows[name]).tobytes() for name in x._file.rows.dtype.names if len(x)],
+             "simulate", "motion"),
+    "string": User(string, goes_on, cf.read, lambda folder: string(folder, 0.02),
+               lambda x: [x.rows.tobytes(), x._along().tobytes()], "drilling.simulate", "motion of a drill-string"),
     "study": User(study, study, study, lambda folder: study(folder, 13), of_study, "study", "study"),
-    "sweep": User(
-        sweep,
-        goes_on,
-        read,
-        lambda folder: sweep(folder, 1e-3),
-        of_sweep,
-        "depth_sweep",
-        "sweep",
-    ),
-}
+    "sweep": User(sweep, goes_on, read, lambda folder: sweep(folder, 1e-3), of_sweep, "depth_sweep", "sweep"),
+}  # fmt: skip
 
 
 def use(monkeypatch, apart=0.0):

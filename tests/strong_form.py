@@ -4,19 +4,14 @@ By scipy's DOP853 at 1e-12 on (r, q, n, m) with the laws (2)-(3), in SI units.
 """
 
 import numpy as np
+from clamped_rod import matrix as matrices
 from scipy.integrate import solve_ivp
 from scipy.optimize import root
 
 
 def matrix(q):
-    a, b, c, d = q / np.linalg.norm(q)
-    return np.array(
-        [
-            [a * a + b * b - c * c - d * d, 2 * (b * c - a * d), 2 * (b * d + a * c)],
-            [2 * (b * c + a * d), a * a - b * b + c * c - d * d, 2 * (c * d - a * b)],
-            [2 * (b * d - a * c), 2 * (c * d + a * b), a * a - b * b - c * c + d * d],
-        ]
-    )
+    """The rotation matrix of one quaternion (4,)."""
+    return matrices(q[:, None])[0]
 
 
 def shoot(length, frame, K, J, density, loads, steps=10):

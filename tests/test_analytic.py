@@ -52,15 +52,12 @@ def test_turning_arm():
     np.testing.assert_allclose(tip.delta, [point["eccentric_arm_delta"] for point in known], rtol=2e-8)
 
 
-@pytest.mark.parametrize(
-    "eta, delta, shortening, tip_rotation",
-    [
-        (0.9, 2.1689562695492, 0.1471325194519424, 0.175892285453352),
-        (1.1, 10.74888227922008, 4.091008973247912, 0.9281897906591813),
-        (1.5, 15.76237478160241, 12.67348426472652, 1.716489358920807),
-        (2.0, 15.97665178536152, 18.44006403193293, 2.156423151699256),
-    ],
-)
+@pytest.mark.parametrize("eta, delta, shortening, tip_rotation", [
+    (0.9, 2.1689562695492, 0.1471325194519424, 0.175892285453352),
+    (1.1, 10.74888227922008, 4.091008973247912, 0.9281897906591813),
+    (1.5, 15.76237478160241, 12.67348426472652, 1.716489358920807),
+    (2.0, 15.97665178536152, 18.44006403193293, 2.156423151699256),
+])  # fmt: skip
 def test_turning_arm_in_full(eta, delta, shortening, tip_rotation):
     """Shooting of n' = 0, m' + r' x n = 0 by Taylor series with 25 digits; from 1.5 on the tip moment is negative."""
     tip = reissner(eta, ECCENTRICITY, LENGTH, **STIFFNESS, arm=True)
@@ -127,25 +124,22 @@ def test_shape_and_order_of_the_load_factors():
         assert tip.delta[1, 0] == tip.shortening[1, 0] == tip.tip_rotation[1, 0] == 0
 
 
-@pytest.mark.parametrize(
-    "field, refused",
-    [
-        ("eta", lambda: secant_delta(-0.1, 0.2)),
-        ("eta", lambda: elastica([0.5, np.nan], 0.2, 1.0)),
-        ("eta", lambda: reissner(np.inf, 0.2, 1.0, **RIGID)),
-        ("eta", lambda: secant_delta("1", 0.2)),
-        ("eccentricity", lambda: secant_delta(0.5, 0.0)),
-        ("eccentricity", lambda: reissner(0.5, -0.2, 1.0, **RIGID)),
-        ("length", lambda: elastica(0.5, 0.2, 0.0)),
-        ("bending", lambda: reissner(0.5, 0.2, 1.0, bending=np.inf, axial=1.0, shear=1.0)),
-        ("axial", lambda: reissner(0.5, 0.2, 1.0, bending=1.0, axial=0.0, shear=1.0)),
-        ("shear", lambda: reissner(0.5, 0.2, 1.0, bending=1.0, axial=1.0, shear=-1.0)),
-        ("arm", lambda: reissner(0.5, 0.2, 1.0, **RIGID, arm=1)),
-        ("load", lambda: transverse_tip_force(-1.0)),
-        ("force", lambda: planar_tip(1.0, 1.0, bending=1.0, force=(0, 0, 1))),
-        ("the tip turns by 2 pi", lambda: elastica(9.0, 0.5, 1.0)),
-    ],
-)
+@pytest.mark.parametrize("field, refused", [
+    ("eta", lambda: secant_delta(-0.1, 0.2)),
+    ("eta", lambda: elastica([0.5, np.nan], 0.2, 1.0)),
+    ("eta", lambda: reissner(np.inf, 0.2, 1.0, **RIGID)),
+    ("eta", lambda: secant_delta("1", 0.2)),
+    ("eccentricity", lambda: secant_delta(0.5, 0.0)),
+    ("eccentricity", lambda: reissner(0.5, -0.2, 1.0, **RIGID)),
+    ("length", lambda: elastica(0.5, 0.2, 0.0)),
+    ("bending", lambda: reissner(0.5, 0.2, 1.0, bending=np.inf, axial=1.0, shear=1.0)),
+    ("axial", lambda: reissner(0.5, 0.2, 1.0, bending=1.0, axial=0.0, shear=1.0)),
+    ("shear", lambda: reissner(0.5, 0.2, 1.0, bending=1.0, axial=1.0, shear=-1.0)),
+    ("arm", lambda: reissner(0.5, 0.2, 1.0, **RIGID, arm=1)),
+    ("load", lambda: transverse_tip_force(-1.0)),
+    ("force", lambda: planar_tip(1.0, 1.0, bending=1.0, force=(0, 0, 1))),
+    ("the tip turns by 2 pi", lambda: elastica(9.0, 0.5, 1.0)),
+])  # fmt: skip
 def test_bad_input_is_refused_by_name(field, refused):
     with pytest.raises(SceneError, match=field):
         refused()

@@ -4,11 +4,11 @@ import itertools
 
 import numpy as np
 import pytest
-import test_orbits
 import test_well_sweep as wells
+import test_whirl
 from fake_string import scene, use
 from reference_strings import pipe_and_collars
-from test_orbits import collar  # noqa: F401
+from test_whirl import collar  # noqa: F401
 
 import cosserat_fenicsx as cf
 
@@ -89,7 +89,7 @@ def test_stability_of_strings():
 
 def test_sections_in_holes(collar):  # noqa: F811
     rod, wall, history = collar
-    station = rod.at(test_orbits.LENGTH / 2)
+    station = rod.at(test_whirl.LENGTH / 2)
     check_all(
         lambda **look: history.plot_orbit(station, wall, **look),
         lambda **look: history.plot_whirl(station, **look),

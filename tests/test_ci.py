@@ -28,19 +28,16 @@ def debian():
     return module
 
 
-@pytest.mark.parametrize(
-    ("suite", "version", "failure", "word", "code"),
-    [
-        ("trixie", "0.9.0", None, "passed", 0),
-        ("trixie", "0.9.0", "pytest", "FAILED", 1),
-        ("trixie", None, "mmdebstrap", "FAILED", 1),
-        ("sid", f"{RECORDED}.post0", None, "passed", 0),
-        ("sid", f"{RECORDED}.post0", "pytest", "FAILED", 1),
-        ("sid", None, "mmdebstrap", "SKIPPED", 0),
-        ("sid", "9.1.0", "pytest", "WARNING", 0),
-        ("sid", "9.1.0", None, "passed", 0),
-    ],
-)
+@pytest.mark.parametrize(("suite", "version", "failure", "word", "code"), [
+    ("trixie", "0.9.0", None, "passed", 0),
+    ("trixie", "0.9.0", "pytest", "FAILED", 1),
+    ("trixie", None, "mmdebstrap", "FAILED", 1),
+    ("sid", f"{RECORDED}.post0", None, "passed", 0),
+    ("sid", f"{RECORDED}.post0", "pytest", "FAILED", 1),
+    ("sid", None, "mmdebstrap", "SKIPPED", 0),
+    ("sid", "9.1.0", "pytest", "WARNING", 0),
+    ("sid", "9.1.0", None, "passed", 0),
+])  # fmt: skip
 def test_a_failure_counts_where_success_is_recorded(suite, version, failure, word, code):
     words, found = verdict(suite, version, failure)
     assert words.startswith(word) and found == code

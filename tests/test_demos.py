@@ -1,7 +1,6 @@
 """The demos run, under mpirun too, and give the numbers that they state."""
 
 import re
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -11,11 +10,6 @@ from conftest import COMM
 import cosserat_fenicsx as cf
 
 DEMOS = Path(__file__).parent.parent / "demos"
-
-
-@pytest.fixture(autouse=True)
-def demos_on_the_path(monkeypatch):
-    monkeypatch.setattr(sys, "path", [str(DEMOS), *sys.path])
 
 
 @pytest.mark.ranks

@@ -1,22 +1,32 @@
-"""The forms: Taylor test of every tangent, balance under rigid motions, and the second variation."""
+"""The forms: Taylor tests, rigid motions, FFCx's kernels, and the constraint equations of supports and joints."""
+
+import ctypes
+from dataclasses import replace
 
 import dense
 import numpy as np
 import pytest
+import ufl
 from conftest import column
+from dense import tangent_of_ties
+from dolfinx import cpp, fem
+from dolfinx.fem import petsc as fem_petsc
 from mpi4py import MPI
 
 import cosserat_fenicsx as cf
+from cosserat_fenicsx import compat
+from cosserat_fenicsx.dynamics.simulate import solvers_of as moving_solvers
+from cosserat_fenicsx.models.connections import TiePattern, Ties
 from cosserat_fenicsx.models.formulation import OF_MOTION, Displacement, Mixed, Multiplier
 from cosserat_fenicsx.models.rodmesh import Layout
 from cosserat_fenicsx.models.signature import Signature
 from cosserat_fenicsx.models.spatial import SpatialModel
+from cosserat_fenicsx.scene.supports import AngleTie, PositionTie, TurnTie
 from cosserat_fenicsx.statics.problem import Problem
+from cosserat_fenicsx.statics.problem import solvers_of as static_solvers
 from cosserat_fenicsx.statics.stability import NegativeModes
 
 pytestmark = pytest.mark.serial
-
-
 #: The multiplier formulation with n from the motion, which the carried n equals in equilibrium.
 GALERKIN = Multiplier(force=OF_MOTION)
 
@@ -132,3 +142,197 @@ def test_second_variation_counts_what_an_eigensolver_counts():
         rows = np.arange(part.K.size[0], dtype=np.int32)
         eigenvalues = np.linalg.eigvalsh(part.K.getValues(rows, rows))
         assert (eigenvalues < 0).sum() == expected
+
+
+def model_of(formulation, *, rigid=False):
+    """A model in a random state, on elements of unequal length, under loads that depend on the state."""
+    rod, scene = column(arm=True)
+    k = rod.stiffness
+    if rigid:
+        section = cf.Stiffness(shear=(np.inf, np.inf), axial=np.inf, bending=k.bending, torsion=k.torsion)
+        rod, scene = column(arm=True, section=section)
+    scene = replace(scene, loads=[*scene.loads, cf.LineForce(rod, (0, 1e3, 0))])
+    layout = Layout.of(scene, 3)
+    model = SpatialModel(MPI.COMM_SELF, Signature.of(scene, layout, formulation=formulation, degree=4))
+    model.load(scene, layout)
+    random = np.random.default_rng(1)
+    model.mesh.geometry.x[:, 0] *= np.linspace(0.7, 1.3, len(model.mesh.geometry.x))
+    for function in (model.state, model.before, model.step, *model.carried):
+        function.x.array[:] = random.normal(size=len(function.x.array))
+    model.load_factor.value = 0.7
+    return model
+
+
+def call(address, A, w, c, coordinates):
+    """Add what a kernel computes to A."""
+    kernel = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * compat.KERNEL_ARGUMENTS)(address)
+    arrays = [np.ascontiguousarray(a, dtype=float) for a in (w, c, coordinates)]
+    assert arrays[2].size == compat.KERNEL_COORDINATES
+    kernel(A.ctypes.data, *(a.ctypes.data for a in arrays), *[None] * (compat.KERNEL_ARGUMENTS - 4))
+
+
+def dofs(space):
+    """Local degrees of freedom of every cell."""
+    size = space.dofmap.index_map_bs
+    return (compat.cell_nodes(space)[:, :, None] * size + np.arange(size)).reshape(len(compat.cell_nodes(space)), -1)
+
+
+def ends(model):
+    return model.mesh.geometry.x[compat.geometry_dofs(model.mesh)]
+
+
+@pytest.mark.parametrize(("formulation", "rigid"), [(Mixed(), False), (Displacement(), False), (Mixed(), True)])
+def test_kernels_assemble_what_dolfinx_assembles(formulation, rigid):
+    """Coefficients at Gauss points, a Constant, and where the rod is rigid unknowns in a mixed space."""
+    model = model_of(formulation, rigid=rigid)
+    assert (model.space is model.nodal_space) == (not rigid)
+    cells = dofs(model.space)
+    forms = model.forms
+    vector = np.zeros(len(model.state.x.array))
+    matrix = np.zeros((len(vector), len(vector)))
+    parts = [(form, vector) for form in forms.residual] + [(form, matrix) for form in forms.tangent]
+    for form, whole in parts:
+        address, compiled = compat.kernel_address(form), compat.kernel(form)
+        (coefficients,) = cpp.fem.pack_coefficients(compiled).values()
+        constants = cpp.fem.pack_constants(compiled)
+        assert len(constants) == (form not in (forms.residual[0], forms.tangent[0]))  # the load factor
+        for here, w, coordinates in zip(cells, coefficients, ends(model), strict=True):
+            A = np.zeros((len(here),) * whole.ndim)
+            call(address, A, w, constants, coordinates)
+            whole[np.ix_(*[here] * whole.ndim)] += A
+    expected = sum(fem_petsc.assemble_vector(form).array for form in forms.residual)
+    np.testing.assert_allclose(vector, expected, rtol=0, atol=1e-14 * np.abs(expected).max())
+    rows, expected = np.arange(len(vector), dtype=np.int32), 0
+    for form in forms.tangent:
+        A = fem_petsc.assemble_matrix(form)
+        A.assemble()
+        expected = expected + A.getValues(rows, rows)
+    np.testing.assert_allclose(matrix, expected, rtol=0, atol=1e-14 * np.abs(expected).max())
+    assert np.abs(expected).max() > 0
+
+
+@pytest.mark.parametrize("name", ["fields", "advance", "density"])
+def test_expressions_have_the_values_that_dolfinx_gives(name):
+    """The Functions and Constants in the order in which a caller must pack them."""
+    model = model_of(Mixed())
+    expression = getattr(model.forms, name)
+    (expression,) = expression if name == "density" else (expression,)
+    address, functions, constants = compat.expression_address(expression)
+    assert len(constants) == (name == "density")
+    c = np.concatenate([[], *(constant.value.ravel() for constant in constants)])
+    w = np.concatenate([function.x.array[dofs(function.function_space)] for function in functions], axis=1)
+    expected = compat.evaluate(expression, model.mesh, np.arange(len(w), dtype=np.int32))
+    found = np.zeros_like(expected)
+    for values, here, coordinates in zip(found, w, ends(model), strict=True):
+        call(address, values, here, c, coordinates)
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-14 * np.abs(expected).max())
+    assert np.abs(expected).max() > 0
+
+
+def test_a_form_of_several_kernels_is_refused():
+    model = model_of(Displacement())
+    dx = ufl.Measure("dx", domain=model.mesh)
+    two = fem.form(ufl.TestFunction(model.space)[0] * (dx(1) + dx(2)))
+    with pytest.raises(ValueError, match="2 integrals over cells, expected 1"):
+        compat.kernel_address(two)
+
+
+ETA, STEP = 0.4, 1e-6
+NODES = [(0, 1), (0, -1), (0, 1), (2, -1), (2, -1), (0, -1), (1, 2)]
+
+
+def moved(rq, node, direction, amount):
+    """(r, q) after a small displacement (directions 0 to 2) or inertial rotation (3 to 5) of one node."""
+    rq, change = rq.copy(), np.zeros(3)
+    change[direction % 3] = amount
+    if direction < 3:
+        rq[node, :3] += change
+        return rq
+    half, (a, v) = np.linalg.norm(change) / 2, (rq[node, 3], rq[node, 4:])
+    c, s = np.cos(half), change / 2
+    rq[node, 3:] = np.append(c * a - s @ v, c * v + a * s + np.cross(s, v))
+    return rq
+
+
+def test_gradient_and_tangent():
+    rng = np.random.default_rng(7)
+
+    def vector():
+        return tuple(rng.normal(size=3))
+
+    q = rng.normal(size=(3, 4))
+    rq = np.hstack([rng.normal(size=(3, 3)), q / np.linalg.norm(q, axis=1, keepdims=True)])
+    ties = [
+        PositionTie(0, 1, vector(), 0.3), PositionTie(0, None, vector(), 0.7), AngleTie(0, 1, vector(), vector()),
+        AngleTie(2, None, vector(), vector()), TurnTie(2, None, vector(), vector()),
+        TurnTie(0, None, vector(), (0, 0, 0)),
+        AngleTie(1, 2, vector(), vector()),
+    ]  # fmt: skip
+    known, multipliers = Ties(ties, TiePattern(NODES, 3), rng.normal(size=(3, 3)), 2.0), rng.normal(size=len(ties))
+    gradient = known.pattern.on_nodes(known.evaluate(rq, ETA)[1])
+    tangent = known.pattern.full(known.change(rq, ETA, multipliers)).reshape(3, 6, 3, 6)
+    for node in range(3):
+        for direction in range(6):
+            (c1, g1), (c0, g0) = (known.evaluate(moved(rq, node, direction, sign * STEP), ETA) for sign in (1, -1))
+            np.testing.assert_allclose((c1 - c0) / (2 * STEP), gradient[:, node, direction], atol=1e-8)
+            reactions = known.reactions(g1 - g0, multipliers) / (2 * STEP)
+            np.testing.assert_allclose(reactions, tangent[:, :, node, direction], atol=1e-8)
+
+
+SECTION = cf.Stiffness((1e4, 1e4), 1e4, (500.0, 500.0), 500.0, mass=1.0, inertia=(10.0, 10.0, 20.0))
+
+
+def held_twice():
+    """Two rods with a hinge between them, moved at one end, on a roller at the other."""
+    a, b = cf.Rod(cf.Line((0, 0, 0), (5, 0, 0)), SECTION, name="a"), cf.Rod(cf.Line((5, 0, 0), (9, 3, 0)), SECTION)
+    moved = cf.Prescribed(a.start, displacement=(0.1, 0.2, 0.0))
+    return cf.Scene([a, b], [moved, cf.Roller(b.end, (0, 1, 0))], [], joints=[cf.Joint(a.end, b.start, (0, 0, 1))])
+
+
+def solvers_of(kind, model):
+    """The solvers of a static formulation or of a scheme for motion."""
+    scene = held_twice()
+    layout = Layout.of(scene, 2)
+    if kind in ("mixed", "multiplier"):
+        return static_solvers(scene, layout, formulation=kind, degree=2, model=model)
+    return moving_solvers(scene, layout, 2, kind, 1.0, MPI.COMM_WORLD, model)
+
+
+@pytest.mark.parametrize(
+    ("kind", "model"),
+    [
+        ("mixed", "spatial"), ("mixed", "planar"), ("multiplier", "spatial"), ("momentum", "spatial"),
+        ("momentum", "planar"), ("generalised-alpha", "spatial"),
+    ],
+)  # fmt: skip
+def test_blocks_of_a_problem(kind, model):
+    """The derivatives in the rows of a solver, of statics and of a step, are those of the residual."""
+    rng = np.random.default_rng(3)
+    with solvers_of(kind, model) as (problem, *_):
+        rows, model = problem.ties, problem.model
+        problem.set_state(problem.x)
+        count, added = model.tied_at_rest.size, list(model.signature.connections.equations)
+
+        def see(y):
+            multipliers = np.zeros(len(rows.seen[1]))
+            multipliers[added] = y[count:]
+            rows.seen = y[:count].reshape(model.tied_at_rest.shape), multipliers
+            rows._forget()
+
+        def residual(y):
+            see(y)
+            return np.concatenate(rows.residual_blocks(ETA))
+
+        def random(size):
+            return np.append(model.tied_at_rest, np.zeros(len(added))) + size * rng.normal(size=count + len(added))
+
+        if hasattr(rows, "begin"):
+            see(random(0.05))
+            rows.begin(model.ties)
+        y = random(0.2)
+        see(y)
+        of_nodes, reactions, equations = tangent_of_ties(rows, ETA)
+        J = np.block([[of_nodes, reactions], [equations, np.zeros((len(added), len(added)))]])
+        for j, column in enumerate(np.eye(len(y))):
+            change = (residual(y + STEP * column) - residual(y - STEP * column)) / (2 * STEP)
+            np.testing.assert_allclose(change, J[:, j], atol=1e-8)

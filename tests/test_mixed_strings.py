@@ -1,14 +1,20 @@
-"""Rods for the lower part of a string under the waves of its pipe: with a bit against the string models, in a hole."""
+"""Rods below a pipe, the pipe as a condition at their end, bits that come down on rock, and the demos."""
 
 import math
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
+from axial_scenes import column, hanging, unbalanced
 from ended_motions import Stopped, stop_at
+from scipy.integrate import solve_ivp
 from torsion_scenes import COLLARS, LAW, PIPE, part
 
 import cosserat_fenicsx as cf
+from cosserat_fenicsx.cli.main import main
+from cosserat_fenicsx.drilling.elements import AxialTorsional
+from cosserat_fenicsx.drilling.pipe_above import DelayLines, TopEnd
 
 pytestmark = pytest.mark.serial
 SMALL = {"elements": 4, "degree": 2}
@@ -112,16 +118,458 @@ def test_refusals():
     for scene, depth, words in (
         (string, None, "depth = None: .*lowest DrillPipe"),
         (string, 3300.0, "depth = 3300.0: expected a depth within the string"),
-        (
-            drilling(None, hole=cf.well.Borehole(curved, cf.well.HoleSection(3200.0, 0.2159, 0.2))),
-            3000.0,
-            "turns by about",
-        ),
+        (drilling(None, hole=cf.well.Borehole(curved, cf.well.HoleSection(3200.0, 0.2159, 0.2))), 3000.0,
+         "turns by about"),
         (replace(string, drag=cf.drilling.ViscousDrag(0.3)), 3000.0, "drag = .*the same rate"),
         (drilling(cutting, weight=1e4), 3000.0, "law = .*a Stribeck"),
-    ):
+    ):  # fmt: skip
         with pytest.raises(cf.SceneError, match=words):
             cf.drilling.mixed_scene(scene, depth)
     steep = cf.drilling.mixed_scene(drilling(cf.drilling.Stribeck(6000.0, 0.0, 0.1), inertia=0.0), 3000.0)
     with pytest.raises(cf.SceneError, match="falls faster with the speed than the rod can follow"):
         cf.simulate(steep.scene, 6.0, dt=0.01, **SMALL)
+
+
+G, E, DENSITY = 79.3e9, 206e9, 7850.0
+STEEL = cf.Material(E=E, nu=E / (2 * G) - 1, density=DENSITY)
+ABOVE = cf.well.DrillPipe(length=3000.0, outer_diameter=0.127, inner_diameter=0.10861, material=STEEL)
+BELOW = {"outer_diameter": 0.1651, "inner_diameter": 0.05715, "material": STEEL}
+Z_ABOVE, Z_BELOW, SPEED = 296.3752962822167, 1793.8208301221391, 3178.350331229312
+# natural frequencies of the reference numbers for drill-strings: a_stability and c_axial, Hz
+TORSIONAL = [0.19208807729519303, 0.627212400600027, 1.116183045133015, 1.625788564006934, 2.143329063144303]
+ON_HOOK = [0.30553636274474666, 0.9808152730876113, 1.7320998057762933, 2.5179520090783853]
+UNDER_RIGID_HOOK = [0.31638592263763815, 1.020855011562465, 1.8063829278567385, 2.6254960072287594]
+
+
+def collars(drive=None, *loads, pipe=ABOVE, damping=0.0, **more):
+    """A vertical rod of collars below the pipe, held across at both ends; loads: functions of the rod."""
+    damping = cf.Damping(drag=damping) if damping else None
+    rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, -200)), cf.Tube(0.1651, 0.05715), STEEL, name="collars", damping=damping)
+    held = [cf.Roller(end, across) for end in (rod.start, rod.end) for across in ((1, 0, 0), (0, 1, 0))]
+    above = cf.drilling.PipeAbove(rod.start, pipe, drive or cf.drilling.TopDrive(0.0), **more)
+    return rod, cf.Scene([rod], held, [above, *(load(rod) for load in loads)])
+
+
+def pulse(size, length):
+    """A smooth load for `length` s, of this largest vector."""
+    return lambda t: tuple(x * math.sin(math.pi * t / length) ** 2 if 0 < t < length else 0.0 for x in size)
+
+
+def torque(length=0.6):
+    """About the axis downwards, at the lower end."""
+    return lambda rod: cf.FollowerMoment(rod.end, pulse((0, 0, 500.0), length))
+
+
+def motion(scene, duration, dt, **more):
+    return cf.simulate(scene, duration, dt=dt, **{"elements": 4, "degree": 2, **more})
+
+
+def bit_speed(history, rod):
+    return -history.angular_velocity(rod.end)[:, 2]
+
+
+def exact_bit_speed(moment, duration, cells=60):
+    """Times, and the speed of the lower end under a torque there, by d'Alembert's solution."""
+    Z, dt = np.repeat([Z_ABOVE, Z_BELOW], [15 * cells, cells]), 200 / SPEED / cells
+    down, up, found = np.zeros(len(Z)), np.zeros(len(Z)), []
+    for step in range(int(duration / dt) + 2):
+        speeds = np.zeros(len(Z) + 1)  # the upper end is held
+        speeds[1:-1] = (down[:-1] - up[1:]) / (Z[:-1] + Z[1:])
+        speeds[-1] = (down[-1] + moment(step * dt)) / Z[-1]
+        down, up = up + 2 * Z * speeds[:-1], down - 2 * Z * speeds[1:]
+        found.append(speeds[-1])
+    return dt * np.arange(len(found)), np.array(found)
+
+
+def frequencies_near(times, values, guesses):
+    """Hz, of the peaks of the spectrum."""
+    window, found = np.hanning(len(times)) * (values - values.mean()), []
+    for guess in guesses:
+        f = guess + np.linspace(-0.02, 0.02, 81)
+        size = np.abs(np.exp(-2j * np.pi * f[:, None] * times) @ window)
+        a, b, c = size[(k := int(size[1:-1].argmax())) : k + 3]
+        found.append(f[k + 1] + (f[1] - f[0]) * 0.5 * (a - c) / (a - 2 * b + c))
+    return np.array(found)
+
+
+# -- the delay lines alone -------------------------------------------------------------------------------------------
+
+
+def free_end(lines, duration, h):
+    """Speeds of a lower end without torque, means over steps."""
+    speeds = []
+    for k in range(int(round(duration / h))):
+        speeds.append(lines.arriving((k + 0.5) * h) / lines.dashpot)
+        lines.advance(k * h, h, speeds[-1])
+    return np.array(speeds)
+
+
+def test_a_free_pipe_under_a_stiff_drive_turns_by_the_double_speed_in_turns():
+    """Travel time of 1 s, in whole steps: 0, then twice the drive's speed for 2 s, 0 for 2 s, and so on."""
+    lines = DelayLines([5.0], [1.0], [0.0, 0.0], TopEnd(lambda a, b: 3.0, stiff=True))
+    speeds = free_end(lines, 9.0, 1 / 64).reshape(-1, 64).mean(axis=1)
+    np.testing.assert_allclose(speeds, [0, 6, 6, 0, 0, 6, 6, 0, 0], atol=1e-12)
+
+
+@pytest.mark.parametrize("split", [[1.0], [0.3, 0.7], [0.21, 0.35, 0.44]])
+def test_parts_of_one_impedance_are_one_pipe_and_interpolation_creates_no_energy(split):
+    """Travel times that are no whole numbers of steps; a smooth wave of 1 s goes up and down for 20 s."""
+
+    def top(start, end):
+        return math.sin(math.pi * (start + end) / 2) ** 2 if end < 1 else 0.0
+
+    n, end, h = len(split), TopEnd(top, stiff=True), 0.0127
+    speeds = free_end(DelayLines([5.0] * n, split, [0.0] * (n + 1), end), 20.0, h)
+    one = free_end(DelayLines([5.0], [1.0], [0.0, 0.0], end), 20.0, h)
+    np.testing.assert_allclose(speeds, one, atol=2e-3)
+    energies = [(speeds[int(t / h) : int((t + 4) / h)] ** 2).sum() for t in (0.5, 4.5, 8.5, 12.5)]
+    assert (np.diff(energies) <= 0).all() and energies[-1] > 0.999 * energies[0]
+
+
+def test_parts_of_several_impedances_scatter_as_they_should():
+    """The first wave that passes from Z = 5 to Z = 2 doubles by 2 x 5/(5 + 2), less than 2 at the free end."""
+    lines = DelayLines([5.0, 2.0], [1.0, 1.0], [0.0, 0.0, 0.0], TopEnd(lambda a, b: 1.0, stiff=True))
+    speeds = free_end(lines, 4.0, 1 / 64).reshape(-1, 64).mean(axis=1)
+    np.testing.assert_allclose(speeds[:3], [0, 0, 2 * 2 * 5 / 7], atol=1e-12)
+
+
+# -- with a rod ------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("scheme", ["momentum", "energy", "generalised-alpha"])
+def test_the_answer_to_a_torque_at_the_bit_is_that_of_the_whole_string(scheme):
+    """Of order 2 in time, in every scheme."""
+    rod, scene = collars(None, torque())
+    times, exact = exact_bit_speed(lambda t: torque()(rod).moment(t)[2], 3.0)
+    errors = []
+    for dt in (0.006, 0.003):
+        history = motion(scene, 3.0, dt, scheme=scheme)
+        off = bit_speed(history, rod) - np.interp(history.times, times, exact)
+        errors.append(np.abs(off).max() / np.abs(exact).max())
+    assert errors[1] < 1e-3 and errors[0] > 2.5 * errors[1]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("hook", "frequencies"), [(cf.drilling.Hook(5e6), ON_HOOK), (None, UNDER_RIGID_HOOK)])
+def test_axial_natural_frequencies_are_those_of_the_reference(hook, frequencies):
+    blow = pulse((0, 0, -2e4), 0.15)
+    rod, scene = collars(None, lambda rod: cf.Force(rod.end, blow), hook=hook)
+    history = motion(scene, 40.0, 0.01, elements=2)
+    found = frequencies_near(history.times, history.velocity(rod.end)[:, 2], frequencies)
+    np.testing.assert_allclose(found, frequencies, rtol=2.5e-4)
+
+
+@pytest.mark.slow
+def test_torsional_natural_frequencies_are_those_of_the_reference():
+    rod, scene = collars(None, torque(0.2))
+    history = motion(scene, 40.0, 0.01, elements=2)
+    np.testing.assert_allclose(
+        frequencies_near(history.times, bit_speed(history, rod), TORSIONAL), TORSIONAL, rtol=5e-5
+    )
+
+
+def test_a_matched_drive_reflects_nothing():
+    """The rod moves as on a dashpot of the pipe's impedance."""
+    rod, scene = collars(cf.drilling.TopDrive(0.0, control=cf.drilling.Matched()), torque())
+    dashpot = cf.Scene([rod], [cf.Pin(rod.start), *scene.supports[2:]],
+                       [cf.Dashpot(rod.start, rotational=Z_ABOVE), torque()(rod)])  # fmt: skip
+    speed, other = (bit_speed(motion(x, 4.0, 0.01), rod) for x in (scene, dashpot))
+    np.testing.assert_allclose(speed, other, atol=1e-9 * np.abs(other).max())
+
+
+@pytest.mark.parametrize("drag", [0.0, 0.2])
+def test_a_controlled_drive_turns_the_rod_as_it_turns_the_string(drag):
+    """Against the waves of the whole string, whose speeds are means over two of its steps."""
+    drive = cf.drilling.TopDrive(
+        lambda t: 5 * (1 - math.cos(math.pi * min(t, 2) / 2)), 2000.0, cf.drilling.PI(800.0, 200.0)
+    )
+    mud = {"drag": cf.drilling.ViscousDrag(drag)} if drag else {}
+    rod, scene = collars(drive, damping=drag, **mud)
+    string = cf.well.DrillString((cf.well.Collar(200.0, **BELOW), ABOVE))
+    whole = cf.drilling.simulate(cf.drilling.Drilling(string, drive, **mud), 8.0, dt=0.0005, model="torsion")
+    history = motion(scene, 8.0, 0.005)
+    expected = np.interp(history.times, whole.times - (whole.times[1] - whole.times[0]) / 2, whole.bit_speed)
+    np.testing.assert_allclose(bit_speed(history, rod), expected, atol=2e-4 * expected.max())
+
+
+@pytest.mark.parametrize(("scheme", "allowed"), [("momentum", 1e-5), ("energy", 1e-9), ("generalised-alpha", 2e-3)])
+def test_energy_balance_with_all_that_the_pipe_does(scheme, allowed):
+    """Off the vertical, under a torque and a force; the first scheme keeps energy to second order alone."""
+    drive = cf.drilling.TopDrive(lambda t: 3 * math.sin(t) ** 2, 2000.0, cf.drilling.PI(800.0, 200.0))
+    blow = pulse((2e3, 0, -2e4), 0.5)
+    rod, scene = collars(drive, torque(), lambda rod: cf.Force(rod.at(100.0), blow), hook=cf.drilling.Hook(5e6))
+    assert imbalance(motion(scene, 3.0, 0.005, scheme=scheme)) < allowed
+
+
+def test_from_hanging_at_rest_the_hook_lifts_it():
+    """By as much as the hook moved, one travel time before, on the mean."""
+    weight = 200.0 * STEEL.density * math.pi / 4 * (0.1651**2 - 0.05715**2) * 9.80665
+    lift = cf.drilling.Hook(speed=lambda t: 0.25 * (1 - math.cos(math.pi * min(t, 1))))
+    rod, scene = collars(None, lambda rod: cf.Weight((0, 0, -9.80665)), hook=lift, tension=weight)
+    history = motion(scene, 40.0, 0.02, start=1.0)
+    up = history.displacement(rod.start)[:, 2]
+    assert np.abs(up[history.times < 3000 / 5122.7 - 0.05]).max() < 1e-8
+    speed, at_zero = np.polyfit(history.times[500:], up[500:], 1)
+    assert abs(speed - 0.5) < 1e-3 and abs(at_zero + 0.25) < 0.05
+
+
+def test_adaptive_steps_that_are_taken_back_do_not_count():
+    rod, scene = collars(None, torque())
+    times, exact = exact_bit_speed(lambda t: torque()(rod).moment(t)[2], 4.0)
+    history = cf.simulate(scene, 4.0, tol=1e-5, elements=4, degree=2)
+    off = bit_speed(history, rod) - np.interp(history.times, times, exact)
+    assert np.abs(off).max() < 2e-3 * np.abs(exact).max()
+
+
+@pytest.mark.parametrize("steps", [{"dt": 0.02}, {"tol": 1e-3}])
+def test_pipe_resumes_to_identical_digits(steps, tmp_path, monkeypatch):
+    drive = cf.drilling.TopDrive(3.0, 2000.0, cf.drilling.PI(800.0, 200.0))
+    rod, scene = collars(drive, torque(), hook=cf.drilling.Hook(5e6))
+    whole = cf.simulate(scene, 4.0, elements=2, degree=2, **steps)
+    stop_at(monkeypatch, 90, 0.0)
+    with pytest.raises(Exception, match="^$"):
+        cf.simulate(scene, 4.0, elements=2, degree=2, folder=tmp_path / "kept", **steps)
+    history = cf.resume(tmp_path / "kept", scene)
+    for name in ("times", "energy", "work"):
+        assert np.array_equal(getattr(history, name), getattr(whole, name))
+    assert np.array_equal(history.position(rod.end), whole.position(rod.end))
+
+
+def test_steps_longer_than_half_a_travel_time_are_halved():
+    """A pipe of 100 m: 20 ms up in torsion, 12 axially."""
+    short = cf.well.DrillPipe(length=100.0, outer_diameter=0.127, inner_diameter=0.10861, material=STEEL)
+    rod, scene = collars(None, torque(), pipe=short)
+    longest = 100 * math.sqrt(DENSITY / E) / 2
+    history = motion(scene, 0.4, 0.016, save_every=0.4)
+    assert history.steps[-1] == 50 and 0.016 / 2 < longest < 0.016
+
+
+def test_refused_pipes():
+    rod, scene = collars()
+    drive, steel = cf.drilling.TopDrive(1.0), {"outer_diameter": 0.127, "inner_diameter": 0.10861}
+    for arguments, words in (
+        ((rod.at(100.0), ABOVE, drive), "station = .*an end of the rod"),
+        ((rod.start, (), drive), "pipe = .*at least one part"),
+        ((rod.start, "pipe", drive), "pipe = .*parts of the pipe"),
+        ((rod.start, cf.well.DrillPipe(**steel), drive), "length = None: expected a positive number"),
+        ((rod.start, ABOVE, 1.0), "drive = 1.0: expected TopDrive"),
+        ((rod.start, ABOVE, drive, 5e6), "hook = .*Hook"),
+        ((rod.start, ABOVE, drive, None, math.inf), "tension = inf: expected a finite number"),
+        ((rod.start, ABOVE, drive, None, 0.0, 0.3), "drag = 0.3: expected ViscousDrag"),
+    ):
+        with pytest.raises(cf.SceneError, match=words):
+            cf.drilling.PipeAbove(*arguments)
+    with pytest.raises(cf.SceneError, match="triple-jump"):
+        cf.simulate(scene, 1.0, dt=0.01, scheme="triple-jump")
+    with pytest.raises(cf.SceneError, match="modes: PipeAbove at collars.start"):
+        cf.modes(scene)
+
+
+TURNS, LOBES, HEIGHT, WEIGHT, MASS = 120 * cf.units.rpm, 3, 8e-3, 6e4, 300.0
+UP = LOBES * TURNS * HEIGHT  # m/s, of the rock below a bit in steady rotation, which meets it at once
+
+
+def bouncing(stiffness=math.inf, mass=MASS, height=HEIGHT, law=None, **changed):
+    """A uniform string of 2000 m: in the first 0.78 s nothing comes back from its top."""
+    string = cf.well.DrillString([cf.well.Collar(2000.0, outer_diameter=0.2, inner_diameter=0.07)])
+    bit = cf.drilling.BitOnRock(cf.drilling.Lobes(LOBES, height, law), WEIGHT, mass=mass, rock_stiffness=stiffness)
+    given = {"string": string, "drive": cf.drilling.TopDrive(TURNS), "bit": bit, "start": "steady"} | changed
+    return cf.drilling.Drilling(**given)
+
+
+def exact(scene, until):
+    """Weight on bit (N) over time: m u'' = W - Z u' - F with F = k (u + h sin(n Om t)) + W, or 0 where that is less."""
+    Z, bit = scene.segments[0].axial_impedance, scene.bit
+    k, m = bit.rock_stiffness, bit.mass
+
+    def weight(t, u):
+        return np.maximum(k * (u + HEIGHT * np.sin(LOBES * TURNS * t)) + WEIGHT, 0.0)
+
+    def rates(t, y):
+        return [y[1], (WEIGHT - Z * y[1] - weight(t, y[0])) / m]
+
+    found = solve_ivp(rates, (0, until), [0.0, 0.0], "Radau", rtol=1e-9, atol=1e-12, dense_output=True, max_step=1e-3)
+    return lambda t: weight(t, found.sol(t)[0])
+
+
+@pytest.mark.parametrize("mass", [0.0, MASS])
+def test_a_weight_on_rigid_rock_is_that_of_the_wave_and_the_impulse_is_told(mass):
+    """m v of the bit's mass at once, Z v of the wave that starts; neither depends on the step, or on the elements."""
+    scene, found = bouncing(mass=mass), []
+    wave = WEIGHT + scene.segments[0].axial_impedance * UP
+    for dt, elements in ((4e-3, None), (2e-3, None), (1e-3, None), (5e-4, 250)):
+        history = cf.drilling.simulate(scene, 0.5, dt=dt, elements=elements)
+        impulse, weight = history.impulse_on_bit, history.weight_on_bit
+        assert impulse[0] == pytest.approx(mass * UP, rel=0.02, abs=1e-9) and (np.diff(impulse) >= 0).all()
+        assert weight[history.times < 8.5e-3].mean() == pytest.approx(wave, rel=0.04)
+        found.append((weight.max(), weight.mean() + impulse[-1] / 0.5))
+        assert np.abs(history.balance).max() < 1e-9 * np.abs(history.lost_at_bit).max()
+    peaks, means = np.array(found).T
+    assert peaks.max() < 1.15 * wave and np.ptp(peaks) < 0.06 * wave, peaks  # a jump rings for some elements
+    assert np.abs(means / means[-1] - 1).max() < 0.02, means
+    told = history.details()
+    assert ("largest impulse" in told) == (mass > 0) and "stopped by an impulse" in told and "N s" in told
+    assert any("impulse" in axes.get_ylabel() for axes in history.plot().axes) == (mass > 0)
+
+
+@pytest.mark.parametrize(("stiffness", "mass"), [(2.5e7, 300.0), (1e8, 3000.0), (1e9, 20e3)])
+def test_rock_that_gives_way_makes_a_force_that_converges(stiffness, mass):
+    """The bit leaves the rock and comes down again; the largest weight is right to 1 % with the usual step."""
+    scene, off = bouncing(stiffness, mass), []
+    weight = exact(scene, 0.5)
+    usual = AxialTorsional(scene).dt
+    for share in (2.0, 1.0, 0.5):
+        history = cf.drilling.simulate(scene, 0.5, dt=share * usual)
+        true = weight(history.mean_times)
+        off.append(np.sqrt(np.mean((history.weight_on_bit - true) ** 2)) / true.max())
+        assert history.weight_on_bit.min() == 0 and (history.impulse_on_bit == 0).all()
+        if share <= 1:
+            assert history.weight_on_bit.max() == pytest.approx(weight(np.linspace(0, 0.5, 20001)).max(), rel=0.01)
+        assert np.abs(history.balance).max() < 1e-9 * np.abs(history.lost_at_bit).max()
+    assert off[1] < 0.01 and off[2] < 0.5 * off[1] < 0.5 * 0.5 * off[0], off
+    assert f"a spring of {stiffness:.4g} N/m" in history.details() and "impulse" not in history.details()
+
+
+def test_steps_that_do_not_resolve_an_impact_are_told():
+    scene = bouncing(1e9, 300.0)
+    assert AxialTorsional(scene).dt == pytest.approx(0.2 * scene.segments[0].axial_impedance / 1e9)
+    told = [why for why in AxialTorsional(scene, 4e-3).why if "APPROXIMATE" in why]
+    assert len(told) == 1 and "within 0.0011 s" in told[0] and "a dt of at most 0.00044 s, and elements of" in told[0]
+    assert not any("APPROXIMATE" in why for why in AxialTorsional(bouncing(2.5e7), 4e-3).why)
+
+
+@pytest.mark.parametrize("mass", [0.0, 2000.0])
+def test_a_bit_that_is_set_down_on_rigid_rock_has_the_impulse_of_its_mass(mass):
+    """It is lifted, then lowered with 1 m/s, at rest in itself: m v, and the force Z v of the wave that starts."""
+    times = [0.0, 2.0, 4.0, 9.0, 11.0, 13.0]
+    hook = cf.drilling.Hook(speed=cf.signals.Table(times, [(0.0,), (0.5,), (0.0,), (0.0,), (-1.0,), (-1.0,)]))
+    bit = cf.drilling.BitOnRock(cf.drilling.Stribeck(0.0, 0.0), 1e4, mass=mass)
+    scene = hanging(hook, bit=bit, weight=300.0, drag=cf.drilling.ViscousDrag(0.0, 2.0))
+    Z = scene.segments[-1].axial_impedance
+    for dt in (4e-3, 2e-3):
+        rows = AxialTorsional(scene, dt, 300).advance(round(12.3 / dt))
+        t, (impulse, weight) = rows[:, 0], (column(rows, name) for name in ("impulse_on_bit", "weight_on_bit"))
+        first = int(np.argmax((weight > 0) & (t > 5)))
+        down = column(rows, "bit_velocity")[first - 2]
+        assert 0.8 < down < 1.2 and impulse[first] - impulse[first - 1] == pytest.approx(mass * down, rel=0.01)
+        assert weight[first + 1 : first + round(0.03 / dt)].mean() == pytest.approx(1e4 + Z * down, rel=0.03)
+        assert unbalanced(rows) < 1e-11
+
+
+def test_a_disc_that_bounces_has_its_whole_mass():
+    """The mass of the last disc, on a spring, comes down on a rock that rises."""
+    discs = cf.drilling.Discs((1e3, 100.0), (500.0,), masses=(1e5, 2e3), axial_stiffnesses=(1e6,))
+    bit = cf.drilling.BitOnRock(cf.drilling.Lobes(LOBES, HEIGHT), 1e3, mass=500.0)
+    history = cf.drilling.simulate(
+        cf.drilling.Drilling(discs, cf.drilling.TopDrive(TURNS), bit, start="steady"), 0.5, dt=1e-3
+    )
+    assert history.impulse_on_bit[0] == pytest.approx(2500.0 * UP, rel=1e-3) and history.weight_on_bit.max() < 4e4
+
+
+def test_a_torque_by_the_weight_leaves_out_what_belongs_to_an_impulse():
+    """Whatever the step; and what is recalled goes on to the same digits."""
+    largest = []
+    for dt in (2e-3, 1e-3, 5e-4):
+        scene = bouncing(law=cf.drilling.Stribeck(0.3, 0.3, radius=0.1), mass=3e3)
+        model, again = AxialTorsional(scene, dt, 300), AxialTorsional(scene, dt, 300)
+        rows = model.advance(round(0.05 / dt))
+        largest.append(column(rows, "torque_on_bit").max())
+        assert largest[-1] <= 0.03 * column(rows, "weight_on_bit").max() * (1 + 1e-12)
+        assert column(rows, "impulse_on_bit")[-1] > 0.9 * 3e3 * UP
+    assert max(largest) < 1.4 * min(largest), largest  # a jump rings for some elements
+    again.recall(model.memory())
+    np.testing.assert_array_equal(model.advance(200), again.advance(200))
+
+
+@pytest.mark.parametrize(("rpm", "stiffness"), [(60, 2.5e7), (100, 1e8)])
+def test_lobes_shake_the_weight_less_where_the_rock_gives_way(rpm, stiffness):
+    """`bit_bounce` and the motion agree: D k/(D + k) of the dynamic stiffness D of the string."""
+    turns = rpm * cf.units.rpm
+    bit = cf.drilling.BitOnRock(cf.drilling.Lobes(LOBES, 0.001), weight=80e3, mass=500.0, rock_stiffness=stiffness)
+    scene = hanging(
+        cf.drilling.Hook(5e6), cf.drilling.TopDrive(turns), bit, drag=cf.drilling.ViscousDrag(0.2, 0.2), start="steady"
+    )
+    model = AxialTorsional(scene, 0.002, 300)
+    rows = model.advance(30000)[20000:]
+    phase = LOBES * turns * (rows[:, 0] - model.dt / 2)
+    parts = np.column_stack([np.sin(phase), np.cos(phase), np.ones(len(phase))])
+    sine, cosine, mean = np.linalg.lstsq(parts, column(rows, "weight_on_bit"), rcond=None)[0]
+    expected = cf.drilling.bit_bounce(scene, [turns]).amplitude[0]
+    assert math.hypot(sine, cosine) == pytest.approx(expected, rel=4e-3) and mean == pytest.approx(80e3, rel=1e-3)
+
+
+def test_a_rock_in_other_units_is_doubted():
+    """1000 kN/mm, say, as a number of 1e3 N/m."""
+    with pytest.warns(cf.SceneWarning, match="BitOnRock.rock_stiffness = 1000 N/m: 60000 N press the bit by 60 m into"):
+        cf.drilling.BitOnRock(cf.drilling.Lobes(3, 8e-3), weight=6e4, rock_stiffness=1e3)
+
+
+@pytest.mark.parametrize(("given", "words"), [
+    ({"weight": 1e4, "rock_stiffness": 0.0}, "BitOnRock.rock_stiffness = 0.0: expected a positive number or inf"),
+    ({"rock_stiffness": 1e8}, "BitOnRock.weight = None: expected the weight on bit .* where the rock has"),
+    ({"law": cf.drilling.Cutting(0.1, 6e7, 0.6, 4), "weight": 1e4, "rock_stiffness": 1e8},
+     "Cutting has a depth of cut"),
+])  # fmt: skip
+def test_refused_bits(given, words):
+    with pytest.raises(cf.SceneError, match=words):
+        cf.drilling.BitOnRock(**({"law": cf.drilling.Stribeck(1e3, 1e3)} | given))
+
+
+@pytest.mark.parametrize("stiffness", [1e6, 1e8, math.inf])
+def test_the_weight_of_a_hook_that_is_lowered_is_that_of_springs_in_a_row(stiffness):
+    """Lines, string and rock; and in steady rotation on rock that gives way nothing changes."""
+    down = cf.signals.Table([0.0, 1.0, 2.0, 60.0], [(0.0,), (-0.01,), (0.0,), (0.0,)])
+    bit = cf.drilling.BitOnRock(cf.drilling.Stribeck(0.0, 0.0), 6e4, rock_stiffness=stiffness)
+    scene = hanging(cf.drilling.Hook(6e6, down), bit=bit, weight=300.0, drag=cf.drilling.ViscousDrag(0.0, 3.0))
+    history = cf.drilling.simulate(scene, 25.0, dt=5e-3)
+    give = sum(x.length / x.EA for x in scene.segments) + 1 / 6e6 + 1 / stiffness
+    assert history.weight_on_bit[-1] - 6e4 == pytest.approx(0.01 / give, rel=1e-6)
+    turning = bouncing(stiffness, height=1e-12, start="steady", drag=cf.drilling.ViscousDrag(0.3, 0.3))
+    assert np.ptp(cf.drilling.simulate(turning, 1.0, dt=5e-3).weight_on_bit) < 1.0
+
+
+DEMOS = Path(__file__).parent.parent / "demos"
+FILES = sorted((DEMOS / "strings").glob("*.toml"))
+
+
+def test_the_demos_give_their_numbers(capsys):
+    import strings
+    from known_numbers import deviation
+
+    names = {demo.__name__ for demo in strings.STRINGS} | {"stability_map"}
+    assert names == {file.stem for file in FILES}
+    for check in strings.main(out=None):
+        assert deviation(check) <= check.allowed, check
+    assert "Drill-strings in motion" in capsys.readouterr().out
+
+
+def test_a_coarse_map_agrees_with_the_linear_theory(capsys):
+    import strings_map
+    from known_numbers import deviation
+
+    assert all(deviation(check) == 0 for check in strings_map.main(quick=True))
+    told = capsys.readouterr().out
+    assert "25 simulations of 120 s on 1 rank(s)" in told and "the bit oscillates in 12, a mode grows in 4" in told
+
+
+def test_the_command_line_explains_them(capsys):
+    for file in FILES:
+        assert main(["explain", str(file)]) == 0
+    told = capsys.readouterr().out
+    for words in (
+        "String, drill pipe: 3000 m, impedance 296.38 N m s/rad in torsion",
+        "Model: axial and torsional: the hook moves.",
+        "Motion: 120 s in 36234 steps of 0.003312 s, 305 places along the string.",
+        "Drive: 40 rpm, PI(Kp=38000.0, Ki=100000.0), inertia 2900 kg m^2.",
+        "Bit: none, the lower end is free.",
+        "Stability at 20 speeds and 20 weights on bit.",
+    ):
+        assert words in told, words
+
+
+@pytest.mark.slow
+def test_the_command_line_maps_the_stability(tmp_path, capsys):
+    pytest.importorskip("matplotlib")
+    assert main(["run", str(DEMOS / "strings" / "stability_map.toml"), "--duration", "5", "-o", str(tmp_path)]) == 0
+    assert "20 speeds from 40 to 192 rpm" in capsys.readouterr().out
+    assert {"stability.csv", "stability.png", "drilling.csv", "map.png"} <= {file.name for file in tmp_path.iterdir()}

@@ -1,18 +1,20 @@
-"""What all results offer: quantities with units, dicts, data frames, files, charts, tables that fit a screen."""
+"""What all results offer: quantities with units, files, charts, tables that fit a screen."""
 
 import csv
 import json
+import re
 
 import numpy as np
 import pytest
-from conftest import column
+from conftest import column, refused
 from moving_scenes import SPAGHETTI
 from reference_strings import pipe_and_collars
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.quantities import Units
-from cosserat_fenicsx.results.screen import LINES, WIDTH
 from cosserat_fenicsx.results.whirl import whirl_of
+from cosserat_fenicsx.results.screen import LINES, ROWS, WIDTH
+from cosserat_fenicsx.scene.describe import actions_in_words
 
 pytestmark = pytest.mark.serial
 WELL = cf.well.WellPath.from_survey([0, 500, 1500, 2500], [0, 0, 60, 85], [0, 0, 0, 0])
@@ -61,23 +63,14 @@ RESULTS = {
     "Buckling": (lambda: cf.buckling(column()[1], 2), "critical_load_factor", "1", "1"),
     "TorqueAndDrag": (answer, "tension", "N", "klbf"),
     "DepthSweep": (sweep, "depth", "m", "ft"),
-    "DrillingHistory": (
-        lambda: cf.drilling.simulate(pipe_and_collars("PI_stiff"), 5.0),
-        "bit_speed",
-        "rad/s",
-        "rpm",
-    ),
-    "Stability": (
-        lambda: cf.drilling.stability(pipe_and_collars("PI_stiff"), [9.0], up_to=2.0),
-        "growth",
-        "1/s",
-        "1/s",
-    ),
+    "DrillingHistory": (lambda: cf.drilling.simulate(pipe_and_collars("PI_stiff"), 5.0), "bit_speed", "rad/s", "rpm"),
+    "Stability": (lambda: cf.drilling.stability(pipe_and_collars("PI_stiff"), [9.0], up_to=2.0), "growth", "1/s",
+                  "1/s"),
     "Campbell": (lambda: cf.drilling.campbell(pipe_and_collars(), 20.0, up_to=4.0), "critical_speed", "rad/s", "rpm"),
     "Orbit": (orbit, "spin", "rad/s", "rpm"),
     "Whirl": (lambda: whirl_of(orbit()), "largest", "m", "in"),
     "Study": (lambda: cf.study(lambda force: {"work": 2.0 * force}, {"force": range(60)}), "work", "1", "1"),
-}
+}  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -189,3 +182,83 @@ def test_whirl_has_the_chart_of_its_orbit():
     assert len(found.orbit.plot().axes) == 2
     assert "backward whirl at -40 rad/s (-382 rpm)" in str(found) and "2 to 2 kN, mean 2 kN" in str(found)
     assert "0.7874 in in the mean" in found.summary("field") and found.value("force").tolist() == [[2e3] * 3]
+
+
+STIFF = cf.Stiffness((1e4, 1e4), 1e4, (10.0, 20.0), 5.0)
+
+
+def arm():
+    rod = cf.Rod(cf.Line((0, 0, 0), (1, 0, 0)), STIFF, name="arm")
+    return cf.Scene([rod], [cf.Clamp("arm.start")], [cf.Force("arm.end", (0, 0, -1.0))])
+
+
+def rows_of(path):
+    return re.findall(r"^[│|] *([\d.]+) [│|]", path.details(), flags=re.M)
+
+
+def test_a_long_table_leaves_out_its_middle():
+    path = cf.solve(arm(), [(k + 1) / 60 for k in range(60)], elements=1, degree=2)
+    path.events = [cf.Event("limit", 0.5, None, after=29)]
+    rows = [row for row in rows_of(path) if row.strip(".")]
+    assert len(rows) == ROWS + 2 and {"0.5", "0.516667"} < set(rows) and (rows[0], rows[-1]) == ("0.0166667", "1")
+    table = path.details()
+    assert table.count("...") == 2 * 8  # two gaps, in every column
+    assert "42 of 60 points: path.csv has all (-o DIR; path.write('path.csv') in Python)." in table
+    short = path[:ROWS]
+    assert len(rows_of(short)) == ROWS and "points: path.csv" not in short.details()
+
+
+def test_prescribed_motions_are_told_with_the_loads():
+    rod = cf.Rod(cf.Line((0, 0, 0), (1, 0, 0)), STIFF, name="arm")
+    scene = cf.Scene([rod], [cf.Clamp("arm.start"), cf.Prescribed("arm.end", displacement=(0, 0, 0.1))])
+    assert actions_in_words(scene) == "Prescribed motions, times the load factor: Prescribed at arm.end."
+
+
+SCENE = """
+[[rods]]
+name = "arm"
+curve = { type = "Line", start = [0, 0, 0], end = [1, 0, 0] }
+section = { type = "Stiffness", shear = [1e4, 1e4], axial = 1e4, bending = [10, 20], torsion = 5, GIVEN }
+"""
+
+
+def test_an_offset_in_a_scene_file(tmp_path):
+    file = tmp_path / "arm.toml"
+    file.write_text(SCENE.replace("GIVEN", "centroid = [0.01, 0], angle = 0.2, mass = 3.0"))
+    (rod,) = cf.read(file).scene.rods
+    assert rod.section == cf.Stiffness.offset((1e4, 1e4), 1e4, (10, 20), 5, centroid=(0.01, 0), angle=0.2, mass=3.0)
+    for given, words in (
+        ("centre = [0.01, 0], angle = 0.2", "unknown key 'centre', did you mean 'centroid'?"),
+        ("centroid = 0.1", "rods[0].section: Stiffness.offset.centroid = 0.1: expected 2 finite numbers (m)"),
+    ):
+        file.write_text(SCENE.replace("GIVEN", given))
+        with refused(words):
+            cf.read(file)
+    file.write_text(SCENE.replace("GIVEN", "angle = 0.1").replace(" torsion = 5,", ""))
+    with pytest.raises(cf.SceneError, match="'torsion' is missing"):
+        cf.read(file)
+
+
+SECTION = cf.Stiffness(shear=(1e6, 1e6), axial=1e6, bending=(100.0, 100.0), torsion=80.0)
+
+
+def test_the_largest_moment_is_found_beyond_a_jump_and_between_nodes():
+    """A rod that is clamped inside; a beam under a line load and an end moment, by textbook."""
+    rod = cf.Rod(cf.Line((0, 0, 0), (10, 0, 0)), SECTION, name="rod")
+    held = cf.Scene([rod], [cf.Clamp(rod.at(3))], [cf.Force(rod.end, (0, 0, 0.01))])
+    found = cf.solve(held, [1.0]).largest()["bending moment"]
+    assert found.size == pytest.approx(0.07, rel=1e-4) and found.station.s == pytest.approx(3)
+    q, M, L = 1e-3, 4e-3, 10.0
+    loads = [cf.LineForce(rod, (0, 0, -q)), cf.Moment(rod.start, (0, M, 0))]
+    beam = cf.Scene([rod], [cf.Hinge(rod.start, (0, 1, 0)), cf.Roller(rod.end, (0, 0, 1))], loads)
+    path = cf.solve(beam, [-1.0, 0.5], elements=2, model="planar")
+    found = path.largest()["bending moment"]
+    place = L / 2 - M / (q * L)
+    assert found.size == pytest.approx(q * place * (L - place) / 2 + M * (1 - place / L), rel=1e-3)
+    assert found.station.s == pytest.approx(place, abs=0.2) and found.point == 0
+
+
+def test_what_is_zero_is_left_out():
+    rod = cf.Rod(cf.Line((0, 0, 0), (10, 0, 0)), SECTION, name="rod")
+    path = cf.solve(cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Force(rod.end, (2.0, 0, 0))]), [1.0])
+    assert set(path.largest()) == {"tension"} and path.largest()["tension"].size == pytest.approx(2.0)

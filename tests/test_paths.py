@@ -1,8 +1,15 @@
-"""Limit points, snap-through, snap-back, bifurcations and branches."""
+"""Limit points, snap-through, bifurcations, branches and events; solvers called from within others."""
+
+import dataclasses
+import threading
+from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from conftest import column
+from conftest import COMM, column
+from moving_scenes import SPAGHETTI
+from mpi4py import MPI
 from path_scenes import (
     ARCH_BIFURCATIONS,
     ARCH_LIMITS,
@@ -13,8 +20,12 @@ from path_scenes import (
     shallow_arch,
     torsion_pendulum,
 )
+from scipy.optimize import brentq
 
 import cosserat_fenicsx as cf
+from cosserat_fenicsx.algebra.pool import PROBLEMS, ProblemPool
+from cosserat_fenicsx.results.records import find_again, keep_confirmed
+from cosserat_fenicsx.statics.path.recorder import Tracing
 
 STEEL = cf.Material(E=210e9, nu=0.3, density=7850.0)
 
@@ -213,16 +224,13 @@ def test_nearly_perfect_columns_follow_their_own_branch(eccentricity):
     assert path.events == []
 
 
-@pytest.mark.parametrize(
-    "arguments, message",
-    [
-        (dict(control="arclength"), "control = 'arclength': did you mean"),
-        (dict(branch=2), "branch = 2: expected 1, -1 or None"),
-        (dict(branch=1, control="load"), "branch: expected control 'auto' or 'arc'"),
-        (dict(control="arc", steps=cf.StepControl(adaptive=False)), "expected adaptive steps"),
-        (dict(until=lambda path: True), "until: expected a function of the Path, with a pair"),
-    ],
-)
+@pytest.mark.parametrize("arguments, message", [
+    (dict(control="arclength"), "control = 'arclength': did you mean"),
+    (dict(branch=2), "branch = 2: expected 1, -1 or None"),
+    (dict(branch=1, control="load"), "branch: expected control 'auto' or 'arc'"),
+    (dict(control="arc", steps=cf.StepControl(adaptive=False)), "expected adaptive steps"),
+    (dict(until=lambda path: True), "until: expected a function of the Path, with a pair"),
+])  # fmt: skip
 def test_arguments_that_are_refused(arguments, message):
     _, scene = column()
     with pytest.raises(cf.SceneError, match=message):
@@ -302,3 +310,305 @@ def test_what_could_not_be_located_is_told(soft, located):
     assert path.negative_modes.tolist() == [0, 1] and len(path.events) == located
     assert [e.load_factor for e in path.events] == pytest.approx([4.493409457909064**2] * located, rel=1e-6)
     assert any("negative modes go from 0 to 1" in sentence for sentence in path.why) == (not located)
+
+
+DEMOS = Path(__file__).parent.parent / "demos"
+
+
+def lees_frame_with_a_follower():
+    scene = cf.read(DEMOS / "lees_frame.toml").scene
+    load = cf.FollowerForce(scene.rod("beam").at(24.0), (0, -1e4, 0))
+    return cf.Scene(scene.rods, scene.supports, [load], scene.joints)
+
+
+def spring():
+    """A clamped spring of sixteen turns, compressed by a fifth of its height and more."""
+    rod = cf.Rod(cf.Helix((0, 0, 0), (0.05, 0, 0), 16, 0.05), cf.Circle(0.005), cf.Material(E=200e9, nu=0.3))
+    pressed = cf.Prescribed(rod.end, displacement=(0, 0, -0.8), rotation=(0, 0, 0))
+    return cf.Scene([rod], [cf.Clamp(rod.start), pressed], [])
+
+
+def told(path):
+    return [sentence for sentence in path.why if "negative modes go" in sentence or "not listed" in sentence]
+
+
+@pytest.mark.serial
+def test_an_event_is_not_beyond_the_end_and_of_one_kind():
+    scene = lees_frame_with_a_follower()
+    assert cf.solve(scene, [3.5], elements=16).events == []
+    path = cf.solve(scene, (0.0, 10.0), elements=16)
+    assert [event.kind for event in path.events] == ["limit"] * 2
+    np.testing.assert_allclose([event.load_factor for event in path.events], [3.53997598, -1.38118014], rtol=1e-8)
+    lie_between_their_points(path)
+
+
+def lie_between_their_points(path):
+    eta = path.load_factors
+    for event in path.events:
+        before, after = eta[event.after], eta[event.after + 1]
+        if event.kind == "limit":
+            assert (event.load_factor - before) * (event.load_factor - after) > 0
+        else:
+            assert (event.load_factor - before) * (event.load_factor - after) < 0
+        assert event.residual <= 1e-6
+
+
+@pytest.mark.serial
+@pytest.mark.parametrize("scene, end", [
+    (shallow_arch()[2], 45.0), (torsion_pendulum()[1], 20.0), (lees_frame()[1], 2e4), (clamped_ring(1.0)[1], 4.0),
+], ids=["arch", "pendulum", "Lee's frame", "ring"])  # fmt: skip
+def test_events_lie_between_their_points(scene, end):
+    path = cf.solve(scene, (0.0, end), elements=16)
+    assert path.events and not told(path)
+    lie_between_their_points(path)
+
+
+def test_divergence_under_a_follower_load():
+    """A pinned column, loaded at half its height: tan(k/2) = -k/2, P =
+    k^2. The symmetric part is indefinite long before."""
+    rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, 1.0), d1=(1, 0, 0)), cf.Stiffness((np.inf,) * 2, np.inf, (1.0, 4.0), 1.0))
+    guides = [cf.Roller(rod.end, axis) for axis in ((1, 0, 0), (0, 1, 0))]
+    scene = cf.Scene([rod], [cf.Hinge(rod.start, (1, 0, 0)), *guides], [cf.FollowerForce(rod.at(0.5), (0, 0, -1.0))])
+    exact = [4 * brentq(lambda z: np.tan(z) + z, *ends) ** 2 for ends in ((2.0, 2.1), (4.8, 5.0))]
+    path = cf.solve(scene, [15.0, 16.0, 18.0, 50.0, 110.0], elements=16, model="spatial")
+    assert [(event.kind, event.after) for event in path.events] == [("bifurcation", 1), ("bifurcation", 3)]
+    np.testing.assert_allclose([event.load_factor for event in path.events], exact, rtol=1e-7)
+    assert (path.negative_modes[:3] == 1).all()
+    lie_between_their_points(path)
+
+
+@pytest.mark.serial
+def test_a_slender_spring_is_stable_where_it_bends_sideways():
+    """With K bounded by the length of its wire there were negative modes, and a bifurcation at 0.807."""
+    path = cf.solve(spring(), (0.0, 0.5), elements=128)
+    assert path.stable.all() and path.events == [] and not told(path)
+
+
+@pytest.mark.serial
+def test_events_are_found_again_on_a_finer_mesh():
+    path = cf.solve(shallow_arch()[2], [45.0], tol=1e-5)
+    assert len(path.events) == 4 and all(0 < event.error <= 1e-5 for event in path.events)
+    assert all(np.isnan(event.error) for event in cf.solve(shallow_arch()[2], [45.0], elements=8).events)
+
+
+@pytest.mark.serial
+def test_what_depends_on_the_mesh_is_told(monkeypatch):
+    meet = Tracing._meet
+
+    def drifting(self, crossing):
+        eta = crossing.point.load_factor + 1e-3 / self.path.elements[0]
+        point = dataclasses.replace(crossing.point, load_factor=eta)
+        return meet(self, dataclasses.replace(crossing, point=point))
+
+    monkeypatch.setattr(Tracing, "_meet", drifting)
+    rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, 20.0)), cf.Rectangle(0.2, 0.25), cf.Material(E=210e9, nu=0.3))
+    scene = cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Force(rod.end, (0, 0, -cf.euler_load(rod)))])
+    path = cf.solve(scene, [0.5, 1.2])
+    assert path.events == [] and path.error.max() <= 1e-6
+    where, count = sorted(told(path))
+    assert where.startswith("a bifurcation near the load factor 0.99") and "could not be confirmed" in where
+    assert count.startswith("negative modes go from 0 to 1 on the way to the load factor 1.2")
+
+
+def test_events_of_two_meshes_are_compared_kind_by_kind():
+    def path(*events):
+        listed = [cf.Event(kind, eta, np.zeros((1, 3)), 0) for kind, eta in events]
+        return SimpleNamespace(events=listed, why=[], load_factors=np.array([0.0, 2.0]))
+
+    fine = path(("limit", 1.0), ("bifurcation", 1.0 + 1e-9), ("bifurcation", 1.5), ("bifurcation", 1.5))
+    coarse = path(("bifurcation", 1.0), ("limit", 1.0 + 1e-8), ("bifurcation", 1.5 + 3e-9), ("bifurcation", 1.9))
+    left = find_again(fine, coarse)
+    assert [event.load_factor for event in left] == [1.9]
+    errors = [event.error for event in fine.events]
+    np.testing.assert_allclose(errors, [1e-8, 1e-9, 2e-9, np.nan], rtol=1e-3)
+    keep_confirmed(fine, 5e-9, left)
+    assert [event.load_factor for event in fine.events] == [1.0 + 1e-9, 1.5]
+    assert len(fine.why) == 3 and "1.9 of a coarser mesh was not found again" in fine.why[-1]
+
+
+HOPELESS = cf.StepControl(adaptive=False, max_iterations=5)
+MOTION = {"dt": 0.05, "elements": 4, "degree": 2, "progress": False}
+
+
+def pulled(force):
+    """A clamped rod with a force, a function of time, at its end."""
+    rod = cf.Rod(cf.Line((0, 0, 0), (10, 0, 0)), SPAGHETTI, name="rod")
+    return rod, cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Force(rod.end, force)])
+
+
+def rising(t):
+    return (0.0, 0.0, 50.0 * min(t, 0.2))
+
+
+def and_nothing_more(*calls):
+    """A function of any argument that makes the calls and returns False."""
+    return lambda *_: bool([call() for call in calls] and False)
+
+
+def tip_of_motion(force):
+    rod, scene = pulled(force)
+    return cf.simulate(scene, 0.4, **MOTION).displacement(rod.end)
+
+
+def another_motion():
+    rod, scene = pulled(lambda t: (0.0, 0.0, -80.0 * min(1.0, 20 * t)))
+    return cf.simulate(scene, 0.1, **MOTION)
+
+
+def test_solve_within_until():
+    """The same signature with twice the eccentricity: sharing one problem gave 15.8724713 m."""
+    rod, scene = column(eccentricity=0.2)
+    _, other = column(eccentricity=0.4)
+    inner = and_nothing_more(lambda: cf.solve(other, [0.3], elements=8))
+    path = cf.solve(scene, (0.0, 1.5), elements=8, until=inner)
+    assert path.displacement(rod.end)[-1, 0] == pytest.approx(15.8283154, abs=1e-6)
+    plain = cf.solve(scene, (0.0, 1.5), elements=8)
+    np.testing.assert_allclose(path.load_factors, plain.load_factors, rtol=1e-12)
+    np.testing.assert_allclose(path.displacement(rod.end), plain.displacement(rod.end), atol=1e-10)
+
+
+def test_calls_within_a_force():
+    """A motion, an equilibrium, and both of them three deep, in a force as a function of time."""
+    plain = tip_of_motion(rising)
+    _, held = column(eccentricity=0.4)
+
+    made = []
+
+    def with_inner(call):
+        def force(t):
+            if abs(t - 0.075) < 1e-9:  # in the middle of the second step, since the function is sampled before too
+                made.append(call())
+            return rising(t)
+
+        return force
+
+    def deep():
+        rod, scene = pulled(with_inner(another_motion))
+        until = and_nothing_more(lambda: cf.simulate(scene, 0.1, **MOTION))
+        return cf.solve(held, (0.0, 0.2), elements=4, until=until)
+
+    def solved():
+        return cf.solve(held, [0.3], elements=4)
+
+    for inner in (another_motion, solved, deep):
+        made.clear()
+        np.testing.assert_allclose(tip_of_motion(with_inner(inner)), plain, atol=1e-12)
+        assert made
+
+
+def test_simulate_within_until():
+    rod, scene = column()
+    plain = cf.solve(scene, (0.0, 0.5), elements=4, model="spatial")
+    path = cf.solve(scene, (0.0, 0.5), elements=4, model="spatial", until=and_nothing_more(another_motion))
+    np.testing.assert_allclose(path.displacement(rod.end), plain.displacement(rod.end), atol=1e-12)
+
+
+@pytest.mark.serial
+def test_threads():
+    """Four threads at once with the same signature."""
+    columns = [column(eccentricity=e) for e in (0.1, 0.2, 0.3, 0.4)]
+
+    def tip(k):
+        rod, scene = columns[k]
+        return cf.solve(scene, [0.4, 0.8], elements=8, model="spatial").displacement(rod.end)
+
+    expected, found = [tip(k) for k in range(4)], {}
+    threads = [threading.Thread(target=lambda k=k: found.update({k: tip(k)})) for k in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    for k in range(4):
+        np.testing.assert_allclose(found[k], expected[k], atol=1e-10)
+
+
+def test_results_outlive_their_problem():
+    """Also the partial result of an error: results do not change when the problem is used for another scene."""
+    rod, scene = column()
+    _, other = column(eccentricity=1.0, length=13.0)
+    for model in ("determinate", "planar", "spatial"):
+        arguments = {"elements": 4, "model": model}
+        looked_at = cf.solve(scene, [0.4], **arguments).fields(0)
+        path = cf.solve(scene, [0.4], **arguments)
+        until = and_nothing_more(lambda arguments=arguments: cf.solve(other, [0.7], **arguments))
+        cf.solve(other, (0.0, 0.7), until=until, **arguments)
+        for name, values in path.fields(0).items():
+            np.testing.assert_array_equal(values, looked_at[name], err_msg=f"{model} {name}")
+    expected = cf.solve(scene, [0.2], elements=4, model="planar", steps=HOPELESS).displacement(rod.end)
+    with pytest.raises(cf.NotConverged) as failure:
+        cf.solve(scene, [0.2, 30.0], elements=4, model="planar", steps=HOPELESS)
+    cf.solve(other, [0.7], elements=4, model="planar")
+    np.testing.assert_array_equal(failure.value.path.displacement(rod.end), expected)
+
+
+def test_warm_calls_make_nothing():
+    """Nor do calls that end with a solver's error, or that change to another model."""
+    rod, scene = column(eccentricity=0.0)
+    _, motion = pulled(rising)
+    calls = (
+        lambda: cf.solve(scene, [0.5, 1.05], elements=4),
+        lambda: cf.simulate(motion, 0.1, **MOTION),
+        lambda: cf.buckling(scene),
+        lambda: cf.modes(scene, 2),
+        lambda: pytest.raises(
+            cf.NotConverged, cf.solve, column()[1], [30.0], elements=4, model="spatial", steps=HOPELESS
+        ),
+    )  # fmt: skip
+    for call in calls:
+        call()
+    made = PROBLEMS.made
+    for call in calls:
+        call()
+    assert PROBLEMS.made == made
+
+
+# -- the pool itself ---------------------------------------------------------------------------------------------------
+
+
+def used(pool, key, comm=MPI.COMM_WORLD, error=None):
+    """Borrow and return a problem; an error may be raised in between."""
+    try:
+        with pool.lend(key, comm, object, KeyError) as problem:
+            if error:
+                raise error
+    except type(error) if error else ():
+        pass
+    return problem
+
+
+@pytest.mark.ranks
+def test_a_busy_problem_is_not_lent():
+    pool = ProblemPool()
+    with pool.lend("a", COMM, object) as one, pool.lend("a", COMM, object) as other:
+        assert one is not other
+    assert used(pool, "a") is one and pool.made == 2  # the one given back last
+
+
+@pytest.mark.ranks
+def test_what_is_idle_is_bounded():
+    """The work of one rank alone does not influence what all ranks create together."""
+    pool = ProblemPool(most_idle=2)
+    a = used(pool, "a")
+    for key in range(10):
+        used(pool, key, MPI.COMM_SELF)
+    used(pool, "b")
+    assert used(pool, "a") is a
+    used(pool, "c")  # b was idle for the longest time
+    made = pool.made
+    assert used(pool, "a") is a and pool.made == made
+    used(pool, "b")
+    assert pool.made == made + 1
+
+
+def test_what_may_be_half_way_is_not_kept():
+    pool = ProblemPool()
+    a = used(pool, "a")
+    assert used(pool, "a", error=KeyError()) is a and used(pool, "a") is a
+    assert used(pool, "a", error=KeyboardInterrupt()) is a and used(pool, "a") is not a
+
+
+@pytest.mark.ranks
+def test_on_a_communicator_of_the_users_own_nothing_is_kept():
+    pool, comm = ProblemPool(), COMM.Dup()
+    assert used(pool, "a", comm) is not used(pool, "a", comm)
+    comm.Free()

@@ -1,8 +1,11 @@
-"""Quantities and the units in which they are shown."""
+"""Units by their definitions, quantities and the units in which they are shown, and studies as tables."""
+
+import math
 
 import numpy as np
 import pytest
 
+import cosserat_fenicsx as cf
 from cosserat_fenicsx import units
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.quantities import Quantity, Units, as_text
@@ -11,17 +14,14 @@ pytestmark = [pytest.mark.serial, pytest.mark.once]
 LOAD = Quantity("hook_load", unit="N")
 
 
-@pytest.mark.parametrize(
-    ("chosen", "expected"),
-    [
-        ("SI", ("N", 1.0)),
-        ("field", ("klbf", units.kip)),
-        ({"force": "kN"}, ("kN", 1e3)),
-        ({"[force]": "lbf"}, ("lbf", units.lbf)),
-        ({"N": "MN"}, ("MN", 1e6)),
-        ({"length": "ft"}, ("N", 1.0)),
-    ],
-)
+@pytest.mark.parametrize(("chosen", "expected"), [
+    ("SI", ("N", 1.0)),
+    ("field", ("klbf", units.kip)),
+    ({"force": "kN"}, ("kN", 1e3)),
+    ({"[force]": "lbf"}, ("lbf", units.lbf)),
+    ({"N": "MN"}, ("MN", 1e6)),
+    ({"length": "ft"}, ("N", 1.0)),
+])  # fmt: skip
 def test_units_are_chosen_by_dimension_or_by_unit(chosen, expected):
     assert Units(chosen).of(LOAD) == pytest.approx(expected) and Units(Units(chosen)).of(LOAD) == Units(chosen).of(LOAD)
 
@@ -33,14 +33,11 @@ def test_field_units():
     assert Units("field").of(Quantity("x", unit="deg")) == ("deg", 1.0)
 
 
-@pytest.mark.parametrize(
-    ("chosen", "words"),
-    [
-        ({"forse": "kN"}, "units.'forse'.: did you mean 'force'"),
-        ({"force": "ft"}, "units.'force'. = 'ft': "),
-        ("imperial", "units = 'imperial': expected 'SI', 'field' or a dict"),
-    ],
-)
+@pytest.mark.parametrize(("chosen", "words"), [
+    ({"forse": "kN"}, "units.'forse'.: did you mean 'force'"),
+    ({"force": "ft"}, "units.'force'. = 'ft': "),
+    ("imperial", "units = 'imperial': expected 'SI', 'field' or a dict"),
+])  # fmt: skip
 def test_other_units_are_refused(chosen, words):
     with pytest.raises(SceneError, match=words):
         Units(chosen)
@@ -65,3 +62,91 @@ def test_columns_and_values():
     assert [as_text(x) for x in (1.23456789, np.nan, True, "a", 3)] == ["1.23457", "-", "yes", "a", "3"]
     assert as_text(-1.887e-12, noise=1e-9) == "0"
     assert [as_text(x, 4) for x in (21987.4, -123456.7, 2e9, 1e-5)] == ["21987", "-123457", "2e+09", "1e-05"]
+
+
+#: NIST Special Publication 811, appendix B: conversion factors, to all digits given there.
+TABULATED = {
+    "inch": 2.54e-2, "foot": 3.048e-1, "pound": 4.5359237e-1, "lbf": 4.448222, "kip": 4.448222e3,
+    "kgf": 9.80665, "ft_lbf": 1.355818, "psi": 6.894757e3, "ksi": 6.894757e6, "lb_per_ft": 1.488164,
+    "lbf_per_ft": 1.459390e1, "ppg": 1.198264e2, "deg": 1.745329e-2, "rpm": 1.047198e-1, "bar": 1e5,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", TABULATED)
+def test_tabulated(name):
+    assert getattr(units, name) == pytest.approx(TABULATED[name], rel=5e-7)
+
+
+def test_definitions():
+    assert units.foot == 0.3048 and units.lbf == 0.45359237 * 9.80665 and units.psi * units.inch**2 == units.lbf
+    assert units.lb_per_ft == pytest.approx(1.48816394, abs=5e-9) and units.ppg == pytest.approx(119.826427, abs=5e-7)
+    assert units.ft_lbf == pytest.approx(1.35581795, abs=5e-9)
+    assert 180 * units.deg == math.pi and 60 * units.rpm == pytest.approx(2 * math.pi, rel=1e-15)
+    assert units.deg_per_100ft / units.deg_per_30m == pytest.approx(30 / 30.48, rel=1e-15)
+    assert (units.mm, units.kN, units.GPa, units.minute) == (1e-3, 1e3, 1e9, 60.0)
+
+
+def test_all_are_floats_and_easy_to_reach():
+    assert cf.units is units
+    given = {name: value for name, value in vars(units).items() if not name.startswith("_") and name != "math"}
+    assert all(type(value) is float and value > 0 for value in given.values()) and len(given) > 30
+
+
+def product(a, b):
+    if (a, b) == (2, "y"):
+        raise ZeroDivisionError("two and y")
+    return {"size": 2 * a, "pair": [a, len(b)], "name": f"{a}{b}", "a": -a}
+
+
+@pytest.fixture
+def found():
+    return cf.study(product, {"a": [1, 2], "b": ["x", "y", "z"]})
+
+
+def test_dataframe(found):
+    pytest.importorskip("pandas")
+    table = found.to_dataframe()
+    assert list(table.columns) == ["a", "b", "size", "pair", "name", "a (result)", "failure"]
+    assert table["a"].tolist() == [1, 1, 1, 2, 2, 2] and table["b"].tolist() == list("xyzxyz")
+    np.testing.assert_array_equal(table["size"], [2, 2, 2, 4, np.nan, 4])
+    assert table["pair"][3].tolist() == [2, 1] and table["name"].tolist() == ["1x", "1y", "1z", "2x", "", "2z"]
+    assert table["failure"].map(bool).tolist() == [False] * 4 + [True, False]
+
+
+def test_xarray_over_the_grid(found):
+    pytest.importorskip("xarray")
+    data = found.to_xarray()
+    assert data.sizes == {"a": 2, "b": 3, "pair_0": 2} and data["b"].values.tolist() == ["x", "y", "z"]
+    assert data["size"].sel(a=2, b="z") == 4 and np.isnan(data["size"].sel(a=2, b="y"))
+    assert data["pair"].sel(a=1, b="z").values.tolist() == [1, 1] and data["name"].dims == ("a", "b")
+    assert data["failure"].sel(a=2, b="y").item().startswith("ZeroDivisionError: two and y")
+
+
+def test_xarray_over_cases_one_by_one():
+    pytest.importorskip("xarray")
+    operations = [cf.well.TripOut(), cf.well.TripIn()]
+    found = cf.study(lambda how, s=0.0: s + 1, [{"how": operations[0]}, {"how": operations[1], "s": 2.0}])
+    data = found.to_xarray()
+    assert data["result"].dims == ("case",) and data["result"].values.tolist() == [1.0, 3.0]
+    assert data["how"].values.tolist() == ["trip out", "trip in"]
+    np.testing.assert_array_equal(data["s"], [np.nan, 2.0])
+    assert found.to_dataframe()["how"].tolist() == operations
+
+
+def test_arrays_of_different_shapes():
+    pytest.importorskip("xarray")
+    found = cf.study(lambda n: np.arange(n), {"n": [2, 3]})
+    assert [len(x) for x in found.to_dataframe()["result"]] == [2, 3]
+    with pytest.raises(cf.SceneError, match="arrays of 'result' differ in shape"):
+        found.to_xarray()
+
+
+def test_long_tables_are_shown_in_part():
+    def fails(i):
+        if i % 2:
+            raise ValueError(f"odd {i}")
+        return 0.5 * i
+
+    text = str(cf.study(fails, {"i": range(100)}))
+    assert "100 cases, 100 done, 50 failed" in text and "case 3 failed: ValueError: odd 3" in text
+    assert "and 38 more: Study.failures has all" in text and "..." in text and len(text.splitlines()) <= 30

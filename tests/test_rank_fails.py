@@ -58,35 +58,27 @@ def run(program, folder, size=2):
     return done, time.monotonic() - began
 
 
-@pytest.mark.parametrize(
-    ("program", "code", "said"),
-    [
-        (SWEEP, 1, "ValueError: one rank"),
-        (SOLVE, 1, "ValueError: one rank"),
-        ("rank == 1 and sys.exit(7)\nwait()", 7, "rank 1 of 2 alone ended with a failure"),
-        ("rank == 0 and sys.exit('no input')\nwait()", 1, "no input\n"),
-        ("rank == 1 and exit(7)\nwait()", 7, "rank 1 of 2 alone ended with a failure"),
-        ("rank == 1 and threading.Thread(target=lambda: 1 / 0).start()\nrank == 0 and wait()", 1, "ZeroDivisionError"),
-    ],
-    ids=["depth_sweep", "solve", "exit", "exit with words", "exit of site", "thread"],
-)
+@pytest.mark.parametrize(("program", "code", "said"), [
+    (SWEEP, 1, "ValueError: one rank"),
+    (SOLVE, 1, "ValueError: one rank"),
+    ("rank == 1 and sys.exit(7)\nwait()", 7, "rank 1 of 2 alone ended with a failure"),
+    ("rank == 0 and sys.exit('no input')\nwait()", 1, "no input\n"),
+    ("rank == 1 and exit(7)\nwait()", 7, "rank 1 of 2 alone ended with a failure"),
+    ("rank == 1 and threading.Thread(target=lambda: 1 / 0).start()\nrank == 0 and wait()", 1, "ZeroDivisionError"),
+], ids=["depth_sweep", "solve", "exit", "exit with words", "exit of site", "thread"])  # fmt: skip
 def test_one_rank_fails(program, code, said, tmp_path):
     done, seconds = run(program, tmp_path)
     assert done.returncode == code and said in done.stderr and done.stderr.count(ALONE) == 1
     assert seconds < 20
 
 
-@pytest.mark.parametrize(
-    ("program", "code", "said"),
-    [
-        ("raise ValueError('all of them')", 1, "ValueError: all of them"),
-        ("sys.exit(5)", 5, ""),
-        ("time.sleep(2 * (rank == 0)); print('report' * (rank == 0)); sys.exit(0)", 0, "report"),
-        ("try:\n    rank == 1 and sys.exit(3)\nexcept SystemExit as stop:\n    assert stop.code == 3\nwait()", 0, ""),
-        ("try:\n    rank == 1 and 1 / 0\nexcept ArithmeticError:\n    wait()\nelse:\n    wait()", 0, ""),
-    ],
-    ids=["all raise", "all exit", "one ends early", "exit that is caught", "exception that is caught"],
-)
+@pytest.mark.parametrize(("program", "code", "said"), [
+    ("raise ValueError('all of them')", 1, "ValueError: all of them"),
+    ("sys.exit(5)", 5, ""),
+    ("time.sleep(2 * (rank == 0)); print('report' * (rank == 0)); sys.exit(0)", 0, "report"),
+    ("try:\n    rank == 1 and sys.exit(3)\nexcept SystemExit as stop:\n    assert stop.code == 3\nwait()", 0, ""),
+    ("try:\n    rank == 1 and 1 / 0\nexcept ArithmeticError:\n    wait()\nelse:\n    wait()", 0, ""),
+], ids=["all raise", "all exit", "one ends early", "exit that is caught", "exception that is caught"])  # fmt: skip
 def test_ranks_that_end_together_or_well_are_left_alone(program, code, said, tmp_path):
     done, _ = run(program, tmp_path)
     assert done.returncode == code and said in done.stdout + done.stderr and ALONE not in done.stderr

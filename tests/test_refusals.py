@@ -1,25 +1,26 @@
-"""Input that is refused in words: what is no file, names written as lists, numbers beyond sense, wrong arguments."""
+"""Files and arguments that are refused in words: surveys, polylines, names, numbers; users' files stay."""
 
 import copy
+import csv
+import math
 import os
 import pickle
-import random
 import subprocess
 import sys
 import tomllib
-import warnings
 import zipfile
 from pathlib import Path
 
+import meshio
+import numpy as np
 import pytest
-from test_scene_fuzz import damaged
+from conftest import refused, refuses
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx import checks
-from cosserat_fenicsx.cli import drilling, well
+from cosserat_fenicsx.cli.explain import explain
 from cosserat_fenicsx.cli.main import main
-from cosserat_fenicsx.cli.options import parser
-from cosserat_fenicsx.files.read import from_tables
+from cosserat_fenicsx.results.result import plain_text
 from cosserat_fenicsx.storage.mark import mark_of
 
 pytestmark = pytest.mark.serial
@@ -57,46 +58,25 @@ def written(folder, survey=STATIONS, more="", weight=241.0, on_bit=0.0):
 
 
 SURVEYS = {
-    "not of one column each": (
-        'survey = "s.csv"\ncolumns = ["MD", ["Inc"], "Azi"]',
-        "MD,Inc,Azi\n0,0,0\n1000,0,0\n",
-        r"inc = \['Inc'\]: expected the name of a column",
-    ),
-    "a column twice": (
-        'survey = "s.csv"',
-        "MD,MD,Inc,Azi\n0,0,0,0\n1000,2000,10,0\n",
-        "columns 1 and 2 are both named 'md'",
-    ),
-    "a column in two units": (
-        'survey = "s.csv"',
-        "MD (m),MD (ft),Inc,Azi\n0,0,0,0\n1000,3281,10,0\n",
-        r"both named 'md' \(MD \(m\), MD \(ft\)\): expected one, or that columns",
-    ),
-    "two usual names": (
-        'survey = "s.csv"',
-        "Depth MD,Measured Depth,Inc,Azi\n0,0,0,0\n1,2,3,4\n",
-        "no column 'md' in Depth MD, Measured Depth",
-    ),
-    "one column for two": (
-        'survey = "s.csv"\ncolumns = ["MD", "Inc", "Inc"]',
-        "MD,Inc,Azi\n0,0,0\n1000,0,0\n",
-        "expected three columns, each of another name",
-    ),
-    "a long field": (
-        'survey = "s.csv"',
-        "MD,Inc,Azi," + "x" * 200_000 + "\n0,0,0,\n",
-        "line 1 is no row of a .csv file",
-    ),
-    "a number of Python's": (
-        'survey = "s.csv"',
-        "MD,Inc,Azi\n0,0,0\n10_00,10,0\n",
-        "line 3, '10_00,10,0': expected num",
-    ),
+    "not of one column each": ('survey = "s.csv"\ncolumns = ["MD", ["Inc"], "Azi"]', "MD,Inc,Azi\n0,0,0\n1000,0,0\n",
+                               r"inc = \['Inc'\]: expected the name of a column"),
+    "a column twice": ('survey = "s.csv"', "MD,MD,Inc,Azi\n0,0,0,0\n1000,2000,10,0\n",
+                       "columns 1 and 2 are both named 'md'"),
+    "a column in two units": ('survey = "s.csv"', "MD (m),MD (ft),Inc,Azi\n0,0,0,0\n1000,3281,10,0\n",
+                              r"both named 'md' \(MD \(m\), MD \(ft\)\): expected one, or that columns"),
+    "two usual names": ('survey = "s.csv"', "Depth MD,Measured Depth,Inc,Azi\n0,0,0,0\n1,2,3,4\n",
+                        "no column 'md' in Depth MD, Measured Depth"),
+    "one column for two": ('survey = "s.csv"\ncolumns = ["MD", "Inc", "Inc"]', "MD,Inc,Azi\n0,0,0\n1000,0,0\n",
+                           "expected three columns, each of another name"),
+    "a long field": ('survey = "s.csv"', "MD,Inc,Azi," + "x" * 200_000 + "\n0,0,0,\n",
+                     "line 1 is no row of a .csv file"),
+    "a number of Python's": ('survey = "s.csv"', "MD,Inc,Azi\n0,0,0\n10_00,10,0\n",
+                             "line 3, '10_00,10,0': expected num"),
     "an endless device": ('survey = "/dev/zero"', "", "/dev/zero: no plain file: expected a survey as .csv"),
     "a folder": ('survey = "."', "", "Is a directory"),
     "a null character": (r'survey = "s\u0000.csv"', "", "cannot be read .*null"),
     "a workbook": ('survey = "s.xlsx"', "", "s.xlsx: a workbook or another archive: .* save the sheet as .csv"),
-}
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("case", SURVEYS)
@@ -154,19 +134,14 @@ def test_scenes_may_come_from_a_pipe():
     assert done.stdout.strip() == tomllib.loads(text).get("title", "")
 
 
-@pytest.mark.parametrize(
-    ("given", "words"),
-    [
-        ({"more": 'name = ["drill pipe"], '}, r"Component.name = \['drill pipe'\]: expected a text"),
-        ({"weight": 6e300}, r"Component.weight = 6e\+300: expected a number from -1e\+06 to 1e\+06 \(N/m\)"),
-        ({"on_bit": 6e303}, r"TripOut.weight = 6e\+303: expected a finite number \(N\), of at most 1e\+10 N"),
-        ({"on_bit": -1e11}, "of at most 1e"),
-        (
-            {"more": "length = 1e7, "},
-            r"Component.length = 10000000.0: expected a positive number \(m\), of at most 1e\+06 m",
-        ),
-    ],
-)
+@pytest.mark.parametrize(("given", "words"), [
+    ({"more": 'name = ["drill pipe"], '}, r"Component.name = \['drill pipe'\]: expected a text"),
+    ({"weight": 6e300}, r"Component.weight = 6e\+300: expected a number from -1e\+06 to 1e\+06 \(N/m\)"),
+    ({"on_bit": 6e303}, r"TripOut.weight = 6e\+303: expected a finite number \(N\), of at most 1e\+10 N"),
+    ({"on_bit": -1e11}, "of at most 1e"),
+    ({"more": "length = 1e7, "},
+     r"Component.length = 10000000.0: expected a positive number \(m\), of at most 1e\+06 m"),
+])  # fmt: skip
 def test_wells(given, words, tmp_path, capsys):
     file = written(tmp_path, **given)
     with pytest.raises(cf.SceneError, match=words):
@@ -194,29 +169,23 @@ def test_a_step_longer_than_all_parts(tmp_path, capsys):
     assert coarse.dt < 0.1 and coarse.bit_speed[-1] == pytest.approx(fine.bit_speed[-1], abs=0.5)
 
 
-@pytest.mark.parametrize(
-    ("call", "words"),
-    [
-        (lambda: cf.Circle(radius=0.1), "Circle has no argument 'radius': did you mean 'diameter'"),
-        (lambda: cf.solve(None, load_factor=[1.0]), "solve has no argument 'load_factor': did you mean 'load_factors'"),
-        (lambda: cf.Material(E=1.0, rho=3.0), "Material has no argument 'rho': did you mean 'density'"),
-        (lambda: cf.well.TripOut(wieght=3.0), "TripOut has no argument 'wieght': did you mean 'weight'"),
-        (
-            lambda: cf.Circle(),
-            r"Circle: missing a required argument: 'diameter': expected Circle\(diameter, shear_factor=...\)",
-        ),
-        (lambda: cf.Circle(1.0, 2.0, 3.0), "Circle: too many positional arguments: expected"),
-    ],
-)
+@pytest.mark.parametrize(("call", "words"), [
+    (lambda: cf.Circle(radius=0.1), "Circle has no argument 'radius': did you mean 'diameter'"),
+    (lambda: cf.solve(None, load_factor=[1.0]), "solve has no argument 'load_factor': did you mean 'load_factors'"),
+    (lambda: cf.Material(E=1.0, rho=3.0), "Material has no argument 'rho': did you mean 'density'"),
+    (lambda: cf.well.TripOut(wieght=3.0), "TripOut has no argument 'wieght': did you mean 'weight'"),
+    (lambda: cf.Circle(),
+     r"Circle: missing a required argument: 'diameter': expected Circle\(diameter, shear_factor=...\)"),
+    (lambda: cf.Circle(1.0, 2.0, 3.0), "Circle: too many positional arguments: expected"),
+])  # fmt: skip
 def test_arguments_that_there_are_not(call, words):
     with pytest.raises(TypeError, match=words):
         call()
 
 
 def test_a_type_error_from_inside_stays():
-    for read in (cf.read,):
-        with pytest.raises(TypeError, match="os.PathLike object"):
-            read(3)
+    with pytest.raises(TypeError, match="os.PathLike object"):
+        cf.read(3)
 
 
 def test_public_functions_are_those_of_their_modules():
@@ -241,26 +210,293 @@ def test_warnings_are_of_the_line_that_calls():
         assert [warning.filename for warning in told] == [__file__]
 
 
-@pytest.mark.parametrize("seed", range(2))
-def test_damaged_files_of_strings(seed):
-    """Scene files of wells and of strings in motion: explained, or refused in words."""
-    tables = {file: tomllib.loads(file.read_text(encoding="utf-8")) for file in sorted(DEMOS.glob("**/*.toml"))}
-    kinds = [
-        (drilling.explain, {file: x for file, x in tables.items() if "drive" in x}),
-        (well.explain, {file: x for file, x in tables.items() if "well" in x and "drive" not in x}),
-    ]
-    chance, refused = random.Random(seed), 0
-    commands = parser()
-    for _ in range(60):
-        for explain, known in kinds:
-            file = chance.choice(list(known))
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore")
-                warnings.simplefilter("error", RuntimeWarning)
-                try:
-                    found = from_tables(damaged(known[file], chance), file.parent)
-                    explain(commands.parse_args(["explain", str(file)]), found)
-                except cf.SceneError as problem:
-                    refused += 1
-                    assert len(str(problem)) < 3000
-    assert 40 < refused < 120
+POINTS = np.array([(0, 0, 0), (1.0, 0.2, 0.1), (1.8, 1.1, 0.7), (2.0, 2.3, 0.4)])
+
+
+@pytest.mark.parametrize("header", ["", "x (m), y (m), z (m)\n", "\ufeffx,y,z\n"])
+def test_csv(header, tmp_path):
+    file = tmp_path / "survey.csv"
+    file.write_text(header + "\n".join(",".join(map(repr, row)) for row in POINTS.tolist()) + "\n\n", encoding="utf-8")
+    for name in (file, str(file)):
+        assert cf.Spline(name) == cf.Spline(POINTS)
+
+
+@pytest.mark.parametrize("suffix", ["vtk", "vtu", "xdmf"])
+def test_mesh_files(suffix, tmp_path):
+    """Line cells in any order and direction, and a point that belongs to none."""
+    file = tmp_path / f"line.{suffix}"
+    order = np.array([4, 1, 0, 2])  # where each point of the line is stored
+    stored = np.full((5, 3), 9.0)
+    stored[order] = POINTS
+    meshio.write(file, meshio.Mesh(stored, [("line", order[[[2, 1], [0, 1], [3, 2]]])]))
+    assert cf.Spline(file) == cf.Spline(POINTS)  # from point 4, whose line starts there
+
+
+def test_quadratic_lines(tmp_path):
+    file = tmp_path / "line.vtu"
+    x = np.linspace(0, 1, 5)
+    points = np.column_stack([x, x**2, 0 * x])
+    meshio.write(file, meshio.Mesh(points, [("line3", [[0, 2, 1], [2, 4, 3]])]))
+    assert cf.Spline(file) == cf.Spline(points)
+
+
+def test_a_ring_from_a_file(tmp_path):
+    file = tmp_path / "ring.vtk"
+    meshio.write(file, meshio.Mesh(POINTS, [("line", [[0, 1], [1, 2], [2, 3], [3, 0]])]))
+    assert cf.Spline(file, closed=True) == cf.Spline(POINTS, closed=True)
+    with pytest.raises(cf.SceneError, match="two ends, or closed = true for this ring"):
+        cf.Spline(file)
+
+
+LINES = {
+    "branch": ([("line", [[0, 1], [1, 2], [1, 3]])], "three or more lines meet at node 1"),
+    "two pieces": ([("line", [[0, 1], [2, 3]])], "a single polyline, but its lines form several"),
+    "line and ring": ([("line", [[0, 1], [2, 3], [3, 4], [4, 2]])], "a single polyline, but its lines form several"),
+    "no line": ([("triangle", [[0, 1, 2]])], "a file with line cells"),
+}
+
+
+@pytest.mark.parametrize("case", LINES)
+def test_refused_lines(case, tmp_path):
+    cells, words = LINES[case]
+    file = tmp_path / "lines.vtk"
+    meshio.write(file, meshio.Mesh(np.vstack([POINTS, [[5, 5, 5]]]), cells))
+    with pytest.raises(cf.SceneError) as refusal:
+        cf.Spline(file)
+    assert words in str(refusal.value) and "lines.vtk" in str(refusal.value)
+
+
+FILES = {
+    "missing.csv": (None, "expected a text file that can be read"),
+    "missing.vtk": (None, "expected a file that exists"),
+    "two.csv": ("0,0,0\n1,2\n", "three numbers in line 2, which is '1,2'"),
+    "words.csv": ("x,y,z\n0,0,0\na,b,c\n", "three numbers in line 3"),
+    "header.csv": ("x,y,z\n", "two points or more"),
+    "nan.csv": ("0,0,0\nnan,0,0\n", "Spline.points[1] = (nan, 0.0, 0.0): expected finite numbers"),
+    "garbage.vtu": ("no mesh", "a mesh file that meshio reads"),
+    "garbage.vtk": ("no mesh", "a mesh file that meshio reads"),
+    "line.unheardof": ("0,0,0", "a mesh file that meshio reads"),
+}
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_refused_files(name, tmp_path, capfd):
+    text, words = FILES[name]
+    if text is not None:
+        (tmp_path / name).write_text(text)
+    with refused(words):
+        cf.Spline(tmp_path / name)
+    assert capfd.readouterr() == ("", "")
+
+
+REFUSED = {
+    "spline of one point": (lambda: cf.Spline([(0, 0, 0)]), "expected two points or more"),
+    "spline of no point": (lambda: cf.Spline([]), "expected points of three numbers"),
+    "spline in a plane": (lambda: cf.Spline([(0, 0), (1, 1)]), "expected points of three numbers"),
+    "spline of ragged points": (lambda: cf.Spline([(0, 0, 0), (1, 1)]), "expected points of three numbers"),
+    "spline of words": (lambda: cf.Spline([("a", "b", "c")]), "expected points of three numbers"),
+    "spline of a number": (lambda: cf.Spline(3.0), "expected points of three numbers"),
+    "spline, NaN": (lambda: cf.Spline([(0, 0, 0), (1, math.nan, 0)]),
+                    "Spline.points[1] = (1.0, nan, 0.0): expected finite numbers"),
+    "spline, nearly": (lambda: cf.Spline([(0, 0, 0), (1, 0, 0), (1 + 1e-9, 0, 0), (2, 0, 1)]),
+                       "Spline.points[2] = (1.000000001, 0.0, 0.0): expected a point apart"),
+    "spline, repeated": (lambda: cf.Spline([(0, 0, 0), (1, 1, 0), (1, 1, 0)]),
+                         "Spline.points[2] = (1.0, 1.0, 0.0): expected a point apart"),
+    "spline, one point twice": (lambda: cf.Spline([(1, 1, 0), (1, 1, 0)], closed=False), "Spline.points[1]"),
+    "closed spline of two": (lambda: cf.Spline([(0, 0, 0), (1, 0, 0), (0, 0, 0)], closed=True),
+                             "expected three points or more"),
+    "spline that turns back": (lambda: cf.Spline([(0, 0, 0), (1, 0, 0), (0, 0, 0)]), "a cusp at (1, 0, 0) m"),
+    "spline that turns back inside": (lambda: cf.Spline([(0, 0, 0), (1, 0, 0), (0.4, 0, 0)]), "a cusp at (1."),
+    "closed and flat": (lambda: cf.Spline([(0, 0, 0), (1, 0, 0), (3, 0, 0)], closed=True), "a cusp"),
+    "spline, d1": (lambda: cf.Spline([(0, 0, 0), (1, 0, 0)], d1=(1, 0, 0)), "Spline.d1"),
+    "spline, closed": (lambda: cf.Spline(POINTS, closed="yes"), "Spline.closed = 'yes'"),
+}  # fmt: skip
+
+
+test_refused_points = refuses(REFUSED)
+
+
+SCENE = """
+[[rods]]
+name = "rod"
+curve = {curve}
+section = {section}
+material = {{ E = 210e9, density = 7850 }}
+[[supports]]
+type = "Clamp"
+station = "rod.start"
+[[loads]]
+type = "Weight"
+"""
+CIRCLE = '{ type = "Circle", diameter = 0.2 }'
+
+
+def read(tmp_path, curve=None, section=CIRCLE):
+    (tmp_path / "scene.toml").write_text(
+        SCENE.format(curve=curve or '{ type = "Line", start = [0, 0, 0], end = [8, 0, 0] }', section=section)
+    )
+    scene = cf.read(tmp_path / "scene.toml").scene
+    return scene
+
+
+TABLES = {
+    '{ type = "Arc", centre = [0, 0, 0], start = [2, 0, 0], angle = 1.5, axis = [0, 1, 0] }':
+        (cf.Arc((0, 0, 0), (2, 0, 0), 1.5, axis=(0, 1, 0)), "Arc (1.5 rad), length 3 m"),
+    '{ type = "Helix", centre = [0, 0, 0], start = [2, 0, 0], turns = -3, pitch = 0.5 }':
+        (cf.Helix((0, 0, 0), (2, 0, 0), -3, 0.5), "Helix (-3 turns), length"),
+    '{ type = "UniformCurvature", length = 3, curvature = [0, 0.5, 0], frame = [0, 1, 0, 0] }':
+        (cf.UniformCurvature(3, (0, 0.5, 0), frame=(0, 1, 0, 0)), "UniformCurvature (0, 0.5, 0 1/m), length 3 m"),
+    '{ type = "Spline", points = [[0, 0, 0], [1, 0, 0], [1, 1, 1.5]], closed = true }':
+        (cf.Spline([(0, 0, 0), (1, 0, 0), (1, 1, 1.5)], closed=True), "closed Spline through 3 points"),
+    '{ type = "Spline", points = "lines/survey.csv" }': (cf.Spline(POINTS), "Spline through 4 points"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("table", TABLES)
+def test_curves_in_a_scene_file(table, tmp_path):
+    (tmp_path / "lines").mkdir()
+    np.savetxt(tmp_path / "lines" / "survey.csv", POINTS, delimiter=",", header="x,y,z", comments="")
+    expected, words = TABLES[table]
+    scene = read(tmp_path, curve=table)
+    assert scene.rods[0].curve == expected
+    assert words in explain(scene, [1.0], {})
+
+
+def test_a_file_that_a_scene_misses(tmp_path):
+    with pytest.raises(cf.SceneError, match=r"line 4, column 28: rods\[0\].curve: Spline.points = '.*nowhere"):
+        read(tmp_path, curve='{ type = "Spline", points = "nowhere.csv" }')
+    with pytest.raises(cf.SceneError, match="unknown key 'centr', did you mean 'centre'?"):
+        read(tmp_path, curve='{ type = "Arc", centr = [0, 0, 0], start = [2, 0, 0], angle = 1.5 }')
+
+
+def test_pieces_in_a_scene_file(tmp_path):
+    thick = '{ to = 5, type = "Circle", diameter = 0.2 }'
+    for last in ('{ type = "Tube", outer_diameter = 0.1, inner_diameter = 0.05 }',
+                 '{ to = 8.0, type = "Tube", outer_diameter = 0.1, inner_diameter = 0.05 }'):  # fmt: skip
+        scene = read(tmp_path, section=f"[{thick}, {last}]")
+        rod = scene.rods[0]
+        assert rod.breaks == (5.0,) and rod.section_at(6.0) == cf.Tube(0.1, 0.05)
+        words = (
+            "Circle (diameter 0.2 m) up to s = 5 m, then Tube (outer_diameter 0.1 m, inner_diameter 0.05 m) up to s"
+            " = 8 m"
+        )
+        assert words in explain(scene, [1.0], {})
+    EI = [210e9 * math.pi * (0.1**4 - 0.05**4) / 64, 210e9 * math.pi * 0.2**4 / 64]
+    assert f"EI = {EI[0]:.4g} to {EI[1]:.4g}, " in explain(scene, [1.0], {})
+    refused = {
+        f"[{CIRCLE}, {CIRCLE}]": r"rods\[0\].section\[0\]: 'to' is missing",
+        f"[{thick}, {{ to = 7, diameter = 0.1, type = 'Circle' }}]": (
+            r"section\[1\].to = 7: expected the rod's length 8 m"
+        ),
+        "[]": "at least one piece",
+        "[3]": r"section\[0\] = 3: expected a piece",
+    }
+    for section, words in refused.items():
+        with pytest.raises(cf.SceneError, match=words):
+            read(tmp_path, section=section)
+
+
+ROOT = Path(__file__).parent.parent
+SURVEY = "MD,Inc,Azi\n0,0,0\n1000,30,0\n"
+USERS_WELL = """
+[well]
+survey = "{survey}"
+sections = [{{ to = 1000.0, diameter = 0.2159, friction = 0.25 }}]
+[string]
+components = [
+    {{ type = "Component", name = "=1+2", length = 10.0, weight = 241.0, contact_radius = 0.0635 }},
+    {{ type = "Component", name = "pipe", weight = 241.0, contact_radius = 0.0635 }},
+]
+[[operations]]
+type = "TripOut"
+[torque_and_drag]
+model = "soft"
+[depth_sweep]
+depths = [900.0, 1000.0]
+"""
+ROD = """
+[[rods]]
+name = "=rod"
+curve = {{ type = "Spline", points = "{points}" }}
+section = {{ type = "Circle", diameter = 0.1 }}
+material = {{ E = 1e9, nu = 0.3 }}
+[[supports]]
+type = "Clamp"
+station = "=rod.start"
+[[loads]]
+type = "Force"
+station = "=rod.end"
+force = [0, -1.0, 0]
+[solve]
+load_factors = [1.0]
+elements = 2
+degree = 2
+"""
+USERS_POINTS = "0,0,0\n0,0,1\n0,0,2\n"
+
+
+@pytest.mark.parametrize("name", ["trip_out.csv", "trip_out_contacts.csv", "depth_sweep.csv", "sub/../trip_out.csv"])
+def test_a_survey_is_not_replaced(name, tmp_path, capsys):
+    (tmp_path / "sub").mkdir()
+    (tmp_path / name).write_text(SURVEY)
+    (tmp_path / "well.toml").write_text(USERS_WELL.format(survey=name))
+    assert main(["run", str(tmp_path / "well.toml"), "-o", str(tmp_path), "--no-picture"]) == 2
+    assert f"{Path(name).name} would replace the file of that name" in capsys.readouterr().err
+    assert (tmp_path / name).read_text() == SURVEY
+    assert main(["run", str(tmp_path / "well.toml"), "-o", str(tmp_path / "out"), "--no-picture"]) == 0
+
+
+@pytest.mark.parametrize("command", ["run", "buckling", "modes"])
+def test_points_of_a_rod_are_not_replaced(command, tmp_path, capsys):
+    name = {"run": "path.csv"}.get(command, f"{command}.csv")
+    (tmp_path / name).write_text(USERS_POINTS)
+    (tmp_path / "rod.toml").write_text(ROD.format(points=name))
+    assert main([command, str(tmp_path / "rod.toml"), "-o", str(tmp_path)]) == 2
+    assert f"{name} would replace" in capsys.readouterr().err and (tmp_path / name).read_text() == USERS_POINTS
+
+
+def cells(file):
+    with open(file, newline="", encoding="utf-8") as stream:
+        return [cell for row in csv.reader(stream) for cell in row]
+
+
+def test_texts_of_tables_are_no_formulas(tmp_path):
+    for text in ("=1+2", "+1", "-1", "@SUM(1)", "\tx", "\rx"):
+        assert plain_text(text) == f"'{text}"
+    assert plain_text("a=b") == "a=b" and plain_text("") == ""
+    (tmp_path / "s.csv").write_text(SURVEY)
+    (tmp_path / "well.toml").write_text(USERS_WELL.format(survey="s.csv"))
+    assert main(["run", str(tmp_path / "well.toml"), "-o", str(tmp_path / "out"), "--no-picture"]) == 0
+    found = cells(tmp_path / "out" / "trip_out.csv") + cells(tmp_path / "out" / "depth_sweep.csv")
+    assert "'=1+2" in found and "=1+2" not in found
+    (tmp_path / "p.csv").write_text(USERS_POINTS)
+    (tmp_path / "rod.toml").write_text(ROD.format(points="p.csv"))
+    assert main(["run", str(tmp_path / "rod.toml"), "-o", str(tmp_path / "out"), "--no-picture"]) == 0
+    headings = cells(tmp_path / "out" / "path.csv")
+    assert any(cell.startswith("-") for cell in headings)  # numbers stay as they are
+    assert any(cell.startswith("'=rod.end displacement") for cell in headings)
+    cf.read_path(tmp_path / "out" / "result.h5").write(tmp_path / "out" / "along.csv", 0)
+    assert cells(tmp_path / "out" / "along.csv").count("'=rod") == 5
+
+
+WITHOUT = """
+import sys
+for name in ("matplotlib", "pyvista"):
+    sys.modules[name] = None
+from cosserat_fenicsx.cli.main import main
+sys.exit(main(["run", sys.argv[1], "-o", sys.argv[2]]))
+"""
+
+
+@pytest.mark.parametrize(("kind", "table", "picture"), [("well", "trip_out.csv", "trip_out_3d.png"),
+                                                        ("rod", "path.csv", "rods.png")])  # fmt: skip
+def test_pictures_without_their_libraries_are_left_out(kind, table, picture, tmp_path):
+    (tmp_path / "in.csv").write_text(SURVEY if kind == "well" else USERS_POINTS)
+    text = USERS_WELL.format(survey="in.csv") if kind == "well" else ROD.format(points="in.csv")
+    (tmp_path / "scene.toml").write_text(text)
+    done = subprocess.run([sys.executable, "-c", WITHOUT, tmp_path / "scene.toml", tmp_path / "out"], check=False,
+                          capture_output=True, encoding="utf-8", cwd=ROOT)  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "out" / table).exists() and not (tmp_path / "out" / picture).exists()
+    assert table in done.stdout and picture not in done.stdout
+    assert picture in done.stderr and "pip install 'cosserat-fenicsx[pictures]'" in done.stderr

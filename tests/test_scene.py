@@ -1,10 +1,12 @@
-"""Invalid input: every message names the field, its value and what was expected."""
+"""Scenes in Python and in files: the same by names and objects, and every message names the field."""
 
 import math
+from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import column
+from conftest import column, refuses
 
 import cosserat_fenicsx as cf
 
@@ -56,25 +58,18 @@ REFUSED = {
     "one of two supported": (lambda: solved(cf.Scene([ROD, OTHER], [CLAMP])), "nothing holds rod 'other'"),
     "no support at all": (lambda: cf.Scene([ROD], [ROD.start]), "Scene.supports[0]"),
     "support elsewhere": (lambda: cf.Scene([ROD], [cf.Clamp(OTHER.start)]), "a rod that is not in the scene"),
-    "load elsewhere": (
-        lambda: cf.Scene([ROD], [CLAMP], [cf.Force(OTHER.end, (0, 0, 1))]),
-        "other.end, a station of a rod",
-    ),
+    "load elsewhere": (lambda: cf.Scene([ROD], [CLAMP], [cf.Force(OTHER.end, (0, 0, 1))]),
+                       "other.end, a station of a rod"),
     "load is a class": (lambda: cf.Scene([ROD], [CLAMP], [cf.Force]), "Scene.loads[0]"),
     "weight without mass": (lambda: cf.Scene([ROD], [CLAMP], [cf.Weight()]), "Material.density = None"),
     "step control": (lambda: cf.StepControl(first=0), "StepControl.first = 0"),
     "step control smallest": (lambda: cf.StepControl(smallest=2), "StepControl.smallest = 2"),
     "step control largest": (lambda: cf.StepControl(largest=-1.0), "StepControl.largest = -1.0"),
     "step control iterations": (lambda: cf.StepControl(max_iterations=0), "StepControl.max_iterations = 0"),
-}
+}  # fmt: skip
 
 
-@pytest.mark.parametrize("case", REFUSED)
-def test_refused(case):
-    make, words = REFUSED[case]
-    with pytest.raises(cf.SceneError) as refusal:
-        make()
-    assert words in str(refusal.value)
+test_refused = refuses(REFUSED)
 
 
 ARGUMENTS = {
@@ -93,13 +88,9 @@ ARGUMENTS = {
 }
 
 
-@pytest.mark.parametrize("case", ARGUMENTS)
-def test_arguments_refused(case):
-    arguments, words = ARGUMENTS[case]
-    _, scene = column()
-    with pytest.raises(cf.SceneError) as refusal:
-        cf.solve(scene, **{"load_factors": [0.1], **arguments})
-    assert words in str(refusal.value)
+test_arguments_refused = refuses(
+    ARGUMENTS, lambda arguments: cf.solve(column()[1], **{"load_factors": [0.1], **arguments})
+)
 
 
 @pytest.mark.parametrize("given", [0.1, np.float64(0.1), np.array(0.1), np.array([0.1]), [0.1], iter([0.1]), range(1)])
@@ -209,3 +200,284 @@ def test_what_looks_like_a_slip_is_asked_about():
         cf.Rod(cf.Line((0, 0, 0), (0, 0, 4)), cf.Circle(0.1), cf.Material(1e9), name="b@2")
     with pytest.raises(cf.SceneError, match="scene is a tuple: expected a Scene"):
         cf.solve((scene(), {}), [1.0])
+
+
+DEMO = Path(__file__).parent.parent / "demos" / "eccentric_cantilever.toml"
+
+
+def test_the_file_gives_the_same_path_as_python():
+    found = cf.read(DEMO)
+    scene, settings = found.scene, found.settings
+    rod, expected = column()
+    assert scene.title and settings["tol"] == 1e-6
+    a = cf.solve(scene, [0.9], elements=4).displacement(scene.rods[0].end)
+    b = cf.solve(expected, [0.9], elements=4).displacement(rod.end)
+    np.testing.assert_allclose(a, b, rtol=1e-9, atol=1e-12)
+
+
+CHANGES = {
+    "unknown key": ("diameter = 0.2", "diametre = 0.2",
+                    "rods[0].section (Circle): unknown key 'diametre', did you mean 'diameter'?"),
+    "unknown table": ("[[supports]]", "[[suports]]", "unknown key 'suports', did you mean 'supports'?"),
+    "unknown type": ('type = "Clamp"', 'type = "Clmap"', "supports[0].type = 'Clmap'"),
+    "unknown solve key": ("tol = 1e-6", "tolerance = 1e-6", "[solve]: unknown key 'tolerance', did you mean 'tol'?"),
+    "type error": ("diameter = 0.2", 'diameter = "0.2"', "Circle.diameter = '0.2': expected a unit"),
+    "type error in solve": ("tol = 1e-6", 'tol = "small"', "solve.tol = 'small': expected a finite number"),
+    "missing key": (", diameter = 0.2", "", "'diameter' is missing"),
+    "unknown station": ('station = "column.start"', 'station = "colum.start"',
+                        "no rod is named 'colum', did you mean 'column'?"),
+    "unknown place": ('station = "column.start"', 'station = "column.top"',
+                      "expected 'rod.start', 'rod.end' or 'rod@s'"),
+    "station is a number": ('station = "column.start"', "station = 3", "supports[0]: Clamp.station = 3"),
+    "beyond the end": ('station = "column.start"', 'station = "column@21"', "expected an arc length in [0, 20] m"),
+    "unknown material": ('material = "steel"', 'material = "steal"', "did you mean 'steel'?"),
+    "no array": ("[[supports]]", "[supports]", "expected an array of tables, [[supports]]"),
+    "not TOML": ("[[supports]]", "[[supports", "not valid TOML"),
+    "vector": ("force = [0, 0, -101739.34535723379]", "force = [0, -1.0]",
+               "Force.force = [0, -1.0]: expected 3 finite numbers (N)"),
+    "no duration": ("[solve]", "[simulate]\ndt = 0.1\n[solve]", "[simulate]: 'duration' is missing"),
+    "unknown simulate key": ("[solve]", "[simulate]\nduration = 1\nduratoin = 2\n[solve]",
+                             "[simulate]: unknown key 'duratoin'"),
+    "text for a duration": ("[solve]", "[simulate]\nduration = 'long'\n[solve]",
+                            "simulate.duration = 'long': expected a number"),
+    "parts of elements": ("[solve]", "[simulate]\nduration = 1\nelements = 2.5\n[solve]",
+                          "simulate.elements = 2.5: expected a whole number"),
+    "title": ('title = "Eccentrically compressed cantilever"', "title = 3", "title = 3: expected a text"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", CHANGES)
+def test_refused_changes(case, tmp_path):
+    old, new, words = CHANGES[case]
+    text = DEMO.read_text(encoding="utf-8")
+    assert old in text
+    file = tmp_path / "scene.toml"
+    file.write_text(text.replace(old, new))
+    with pytest.raises(cf.SceneError) as refusal:
+        cf.read(file)
+    assert words in str(refusal.value) and str(file) in str(refusal.value)
+
+
+MOTION = f"""{DEMO.read_text(encoding="utf-8").partition("[solve]")[0]}[simulate]
+duration = "1 s"
+"""
+WELL = """[well]
+stations = [[0, 0, 0], [1000, 0, 0]]
+sections = [{ to = 1000.0, diameter = "8.5 in", friction = 0.3 }]
+
+[string]
+components = [{ type = "DrillPipe", size = "5 in 19.50 lb/ft" }]
+
+[mud]
+density = "10 ppg"
+"""
+WELLS = WELL + """
+[[operations]]
+type = "TripIn"
+"""
+DRILLING = WELL + """
+[drive]
+speed = "60 rpm"
+"""
+FILES = {"rods": DEMO.read_text(encoding="utf-8"), "motion": MOTION, "well": WELLS, "drilling": DRILLING}
+MISTAKES = [
+    ("rods", 'station = "column.end"\nforce', 'sation = "column.end"\nforce',
+     (21, 1, "'sation', did you mean 'station'")),
+    ("rods", "diameter = 0.2", 'diameter = "0.2 psi"', (12, 30, "psi is a unit of pressure, expected one of length")),
+    ("rods", "[solve]", "[solve]\n[solve]", (30, 1, "[solve] is given twice, first at line 29, column 1")),
+    ("rods", "[[rods]]", "[rods]\n[[rods]]", (10, 1, "[[rods]] is given twice, first at line 9, column 1")),
+    ("motion", "duration =", "durration =", (30, 1, "[simulate]: unknown key 'durration', did you mean 'duration'")),
+    ("motion", '"1 s"', '"1 m"', (30, 1, "m is a unit of length, expected one of time")),
+    ("motion", '"1 s"', '"1 s"\nduration = 2', (31, 1, "simulate.duration is given twice, first at line 30, column 1")),
+    ("well", "friction", "fricton", (3, 49, "unknown key 'fricton', did you mean 'friction'")),
+    ("well", "10 ppg", "10 psi", (9, 1, "psi is a unit of pressure, expected one of density")),
+    ("well", "[mud]", "[well]\n[mud]", (8, 1, "[well] is given twice, first at line 1, column 1")),
+    ("well", "to = 1000.0", "to = 1000.0, to = 1",
+     (3, 28, "well.sections[0].to is given twice, first at line 3, column 15")),
+    ("drilling", "speed =", "sped =", (12, 1, "drive (TopDrive): unknown key 'sped', did you mean 'speed'")),
+    ("drilling", "60 rpm", "60 ft", (12, 1, "ft is a unit of length, expected one of angular velocity")),
+    ("drilling", "[drive]", "[drive]\n[[drive]]", (12, 1, "[[drive]] is given twice, first at line 11, column 1")),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("kind", "old", "new", "expected"), MISTAKES)
+def test_mistakes_are_refused_with_their_places(kind, old, new, expected, tmp_path):
+    """An unknown key, a unit of another dimension and what is given twice, in every kind of scene file."""
+    text, file = FILES[kind], tmp_path / "scene.toml"
+    line, column, words = expected
+    assert old in text
+    file.write_text(text, encoding="utf-8")
+    cf.read(file)
+    file.write_text(text.replace(old, new, 1), encoding="utf-8")
+    with pytest.raises(cf.SceneError) as refusal:
+        cf.read(file)
+    assert str(refusal.value).startswith(f"{file}, line {line}, column {column}: ") and words in str(refusal.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "column"),
+    [("[a\n", 1, 3), ("a = 1\n[a]\n[b\n", 2, 1), ("a = {}\n[a.b]\n", 2, 5), ("x = 5 m\n", 1, 7), ("[[a]]\n[a]", 2, 1)],
+)
+def test_what_is_no_toml_is_refused_with_its_place(text, line, column, tmp_path):
+    file = tmp_path / "scene.toml"
+    file.write_text(text, encoding="utf-8")
+    with pytest.raises(cf.SceneError) as refusal:
+        cf.read(file)
+    assert str(refusal.value).startswith(f"{file}, line {line}, column {column}: ")
+
+
+def test_missing_file(tmp_path):
+    with pytest.raises(cf.SceneError, match="nowhere.toml: cannot be read"):
+        cf.read(tmp_path / "nowhere.toml")
+
+
+def test_marks_and_encodings_of_editors(tmp_path):
+    """A mark at the beginning of UTF-8 is skipped; other encodings are named."""
+    text = DEMO.read_text(encoding="utf-8").replace("Eccentrically", "B\u00fcgel")
+    (tmp_path / "marked.toml").write_text(text, encoding="utf-8-sig")
+    assert cf.read(tmp_path / "marked.toml").scene.title.startswith("B\u00fcgel")
+    (tmp_path / "latin.toml").write_text(text, encoding="latin-1")
+    with pytest.raises(cf.SceneError, match="latin.toml: not UTF-8 .*: save it as UTF-8"):
+        cf.read(tmp_path / "latin.toml")
+
+
+HEAVY = cf.Material(E=210e9, density=7850.0)
+FRAME = """
+rods = [
+  { name = "post", curve = { type = "Line", start = [0, 0, 0], end = [0, 0, 2] }, section = { type = "Circle", diameter = 0.02 }, material = { E = 210e9, density = 7850.0 } },
+]
+supports = [{ type = "Clamp", station = "post.start" }]
+loads = [{ type = "Force", station = "post.end", force = [10, 0, 0] }]
+solve = { load_factors = "0:1", elements = 2, degree = 2 }
+"""  # noqa: E501
+
+
+def rods():
+    post = cf.Rod(cf.Line((0, 0, 0), (0, 0, 2)), cf.Circle(0.02), HEAVY, name="post")
+    beam = cf.Rod(cf.Line((0, 0, 2), (1, 0, 2)), cf.Circle(0.02), HEAVY, name="beam")
+    return [post, beam]
+
+
+def framed(named=True):
+    """Stations and rods are given by their names, or as objects."""
+    post, beam = rods()
+    ends = ("post.start", "post.end", "beam.start", "beam.end", "beam@0.5") if named else (
+        post.start, post.end, beam.start, beam.end, beam.at(0.5))  # fmt: skip
+    foot, head, inner, outer, middle = ends
+    low, high = ("post", "beam") if named else (post, beam)
+    loads = [
+        cf.Force(middle, (0, 0, -5.0)),
+        cf.LineForce(low, cf.signals.AlongTable([0, 2], [(0, 0, 0), (3.0, 0, 0)])),
+        cf.Foundation(high, 10.0),
+        cf.Wall(low, (0, 0, 0), (0, 0, 1), 0.5, 1e3),
+        cf.Spring(head, stiffness=20.0),
+        cf.Drag(low, 1.0, current=(1.0, 0, 0)),
+    ]
+    return cf.Scene([post, beam], [cf.Clamp(foot), cf.Roller(outer, (0, 0, 1))], loads, [cf.Joint(head, inner)])
+
+
+def test_names_and_objects_are_the_same():
+    named, plain = (cf.solve(scene, [1.0], elements=2, degree=2) for scene in (framed(), framed(named=False)))
+    np.testing.assert_array_equal(named.position("beam.end"), plain.position("beam.end"))
+    for given in ("beam.end", named.scene.station("beam.end"), named.scene.supports[1]):
+        np.testing.assert_array_equal(named.reaction(given), plain.reaction(plain.scene.supports[1]))
+    with pytest.raises(cf.SceneError, match=r"post\.end is no support .*Clamp at post\.start, Roller at beam\.end"):
+        named.reaction("post.end")
+
+
+@pytest.mark.serial
+def test_a_support_given_by_name_is_known_as_it_was_given():
+    post = rods()[0]
+    held = cf.Clamp("post.start")
+
+    def push(t):
+        return t, 0, 0
+
+    loads = [cf.Force("post.end", push), cf.PointMass("post.end", 1.0)]
+    scene = cf.Scene([post], [held], loads, velocities=[cf.InitialVelocity("post", angular=(0, 0, 0))])
+    assert held.station == "post.start" and scene.supports[0].station == post.start
+    assert scene.supports_of(held) == scene.supports_of(scene.supports[0]) == [0]
+    assert scene.loads[0].force.place == "post.end" and scene.loads[0].force.function is push
+    assert scene.loads[0].force(2.0) == (2.0, 0.0, 0.0) and scene.velocities[0].rod is post
+    # the same parts belong to another scene too
+    other = rods()[0]
+    assert cf.Scene([other], [held], loads).loads[0].station.rod is other
+
+
+@dataclass(frozen=True)
+class Own(cf.PointAction):
+    station: object
+
+
+@pytest.mark.serial
+def test_a_class_of_ones_own_has_names_too():
+    post = rods()[0]
+    assert cf.Scene([post], (), [Own("post.end")]).loads[0].station == post.end
+    with pytest.raises(cf.SceneError, match=r"Scene.loads\[0\].station = 3: expected a station"):
+        cf.Scene([post], (), [Own(3)])
+
+
+REFUSED_NAMES = {
+    "an unknown station": (lambda r: cf.Scene(r, [cf.Clamp("pots.start")]), "Scene.supports[0].station = 'pots.start'"),
+    "its nearest": (lambda r: cf.Scene(r, [cf.Clamp("pots.start")]), "did you mean 'post'?"),
+    "no station": (lambda r: cf.Scene(r, [cf.Clamp("post")]), "expected 'rod.start', 'rod.end' or 'rod@s'"),
+    "an unknown rod": (lambda r: cf.Scene(r, (), [cf.Foundation("pier", 1.0)]), "Scene.loads[0].rod = 'pier'"),
+    "a place inside a wall": (
+        lambda r: cf.Scene(r, (), [cf.Wall("beam", (0, 0, 0), (0, 0, 1), 0.1)]), "rod 'beam' lies outside it"),
+    "a joint apart": (lambda r: cf.Scene(r, (), (), [cf.Joint("post.start", "beam.start")]), "they are 2 m apart"),
+    "a number": (lambda r: cf.Clamp(3), "Clamp.station = 3: expected a station such as rod.end, or its name"),
+    "a rod for a station": (lambda r: cf.Clamp(r[0]), "Clamp.station = <Rod 'post': Line, length 2 m>: expected"),
+}  # fmt: skip
+
+
+test_refused_names = pytest.mark.serial(refuses(REFUSED_NAMES, lambda make: make(rods())))
+
+
+def test_what_a_file_says_is_what_solve_takes(tmp_path):
+    file = tmp_path / "post.toml"
+    file.write_text(FRAME)
+    found = cf.read(file)
+    scene, settings = found.scene, found.settings
+    assert settings["load_factors"] == (0.0, 1.0)
+    path = cf.solve(scene, **settings)
+    assert path.load_factors[-1] == 1.0
+    assert (cf.solve(scene, elements=2, degree=2).load_factors == path.load_factors).all()
+    file.write_text(FRAME.replace("0:1", "0.25,1"))
+    assert cf.read(file).settings["load_factors"] == [0.25, 1.0]
+    file.write_text(FRAME.replace("0:1", "0:1:2"))
+    with pytest.raises(cf.SceneError, match="load factors '0:1:2': expected A:B"):
+        cf.read(file)
+
+
+@pytest.mark.parametrize("given", [(0, 1, 2), (1,), (), "0:1"])
+def test_tuples_that_are_no_pair_are_refused(given):
+    with pytest.raises(cf.SceneError, match=r"expected a tuple \(a, b\), between which .* or a list"):
+        cf.solve(framed(named=False), given)
+
+
+def test_one_point_of_a_path_is_a_path():
+    path = cf.solve(framed(), [0.5, 1.0], elements=1, degree=2)
+    last, both = path[-1], path[:]
+    assert type(last) is type(path) and last.load_factors.tolist() == [1.0] and len(both) == 2
+    np.testing.assert_array_equal(last.position("post.end")[0], path.position("post.end")[1])
+    assert [part.load_factors[0] for part in path] == [0.5, 1.0]
+    with pytest.raises(IndexError, match=r"\[2\]: expected the index of a load factor, a whole number from -2 to 1"):
+        path[2]
+
+
+def soft():
+    rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, 1)), cf.Circle(0.02), cf.Material(E=210.0, density=1.0), name="rod")
+    return cf.Scene([rod], [cf.Clamp("rod.start")], [cf.Force("rod.end", (1e-9, 0, 0))])
+
+
+@pytest.mark.serial
+def test_a_probable_mistake_in_units_is_a_warning_where_the_caller_is():
+    for call in (lambda: cf.solve(soft(), 1.0, elements=1), lambda: cf.simulate(soft(), 0.01, dt=0.01, elements=1)):
+        with pytest.warns(cf.SceneWarning, match="E = 210 Pa is softer than most rubbers") as told:
+            call()
+        assert told[0].filename == __file__
+
+
+def test_scenes_and_rods_in_one_line():
+    assert repr(framed(named=False)) == "<Scene: rods post, beam; 2 supports, 6 loads, 1 joints>"
+    assert repr(rods()[0]) == "<Rod 'post': Line, length 2 m>"

@@ -1,8 +1,11 @@
-"""Derivatives of queries of a path by numbers of its scene: closed forms, and differences of solutions."""
+"""Derivatives of queries and of critical loads by numbers of a scene: closed forms, differences, scales."""
+
+import math
 
 import numpy as np
 import pytest
 from conftest import column
+from path_scenes import shallow_arch
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.numerics import PLACES, derivative
@@ -264,3 +267,196 @@ def test_a_cable_that_is_pulled_through_a_conduit():
     for name, (field, value) in names.items():
         by = differenced(lambda x: cf.solve(scene(**{field: x}), [1.0], elements=12), pull, value, step=5e-4)
         agrees(found, name, by, tol=1e-7)
+
+
+def tip_of(path):
+    return path.displacement("mast.end")[:, 0]
+
+
+def mast(x=0.0, lean=0.0, at=None, section=None):
+    rod = cf.Rod(cf.Line((x, 0, 0), (x + lean, 0, 20.0)), section or cf.Circle(0.2), cf.Material(E=210e9, nu=0.3),
+                 name="mast")  # fmt: skip
+    return cf.Scene(
+        [rod],
+        [cf.Clamp(rod.start)],
+        [cf.Force(rod.at(at) if at else rod.end, (20e3, 0, -60e3)), cf.Foundation(rod, 500.0)],
+    )
+
+
+def by_end(scene):
+    found = cf.solve(scene, [1.0], elements=4).sensitivity(tip_of, ["rods.mast.curve.end[0]"])
+    return found["rods.mast.curve.end[0]"]
+
+
+def test_derivatives_by_places_do_not_depend_on_the_origin():
+    """Far from it, and where a coordinate is 0 but for rounding (the derivative is rounded by 1e-9 to 3e-9)."""
+    here = by_end(mast())
+    assert abs(here[0]) > 0.4
+    assert by_end(mast(5e5)) == pytest.approx(here, rel=1e-7)
+    assert by_end(mast(lean=20 * math.cos(math.pi / 2))) == pytest.approx(here, rel=1e-8)
+
+
+def test_a_scene_that_changes_abruptly_is_refused():
+    path = cf.solve(mast(), [1.0], elements=4)
+    with pytest.raises(cf.SceneError, match="does not change smoothly up to 1.6 from it.*scale"):
+        path.sensitivity(tip_of, [cf.Parameter("lean", 0.0, lambda x: mast(lean=20 * math.tanh(x)), scale=100.0)])
+    found = path.sensitivity(tip_of, [cf.Parameter("lean", 0.0, lambda x: mast(lean=20 * math.tanh(x)), scale=1.0)])
+    assert found["lean"] == pytest.approx(20 * by_end(mast()), rel=1e-9)
+
+
+def test_a_line_that_becomes_vertical_needs_its_d1():
+    """Without one its directors jump there by a right angle."""
+
+    def tilted(lean, d1=(1, 0, 0)):
+        rod = cf.Rod(cf.Line((0, 0, 0), (lean, 0, 20.0), d1), cf.Rectangle(0.2, 0.1), cf.Material(E=210e9, nu=0.3),
+                     name="mast")  # fmt: skip
+        return cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Force(rod.end, (5e3, 5e3, -6e3))])
+
+    def solved(lean, *d1):
+        return cf.solve(tilted(lean, *d1), [1.0], elements=4, model="spatial")
+
+    name = "rods.mast.curve.end[0]"
+    with pytest.raises(cf.SceneError, match="and d1 for a Line that becomes vertical"):
+        solved(0.0, None).sensitivity(tip_of, [name])
+    found = solved(0.0).sensitivity(tip_of, [name])[name]
+    assert found == pytest.approx((tip_of(solved(0.01)) - tip_of(solved(-0.01))) / 0.02, rel=1e-5)
+
+
+def test_parameters_that_move_elements_are_refused():
+    path = cf.solve(mast(at=10.0), [1.0], elements=4)
+    stepped = [(8.0, cf.Circle(0.2)), (None, cf.Circle(0.1))]
+    for path, name in (
+        (path, "loads[0].station.s"), (path, cf.Parameter("place", 10.0, lambda s: mast(at=s))),
+        (cf.solve(mast(section=stepped), [1.0], elements=4), "rods.mast.curve.end[2]"),
+    ):  # fmt: skip
+        with pytest.raises(cf.SceneError, match="moves a load, support, joint or end of a section"):
+            path.sensitivity(tip_of, [name])
+
+
+def test_diameters_of_a_thin_tube():
+    """EI has the power four of both diameters."""
+    outer, inner, names = 0.1, 0.0999, [f"rods.mast.section.{side}_diameter" for side in ("outer", "inner")]
+    rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, 20.0)), cf.Tube(outer, inner), cf.Material(E=210e9, nu=0.3), name="mast")
+    path = cf.solve(cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Moment(rod.end, (0, 1e-3, 0))]), [1.0], elements=4)
+    found, power = path.sensitivity(tip_of, names), 4 / (outer**4 - inner**4)
+    assert [found.relative(name)[0] for name in names] == pytest.approx([-power * outer**4, power * inner**4], rel=1e-6)
+
+
+def test_a_number_that_two_rods_share_counts_once():
+    steel = cf.Material(E=210e9, nu=0.3)
+    lower = cf.Rod(cf.Line((0, 0, 0), (0, 0, 5.0)), cf.Circle(0.2), steel, name="lower")
+    upper = cf.Rod(cf.Line((0, 0, 5.0), (0, 0, 8.0)), cf.Circle(0.1), steel, name="mast")
+    joint = [cf.Joint(lower.end, upper.start)]
+    path = cf.solve(cf.Scene([lower, upper], [cf.Clamp(lower.start)], [cf.Force(upper.end, (1e3, 0, 0))], joint), [1.0])
+    names = [f"rods.{name}.material.E" for name in ("lower", "mast")]
+    with pytest.raises(cf.SceneError, match="is the same number of the scene as 'rods.lower.material.E'"):
+        path.uncertainty(dict.fromkeys(names, 1e9), tip_of)
+    assert path.sensitivity(tip_of, names[1:]).relative(names[1]) == pytest.approx(-1.0, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    "rho", [[[1, 0.9, 0.9], [0.9, 1, -0.9], [0.9, -0.9, 1]], [[1, 2], [3]], np.full((3, 3), np.nan)]
+)
+def test_what_is_no_correlation_is_refused(rho):
+    found = cf.Sensitivity(
+        np.ones(1), *({name: np.ones(1) for name in "abc"} for _ in range(3)), dict.fromkeys("abc", "")
+    )
+    with pytest.raises(cf.SceneError, match="correlation"):
+        found.uncertainty(dict.fromkeys("abc", 1.0), rho)
+    assert found.uncertainty(dict.fromkeys("abc", 1.0), np.ones((3, 3))).standard_deviation == pytest.approx([3.0])
+
+
+def euler(*, E=210e9, diameter=0.2, length=20.0, loads=lambda rod: ()):
+    rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, length)), cf.Circle(diameter), cf.Material(E=E, nu=0.3), name="column")
+    return rod, cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Force(rod.end, (0, 0, -1e5)), *loads(rod)])
+
+
+def test_buckling_loads_of_a_column():
+    """P (1 + P/GA) = P_Euler: P is in proportion to E, nearly to d^4 and L^-2."""
+    rod, scene = euler()
+    found = cf.buckling(scene, 2).sensitivity([E, DIAMETER, LOAD, "rods.column.curve.end[2]"])
+    P, GA = found.value[0] * 1e5, rod.stiffness.shear[0]
+    x = P / GA / (1 + P / GA)
+    exact = 1.0, (4 + 2 * x) / (1 + x), -1.0, -2 / (1 + x)
+    for name, power in zip(found, exact, strict=True):
+        assert found.relative(name) == pytest.approx([power] * 2, rel=1e-8)
+        assert found.error[name] == pytest.approx(0, abs=1e-8 * abs(found[name]).max())
+    spread = cf.buckling(scene).uncertainty({E: 0.02 * 210e9, DIAMETER: 0.01 * 0.2})
+    assert spread.standard_deviation[0] / P * 1e5 == pytest.approx(np.hypot(0.02, 0.01 * exact[1]), rel=1e-6)
+
+
+def test_a_foundation_carries_a_part_of_the_buckling_load():
+    """Of a pinned column, P_cr = P_Euler + k (L/pi)^2 in its first mode without shear."""
+
+    def scene(k):
+        stiff = cf.Stiffness(shear=(np.inf,) * 2, axial=np.inf, bending=(1e6, 1e6), torsion=1e6)
+        rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, 10.0)), stiff, name="column")
+        held = [cf.Hinge(rod.start, (0, 1, 0)), cf.Roller(rod.end, (1, 0, 0)), cf.Roller(rod.end, (0, 1, 0))]
+        return cf.Scene([rod], held, [cf.Force(rod.end, (0, 0, -1e4)), cf.Foundation(rod, k, direction=(1, 0, 0)),
+                                      cf.Foundation(rod, 10 * k, direction=(0, 1, 0))])  # fmt: skip
+
+    found = cf.buckling(scene(1e3), elements=8).sensitivity(["loads[1].stiffness", "loads[2].stiffness"])
+    assert found["loads[1].stiffness"][0] * 1e4 == pytest.approx((10 / np.pi) ** 2, rel=1e-5)
+    assert abs(found["loads[2].stiffness"][0]) * 1e4 < 1e-5
+
+
+def test_equal_buckling_loads_that_part_are_refused():
+    stiff = cf.Stiffness(shear=(1e9, 1e9), axial=1e9, bending=(1e6, 1e6), torsion=1e6)
+    rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, 20.0)), stiff, name="column")
+    scene = cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Force(rod.end, (0, 0, -1e5))])
+    with pytest.raises(cf.SceneError, match="it separates the critical load factors 0 and 1"):
+        cf.buckling(scene, 2).sensitivity(["rods.column.section.bending[0]"])
+    path = cf.solve(scene, (0.0, 1.0), model="spatial", elements=4)
+    with pytest.raises(cf.SceneError, match="it separates the two bifurcations"):
+        path.sensitivity(path.events[0], ["rods.column.section.bending[0]"])
+    follower = cf.Scene([rod], [cf.Clamp(rod.start)], [cf.FollowerForce(rod.end, (0, 0, -1e5))])
+    with pytest.raises(cf.SceneError, match="have a potential"):
+        cf.buckling(follower).sensitivity([LOAD])
+
+
+def test_bifurcation_of_a_column():
+    """P (1 + P/GA - P/EA) = P_Euler of the column that shortens and shears before it buckles."""
+    rod, scene = euler()
+    path = cf.solve(scene, (0.0, 5.0), model="spatial", elements=8)
+    found = path.sensitivity(path.events[0], [E, DIAMETER, LOAD, "rods.column.curve.end[2]"])
+    P = path.events[0].load_factor * 1e5
+    y = P * (1 / rod.stiffness.shear[0] - 1 / rod.stiffness.axial)
+    y /= 1 + y
+    for name, power in zip(found, (1.0, (4 + 2 * y) / (1 + y), -1.0, -2 / (1 + y)), strict=True):
+        assert found.relative(name) == pytest.approx(power, rel=1e-8)
+    with pytest.raises(cf.SceneError, match="'loads.0..force.0.': it is an imperfection, with which the bifurcation disappears"):
+        path.sensitivity(path.events[0], ["loads[0].force[0]"])
+    again = cf.solve(scene, (0.0, 5.0), model="spatial", elements=8)
+    with pytest.raises(cf.SceneError, match="the event does not belong to this path"):
+        path.sensitivity(again.events[0], [E])
+    spread = path.uncertainty({E: 0.02 * 210e9}, path.events[0])
+    assert spread.standard_deviation == pytest.approx(0.02 * path.events[0].load_factor, rel=1e-8)
+
+
+def arch(stiffness=1.0, radius=133.114):
+    """`path_scenes.shallow_arch` with other stiffnesses, or another radius of the same span."""
+    given = shallow_arch()[0].section
+    scaled = {x: getattr(given, x) for x in ("shear", "axial", "bending", "torsion")}
+    section = cf.Stiffness(**{x: tuple(stiffness * np.array(v)) if np.ndim(v) else stiffness * v
+                              for x, v in scaled.items()})  # fmt: skip
+    half = np.arcsin(17.0 / radius)
+    curve = cf.Arc((17.0, -radius * np.cos(half), 0), (0, 0, 0), -2 * half, axis=(0, 0, 1), d1=(0, 0, 1))
+    rod = cf.Rod(curve, section, name="arch")
+    loads = [cf.Force(rod.at(rod.length / 2), (0, -1.0, 0))]
+    return cf.Scene([rod], [cf.Clamp(rod.start), cf.Clamp(rod.end)], loads)
+
+
+@pytest.mark.slow
+def test_limit_points_and_bifurcations_of_an_arch():
+    """All are in proportion to the stiffness; by the radius, as by differences of the first limit load."""
+    given = {"elements": 8, "model": "spatial", "control": "arc"}
+    path = cf.solve(arch(), (0.0, 40.0), **given)
+    parameters = [cf.Parameter("stiffness", 1.0, arch), cf.Parameter("radius", 133.114, lambda r: arch(radius=r), "m")]
+    assert [event.kind for event in path.events] == ["limit", "bifurcation", "bifurcation", "limit"]
+    for event, tol in zip(path.events, (1e-7, 1e-5, 1e-6, 1e-7), strict=True):
+        found = path.sensitivity(event, parameters)
+        assert found["stiffness"] == pytest.approx(event.load_factor, rel=tol)
+    step = 2e-3 * 133.114
+    near = [cf.solve(arch(radius=133.114 + k * step), (0.0, 40.0), **given).events[0].load_factor for k in PLACES]
+    by, _ = derivative(near, step)
+    assert path.sensitivity(path.events[0], parameters)["radius"] == pytest.approx(by, rel=1e-6)

@@ -1,17 +1,29 @@
-"""What every folder guarantees, whatever it holds: motions of rods and of strings, studies, sweeps.
+"""Folders of motions, strings, studies and sweeps: gone on with to the same digits, or refused in words."""
 
-`--mutations 200` damages as many folders of each of the four.
-"""
-
+import errno
+import gc
 import json
+import math
+import os
 import random
+import shutil
 import signal
 import warnings
 
+import numpy as np
 import pytest
+from ended_motions import CASES, SMALL, Stopped, assert_same, part_of, rows, run, stop_at
+from fake_string import scene
+from fake_string import use as use_pendulum
+from moving_scenes import flying_in_a_plane, flying_in_space
 from stored_users import USERS, at_write, copy, die, full, in_a_child, interrupt, mutated, use, written
+from test_schemes import everything
 
 import cosserat_fenicsx as cf
+from cosserat_fenicsx.drilling import time_loop as drilling_loop
+from cosserat_fenicsx.dynamics import time_loop
+from cosserat_fenicsx.dynamics.schemes import SCHEMES
+from cosserat_fenicsx.results.records import Instant
 from cosserat_fenicsx.storage import files
 from cosserat_fenicsx.storage.store import Store, holds, resume
 
@@ -200,3 +212,358 @@ def test_lines_that_were_changed_are_computed_again(change, user, kept, tmp_path
         file.write_bytes(b"".join([files.sealed(changed, seed), *lines[1:]]))
         found, said = quietly(user.go_on, folder)
         assert user.digits(found) == kept[user.call]["digits"] and "line 1: " in said[0]
+
+
+PARTS = ("stepper", "schemes", "step_problem", "contact", "pace")
+SOLVERS = tuple(f"cosserat_fenicsx.dynamics.{name}" for name in PARTS)
+
+
+@pytest.mark.parametrize(("case", "apart"), [*((case, 0.02) for case in CASES), ("fixed", 0.0), ("adaptive", 1e9)])
+def test_it_goes_on_to_the_same_digits(case, apart, tmp_path, monkeypatch, never_ended):
+    """With some checkpoints, one at every step, and one at the start alone."""
+    scene = part_of(case, tmp_path / "part", monkeypatch, step=25, apart=apart)
+    before, seen = rows(tmp_path / "part").copy(), cf.read_history(tmp_path / "part", scene)
+    cf.simulate(scene, 0.05, dt=0.05, **SMALL)  # the pooled solver now has another tangent
+    history = cf.resume(tmp_path / "part", scene)
+    assert_same(tmp_path / "part", never_ended(case))
+    assert 0 < len(before) == len(seen) < len(history)  # a history read before does not grow
+    assert rows(tmp_path / "part")[: len(before)].tobytes() == before.tobytes()
+    assert history.times[-1] == CASES[case][1] and history.why == cf.read_history(never_ended(case), scene).why
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_everything_that_steps_depend_on_is_remembered(scheme, tmp_path, monkeypatch):
+    """A smooth motion, where tangents are reused for many steps: all
+    numbers in the solvers are those of an uninterrupted run."""
+    section = cf.Stiffness((1e6, 1e6), 1e6, (1e3, 1e3), 1e3, mass=1.0, inertia=(1, 1, 2))
+    rod = cf.Rod(cf.Line((0, 0, 0), (10, 0, 0)), section)
+    scene = cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Force(rod.end, cf.signals.Sine((0, 0, 3.0), 0.05))])
+    write, over, kept, motions = files.write_checkpoint, time_loop.TimeLoop.over, [], []
+
+    def write_and_keep(file, *given):
+        write(file, *given)
+        kept.append(file.read_bytes())
+
+    def over_and_keep(self, *more):
+        motions.append(self)
+        return over(self, *more)
+
+    monkeypatch.setattr(time_loop.TimeLoop, "over", over_and_keep)
+    monkeypatch.setattr(files, "write_checkpoint", write_and_keep)
+    monkeypatch.setattr(Store, "APART", 0.0)
+    monkeypatch.setattr(Store, "SELDOM", 0)
+    asked = {"dt": 0.02, "scheme": scheme, "elements": 24, "degree": 2}
+    cf.simulate(scene, 0.8, folder=tmp_path / "whole", **asked)
+    expected = numbers_held(motions[-1])
+    monkeypatch.setattr(files, "write_checkpoint", write)
+    for k in (20, 30, 36, 38, 39):
+        shutil.copytree(tmp_path / "whole", tmp_path / f"from {k}")
+        (tmp_path / f"from {k}" / "checkpoint.npz").write_bytes(kept[k])
+        cf.simulate(scene, 0.1, **asked)
+        cf.resume(tmp_path / f"from {k}", scene)
+        assert numbers_held(motions[-1]) == expected
+        assert_same(tmp_path / f"from {k}", tmp_path / "whole")
+
+
+def numbers_held(thing, before=""):
+    """All numbers in the solvers of a motion, by attribute names."""
+    found = {}
+    for name, value in vars(thing).items():
+        if isinstance(value, bool | int | float):
+            found[before + name] = value
+        elif hasattr(value, "__dict__") and type(value).__module__.startswith(SOLVERS):
+            if name != "problem" or not before:
+                found |= numbers_held(value, f"{before}{name}.")
+    return found
+
+
+def test_a_stored_history_answers_as_one_in_memory(tmp_path):
+    rod, scene = everything()
+    stored = cf.simulate(scene, 0.2, dt=0.01, folder=tmp_path / "motion", **SMALL)
+    kept = cf.simulate(scene, 0.2, dt=0.01, **SMALL)
+    again = cf.read_history(tmp_path / "motion")
+    twin = next(x for x in again.scene.rods if x.name == rod.name)
+    assert repr(stored) == repr(kept) == repr(again)
+    for name in ("times", "steps", "iterations", "kinetic", "strain", "energy", "work", "dissipated", "balance",
+                 "linear_momentum", "angular_momentum", "along_axis"):  # fmt: skip
+        for history in (stored, again):
+            assert (getattr(history, name) == getattr(kept, name)).all(), name
+    for name in ("position", "displacement", "rotation", "rotation_angle", "force", "moment", "velocity",
+                 "angular_velocity"):  # fmt: skip
+        expected = getattr(kept, name)(rod.at(0.7))
+        assert (getattr(stored, name)(rod.at(0.7)) == expected).all(), name
+        assert (getattr(again, name)(twin.at(0.7)) == expected).all(), name
+    for name, values in kept.fields(7, rod).items():
+        assert (stored.fields(7, rod)[name] == values).all() and (again.fields(7, twin)[name] == values).all(), name
+    assert (stored.largest_displacement() == kept.largest_displacement()).all()
+    assert (stored.at_points([3, 5]).position(rod.end) == kept.position(rod.end)[[3, 5]]).all()
+    for history, name in ((kept, "kept"), (again, "again")):
+        history.write(tmp_path / f"{name}.xdmf")
+    assert (tmp_path / "kept.xdmf").read_text().replace("kept", "again") == (tmp_path / "again.xdmf").read_text()
+    again.plot_energy(tmp_path / "energy.png")
+    assert (tmp_path / "energy.png").stat().st_size > 10000
+
+
+def test_neither_tol_nor_dt(tmp_path):
+    """The default tolerance; a folder may be prolonged."""
+    _, scene = flying_in_space()
+    history = cf.simulate(scene, 0.02, folder=tmp_path / "flight", elements=1, degree=2)
+    assert (cf.read_history(tmp_path / "flight").times == history.times).all()
+    assert cf.resume(tmp_path / "flight", duration=0.04).times[-1] == 0.04
+
+
+def test_none_of_its_states_stays_in_memory(tmp_path):
+    def instants():
+        gc.collect()
+        return sum(type(x) is Instant for x in gc.get_objects())
+
+    before = instants()
+    history = run("adaptive", tmp_path / "motion")
+    assert len(history) > 30 and instants() <= before
+    history.position(history.scene.rods[0].end)
+    assert instants() <= before and isinstance(history._all_rq, np.memmap)
+
+
+def test_a_checkpoint_that_cannot_be_written_leaves_the_one_before(tmp_path, monkeypatch, never_ended):
+    replace, done = os.replace, []
+
+    def full(source, target):
+        done.append(target)
+        if len(done) > 5:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        replace(source, target)
+
+    monkeypatch.setattr(os, "replace", full)
+    monkeypatch.setattr(Store, "APART", 0.0)
+    monkeypatch.setattr(Store, "SELDOM", 0)
+    with pytest.raises(cf.NotStored, match="No space left on device"):
+        run("fixed", tmp_path / "part")
+    monkeypatch.setattr(os, "replace", replace)
+    assert sorted(x.name for x in (tmp_path / "part").iterdir()) == sorted(
+        x.name for x in never_ended("fixed").iterdir()
+    )
+    cf.resume(tmp_path / "part")
+    assert_same(tmp_path / "part", never_ended("fixed"))
+
+
+def test_a_complete_motion_stays_as_it_is_and_may_be_prolonged(tmp_path, monkeypatch, never_ended):
+    """Steps of 0.05 s: the extended motion equals one of that duration from the start."""
+    scene = flying_in_space()[1]
+    short = cf.simulate(scene, 2, dt=0.05, folder=tmp_path / "short", **SMALL)
+    stamps = {file.name: file.stat().st_mtime_ns for file in (tmp_path / "short").iterdir()}
+    again = cf.resume(tmp_path / "short")
+    assert repr(again) == repr(short) and (again.energy == short.energy).all()
+    assert {file.name: file.stat().st_mtime_ns for file in (tmp_path / "short").iterdir()} == stamps
+    stop_at(monkeypatch, 20, 0.0)
+    with pytest.raises(Stopped):
+        cf.resume(tmp_path / "short", duration=5)
+    longer = cf.resume(tmp_path / "short")
+    whole = cf.read_history(never_ended("fixed"))
+    np.testing.assert_allclose(longer.times, whole.times, rtol=1e-14)
+    np.testing.assert_allclose(longer._all_rq, whole._all_rq, atol=1e-11)
+    with pytest.raises(cf.SceneError, match="at least 5 s"):
+        cf.resume(tmp_path / "short", duration=3)
+
+
+def test_a_lost_motion_keeps_what_is_done(tmp_path):
+    rod, _ = flying_in_space()
+    torn = cf.Scene([rod], loads=[cf.Force(rod.end, cf.signals.Step((1e9, 0, 0), start=0.2))])
+    with pytest.raises(cf.NotConverged) as lost:
+        cf.simulate(torn, 1, dt=0.05, folder=tmp_path / "torn", **SMALL)
+    times = lost.value.path.times
+    with pytest.raises(cf.NotConverged) as again:
+        cf.resume(tmp_path / "torn")
+    assert 0.2 < times[-1] < 1 and (again.value.path.times == times).all()
+
+
+def test_damaged_files(tmp_path, monkeypatch, never_ended):
+    """A truncated file of states or a missing checkpoint only costs time; the message says what was lost."""
+    folder = tmp_path / "part"
+    part_of("fixed", folder, monkeypatch, apart=1e9)
+    states = folder / "instants.npy"
+    whole = states.read_bytes()
+    states.write_bytes(whole[: -rows(folder).dtype.itemsize * 3 // 2])
+    seen = cf.read_history(folder)
+    assert 0 < len(seen) < 30
+    cf.resume(folder)
+    assert_same(folder, never_ended("fixed"))
+    for damage in (b"", b"nonsense", (folder / "checkpoint.npz").read_bytes()[:-100]):
+        states.write_bytes(whole)
+        (folder / "checkpoint.npz").write_bytes(damage)
+        cf.resume(folder)
+        assert_same(folder, never_ended("fixed"))
+    states.write_bytes(b"nonsense" + whole[8:])
+    with pytest.raises(cf.SceneError, match=r"instants.npy is damaged .* expected saved states"):
+        cf.read_history(folder)
+    states.unlink()
+    cf.resume(folder)
+    assert_same(folder, never_ended("fixed"))
+    for name in ("checkpoint.npz", "start.npz"):
+        (folder / name).unlink()
+    with pytest.raises(cf.SceneError, match="no checkpoint can be read"):
+        cf.resume(folder, flying_in_space()[1])
+
+
+def test_no_objects_are_read_from_a_file_of_states(tmp_path):
+    """They would be pointers of another process, which crash this one."""
+    folder = tmp_path / "motion"
+    run("plane", folder)
+    scene, states = flying_in_a_plane()[1], folder / "instants.npy"
+    whole = states.read_bytes()
+    for kind in (b"'|O'", b"'<U2'", b"'>f8'"):
+        states.write_bytes(whole.replace(b"'<f8'", kind.ljust(5), 1))
+        with pytest.raises(cf.SceneError, match="other columns than those of saved states|is damaged"):
+            cf.read_history(folder, scene)
+
+
+def test_another_scene_is_told_from_the_one_of_the_motion(tmp_path, monkeypatch):
+    folder = tmp_path / "motion"
+    rod, scene = flying_in_space()
+    part_of("fixed", folder, monkeypatch)
+    longer = cf.Rod(cf.Line((6, 0, 0), (0, 8, 1)), rod.section, name=rod.name)
+    softer = cf.Rod(
+        rod.curve, cf.Stiffness((1e4, 1e4), 1e4, (500, 400), 500, mass=1.0, inertia=(10, 10, 20)), name=rod.name
+    )
+    damped = cf.Rod(rod.curve, rod.section, name=rod.name, damping=cf.Damping(drag=1.0))
+    others = {
+        "rods is '2 items'": cf.Scene([rod, cf.Rod(cf.Line((0, 0, 0), (1, 0, 0)), rod.section)], loads=scene.loads),
+        "rods[0].curve.end is [0.0, 8.0, 1.0]": cf.Scene([longer]),
+        "rods[0].section.bending is [500.0, 400.0]": cf.Scene([softer]),
+        "rods[0].damping is": cf.Scene([damped]),
+        "loads is '1 items'": cf.Scene([rod], loads=scene.loads[:1]),
+        "loads[0].force.value is": cf.Scene(
+            [rod], loads=[cf.Force(rod.start, cf.signals.Triangle((10, 0, 0), 0, 2.5, 5)), scene.loads[1]]
+        ),
+        "loads[0].station.s is 10.0": cf.Scene(
+            [rod], loads=[cf.Force(rod.end, cf.signals.Triangle((20, 0, 0), 0, 2.5, 5)), scene.loads[1]]
+        ),
+        "supports is '1 items'": cf.Scene([rod], [cf.Pin(rod.start)], scene.loads),
+    }
+    for words, other in others.items():
+        with pytest.raises(cf.SceneError, match="the scene is not the one of the motion") as refusal:
+            cf.resume(folder, other)
+        assert words in str(refusal.value)
+
+
+def test_what_cannot_be_done_is_said(tmp_path, monkeypatch):
+    folder, scene = tmp_path / "motion", flying_in_a_plane()[1]
+    with pytest.raises(cf.SceneError, match=r"no motion was found there .*: expected a folder that simulate"):
+        cf.resume(folder)
+    part_of("plane", folder, monkeypatch)
+    with pytest.raises(
+        cf.SceneError, match=r"resume.scene = None: expected the scene of .* a function written in Python cannot be"
+    ):
+        cf.resume(folder)
+    with pytest.raises(cf.SceneError, match=r"resume.scene = 3: expected a Scene"):
+        cf.resume(folder, 3)
+    with pytest.raises(cf.SceneError, match=r"resume.duration = 1: expected None or at least 3 s"):
+        cf.resume(folder, scene, duration=1)
+    with pytest.raises(cf.SceneError, match=r"simulate.folder = .*: it holds a motion already"):
+        run("plane", folder)
+    head = {**files.unsealed((folder / "stored.json").read_bytes()), "ranks": 2}
+    (folder / "stored.json").write_bytes(files.sealed(head))
+    with pytest.raises(cf.SceneError, match=r"computed by 2 rank\(s\), and here are 1"):
+        cf.resume(folder, scene)
+
+
+SECTION = cf.Stiffness((5e3, 5e3), 1e4, (50, 50), 40, mass=1.0, inertia=(0.01, 0.01, 0.02))
+ROD = cf.Rod(cf.Line((0, 0, 0), (1, 0, 0)), SECTION, name="rod")
+HELD = [cf.Clamp(ROD.start)]
+BEGUN = {"dt": 0.05, "elements": 1, "degree": 2}
+
+
+def pushed(force):
+    return cf.Scene([ROD], HELD, [cf.Force(ROD.end, force)])
+
+
+def test_a_scene_that_changes_after_the_first_duration_is_another(tmp_path):
+    """Scenes are compared over the longest duration requested so far, the present one included."""
+    folder = tmp_path / "motion"
+    first = pushed(lambda t: (0, 5.0, 0))
+    cf.simulate(first, 1.0, folder=folder, **BEGUN)
+    head = (folder / "stored.json").read_text()
+    changes = {2.0: 1.0, 2.9: 2.5}
+    for until, since in changes.items():
+        other = pushed(lambda t, since=since: (0, 5.0 if t <= since else 50.0, 0))
+        with pytest.raises(
+            cf.SceneError, match=r"force at t = .* s is \[0.0, 50.0, 0.0\], where the motion has \[0.0, 5.0, 0.0\]"
+        ):
+            cf.resume(folder, other, duration=until)
+        assert cf.resume(folder, other).times[-1] < until  # the same motion so far
+        assert (folder / "stored.json").read_text() == head
+        assert cf.resume(folder, first, duration=until).times[-1] == until
+        with pytest.raises(cf.SceneError, match="the scene is not the one of the motion"):
+            cf.resume(folder, other)
+        head = (folder / "stored.json").read_text()
+
+
+def test_what_differs_is_told_where_it_differs_most(tmp_path):
+    """Not at half the duration, where the sine is zero up to rounding."""
+    folder = tmp_path / "motion"
+    cf.simulate(pushed(lambda t: (0, 5 * math.sin(4 * math.pi * t), 0)), 1.0, folder=folder, **BEGUN)
+    with pytest.raises(cf.SceneError) as refusal:
+        cf.resume(folder, pushed(lambda t: (0, 6 * math.sin(4 * math.pi * t), 0)))
+    told, expected = (float(part.split(", ")[1]) for part in str(refusal.value).split("[")[-2:])
+    assert told / expected == pytest.approx(1.2) and abs(told - expected) > 0.9
+    assert len(cf.resume(folder, pushed(lambda t: (0, 5 * math.sin(4 * math.pi * t * (1 + 1e-12)), 0)))) == 21
+
+
+def contents(folder):
+    return {file.name: file.read_bytes() for file in folder.iterdir()}
+
+
+LATE = {
+    "load": pushed(lambda t: (0, 1.0, 0 if t < 2 else 5.0)),
+    "motion": cf.Scene([ROD], [cf.Prescribed(ROD.start, lambda t: (0, 0.01 * t**2, max(0, t - 2) ** 3), (0, 0, 0))]),
+    "plane": cf.Scene([ROD], HELD, [cf.Force(ROD.end, lambda t: (0, 0, 0 if t < 2 else 5.0))]),
+}
+
+
+@pytest.mark.parametrize("case", LATE)
+def test_what_leaves_its_plane_later_is_refused_before_anything_is_written(tmp_path, case):
+    folder = tmp_path / "motion"
+    assert cf.simulate(LATE[case], 1.0, folder=folder, **BEGUN).model == "planar"
+    before = contents(folder)
+    with pytest.raises(
+        cf.SceneError, match=r"resume.duration = 3: .* was computed in the x-y plane, and until then"
+    ) as refusal:
+        cf.resume(folder, LATE[case], duration=3.0)
+    assert "a motion in space, by another simulate" in str(refusal.value) and "velocities" not in str(refusal.value)
+    assert contents(folder) == before
+    assert cf.resume(folder, LATE[case], duration=1.5).times[-1] == 1.5
+
+
+def test_a_longer_duration_that_is_refused_leaves_no_trace(tmp_path):
+    """A support that jumps later; too many steps."""
+    folder = tmp_path / "motion"
+    scene = cf.Scene([ROD], [cf.Prescribed(ROD.start, cf.signals.Step((0, 0.1, 0), 2.0), (0, 0, 0))])
+    cf.simulate(scene, 1.0, folder=folder, **BEGUN)
+    before = (folder / "stored.json").read_bytes()
+    for until, words in ((3.0, "displacement jumps at t = 2 s, by 0.1 m"), (1e12, "expected at most 1e.09 steps")):
+        with pytest.raises(cf.SceneError, match=words):
+            cf.resume(folder, scene, duration=until)
+    assert (folder / "stored.json").read_bytes() == before
+
+
+def test_functions_of_time_are_compared_by_their_values(tmp_path, monkeypatch):
+    use_pendulum(monkeypatch)
+
+    def moving(factor):
+        return scene(drive=cf.drilling.TopDrive(lambda t: factor * min(t, 5.0)))
+
+    cf.drilling.simulate(moving(1.0), 2.0, folder=tmp_path / "one")
+    with pytest.raises(cf.SceneError, match=r"expected the scene of .* a function written in Python cannot be stored"):
+        cf.resume(tmp_path / "one")
+    with pytest.raises(cf.SceneError, match=r"drive.speed at t = .* s is .*, where the motion has"):
+        cf.resume(tmp_path / "one", moving(1.001))
+    assert len(cf.resume(tmp_path / "one", moving(1.0), duration=3.0)) == 300
+
+
+def test_checkpoints_are_seldom(tmp_path, monkeypatch):
+    """A fiftieth of the time at most, and not more often than the limit."""
+    use_pendulum(monkeypatch)
+    written, write = [], files.write_checkpoint
+    monkeypatch.setattr(files, "write_checkpoint", lambda *args: (written.append(1), write(*args)))
+    monkeypatch.setattr(drilling_loop, "CHUNK", 10)
+    cf.drilling.simulate(scene(), 10.0, folder=tmp_path / "one")
+    assert len(written) == 3  # at the start, which is kept twice, and at the end

@@ -1,4 +1,4 @@
-"""The sweep over load factors in C gives the same path as the continuation in Python, and stops where it is told to."""
+"""The sweep over load factors in C, the continuation in Python, their step control and what they record."""
 
 import os
 import signal
@@ -7,14 +7,16 @@ import time
 
 import numpy as np
 import pytest
+from conftest import column
 from path_scenes import shallow_arch
 from test_joints import star
 
 import cosserat_fenicsx as cf
+from cosserat_fenicsx.results.records import Records
 from cosserat_fenicsx.statics.path.follower import Follower
+from cosserat_fenicsx.statics.path.track import LIMITS, step_control
 
 pytestmark = pytest.mark.serial
-
 SECTION = cf.Stiffness(shear=(3e3, 5e3), axial=8e3, bending=(1.0, 2.5), torsion=0.7, mass=1.0)
 
 
@@ -32,7 +34,7 @@ def swept(monkeypatch):
     return counts
 
 
-def column(*loads, section=SECTION):
+def pushed(*loads, section=SECTION):
     """Pressed with a small eccentricity; its Euler load is 2.5."""
     rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, 1.0)), section, name="column")
     more = [load(rod) for load in loads] or [cf.Moment(rod.end, (0.0, 0.05, 0))]
@@ -41,7 +43,7 @@ def column(*loads, section=SECTION):
 
 def hung():
     """The same column under its own weight and a permanent force."""
-    return column(
+    return pushed(
         lambda rod: cf.Weight((0, 0.3, 0), permanent=True), lambda rod: cf.Force(rod.end, (0.2, 0, 0), permanent=True)
     )
 
@@ -58,17 +60,17 @@ def buckling():
 
 ETAS = np.linspace(0.2, 1.6, 15)
 WAYS = {
-    "load factors": (column(), ETAS, {}),
-    "a range": (column(), (0.1, 1.6), {}),
-    "there and back": (column(), [0.5, 0.2, 0.2, 0.9, 0.0, -0.5], {"model": "spatial"}),
-    "small steps": (column(), [0.4, 0.8], {"steps": cf.StepControl(first=0.01, largest=0.05)}),
-    "long steps": (column(), [1.0, 1.6], {"steps": cf.StepControl(first=2.0, smallest=0.01)}),
-    "few iterations": (column(), ETAS, {"steps": cf.StepControl(max_iterations=4)}),
-    "determinate": (column(), ETAS, {"model": "determinate"}),
-    "displacement": (column(), ETAS[:5], {"formulation": "displacement", "model": "spatial"}),
-    "inextensible": (column(section=cf.Stiffness((np.inf,) * 2, np.inf, (1.0, 2.5), 0.7)), ETAS[:5], {}),
-    "along its length": (column(lambda rod: cf.LineForce(rod, (0.2, 0.3, -0.4))), ETAS[:7], {}),
-    "followed": (column(lambda rod: cf.FollowerForce(rod.end, (0.3, 0.2, 0))), ETAS[:5], {}),
+    "load factors": (pushed(), ETAS, {}),
+    "a range": (pushed(), (0.1, 1.6), {}),
+    "there and back": (pushed(), [0.5, 0.2, 0.2, 0.9, 0.0, -0.5], {"model": "spatial"}),
+    "small steps": (pushed(), [0.4, 0.8], {"steps": cf.StepControl(first=0.01, largest=0.05)}),
+    "long steps": (pushed(), [1.0, 1.6], {"steps": cf.StepControl(first=2.0, smallest=0.01)}),
+    "few iterations": (pushed(), ETAS, {"steps": cf.StepControl(max_iterations=4)}),
+    "determinate": (pushed(), ETAS, {"model": "determinate"}),
+    "displacement": (pushed(), ETAS[:5], {"formulation": "displacement", "model": "spatial"}),
+    "inextensible": (pushed(section=cf.Stiffness((np.inf,) * 2, np.inf, (1.0, 2.5), 0.7)), ETAS[:5], {}),
+    "along its length": (pushed(lambda rod: cf.LineForce(rod, (0.2, 0.3, -0.4))), ETAS[:7], {}),
+    "followed": (pushed(lambda rod: cf.FollowerForce(rod.end, (0.3, 0.2, 0))), ETAS[:5], {}),
     "permanent loads": (hung(), ETAS[:7], {}),
     "hinge": (tied(), np.linspace(0.2, 1, 5), {}),
     "bifurcations": (buckling(), (0.0, 3.4), {"model": "spatial"}),
@@ -132,11 +134,11 @@ def test_the_first_step_of_a_slender_rod_in_a_new_problem(swept):
     """The residual of a scene is rounded as its own stiffness tells, not as that of the scene before."""
     stiff = cf.Stiffness(shear=(6e8, 6e8), axial=1.6e9, bending=(1.0, 2.5), torsion=0.8)
     for _ in range(2):
-        path = cf.solve(column(section=stiff), [0.1, 0.2], elements=7, degree=2, model="spatial")
+        path = cf.solve(pushed(section=stiff), [0.1, 0.2], elements=7, degree=2, model="spatial")
         assert path.iterations.max() <= 8 and path.steps[-1] <= 5
 
 
-@pytest.mark.parametrize("scene", [column(), tied()], ids=["alone", "hinge"])
+@pytest.mark.parametrize("scene", [pushed(), tied()], ids=["alone", "hinge"])
 def test_ctrl_c_keeps_the_points_so_far(scene):
     """Also where the signal finds Python in the middle of what C has asked for."""
     etas = np.tile(np.linspace(0.1, 1.0, 100), 1000)
@@ -165,7 +167,7 @@ def test_threads_take_turns_in_petsc():
     """PETSc keeps reductions that have begun in one place for all threads."""
 
     def tip():
-        scene = column()
+        scene = pushed()
         return cf.solve(scene, np.linspace(0.1, 1.6, 200), elements=3, model="spatial").position(scene.rods[0].end)
 
     expected, failures = tip(), []
@@ -183,3 +185,74 @@ def test_threads_take_turns_in_petsc():
     for thread in threads:
         thread.join()
     assert not failures
+
+
+@pytest.mark.parametrize(
+    ("step", "largest", "here", "wanted", "goal"),
+    [
+        (0.1, 9.0, 0.0, 1.0, 0.1),
+        (0.1, 9.0, 0.0, -1.0, -0.1),
+        (0.1, 9.0, 0.5, 0.62, 0.62),  # at most a fifth longer
+        (0.1, 9.0, 0.5, 0.65, 0.575),  # two equal steps instead of a long and a short one
+        (0.1, 0.05, 0.0, 1.0, 0.05),
+        (0.1, 0.1, 0.0, 0.11, 0.055),
+    ],
+)
+def test_where_a_step_ends(step, largest, here, wanted, goal):
+    lib, control = step_control(step=step, largest=largest)
+    assert lib.step_goal(control, here, wanted) == pytest.approx(goal, rel=1e-14)
+
+
+def test_which_steps_are_accepted():
+    """Near the predictor, else not far from it, along the path, and not farther than the predicted increment."""
+    lib, control = step_control()
+    near, off = 0.9 * LIMITS.slight, 2 * LIMITS.slight
+    assert lib.judge_step(control, 2, near, -1.0, 1.0, 9.0) == lib.ACCEPTED
+    assert lib.judge_step(control, 2, off, 1.0, 1.0, 1.0) == lib.ACCEPTED
+    assert lib.judge_step(control, 2, off, -1.0, 1.0, 1.0) == lib.OPPOSITE
+    assert lib.judge_step(control, 2, off, 1.0, 1.0, 1.1) == lib.UNSURE
+    assert lib.judge_step(control, 1, off, 1.0, 1.0, 0.5) == lib.UNSURE
+    assert lib.judge_step(control, 1, 4 * LIMITS.intended, 1.0, 1.0, 0.5) == lib.UNSURE and control.shrink == 0.5
+    assert lib.judge_step(control, 2, 9 * LIMITS.intended, 1.0, 1.0, 0.5) == lib.TOO_FAR
+    assert control.shrink == pytest.approx(1 / 3)
+
+
+def test_how_long_the_next_step_is():
+    lib, control = step_control(step=0.1, smallest=0.01, largest=9.0, shrink=0.5, patience=3)
+    assert lib.step_growth(control, LIMITS.intended / 2.25, 2, 3) == pytest.approx(1.5)
+    assert lib.step_growth(control, 1e-9, 2, LIMITS.easy) == 2.0
+    assert lib.step_growth(control, 1e-9, 2, LIMITS.easy + 1) == 1.0
+    assert lib.step_growth(control, 1e-9, 2, LIMITS.hard) == 0.5
+    lib.accept_step(control, 0.05, 1.5)  # a step that was short to land on a load factor does not shorten the next
+    assert control.step == 0.1
+    lib.accept_step(control, 0.1, 0.7)
+    assert control.step == pytest.approx(0.07)
+    assert not lib.reject_step(control, 0.07) and control.step == pytest.approx(0.035)
+    lib.accept_step(control, 0.035, 1.0)
+    assert control.rejections == 1
+    assert not lib.reject_step(control, 0.035) and lib.reject_step(control, 0.03) and control.rejections == 3
+    lib.accept_step(control, 0.03, 1.0)
+    lib.accept_step(control, 0.03, 1.0)
+    assert control.rejections == 0 and lib.reject_step(control, 0.019)
+
+
+@pytest.mark.parametrize("model", ["determinate", "planar", "spatial"])
+def test_one_by_one_and_many_at_once(model, monkeypatch):
+    rod, scene = column()
+    etas, given, append = [0.2, 0.4, 0.6, 0.8, 1.0], [], cf.Path.append
+    monkeypatch.setattr(Follower, "sweeps", False)
+    monkeypatch.setattr(cf.Path, "append", lambda path, record: (given.append(record), append(path, record)))
+    single = cf.solve(scene, etas, model=model, elements=3)
+    mixed = single.at_points([])
+    append(mixed, given[0])
+    mixed.extend(Records.of(given[1:3]))
+    assert mixed.load_factors.tolist() == etas[:3] and mixed.position(rod.end).shape == (3, 3)
+    mixed.extend(Records.of(given[3:4]))
+    append(mixed, given[4])
+    for found in (mixed, mixed.at_points(range(5)), mixed[3:].with_points(mixed[:3], np.arange(5) < 3)):
+        assert len(found) == 5
+        for name in ("load_factors", "negative_modes", "iterations", "steps"):
+            np.testing.assert_array_equal(getattr(found, name), getattr(single, name))
+        for query in ("position", "rotation", "force", "moment"):
+            np.testing.assert_array_equal(getattr(found, query)(rod.at(7.0)), getattr(single, query)(rod.at(7.0)))
+        np.testing.assert_array_equal(found.reaction(rod.start), single.reaction(rod.start))

@@ -23,10 +23,9 @@ def column(J, force, K=(np.inf, np.inf, np.inf), **loads):
     return bvp.Problem(2.0, straight, K, J, np.array(force) / 4.0, **loads)
 
 
-@pytest.mark.parametrize(
-    "load, w, u",
-    [(1, 0.3017207738, 0.0564332363), (5, 0.7137915236, 0.3876283607), (10, 0.8106090249, 0.5549955978)],
-)
+@pytest.mark.parametrize("load, w, u", [
+    (1, 0.3017207738, 0.0564332363), (5, 0.7137915236, 0.3876283607), (10, 0.8106090249, 0.5549955978),
+])  # fmt: skip
 def test_elastica(load, w, u):
     """Mattiasson, Int. J. Numer. Methods Eng. 17 (1981) 145."""
     found = bvp.equilibrium(column((1.0, 1.0, 1.0), (load, 0, 0)))
@@ -79,16 +78,13 @@ def test_line_moments_and_stiffness_that_varies():
     assert found.index is None
 
 
-@pytest.mark.parametrize(
-    "J, critical, modes, shape",
-    [
-        ((1.0, 3.0, 0.8), np.pi**2 / 4, 1, "end"),
-        ((1.0, 1.0, 0.8), np.pi**2 / 4, 2, "end"),
-        ((1.0, 3.0, 0.8), 9 * np.pi**2 / 4, 3, "end"),
-        ((1.0, 3.0, 0.8), 7.8373474, 1, "weight"),
-        ((1e5, 1.0, 0.7), 4.0126 * np.sqrt(0.7), 1, "sideways"),
-    ],
-)
+@pytest.mark.parametrize("J, critical, modes, shape", [
+    ((1.0, 3.0, 0.8), np.pi**2 / 4, 1, "end"),
+    ((1.0, 1.0, 0.8), np.pi**2 / 4, 2, "end"),
+    ((1.0, 3.0, 0.8), 9 * np.pi**2 / 4, 3, "end"),
+    ((1.0, 3.0, 0.8), 7.8373474, 1, "weight"),
+    ((1e5, 1.0, 0.7), 4.0126 * np.sqrt(0.7), 1, "sideways"),
+])  # fmt: skip
 def test_negative_modes_begin_at_the_critical_loads(J, critical, modes, shape):
     """Euler, Greenhill, and lateral buckling (Timoshenko & Gere)."""
     for load, expected in ((0.9998 * critical, None), (1.0002 * critical, modes)):

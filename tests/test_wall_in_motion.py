@@ -200,18 +200,15 @@ def stopping(taken):
     return accept_or_stop
 
 
-@pytest.mark.parametrize(
-    ("wrong", "word"),
-    [
-        ({"friction": -0.1}, "friction"),
-        ({"damping": -1.0}, "damping"),
-        ({"damping": np.inf}, "damping"),
-        ({"stiffness": 0.0}, "stiffness"),
-        ({"kinetic": 1.2}, "kinetic"),
-        ({"speed": 0.0}, "speed"),
-        ({"contact_radius": 0.2}, "less than the radius of the tube"),
-    ],
-)
+@pytest.mark.parametrize(("wrong", "word"), [
+    ({"friction": -0.1}, "friction"),
+    ({"damping": -1.0}, "damping"),
+    ({"damping": np.inf}, "damping"),
+    ({"stiffness": 0.0}, "stiffness"),
+    ({"kinetic": 1.2}, "kinetic"),
+    ({"speed": 0.0}, "speed"),
+    ({"contact_radius": 0.2}, "less than the radius of the tube"),
+])  # fmt: skip
 def test_bad_numbers_are_refused(wrong, word):
     rod, _ = thick_rod(VERTICAL)
     with pytest.raises(cf.SceneError, match=word):

@@ -1,16 +1,31 @@
-"""Sweeps over depths, that are kept and gone on with; friction from measurements; charts."""
+"""Sweeps over depths and their folder, friction from measurements, and what a soft string leaves out."""
 
 import contextlib
+import json
+import math
 import os
 import signal
+from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 import pytest
+import random_wells
+import ufl
+from reference_wells import well
+from scipy.integrate import trapezoid
+from scipy.special import ai_zeros
 
 import cosserat_fenicsx as cf
+from cosserat_fenicsx.actions.walls import TubeWall
+from cosserat_fenicsx.algebra.newton import LimitedNewton
+from cosserat_fenicsx.models.rodmesh import Layout
 from cosserat_fenicsx.quantities import Units
+from cosserat_fenicsx.scene import action
+from cosserat_fenicsx.statics.problem import solvers_of
 from cosserat_fenicsx.well import sweep as module
 from cosserat_fenicsx.well.rod import rod_in_hole
+from cosserat_fenicsx.well.rod.rod_in_hole import solve_in_hole
 
 pytestmark = pytest.mark.serial
 PATH = cf.well.WellPath.from_survey([0, 600, 1200, 1800, 2500], [0, 0, 50, 60, 85], [0, 0, 120, 150, 150])
@@ -44,30 +59,6 @@ def test_a_sweep_is_its_answers():
         1,
         1,
     )
-
-
-def test_a_sweep_goes_on_where_it_was_broken_off(tmp_path, monkeypatch):
-    file, asked = tmp_path / "sweep", []
-
-    def counted(*args, **named):
-        asked.append(named["depth"])
-        if len(asked) == 12:
-            raise KeyboardInterrupt
-        return cf.well.torque_and_drag(*args, **named)
-
-    monkeypatch.setattr(module, "torque_and_drag", counted)
-    with pytest.raises(cf.Interrupted, match="after 11 answers") as stop:
-        sweep(folder=file)
-    assert len(stop.value.path) == 11 and np.isfinite(stop.value.path.hook_load).sum() == 11
-    with (file / "rows.0.jsonl").open("a") as stream:
-        stream.write("[0, 0, 3, 1.5")  # as by a machine that stopped
-    again = sweep(folder=file)
-    assert len(asked) == 12 + 19 and len(again) == 30
-    assert (again.hook_load == sweep().hook_load).all()
-    asked.clear()
-    assert (sweep(folder=file).surface_torque == again.surface_torque).all() and not asked
-    with pytest.raises(cf.SceneError, match="holds another sweep"):
-        sweep(folder=file, tol=1e-3)
 
 
 def test_a_depth_without_an_answer_is_a_row_that_says_so(monkeypatch, tmp_path):
@@ -185,20 +176,12 @@ def test_friction_from_measurements():
     )
 
 
-@pytest.mark.parametrize(
-    ("wrong", "words"),
-    [
-        (lambda m: (m.operation, m.hook_load + 150e3), "with block_weight=None it is .*weigh 1(49|50)"),
-        (lambda m: (m.operation, m.hook_load / 1e3), "the hook loads are .*e-0. times those computed: expected N"),
-        (
-            lambda m: (
-                {"trip out": OPERATIONS[1], "trip in": OPERATIONS[0]}.get(m.operation.name, m.operation),
-                m.hook_load,
-            ),
-            "at the depth 900 m the hook load out is below that in: are they swapped",
-        ),
-    ],
-)
+@pytest.mark.parametrize(("wrong", "words"), [
+    (lambda m: (m.operation, m.hook_load + 150e3), "with block_weight=None it is .*weigh 1(49|50)"),
+    (lambda m: (m.operation, m.hook_load / 1e3), "the hook loads are .*e-0. times those computed: expected N"),
+    (lambda m: ({"trip out": OPERATIONS[1], "trip in": OPERATIONS[0]}.get(m.operation.name, m.operation), m.hook_load),
+     "at the depth 900 m the hook load out is below that in: are they swapped"),
+])  # fmt: skip
 def test_readings_that_do_not_fit_are_doubted(wrong, words):
     readings = [m for m in measured(0.1) if m.torque is None and m.depth in (900, 1700, 2500)]
     changed = [cf.well.RigMeasurement(m.depth, *wrong(m)) for m in readings]
@@ -322,3 +305,327 @@ def test_the_string_in_its_hole_in_space(tmp_path):
         answer.plot_3d(tmp_path / "hole.jpg")
     with pytest.raises(cf.SceneError, match="plot_3d.between"):
         answer.plot_3d(tmp_path / "hole.png", between=(2600, 2700))
+
+
+BUILD = cf.well.WellPath.from_survey([0, 500, 1000], [0, 0, 30], [0, 0, 0])
+PIPE = cf.well.DrillPipe(size="5 in 19.50 lb/ft")
+TWO_DEPTHS = [600.0, 800.0, 1000.0]
+
+
+def hole(**given):
+    return cf.well.Borehole(BUILD, cf.well.HoleSection(1000.0, 0.2159, 0.2), **given)
+
+
+def swept(file, **given):
+    given = {
+        "hole": hole(),
+        "string": cf.well.DrillString([PIPE]),
+        "mud": cf.well.Mud(1200.0),
+        "model": "soft",
+        **given,
+    }
+    return cf.well.depth_sweep(operations=[cf.well.TripOut()], depths=TWO_DEPTHS, folder=file, progress=False, **given)
+
+
+def test_every_part_of_the_hole_is_compared(tmp_path):
+    """Also what only the rod depends on: hook loads by two stiffnesses of the wall differ by 1 %."""
+    file = tmp_path / "sweep"
+    swept(file, hole=hole(wall_stiffness=1e10))
+    with pytest.raises(cf.SceneError, match=r"another folder: hole.wall_stiffness is 1.*, where the sweep has 1000"):
+        swept(file, hole=hole(wall_stiffness=1e5))
+    for name, other in {
+        "string": cf.well.DrillString([cf.well.Collar(50.0, "NC46-65"), PIPE]),
+        "mud": cf.well.Mud(1201.0),
+        "friction": [0.3],
+        "torque_convention": "fixed",
+    }.items():
+        given = {"hole": hole(wall_stiffness=1e10), name: other}
+        with pytest.raises(cf.SceneError, match="holds another sweep|torque_convention") as refusal:
+            swept(file, **given)
+        assert name in str(refusal.value)
+    assert (swept(file, hole=hole(wall_stiffness=1e10)).hook_load == swept(None).hook_load).all()
+
+
+@dataclass(frozen=True)
+class Own(cf.well.Component):
+    """A component of the user's own, with a field that the package does not know."""
+
+    maker: str = ""
+
+
+def test_components_of_the_users_own_are_compared_by_all_their_fields(tmp_path):
+    strings = [cf.well.DrillString([Own(None, None, 200.0, 0.0635, maker=maker)]) for maker in ("one", "other")]
+    swept(tmp_path / "sweep", string=strings[0], mud=None)
+    with pytest.raises(cf.SceneError, match="string.components.*maker is 'other', where the sweep has 'one'"):
+        swept(tmp_path / "sweep", string=strings[1], mud=None)
+
+
+STIFF = cf.Stiffness((1e9, 1e9), 7e8, (1228200.0, 1228200.0), 9.4e5)
+LONG_STRING = cf.well.DrillString([cf.well.Component(None, STIFF, 241.13, 0.0635)])
+
+#: Well, operation, clearance (m), hook load of the rod in contact less that of the soft string (N): finite elements in
+#: space with a penalty, on 2 m elements.
+IN_SPACE = [
+    ("P", cf.well.TripOut(), 0.001, -426), ("P", cf.well.TripOut(), 0.010, -1343),
+    ("P", cf.well.TripOut(), 0.04445, -2776), ("P", cf.well.TripIn(), 0.04445, 316),
+    ("P", cf.well.RotateOffBottom(), 0.04445, 7), ("F-12", cf.well.TripOut(), 0.04445, -7705),
+    ("F-12", cf.well.TripIn(), 0.04445, 4554), ("ISCWSA 2", cf.well.TripOut(), 0.04445, -3575),
+]  # fmt: skip
+#: Radius of the build section (m), its end (degrees), straight hole below (m), pull at the bottom (N), operation,
+#: friction, hook loads of the stiff and of the soft string (N): by shooting.
+PLANE = [
+    (100.0, 40.0, 40.0, 150e3, cf.well.TripOut, 0.3, 215232.69479833, 216392.47901719),
+    (100.0, 40.0, 40.0, 150e3, cf.well.TripIn, 0.3, 147221.08801421, 146483.90087545),
+    (100.0, 40.0, 40.0, 150e3, cf.well.Static, 0.3, 177717.66167666, 177710.78949514),
+    (200.0, 50.0, 1000.0, 0.0, cf.well.TripOut, 0.3, 312052.92537158, 313898.00773871),
+    (200.0, 50.0, 1000.0, 0.0, cf.well.TripIn, 0.3, 119200.52736823, 118617.76502673),
+]
+
+
+def soft(path, clearance, operation, mu):
+    hole = cf.well.Borehole(path, cf.well.HoleSection(path.length, 2 * (0.0635 + clearance), mu))
+    return cf.well.torque_and_drag(hole, LONG_STRING, operation, model="soft", tol=1e-9)
+
+
+@pytest.mark.parametrize(("name", "operation", "clearance", "differs"), IN_SPACE)
+def test_the_difference_of_whole_wells_is_covered(name, operation, clearance, differs):
+    answer = soft(well(name), clearance, operation, 0.25)
+    told = answer.model_error * abs(answer.tension).max()
+    assert abs(differs) <= told
+    if operation.slip[0]:
+        assert told < 6 * abs(differs)  # and not by far too much
+
+
+@pytest.mark.parametrize(("radius", "angle", "below", "pull", "operation", "mu", "stiff", "flexible"), PLANE)
+def test_build_sections(radius, angle, below, pull, operation, mu, stiff, flexible):
+    arc = radius * math.radians(angle)
+    path = cf.well.WellPath.from_survey([0, 20, 20 + arc, 20 + arc + below], [0, 0, angle, angle], [0, 0, 0, 0])
+    answer = soft(path, 0.04445, operation(weight=-pull), mu)
+    assert answer.hook_load == pytest.approx(flexible, rel=1e-10)
+    told = answer.model_error * abs(answer.tension).max()
+    assert abs(stiff - flexible) <= told < 8 * abs(stiff - flexible)
+
+
+@pytest.mark.parametrize(("md", "inc", "differs"), [
+    ([0, 200, 600], [0, 40, 40], -103.52), ([0, 300], [0, 60], -110.03), ([0, 100, 400], [30, 30, 70], -13.84),
+])  # fmt: skip
+def test_a_bend_at_an_end_takes_from_the_tension(md, inc, differs):
+    """Without friction, with a pull of 300 kN; the rod in contact on 1024 elements."""
+    answer = soft(cf.well.WellPath.from_survey(md, inc, [20] * len(md)), 0.04445, cf.well.Static(-300e3), 0.25)
+    assert abs(differs) <= answer.model_error * answer.tension.max() < 6 * abs(differs)
+
+
+def test_torque_of_rotating_strings_is_covered():
+    """The rod in contact gives 0.54 and 3.4 % less torque than the soft string by Coulomb's law."""
+    for name, less in (("P", 0.0054), ("F-12", 0.034)):
+        assert less <= soft(well(name), 0.04445, cf.well.RotateOffBottom(), 0.25).model_error < 4 * less
+
+
+def test_a_snake_that_is_a_small_part_of_a_piece():
+    """Above the helix of a vertical string: mu times the wall force of a helix that goes on to its top, by hand."""
+    EI, weight, radius, friction = 1228200.0, 241.13, 0.0635, 0.3
+    stiffness = cf.Stiffness((1e9, 1e9), 7e8, (EI, EI), 9.4e5)
+    path = cf.well.WellPath.from_survey([0, 3000], [0, 0], [0, 0])
+    hole = cf.well.Borehole(path, [cf.well.HoleSection(3000, 0.2159, friction)])
+    string = cf.well.DrillString([cf.well.Component(None, stiffness, weight, radius)])
+    answer = cf.well.torque_and_drag(hole, string, cf.well.Sliding(60e3))
+    most, least = (factor * math.cbrt(EI * weight**2) for factor in (5.55, 0.14))
+    snake = friction * (0.10795 - radius) * (most**3 - least**3) / (12 * EI * weight)
+    assert answer.helical.any() and answer.model_error * 662.6e3 == pytest.approx(snake, rel=0.05)
+
+
+@pytest.mark.parametrize("length", [3500.0, 4000.0, 4500.0, 4800.0, 5000.0])
+def test_snakes_that_a_helix_above_multiplies(length):
+    """A string pushed into a horizontal hole whose snake has half the wall force of a helix, in closed form: near
+    lock-up this changes the hook load to a multiple."""
+    EI, w, r, mu = 2063790.0, 315.0, 0.041, 0.3
+    snake = 2 * math.sqrt(EI * w / r)
+    thrust, place = snake, snake / (mu * w)
+    for part, end in ((0.5, math.sqrt(2) * snake), (1.0, math.inf)):
+        k = math.sqrt(part * r / (4 * EI * w))
+        angle = min(math.atan(k * end), math.atan(k * thrust) + mu * w * k * (length - place))
+        place += (angle - math.atan(k * thrust)) / (mu * w * k)
+        thrust = math.tan(angle) / k if angle < math.pi / 2 - 1e-12 else math.inf
+    hole = cf.well.Borehole(
+        cf.well.WellPath.from_survey([0, 6000], [90, 90], [0, 0]), [cf.well.HoleSection(6000, 2 * (0.064 + r), mu)]
+    )
+    string = cf.well.DrillString([cf.well.Component(None, cf.Stiffness((1e9, 1e9), 2.6e9, (EI, EI), 1.59e6), w, 0.064)])
+    for model in ("soft", "buckled"):
+        answer = cf.well.torque_and_drag(hole, string, cf.well.TripIn(), depth=length, model=model)
+        told = answer.model_error * abs(answer.tension).max()
+        assert thrust + answer.hook_load <= told and not answer.enough
+        if length < 4600:
+            assert told < 4 * abs(thrust + answer.hook_load)
+        else:
+            assert math.isinf(told) and "may lock up" in str(answer)
+
+
+def test_tension_beyond_what_a_pipe_carries_is_told():
+    path = cf.well.WellPath.from_survey([0, 1000], [0, 0], [0, 0])
+    hole = cf.well.Borehole(path, [cf.well.HoleSection(1000, 0.2159, 0.3)])
+    for weight, told in ((-6e6, False), (-8e6, True)):
+        answer = cf.well.torque_and_drag(hole, LONG_STRING, cf.well.TripOut(weight=weight), model="soft")
+        assert ("BEYOND WHAT ANY PIPE CARRIES" in str(answer)) == told
+
+
+def test_a_random_well():
+    """`make random-wells` compares 100 of them; here the rod's answers in one."""
+    drawn = random_wells.draw(2)
+    for operation in drawn.operations[:2]:
+        said, _, _, errors = random_wells.compare(drawn, operation)
+        assert said == "rod" and len(errors) == 3 and all(true <= told for told, true in errors.values())
+
+
+EI, W, R, KP = 1228200.0, 241.13, 0.04445, 1e9
+#: Wave number of the snake, and the load at which it begins.
+K, F_SNAKE = (W / (EI * R)) ** 0.25, 2 * math.sqrt(EI * W / R)
+
+
+@pytest.mark.parametrize("length", [1000.0, 8050.0])  # w L^3/EI = 2e5 and 1e8
+def test_a_hanging_string_is_stable_until_its_lower_end_buckles(length):
+    """Pushed up by F at its free end: EI theta'' = (w x - F) theta, theta'(0) = 0, so that Ai' has a zero there."""
+    pipe = cf.Stiffness((1.35e8, 1.35e8), 7e8, (EI, EI), 1e6)
+    rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, -length)), pipe)
+    critical = -ai_zeros(1)[1][0] * (W**2 * EI) ** (1 / 3)
+    for share, negative in ((0.0, 0), (0.995, 0), (1.005, 2)):
+        push = [cf.Force(rod.end, (0, 0, share * critical))] if share else []
+        scene = cf.Scene([rod], [cf.Clamp(rod.start)], [cf.LineForce(rod, (0, 0, -W)), *push])
+        steps = cf.StepControl(adaptive=False)
+        path = cf.solve(scene, [1.0], model="spatial", elements=int(length / 12), degree=3, steps=steps)
+        assert path.negative_modes.tolist() == [negative]
+
+
+@dataclass(frozen=True)
+class Level(cf.PointAction):
+    """Holds the rotation of a station about the second axis, almost."""
+
+    station: cf.PointAction
+
+    scaled = False
+
+    def data(self, rod, s):
+        return action.vector((0, 1.0, 0), "1"), action.scalar(1e4 * EI, "N m/rad")
+
+    @staticmethod
+    def work(point, test, axis, c):
+        return -c * ufl.dot(point.theta, axis) * ufl.dot(test.phi, axis)
+
+
+@dataclass(frozen=True)
+class FullWeight(cf.LineAction):
+    """A weight that the load factor does not multiply."""
+
+    rod: cf.Rod
+
+    scaled, work = False, "force"
+
+    def data(self, rod, s):
+        return (action.vector(np.tile((0, 0, W), (len(s), 1)), "N/m"),)
+
+
+def half_wave():
+    """A rod of half a wave on the low side of a horizontal hole, its ends on the line where it lies, and its load."""
+    length, low = math.pi / K, R + W / KP
+    path = cf.well.WellPath.from_survey([0, length + 20], [90, 90], [0, 0])
+    pipe = cf.Stiffness((math.inf, math.inf), math.inf, (EI, EI), 1e6)
+    rod = cf.Rod(cf.Line((10, 0, low), (10 + length, 0, low)), pipe)
+    wall = TubeWall(rod, path, radius=0.0635 + R, contact_radius=0.0635, stiffness=KP, begins=10.0)
+    held = [cf.Hinge(rod.start, (0, 0, 1)), cf.Roller(rod.end, (0, 1, 0)), cf.Roller(rod.end, (0, 0, 1))]
+    loads = [FullWeight(rod), cf.Force(rod.end, (-F_SNAKE, 0, 0)), wall, Level(rod.end)]
+    return cf.Scene([rod], held, loads), rod, low
+
+
+def test_the_snake_begins_at_its_load_and_has_its_amplitude():
+    """theta'''' - 6 theta'^2 theta'' + beta theta'' + sin theta = 0 with wave number 1: amplitudes 0.2708936 at beta =
+    2.1 and 0.5486839 at 2.4, where its pressures over w are 0.639169 to 1.858649."""
+    scene, rod, low = half_wave()
+    layout = Layout.of(scene, 16)
+    with solvers_of(scene, layout, degree=3) as (problem, _, stability):
+        model = problem.model
+        s = layout.node_s(model.nodes)[0] * rod.length
+        for share, amplitude, negative in (
+            (0.9999, 0.0, 0),
+            (1.0001, 0.0, 1),
+            (1.05, 0.27089361, 0),
+            (1.2, 0.5486839, 0),
+        ):
+            problem.set_load_factor(share)
+            theta, slope = amplitude * np.sin(K * s), amplitude * K * np.cos(K * s)
+            side, down = np.sin(theta), np.cos(theta)
+            r = np.stack([s, low * side, low * (down - 1)], axis=1) / model.scales.length
+            q = np.stack([np.ones_like(s), 0 * s, low * side * slope / 2, low * down * slope / 2], axis=1)
+            rq = np.concatenate([r, q / np.linalg.norm(q, axis=1)[:, None]], axis=1)
+            n = np.tile((-share * F_SNAKE / model.scales.force, 0.0, 0.0), (16, 3, 1))
+            problem.begin_at(model.unknowns_of(rq), n, np.zeros_like(problem.multipliers()))
+            newton = LimitedNewton(problem, 0.1, 0.1)
+            assert min(newton.step().moved for _ in range(8)) < 1e-12
+            y, z = (model.snapshot()[0][:, 1:3] * model.scales.length + (0.0, low)).T
+            assert np.abs(np.arctan2(y, z)).max() == pytest.approx(amplitude, rel=2e-4, abs=1e-9)
+            assert stability.count() == negative
+        force = model.densities.here()[1][..., :3] * model.scales.force / model.scales.length / W
+        pressure = np.linalg.norm(force, axis=2)[1:-1]  # at the ends supports share the load
+        assert pressure.min() == pytest.approx(0.639169, rel=0.03)
+        assert pressure.max() == pytest.approx(1.858649, rel=3e-3)
+
+
+@pytest.mark.parametrize("share, stable", [(0.9, True), (1.1, False)])
+def test_a_long_string_on_the_low_side_says_that_it_would_snake(share, stable):
+    path = cf.well.WellPath.from_survey([0, 300], [90, 90], [0, 0])
+    pipe = cf.Stiffness((1.35e8, 1.35e8), 7e8, (EI, EI), 1e6)
+    given = {"radius": 0.0635 + R, "rings": [(200.0, 0.0, 0.1)], "bottom_tension": -share * F_SNAKE}
+    answer = solve_in_hole(path, [200.0], pipe, W, 0.0635, elements=512, **given)
+    assert (answer.negative_modes == 0) is stable
+    assert answer.hook_load == pytest.approx(-share * F_SNAKE, rel=1e-9)
+
+
+@pytest.mark.parametrize("name", ["helix", "helix at 400 kN"])
+def test_the_helix_of_a_thrust(name):
+    """A weightless rod with finite EA and GA in a frictionless cylinder: a Cosserat helix in the middle."""
+    case = json.loads((Path(__file__).parent / "reference" / "rod_in_hole.json").read_text(encoding="utf-8"))[name]
+    length, radius = 250.0, case["r"]
+    path = cf.well.WellPath.from_survey([0, length + 10], [0, 0], [0, 0])
+    pipe = cf.Stiffness((case["GA"],) * 2, case["EA"], (case["EI"],) * 2, case["EI"])
+    answer = solve_in_hole(
+        path, [length], pipe, 1e-6, 0.05, radius=0.05 + radius, rings=[(length, 0.0, 0.05)],
+        bottom_tension=-case["F"], extensible=True, helix=True, tol=1e-3,
+    )  # fmt: skip
+    middle = (answer.s > 0.35 * length) & (answer.s < 0.65 * length)
+    turns = np.polyfit(answer.s[middle], np.unwrap(answer.side[middle]), 1)[0]
+    assert abs(turns) == pytest.approx(case["turn_rate"], rel=1e-6) and answer.negative_modes == 0
+    assert answer.side_force[middle] == pytest.approx(case["contact_per_reference_length"], rel=1e-4)
+    s, z = answer.s[middle], answer.position[middle, 2]
+    shortening = 1 - (z[-1] - z[0]) / (s[-1] - s[0])
+    assert shortening == pytest.approx(case["shortening"], rel=3e-5)  # the wall gives way
+
+
+def test_a_string_that_is_pressed_on_its_bit_is_a_helix():
+    """In a vertical hole, hung from a clamp: it is as slender a helix everywhere as its compression F there asks for,
+    with sqrt(F/(2 EI)) rad per m and r F^2/(4 EI) of the wall, and it is stable, unlike the straight string."""
+    length, thrust = 500.0, 150e3
+    path = cf.well.WellPath.from_survey([0, length + 10], [0, 0], [0, 0])
+    pipe = cf.Stiffness((1.35e8, 1.35e8), 7e8, (EI, EI), 1e6)
+    given = {"radius": 0.0635 + R, "rings": [(length, 0.0, 0.1)], "bottom_tension": -thrust}
+    straight = solve_in_hole(path, [length], pipe, W, 0.0635, elements=256, **given)
+    answer = solve_in_hole(path, [length], pipe, W, 0.0635, helix=True, **given)
+    assert straight.distance.max() < 1e-9 and straight.negative_modes > 10
+    assert answer.negative_modes == 0 and answer.error < 1e-4
+    assert answer.hook_load == pytest.approx(W * length - thrust, rel=1e-9)
+    wound = (answer.s > 50) & (answer.s < 480)
+    F = thrust - W * (length - answer.s)
+    rate = np.gradient(np.unwrap(answer.side), answer.s)
+    assert rate[wound] == pytest.approx(np.sqrt(F / (2 * EI))[wound], rel=1e-3)
+    pressure = (answer.node_force / answer.node_length)[wound]
+    assert pressure == pytest.approx((R * F**2 / (4 * EI))[wound], rel=2e-2)
+    s, z = answer.s[wound], answer.position[wound, 2]
+    assert np.ptp(s) - np.ptp(z) == pytest.approx(trapezoid((R**2 * F / (4 * EI))[wound], s), rel=1e-3)
+
+
+@pytest.mark.parametrize(("inclination", "operation"), [(45, cf.well.Static(250e3)), (60, cf.well.Sliding(240e3))])
+def test_a_string_in_a_plane_hole_leaves_the_plane_where_it_would_buckle(inclination, operation):
+    """Straight, and beyond the load of a snake: in the plane Newton's method keeps the symmetry."""
+    path = cf.well.WellPath.from_survey([0, 300, 650], [inclination] * 3, [0, 0, 0])
+    hole = cf.well.Borehole(path, cf.well.HoleSection(650.0, 0.2159, 0.2))
+    string = cf.well.DrillString([cf.well.DrillPipe(size="5 in 19.50 lb/ft")])
+    found = cf.well.torque_and_drag(hole, string, operation, mud=cf.well.Mud(1200.0), depth=600.0, model="rod")
+    assert found.solved.negative_modes == 0 and found.enough and any("begun as a helix" in line for line in found.why)
+    assert np.abs(found.offset[:, 1]).max() > 0.01
