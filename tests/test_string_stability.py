@@ -282,7 +282,7 @@ def test_limit_speed_of_a_bit_that_cuts():
 
 
 def test_other_drives():
-    answer = cf.drilling.stability(pipe_and_collars(), [6.0], up_to=1.0)
+    answer = cf.drilling.stability(pipe_and_collars(), range(6, 7), up_to=1.0)
     assert set(answer.with_drives(0)) == {"matched"}  # no inertia to tune
     own = answer.with_drives(0, 0, {"own": drive_of("rigid")})["own"]
     assert own == pytest.approx(answer.growth[0, 0], rel=1e-12)

@@ -236,8 +236,8 @@ def speeds_and_weights(owner, scene, speeds, weights):
 
 def _numbers(owner, field, values, dimension):
     """(n,) positive numbers, given as one or several."""
-    several = Values(Number(dimension, positive()))
-    return np.array(several.check(owner, field, values if np.ndim(values) else [values]))
+    several = values if isinstance(values, dict) else list(values) if np.ndim(values) else [values]
+    return np.array(Values(Number(dimension, positive())).check(owner, field, several))
 
 
 def or_none(weight):
