@@ -21,7 +21,7 @@ from cosserat_fenicsx.models.rod_data import as_matrix, law_of
 from cosserat_fenicsx.models.rodmesh import Layout
 from cosserat_fenicsx.statics.problem import solvers_of
 from trials import problems
-from trials.cells import Answer, NotForIt, Stopped
+from trials.cells import NO_ROTATION, Answer, NotForIt, Stopped
 from trials.own import against_steps
 
 _CLAMPED = (0, 1, 2, 3, 4, 5, 6)
@@ -142,6 +142,11 @@ class Loop:
         moved = self.x.array_r[self._tip] - self._at_rest[self._tip]
         return moved * self.problem["length"]
 
+    def off_rotation(self):
+        """| |q| - 1 | at the clamp."""
+        (clamp,) = self.model.nodal[self.model.slots == 0]
+        return float(abs(np.linalg.norm(self.x.array_r[clamp[3:7]]) - 1))
+
 
 def weakly_unit(model):
     """Residual and tangent of eq. (1) with |q|^2 = 1 integrated with the
@@ -204,6 +209,8 @@ class Bare:
         loop = Loop(problem, **options)
         tips = [loop.to(eta) for eta in etas]
         answer = Answer(tips[-1][None], "", note)
+        if key == "clamp":
+            return problem, answer, loop.off_rotation(), NO_ROTATION
         if key != "line_search":
             return problem, answer, None, ""
         same = {"model": "spatial", "formulation": "displacement", "degree": 2}

@@ -11,6 +11,8 @@ SILENT = "silently wrong"
 STOPPED = "stopped"
 NOT = "does not apply"
 MISSING = "not installed"
+#: The unit in which `numerics` of a method gives how far the clamp's quaternion is from a rotation.
+NO_ROTATION = "norm of q at the clamp, less one"
 VERDICTS = (RIGHT, SAID, STOPPED, SILENT, NOT, MISSING)
 
 
