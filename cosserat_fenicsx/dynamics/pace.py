@@ -14,6 +14,7 @@ Two conditions limit the step:
 """
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -160,20 +161,29 @@ def _even(left, dt):
 _SAMPLE_POINTS = np.array([1e-6, 0.137, 0.311, 0.5, 0.647, 0.871, 1 - 1e-6])
 
 
-# Largest deviation of a function of time from a straight line within a step, over its range; a sine with ten steps a
-# period has 0.024.
-_DEVIATION = 0.02
-# Samples that estimate the range of a function beforehand: over the whole motion, and at least between two jumps.
-_RANGE_SAMPLES, _FEWEST_RANGE_SAMPLES = 512, 16
-# A load is ignored where acting in resonance all the time would move its rod by less than this share of the allowed
-# error.
-_NEGLIGIBLE = 0.1
-_SHARE = 0.5  # of the tolerance, for the errors of impulses
-# The requirement of a step decays by the first factor per later step, since the impulse errors of equal steps cancel
-# best. It is halved per step instead where it has dropped below the second share, as after a jump that is not declared.
-_DECAY, _SUDDEN_DROP = 0.99, 1e-3
-# Fixed steps that are tested, and the share of dt below which the longest resolving step causes a warning.
-_TESTED_STEPS, _WARNING_SHARE = 200, 0.85
+@dataclass(frozen=True)
+class Sampling:
+    """Settings of the sampling of loads and prescribed motions, and of what steps resolve of them."""
+
+    # Largest deviation of a function of time from a straight line within a step, over its range; a sine with ten steps
+    # a period has 0.024.
+    deviation: float = 0.02
+    range_samples: int = 512  # samples that estimate the range of a function beforehand, over the whole motion
+    fewest_range_samples: int = 16  # the same between two jumps
+    # A load is ignored where acting in resonance all the time would move its rod by less than this share of the allowed
+    # error.
+    negligible: float = 0.1
+    share: float = 0.5  # of the tolerance, for the errors of impulses
+    # Factor on the requirement of a step per later step, since the impulse errors of equal steps cancel best.
+    decay: float = 0.99
+    # The requirement is halved per step instead where it has dropped below this share, as after a jump that is not
+    # declared.
+    sudden_drop: float = 1e-3
+    tested_steps: int = 200  # fixed steps that are tested
+    warning_share: float = 0.85  # share of dt below which the longest resolving step causes a warning
+
+
+_SAMPLING = Sampling()
 # Multiples of the golden ratio modulo 1 are evenly distributed in [0, 1] without a common spacing.
 _GOLDEN = (math.sqrt(5) - 1) / 2
 
@@ -187,7 +197,7 @@ class Resolution:
 
     def __init__(self, scene, duration, tol, load_factor, impulse_error):
         size = max(rod.length for rod in scene.rods)
-        allowed = _SHARE * tol * size / max(24 * impulse_error * abs(load_factor), 1e-300)
+        allowed = _SAMPLING.share * tol * size / max(24 * impulse_error * abs(load_factor), 1e-300)
         persistence = _persistence(scene, duration)
         self._sampled = [
             _SampledSignal(signal, _largest_acceleration(scene, item, field), persistence, duration, allowed)
@@ -216,9 +226,9 @@ def unresolved_by_fixed_steps(scene, duration, dt):
     for item, field, signal in _nonlinear(scene):
         sampled = _SampledSignal(signal, None, duration, duration, 1.0)
         steps = max(1, math.ceil(duration / dt - 1e-9))
-        for t in sorted({dt * int(steps * x) for x in np.arange(_TESTED_STEPS) * _GOLDEN % 1}):
+        for t in sorted({dt * int(steps * x) for x in np.arange(_SAMPLING.tested_steps) * _GOLDEN % 1}):
             h = min([dt, *(x - t for x in signal.jumps if x > t + 1e-6 * dt)])
-            if sampled.longest(t, h) < _WARNING_SHARE * h:
+            if sampled.longest(t, h) < _SAMPLING.warning_share * h:
                 return (
                     f"{type(item).__name__}.{field} changes faster than steps of {dt:g} s can follow, such as at "
                     f"t = {t:.4g} s: fewer than about ten steps a period, or a rise within a step. The result may be "
@@ -261,7 +271,7 @@ class _SampledSignal:
 
     def enter(self, begin, end):
         """Estimate its range and mean slope in the interval between two jumps (s)."""
-        count = max(_FEWEST_RANGE_SAMPLES, _RANGE_SAMPLES // len(self._marks))
+        count = max(_SAMPLING.fewest_range_samples, _SAMPLING.range_samples // len(self._marks))
         shares = np.concatenate([[1e-6, 1 - 1e-6], (np.arange(count) * _GOLDEN) % 1])
         values = self._at(begin + (end - begin) * shares)
         self.piece, self.range, self.required = (begin, end), float(np.ptp(values, axis=0).max()), 0.0
@@ -277,7 +287,7 @@ class _SampledSignal:
             )
             self.enter(before, after)
         before, now = self.required, self._required_in(t, h)
-        self.required = max(now, before * (_DECAY if now > _SUDDEN_DROP * before else 0.5))
+        self.required = max(now, before * (_SAMPLING.decay if now > _SAMPLING.sudden_drop * before else 0.5))
         while self.required * h**2 > 1 and h > self._shortest:
             h = max(h / 4, 0.95 / math.sqrt(self.required), self._shortest)
             self.required = max(self.required, self._required_in(t, h))
@@ -287,14 +297,14 @@ class _SampledSignal:
         """1/h_max^2, 1/s^2, with the longest step h_max that meets both conditions for the function in (t, t + h)."""
         values = self._at(t + h * _SAMPLE_POINTS)
         self.range = max(self.range, float(np.ptp(values, axis=0).max()))
-        if self._resonance * self.range <= _NEGLIGIBLE:
+        if self._resonance * self.range <= _SAMPLING.negligible:
             return 0.0
         deviation = np.abs(values - values[0] - np.outer(_SAMPLE_POINTS, values[-1] - values[0])).max()
         if deviation <= 1e-5 * self.range:
             return 0.0
         slopes = np.diff(values, axis=0) / np.diff(_SAMPLE_POINTS * h)[:, None]
         impulse_error = h**2 / 24 * np.linalg.norm(slopes - self._slope, axis=1).max()
-        return max(deviation / (_DEVIATION * self.range), self._drift * impulse_error) / h**2
+        return max(deviation / (_SAMPLING.deviation * self.range), self._drift * impulse_error) / h**2
 
     def _at(self, times):
         values = []
