@@ -4,6 +4,7 @@ Graded meshes have short elements in boundary layers, and element lengths that e
 """
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -27,22 +28,30 @@ from cosserat_fenicsx.scene.curves import Line
 #: Elements per rod of the first mesh, where the mesh is not given.
 FIRST_ELEMENTS = 4
 
-# Where sections or loads are functions of s: relative accuracy with which the first mesh integrates flexibilities 1/EI
-# and loads.
-_INTEGRATED = 1e-3
-_SAMPLED = 256  # intervals per rod of the quadrature that the integrals are compared with
-_SHORTEST = 1024  # the rod's length over the shortest element
-_LARGE = 0.1  # share of the largest quadrature error above which an element is halved
-# Where rods turn by more than the second angle (rad): the angle by which an element may turn, and the most elements.
-_TURNS, _MANY_TURNS, _MOST_FOR_TURNS = 2.5, 6.3, 512
-# Smallest mean ratio of chord to arc over a part of an element (see `resolving`): that of an arc of one radian.
-_STRAIGHT = 0.958
-# Wave number of the displacement of a straight rod that bends by about a radian, over its length; most elements per
-# unit of it.
-_BENDING, _MOST_PER_WAVE = 4.0, 3
-_SAMPLES = 257  # places at which the direction of a rod's axis is compared
-# Difference of two meshes over the true error, about; share of the gain of a halving assumed for the finer mesh.
-_ESTIMATED, _GAINED = 1.5, 0.25
+
+@dataclass(frozen=True)
+class FirstMesh:
+    """Settings of the first mesh: what it has to resolve, and how large it may be."""
+
+    # Where sections or loads are functions of s: relative accuracy of the integrals of the flexibilities 1/EI and of
+    # the loads.
+    integrated: float = 1e-3
+    sampled: int = 256  # intervals per rod of the quadrature that the integrals are compared with
+    shortest: int = 1024  # the rod's length over the shortest element
+    turns: float = 2.5  # angle (rad) by which an element may turn, where rods turn by many radians
+    many_turns: float = 6.3  # smallest angle (rad) of a rod that turns by many radians
+    most_for_turns: int = 512  # elements of such a rod
+    large: float = 0.1  # share of the largest quadrature error above which an element is halved
+    # Smallest mean ratio of chord to arc over a part of an element (see `resolving`), as of an arc of one radian.
+    straight: float = 0.958
+    bending: float = 4.0  # wave number of the displacement of a straight rod that bends by a radian, over its length
+    most: int = 3  # elements per unit of the wave number
+    samples: int = 257  # places at which the direction of a rod's axis is compared
+    estimated: float = 1.5  # difference of two meshes over the true error, about
+    gained: float = 0.25  # share of the gain of a halving that is assumed for the finer mesh
+
+
+_FIRST = FirstMesh()
 
 
 def meshes_for(scene, degree, tol, many):
@@ -54,11 +63,11 @@ def meshes_for(scene, degree, tol, many):
     usual = first_layout(scene, degree)
     if not 1 <= degree <= 4 or not all(rod.uniform for rod in scene.rods) or not _acts_evenly(scene):
         return usual, None
-    wanted = (tol if many else _GAINED * 2 ** (degree + 1) * tol) / _ESTIMATED
-    waves = _BENDING + _turning(scene)
+    wanted = (tol if many else _FIRST.gained * 2 ** (degree + 1) * tol) / _FIRST.estimated
+    waves = _FIRST.bending + _turning(scene)
     # the best polynomial for a wave is off by (waves/2n)^(p + 1)/((p + 1)! 2^p) of its amplitude, that by 1/waves
     elements = waves / 2 * (wanted * waves * math.factorial(degree + 1) * 2**degree) ** (-1 / (degree + 1))
-    layout = first_layout(scene, degree, math.ceil(min(max(elements, 1), _MOST_PER_WAVE * waves)))
+    layout = first_layout(scene, degree, math.ceil(min(max(elements, 1), _FIRST.most * waves)))
     if elements <= FIRST_ELEMENTS and any(a > b for a, b in zip(layout.counts, usual.counts, strict=True)):
         return usual, None  # which asks less of curves
     coarser = any(a < b for a, b in zip(layout.counts, usual.counts, strict=True))
@@ -77,8 +86,10 @@ def resolving_turns(scene, layout, largest):
         turn = max((_size(getattr(x, "rotation", None)) for x in here), default=0.0)
         moment = sum(_size(getattr(x, "moment", None)) for x in here)
         turn = largest * max(turn, moment * rod.length / rod.profile.range[0].J.min())
-        turn = turn if turn > _MANY_TURNS else 0.0
-        wanted.append(np.maximum(1.0, np.minimum(turn / _TURNS * np.diff(breaks), _MOST_FOR_TURNS / len(breaks))))
+        turn = turn if turn > _FIRST.many_turns else 0.0
+        wanted.append(
+            np.maximum(1.0, np.minimum(turn / _FIRST.turns * np.diff(breaks), _FIRST.most_for_turns / len(breaks)))
+        )
     return layout.resized(scene, wanted) if max(map(np.max, wanted)) > 1 else None
 
 
@@ -107,7 +118,7 @@ def _acts_evenly(scene):
 @per_scene
 def _turning(scene):
     """The largest total turn of the axis of a rod, rad."""
-    tangents = (rod.curve.frame(np.linspace(0, rod.length, _SAMPLES))[:, :, 2] for rod in scene.rods)
+    tangents = (rod.curve.frame(np.linspace(0, rod.length, _FIRST.samples))[:, :, 2] for rod in scene.rods)
     return float(max(2 * np.arcsin(np.linalg.norm(np.diff(t, axis=0), axis=1) / 2).sum() for t in tangents))
 
 
@@ -154,10 +165,10 @@ def _varying(scene, rod):
 def _too_long(rod, functions, breaks, degree, parts):
     """(elements,) of bool: the elements to be halved: all until so many equal parts of them are almost straight, then
     those in which the Gauss points do not integrate the functions."""
-    long_enough = np.diff(breaks) > 1.01 / _SHORTEST
+    long_enough = np.diff(breaks) > 1.01 / _FIRST.shortest
     ends = (breaks[:-1, None] + np.diff(breaks)[:, None] * np.arange(parts) / parts).ravel()
     chords = np.diff(rod.curve.position(np.append(ends, 1.0) * rod.length), axis=0)
-    if np.linalg.norm(chords, axis=1).sum() < _STRAIGHT * rod.length:
+    if np.linalg.norm(chords, axis=1).sum() < _FIRST.straight * rod.length:
         return long_enough
     marked = np.zeros(len(breaks) - 1, dtype=bool)
     for values in functions:
@@ -181,26 +192,33 @@ def _unresolved(values, breaks, degree):
         return found
 
     whole = np.ones(len(breaks) - 1, dtype=int)
-    fine = integrals(np.maximum(8, np.ceil(_SAMPLED * np.diff(breaks) - 1e-9).astype(int)))
+    fine = integrals(np.maximum(8, np.ceil(_FIRST.sampled * np.diff(breaks) - 1e-9).astype(int)))
     # of whole elements and of parts: one of these may agree by chance
     error = np.max([np.abs(integrals(parts * whole) - fine) for parts in (1, 2, 3)], axis=0)
-    if (error.sum(axis=0) <= _INTEGRATED * np.abs(fine).sum(axis=0).max()).all():
+    if (error.sum(axis=0) <= _FIRST.integrated * np.abs(fine).sum(axis=0).max()).all():
         return np.zeros(len(whole), dtype=bool)
     error = error.max(axis=1)
-    return error > _LARGE * error.max()
+    return error > _FIRST.large * error.max()
 
 
-# Graded meshes. Largest length of an element next to a support, load or kink, over the length of the boundary layer
-# there; smallest length of such an element over its rod's.
-_IN_LAYER, _SMALLEST = 2.0, 1e-6
-_TURNED = 2.0  # largest angle (rad) by which an element of high degree may turn relative to its rest state
-# Largest distance of an edge of contact from the end of an element, over its length; most edges of one rod that
-# elements end at.
-_BESIDE, _MOST_EDGES = 3e-4, 12
-# A mesh is graded only where that needs less than this share of the elements of uniform refinement, and the latter at
-# least so many.
-_WORTH, _MANY = 0.5, 32
-_FEWEST, _MOST = 0.5, 4.0  # bounds of the number of elements that replace one element
+@dataclass(frozen=True)
+class Grading:
+    """Settings of the elements of graded meshes."""
+
+    # Largest length of an element next to a support, load or kink, over the length of the boundary layer there.
+    resolved: float = 2.0
+    shortest: float = 1e-6  # smallest length of such an element, over its rod's
+    turned: float = 2.0  # largest angle (rad) by which an element of high degree may turn relative to its rest state
+    beside: float = 3e-4  # largest distance of an edge of contact from the end of an element, over its length
+    most_edges: int = 12  # edges of one rod that elements end at
+    # A mesh is graded only where it needs less than this share of the elements of uniform refinement.
+    worth: float = 0.5
+    many: int = 32  # fewest elements of uniform refinement for which a mesh is graded
+    fewest: float = 0.5  # least number of elements that replace one element
+    most: float = 4.0  # largest number of elements that replace one element
+
+
+_GRADING = Grading()
 
 
 def layers_of(model):
@@ -214,16 +232,16 @@ def with_layers(scene, layout, lengths):
     `lengths` are those of `results.accuracy.layer_lengths`."""
     if lengths is None:
         return None
-    lengths = [np.maximum(layers, _SMALLEST) for layers in lengths]
+    lengths = [np.maximum(layers, _GRADING.shortest) for layers in lengths]
     if not unresolved(scene, layout, lengths):
         return None
-    return layout.with_short_ends(scene, [_IN_LAYER * layers for layers in lengths])
+    return layout.with_short_ends(scene, [_GRADING.resolved * layers for layers in lengths])
 
 
 def with_turns(scene, path):
     """The layout whose elements turn by little between their ends; None where all do. An element that turns by more
     than half a turn may have another number of turns than the rod, which finer meshes inherit."""
-    most = min(_TURNED, path.degree / 2)
+    most = min(_GRADING.turned, path.degree / 2)
     turns = turns_of(path, most)
     if turns is None:
         return None
@@ -234,7 +252,7 @@ def with_edges(scene, path):
     """The layout with element ends, moved or new, where contact with walls begins and ends at the points of a path;
     None where all edges of contact are at element ends, or there are too many."""
     edges = contact_edges(path)
-    if edges is None or not loose_edges(path, edges) or max(map(len, edges)) > _MOST_EDGES:
+    if edges is None or not loose_edges(path, edges) or max(map(len, edges)) > _GRADING.most_edges:
         return None
     breaks, layout = [], path.layout
     for i, pieces in enumerate(layout.pieces(scene)):
@@ -245,7 +263,7 @@ def with_edges(scene, path):
             if near not in taken:
                 moved[near] = x
                 taken.add(near)
-            elif abs(moved[near] - x) > _BESIDE * np.diff(layout.breaks[i]).min():
+            elif abs(moved[near] - x) > _GRADING.beside * np.diff(layout.breaks[i]).min():
                 more.append(x)
         breaks.append(np.sort(np.concatenate([moved, more])))
     return Layout(tuple(breaks))
@@ -256,7 +274,7 @@ def loose_edges(path, edges):
     for breaks, found in zip(path.layout.breaks, edges, strict=True):
         cells = np.clip(np.searchsorted(breaks, found) - 1, 0, len(breaks) - 2)
         off = np.minimum(np.abs(found - breaks[cells]), np.abs(found - breaks[cells + 1]))
-        if (off > _BESIDE * np.diff(breaks)[cells]).any():
+        if (off > _GRADING.beside * np.diff(breaks)[cells]).any():
             return True
     return False
 
@@ -270,7 +288,7 @@ def balanced(fine, coarse, above):
         above: the estimated error of `fine` over the target error.
     """
     layout, order = coarse.layout, coarse.degree + 1
-    if sum(fine.elements) * above ** (1 / order) < _MANY:
+    if sum(fine.elements) * above ** (1 / order) < _GRADING.many:
         return None
     rough = np.concatenate([found.max(axis=0) for found in leading_coefficients(fine, fine._motion[..., :3])])
     if _even(rough ** (1 / coarse.degree)):
@@ -280,7 +298,7 @@ def balanced(fine, coarse, above):
     if largest == 0:
         return None
     wanted = [(above * found / largest) ** (1 / order) for found in differences]
-    wanted = [np.clip(number, _FEWEST, _MOST) for number in wanted]
+    wanted = [np.clip(number, _GRADING.fewest, _GRADING.most) for number in wanted]
     if _even(np.concatenate(wanted)):
         return None
     for number, pieces in zip(wanted, layout.pieces(coarse.scene), strict=True):
@@ -292,7 +310,7 @@ def balanced(fine, coarse, above):
 
 def _even(numbers):
     """Whether the mean of the numbers of elements is close to their maximum, so that grading saves little."""
-    return numbers.mean() > _WORTH * numbers.max()
+    return numbers.mean() > _GRADING.worth * numbers.max()
 
 
 def _round_up(number):
