@@ -8,26 +8,37 @@ path is smooth in its arc length at limit points too.
 
 import itertools
 import math
+from dataclasses import dataclass
 
 from cosserat_fenicsx.interrupts import obey
 from cosserat_fenicsx.numerics import lagrange
 from cosserat_fenicsx.statics.path.events import UNEXPLAINED, Lost
 from cosserat_fenicsx.statics.path.track import LIMITS, bends, between, step_control, through
 
-# Largest distance of the corrected point from the predictor over the length of the step; the second applies where the
-# number of negative modes changes without a limit point: the step may have changed to another branch.
-_BEND, _SURE = 0.4, 0.1
-# A closed path is recognised by a step that passes its first point at a distance below the first number times the
-# step's length, where the path itself passes at one below the second.
-_BESIDE, _SAME = 0.1, 1e-4
-# A step that is shorter than the first number times the length of the path from the unloaded state, and turns by less
-# than the second (rad), is on the path whatever the number of negative modes.
-_SHORT, _STRAIGHT = 3e-3, 0.05
-# Largest relative difference of the load factors of two limit points that are the same one; its root for the states.
-_MET = 1e-7
-# Plain steps in which negative modes may change without an event before their number is no longer compared.
-_EXCUSES = 4
-_FIRST = 0.02  # smallest first step, over the length of the path from the unloaded state
+
+@dataclass(frozen=True)
+class Steps:
+    """Settings of steps of arc length, and of what is recognised on the way."""
+
+    bend: float = 0.4  # largest distance of the corrected point from the predictor, over the length of the step
+    # The same where the number of negative modes changes without a limit point: the step may have changed to another
+    # branch.
+    sure: float = 0.1
+    # A closed path: largest distance over the step's length at which a step passes the path's first point, and at which
+    # the path itself passes it there.
+    beside: float = 0.1
+    same: float = 1e-4
+    # A step is on the path whatever the number of negative modes: largest length, over that of the path from the
+    # unloaded state, and largest turn (rad).
+    short: float = 3e-3
+    straight: float = 0.05
+    met: float = 1e-7  # largest relative difference of the load factors of one limit point; its root for the states
+    excuses: int = 4  # plain steps whose negative modes change without an event, before these are no longer compared
+    first: float = 0.02  # smallest first step, over the length of the path from the unloaded state
+
+
+_STEPS = Steps()
+
 _CLOSED = "the path is closed: it returned to an earlier point without reaching that load factor"
 # A path that has begun at the unloaded state returns to an earlier point only after passing that state again.
 _CHANGED = (
@@ -104,7 +115,7 @@ class ArcLength:
                     track.restore()
                     return True
             self._accept(landing or point, point)
-            self._excused = self._excuses > _EXCUSES
+            self._excused = self._excuses > _STEPS.excuses
             if on_step:
                 on_step(track.here)
             if landing is not None:
@@ -115,7 +126,11 @@ class ArcLength:
     def _plain(self, point):
         """Whether a step is so short and straight that it cannot have changed to another path."""
         found = bends(self.track, self.track.here, point, self._weight)
-        return found.length < _SHORT * self._scale and found.turn < _STRAIGHT and found.corner < _STRAIGHT / 10
+        return (
+            found.length < _STEPS.short * self._scale
+            and found.turn < _STEPS.straight
+            and found.corner < _STEPS.straight / 10
+        )
 
     def _accept(self, point, end):
         """Accept a point, within the step from the last point to `end` or at its end."""
@@ -144,7 +159,7 @@ class ArcLength:
         track.set_tangent(here, slope, between(before, here), self._weight)
         last = self._length(before, here)
         self._scale = self._length(track.origin, here) or last
-        self._step = min(max(last, _FIRST * self._scale), 0.1 * self._scale)
+        self._step = min(max(last, _STEPS.first * self._scale), 0.1 * self._scale)
 
     def _branch_off(self, first):
         """Choose weight, direction and first step where the last point is a bifurcation."""
@@ -189,7 +204,7 @@ class ArcLength:
         guess = [u + share * (v - u) for u, v in zip(a.numbers, b.numbers, strict=True)]
         solved = track.on_plane(guess, a.load_factor + share * chord[1], place.along, w * place.rise)
         off = track.problem.numbers()[0] - place.numbers[0], track.problem.load_factor - place.load_factor
-        same = solved.converged and track.length(off, w) <= _SAME * track.length(chord, w)
+        same = solved.converged and track.length(off, w) <= _STEPS.same * track.length(chord, w)
         return same and track.point(solved).negative_modes == place.negative_modes
 
     def _share(self, place, a, b):
@@ -198,14 +213,14 @@ class ArcLength:
         chord, moved = between(a, b), between(a, place)
         size, along = track.dot(chord, chord, w), track.dot(moved, chord, w)
         beside = track.dot(moved, moved, w) - along**2 / size
-        return along / size if 0 <= along < size and beside < (_BESIDE**2) * size else None
+        return along / size if 0 <= along < size and beside < (_STEPS.beside**2) * size else None
 
     def _again(self, limit, other):
         """Whether two limit points are the same one, passed in the same direction."""
         track, a, b = self.track, limit.point, other.point
         apart = track.distance(a.numbers, b.numbers)
-        near = abs(a.load_factor - b.load_factor) <= _MET * max(abs(a.load_factor), abs(b.load_factor))
-        return near and apart <= _MET**0.5 and track.product(limit.direction, other.direction) > 0
+        near = abs(a.load_factor - b.load_factor) <= _STEPS.met * max(abs(a.load_factor), abs(b.load_factor))
+        return near and apart <= _STEPS.met**0.5 and track.product(limit.direction, other.direction) > 0
 
     def _length(self, a, b):
         return self.track.length(between(a, b), self._weight)
@@ -250,7 +265,7 @@ class ArcLength:
         off = track.distance(numbers, predicted)
         bend = track.length((numbers[0] - predicted[0], found - load_factor), self._weight) / length
         order = len(track.history) + 1
-        if off > LIMITS.far or bend > _BEND:
+        if off > LIMITS.far or bend > _STEPS.bend:
             track.failure = "the path bends too sharply"
             return self._shorten()
         point = track.point(solved)
@@ -258,10 +273,10 @@ class ArcLength:
         if not bends(track, here, point, self._weight).resolved:
             track.failure = "the path bends too sharply"
             return self._shorten()
-        if point.negative_modes != here.negative_modes and point.rise * here.rise > 0 and bend > _SURE:
+        if point.negative_modes != here.negative_modes and point.rise * here.rise > 0 and bend > _STEPS.sure:
             track.failure = "the step crossed a point where stability changes"
             return self._shorten()
-        off = max(off, LIMITS.intended / _SURE * bend)
+        off = max(off, LIMITS.intended / _STEPS.sure * bend)
         growth = self._lib.step_growth(self._limits, off, order, solved.iterations)
         self._step = max(self._step, length * growth) if growth >= 1 else length * growth
         return point
