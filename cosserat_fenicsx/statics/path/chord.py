@@ -6,29 +6,43 @@ coordinate is found by Newton's method in the plane perpendicular to the chord t
 
 import itertools
 import math
+from dataclasses import dataclass
 
 import numpy as np
 
 from cosserat_fenicsx.numerics import lagrange
 from cosserat_fenicsx.statics.path.track import bends, between, through
 
-# Relative accuracy of the load factor at which a search ends; largest number of its iterations; stride of those that
-# bisect the bracket.
-_FINE, _MOST, _OFTEN = 1e-8, 25, 6
-_PROBES = 1 / 3, 2 / 3  # coordinates at which a step is checked for negative modes that appear and vanish within it
-_VARIES = 4.0  # largest change of the determinant within a step in which no eigenvalue comes close to zero
-# Largest imaginary part of the roots of a determinant that almost vanishes, and distance from the step over its length.
-_NEARLY = 0.35
-# Distances on both sides of a critical point at which the path is solved for; largest length between these two points,
-# over their distance along the chord.
-_BESIDE, _STEEP = (1e-3, 1e-4), 2.0
-# Largest distance of the direction between these two points from the mean of their tangents, over the angle between the
-# tangents: on a smooth path it is of second order in their distance, while points beside each other with parallel
-# tangents lie on two paths. How far they are beside each other by rounding, times their distance (rad, rod lengths):
-# Newton's method loses accuracy along the mode in inverse proportion to that.
-_ASTRIDE, _ROUNDING = 0.1, 1e-9
-_APART = 1e-5  # smallest distance of the coordinates of two interpolation points
-_ASIDE = 0.0, 1e-3, -1e-3, 1e-2, -1e-2  # offsets of the coordinate, tried in turn until Newton's method converges
+
+@dataclass(frozen=True)
+class Search:
+    """Settings of the search for critical points along a chord."""
+
+    fine: float = 1e-8  # relative accuracy of the load factor at which a search ends
+    most: int = 25  # iterations of a search
+    often: int = 6  # stride of the iterations that bisect the bracket of a root instead of interpolating
+    # Coordinates at which a step is checked for negative modes that appear and vanish within it.
+    probes: tuple[float, ...] = (1 / 3, 2 / 3)
+    varies: float = 4.0  # largest change of the determinant within a step in which no eigenvalue comes close to zero
+    # Largest imaginary part of the roots of a determinant that almost vanishes, and largest distance from the step,
+    # over its length.
+    nearly: float = 0.35
+    # Distances on both sides of a critical point at which the path is solved for.
+    beside: tuple[float, ...] = (1e-3, 1e-4)
+    steep: float = 2.0  # largest length between these two points, over their distance along the chord
+    # Largest distance of the direction between these two points from the mean of their tangents, over the angle between
+    # the tangents: on a smooth path it is of second order in their distance, while points beside each other with
+    # parallel tangents lie on two paths.
+    astride: float = 0.1
+    # How far they are beside each other by rounding, times their distance (rad, rod lengths): Newton's method loses
+    # accuracy along the mode in inverse proportion to that distance.
+    rounding: float = 1e-9
+    apart: float = 1e-5  # smallest distance of the coordinates of two interpolation points
+    # Offsets of the coordinate, tried in turn until Newton's method converges.
+    aside: tuple[float, ...] = (0.0, 1e-3, -1e-3, 1e-2, -1e-2)
+
+
+_SEARCH = Search()
 
 
 class Chord:
@@ -44,7 +58,7 @@ class Chord:
         dips: whether the determinant of the second variation almost vanishes between, more often than the number of
             negative modes changes: two eigenvalues that change their signs together, in opposite directions, change
             neither that number nor the determinant's sign.
-        varies: whether the determinant changes by more than a factor of `_VARIES`.
+        varies: whether the determinant changes by more than a factor of `_SEARCH.varies`.
     """
 
     dips = varies = False
@@ -84,7 +98,7 @@ class Chord:
     def at(self, place):
         """(coordinate, `PathPoint`) of the path at a coordinate, or beside it where the tangent is almost singular;
         None where Newton's method fails."""
-        for aside in _ASIDE:
+        for aside in _SEARCH.aside:
             point = self._point(place + aside)
             if point is not None:
                 return place + aside, point
@@ -105,18 +119,18 @@ class Chord:
         where it is. Sets `dips` and `varies`."""
         track, (_, a), (_, b) = self.track, self.known[0], self.known[-1]
         counts, logarithms = [a.negative_modes], [a.logarithm]
-        for place in _PROBES:
+        for place in _SEARCH.probes:
             track.put(*self.guess(place))
             counts.append(track.stability.count(neutral=track.neutral is not None))
             logarithms.append(track.stability.logarithm)
         counts.append(b.negative_modes)
         logarithms.append(b.logarithm)
         self.dips = track.model.carries_force and _dips(counts, logarithms)
-        self.varies = not max(logarithms) - min(logarithms) <= math.log(_VARIES)
+        self.varies = not max(logarithms) - min(logarithms) <= math.log(_SEARCH.varies)
         changes = np.diff(counts)
         if min(counts) < 0 or (changes >= 0).all() or (changes <= 0).all():
             return None
-        return _PROBES[int(np.flatnonzero(changes)[0])]
+        return _SEARCH.probes[int(np.flatnonzero(changes)[0])]
 
     def passes(self, place, *, turning):
         """Whether the path passes smoothly through a coordinate, by points close to it on both sides.
@@ -129,13 +143,13 @@ class Chord:
         """
         if self._short:  # points at these distances would differ by little more than rounding
             return True
-        for apart in _BESIDE:
+        for apart in _SEARCH.beside:
             before, after = (self._point(place + aside) for aside in (-apart, apart))
             if before is None or after is None or (before.rise * after.rise < 0) != turning:
                 continue
             steep = bends(self.track, before, after, self._weight)
-            if steep.resolved and steep.length <= _STEEP * 2 * apart * self.length:
-                return (steep.corner - _ASTRIDE * steep.turn) * steep.length**2 <= _ROUNDING
+            if steep.resolved and steep.length <= _SEARCH.steep * 2 * apart * self.length:
+                return (steep.corner - _SEARCH.astride * steep.turn) * steep.length**2 <= _SEARCH.rounding
         return False
 
     def neighbours(self, place):
@@ -165,20 +179,20 @@ class Chord:
         middle = 0.5 if near is None else near
         low, high = min(changes, key=lambda ends: abs(ends[0] + ends[1] - 2 * middle))
         place, estimate, halve = middle, None, False
-        for k in range(1, _MOST):
+        for k in range(1, _SEARCH.most):
             places = _nearest(values, place, always=(low, high))
             place = _zero(places, [values[at] for at in places], low, high)
             load_factor = self.load_factor(place)
-            fine = _FINE * max(abs(load_factor), abs(self.change))
+            fine = _SEARCH.fine * max(abs(load_factor), abs(self.change))
             settled = estimate is not None and abs(load_factor - estimate) <= fine
-            known = min(abs(place - at) for at in values) < _APART
-            if settled or (known and high - low < 4 * _APART):
+            known = min(abs(place - at) for at in values) < _SEARCH.apart
+            if settled or (known and high - low < 4 * _SEARCH.apart):
                 break
             estimate, look = load_factor, place
-            if halve or k % _OFTEN == 0:
+            if halve or k % _SEARCH.often == 0:
                 look, halve = (low + high) / 2, False
             elif known:
-                look, halve = place + math.copysign(2 * _APART, low + high - 2 * place), True
+                look, halve = place + math.copysign(2 * _SEARCH.apart, low + high - 2 * place), True
             found = self.at(look)
             if found is None:
                 break
@@ -189,7 +203,7 @@ class Chord:
                 low = max(low, found[0])
             else:
                 high = min(high, found[0])
-            halve = halve and high - low > 4 * _APART
+            halve = halve and high - low > 4 * _SEARCH.apart
         return place
 
 
@@ -197,7 +211,7 @@ def _nearest(places, place, always=()):
     """The coordinates `always`, and up to four others nearest to a coordinate, at least `apart` from one another."""
     chosen = list(always)
     for at in sorted(places, key=lambda at: abs(at - place)):
-        if len(chosen) < 4 + len(always) and all(abs(at - other) >= _APART for other in chosen):
+        if len(chosen) < 4 + len(always) and all(abs(at - other) >= _SEARCH.apart for other in chosen):
             chosen.append(at)
     return chosen
 
@@ -207,8 +221,8 @@ def _dips(counts, logarithms):
     if min(counts) < 0 or not np.isfinite(logarithms).all():
         return False
     values = (-1.0) ** np.array(counts) * np.exp(np.array(logarithms) - max(logarithms))
-    roots = np.roots(np.polyfit([0.0, *_PROBES, 1.0], values, 3))
-    near = roots[(np.abs(roots.real - 0.5) < 0.5 + _NEARLY) & (np.abs(roots.imag) < _NEARLY)]
+    roots = np.roots(np.polyfit([0.0, *_SEARCH.probes, 1.0], values, 3))
+    near = roots[(np.abs(roots.real - 0.5) < 0.5 + _SEARCH.nearly) & (np.abs(roots.imag) < _SEARCH.nearly)]
     return len(near) > 1 + int((np.diff(np.sign(values)) != 0).sum())
 
 
