@@ -16,17 +16,25 @@ import numpy as np
 from cosserat_fenicsx.statics.path.chord import Chord, zero_of
 from cosserat_fenicsx.statics.path.track import PathPoint
 
-# Two eigenvalues vanish at the same point where one is below this times its size at the ends of the chord while the
-# other vanishes.
-_SAME = 1e-5
-_MOST = 25  # iterations for a requested load factor
-_SINGULAR = 1e-5  # largest residual of an event, see `Crossing`
-# Two events are the same where the cosine of their null vectors is above the first number and their coordinates on the
-# chord differ by less than the second.
-_ALIKE, _ONE_PLACE = 0.7, 1e-2
-_LEVEL = 1e-10  # relative difference of two load factors that may be rounding
-# Largest change of the logarithm of the bordered tangent's determinant within a step without a bifurcation.
-_BORDERED = math.log(30.0)
+
+@dataclass(frozen=True)
+class Tolerances:
+    """Settings that tell events from each other, and from what is none."""
+
+    # Two eigenvalues vanish at the same point where one is below this times its size at the ends of the chord while the
+    # other vanishes.
+    same: float = 1e-5
+    most: int = 25  # iterations for a requested load factor
+    singular: float = 1e-5  # largest residual of an event, see `Crossing`
+    alike: float = 0.7  # smallest cosine of the null vectors of one event that was found twice
+    one_place: float = 1e-2  # largest difference of its coordinates on the chord
+    level: float = 1e-10  # relative difference of two load factors that may be rounding
+    # Largest change of the logarithm of the bordered tangent's determinant within a step without a bifurcation.
+    bordered: float = math.log(30.0)
+
+
+_TOLERANCES = Tolerances()
+
 #: Why a step is shortened, in words.
 UNEXPLAINED = "the number of negative modes does not change as the located critical points require"
 NEARLY = "two modes are almost neutral at once"
@@ -126,7 +134,8 @@ class Locator:
             return False
         parts = [(a, limits[0], a.rise), (limits[0], b, b.rise)] if limits else [(a, b, a.rise)]
         for begin, end, rise in parts:
-            if (end.load_factor - begin.load_factor) * math.copysign(1.0, rise) < -_LEVEL * abs(end.load_factor):
+            rounding = _TOLERANCES.level * abs(end.load_factor)
+            if (end.load_factor - begin.load_factor) * math.copysign(1.0, rise) < -rounding:
                 return False
         return self.counts_agree(a, b, crossings)
 
@@ -146,7 +155,7 @@ class Locator:
         """
         limits = self.limits(chord) if limits is None else limits
         found = [*limits, *self.bifurcations(chord, limits)]
-        return _in_order([crossing for crossing in found if crossing.residual <= _SINGULAR])
+        return _in_order([crossing for crossing in found if crossing.residual <= _TOLERANCES.singular])
 
     def limits(self, chord):
         """[the `Crossing` at the extremum of the load factor], whatever its residual; an empty list without one.
@@ -182,7 +191,7 @@ class Locator:
             place = chord.root(lambda at, v=motion: self.track.response(at.numbers, at.load_factor, v)[0], near)
             if place is not None:
                 here = self._singular("bifurcation", chord, place, modes)
-                here = [x for x in here if x.residual <= _SINGULAR and not self._known(x, (*limits, *found))]
+                here = [x for x in here if x.residual <= _TOLERANCES.singular and not self._known(x, (*limits, *found))]
                 if here and not chord.passes(place, turning=False):
                     raise Lost(0.5, ASIDE)
                 found += here
@@ -190,8 +199,8 @@ class Locator:
 
     def _known(self, crossing, others):
         """Whether one of other `Crossing`s has the same null vector at the same point."""
-        near = [other for other in others if abs(other.place - crossing.place) < _ONE_PLACE]
-        return any(abs(self.track.bordered.work(other.null, crossing.null)) > _ALIKE for other in near)
+        near = [other for other in others if abs(other.place - crossing.place) < _TOLERANCES.one_place]
+        return any(abs(self.track.bordered.work(other.null, crossing.null)) > _TOLERANCES.alike for other in near)
 
     def _by_count(self, chord, counts, limits):
         """(coordinate, `PathPoint`, modes) of the eigenvalues of the second variation that change their sign, as many
@@ -276,7 +285,7 @@ class Locator:
         together = 1
         while j + together < last:
             ends = max(abs(eigenvalue(end, j + together)) for _, end in (chord.known[0], chord.known[-1]))
-            if abs(eigenvalue(point, j + together)) > _SAME * ends:
+            if abs(eigenvalue(point, j + together)) > _TOLERANCES.same * ends:
                 break
             together += 1
         return place, point, together
@@ -284,7 +293,7 @@ class Locator:
     def _land(self, chord, low, high, before, after, load_factor):
         """(coordinate, `PathPoint`) at a load factor between two coordinates, by Newton's method."""
         track = self.track
-        for _ in range(_MOST):
+        for _ in range(_TOLERANCES.most):
             place = zero_of(lambda at: chord.load_factor(at) - load_factor, low, high)
             predicted, _ = chord.guess(place)
             solved = track.at_load(predicted, load_factor)
@@ -312,7 +321,7 @@ def _near_bifurcation(a, b):
     if not a.rise or not b.rise:
         return False
     change = b.logarithm - a.logarithm - math.log(abs(b.rise / a.rise))
-    return abs(change) > _BORDERED  # not where it is unknown
+    return abs(change) > _TOLERANCES.bordered  # not where it is unknown
 
 
 def _in_order(crossings):
