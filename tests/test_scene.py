@@ -123,7 +123,7 @@ def test_not_converged_keeps_the_partial_path():
 def test_accuracy_that_cannot_be_met_is_refused(monkeypatch):
     from cosserat_fenicsx.statics import refinement
 
-    monkeypatch.setattr(refinement, "_MOST_ELEMENTS", 32)
+    monkeypatch.setattr(refinement, "_REFINEMENT", refinement.Refinement(most_elements=32))
     _, scene = column()
     with pytest.raises(cf.NotConverged, match="the accuracy tol = 1e-06 was not reached with 48 elements") as refusal:
         cf.solve(scene, [1.5], degree=1)

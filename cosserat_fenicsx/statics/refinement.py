@@ -6,6 +6,7 @@ that is the mesh on which the path was traced, it is not computed again.
 """
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -28,18 +29,25 @@ from cosserat_fenicsx.results.records import find_again, keep_confirmed
 from cosserat_fenicsx.statics.meshes import balanced, loose_edges, resolving, with_edges, with_layers, with_turns
 from cosserat_fenicsx.statics.problem import Promoted
 
-_MOST_ELEMENTS = 1024  # of one rod
-# Positions that differ by less on two meshes, relative to the largest displacement, are on the same branch: the points
-# on the finer mesh may start from those on the coarser one.
-_RESOLVED = 1e-2
-# Refinement factors are multiples of one over this, so that scenes share compiled meshes.
-_QUARTERS = 4
-_AIM = 0.8  # the error aimed at, over the tolerance
-# Smallest tolerance of the load factors of events on two meshes; most finer meshes that are solved for events alone.
-_LOCATED, _FOR_EVENTS = 1e-6, 2
-_MOST_BALANCINGS = 4  # times that the error is equidistributed over the elements
-_MOST_MOVES = 3  # times that element ends are moved to the edges of contact, before elements are halved
-_CHEAP = 800  # unknowns, of all points together, that are cheaper to solve than another mesh is to make
+
+@dataclass(frozen=True)
+class Refinement:
+    """Settings of the mesh refinement."""
+
+    most_elements: int = 1024  # of one rod
+    # Positions that differ by less on two meshes, relative to the largest displacement, are on the same branch: the
+    # points on the finer mesh may start from those on the coarser one.
+    resolved: float = 1e-2
+    quarters: int = 4  # refinement factors are multiples of one over this, so that scenes share compiled meshes
+    aim: float = 0.8  # the error aimed at, over the tolerance
+    located: float = 1e-6  # smallest tolerance of the load factors of events on two meshes
+    for_events: int = 2  # most finer meshes that are solved for events alone
+    most_balancings: int = 4  # times that the error is equidistributed over the elements
+    most_moves: int = 3  # times that element ends are moved to the edges of contact, before elements are halved
+    cheap: int = 800  # unknowns, of all points together, that are cheaper to solve than another mesh is to make
+
+
+_REFINEMENT = Refinement()
 
 
 class _TooCoarse(Exception):
@@ -99,7 +107,7 @@ class _Search:
         # Assumed orders of the errors in h; refinement factor over the mesh before, None where meshes are not nested.
         self._order, self._factor = np.ones(len(NAMES) + len(bound)), 2.0
         self._failed, self._promoted, self._best = False, None, math.inf
-        self.accurate, self._meshes_for_events, self._lost_events = None, _FOR_EVENTS, []
+        self.accurate, self._meshes_for_events, self._lost_events = None, _REFINEMENT.for_events, []
         self._halved = None  # sample points on this mesh and on the one before, if this one halves its elements
         self._error_before = None  # errors of the latter
         self._layered = None  # the next mesh where the last one does not resolve the boundary layers
@@ -116,7 +124,7 @@ class _Search:
                 raise _TooCoarse from None
             promoted = isinstance(problem, Promoted)
             again = problem.agrees(self._promoted) if promoted else self._failed
-            if again or elements >= _MOST_ELEMENTS:
+            if again or elements >= _REFINEMENT.most_elements:
                 raise
             self._promoted, self._failed = (problem, self._failed) if promoted else (self._promoted, True)
             self._few = self._apart = self._halved = None
@@ -130,7 +138,7 @@ class _Search:
             if self._usual is not None and not self._plain:
                 raise _TooCoarse
         self._layered = with_layers(self._scene, found.layout, layers) or with_turns(self._scene, found)
-        if self._layered is None and self._presses and self._moved < _MOST_MOVES:
+        if self._layered is None and self._presses and self._moved < _REFINEMENT.most_moves:
             self._layered = with_edges(self._scene, found)
             self._moved += self._layered is not None
         if found.rounding > self._tol:  # refinement would increase it
@@ -138,11 +146,11 @@ class _Search:
         if np.isfinite(found.worst).all():
             reached = float(found.worst.max())
             if reached <= self._tol and found is self.whole and self._layered is None:
-                agree = all(event.error <= max(self._tol, _LOCATED) for event in found.events)
-                if agree or elements >= _MOST_ELEMENTS or not self._meshes_for_events:
+                agree = all(event.error <= max(self._tol, _REFINEMENT.located) for event in found.events)
+                if agree or elements >= _REFINEMENT.most_elements or not self._meshes_for_events:
                     return self.confirmed(found)
                 self.accurate, self._meshes_for_events = found, self._meshes_for_events - 1
-            elif elements >= _MOST_ELEMENTS or (reached > self._best and self._best < 1e-8):
+            elif elements >= _REFINEMENT.most_elements or (reached > self._best and self._best < 1e-8):
                 if found is not self.whole:
                     found = self._all_points(layout, found)
                 raise NotConverged(_not_accurate(self._tol, reached, self._best, elements, self._degree, found), found)
@@ -159,7 +167,7 @@ class _Search:
         if hidden:
             path.bounded = tuple(name for name in path.bounded if name not in hidden)
             path.why.extend(_rounding_leaves(self._tol, name, path) for name in hidden)
-        keep_confirmed(path, max(self._tol, _LOCATED), self._lost_events if path is self.whole else [])
+        keep_confirmed(path, max(self._tol, _REFINEMENT.located), self._lost_events if path is self.whole else [])
         return path
 
     def next_after(self, layout):
@@ -177,8 +185,8 @@ class _Search:
         known = self._few is not None and np.isfinite(self._few.worst).all() and self._few.worst.max() > self._tol
         self._factor = 2.0
         if known:
-            above = float(self._few.worst.max()) / (_AIM * self._tol)
-            if self._halved is not None and self._balancings < _MOST_BALANCINGS:
+            above = float(self._few.worst.max()) / (_REFINEMENT.aim * self._tol)
+            if self._halved is not None and self._balancings < _REFINEMENT.most_balancings:
                 even = balanced(*self._halved, above)
                 if even is not None:
                     self._balancings += 1
@@ -197,7 +205,7 @@ class _Search:
         mesh before where the sample points show that it suffices."""
         few = None if self._few is None else self._correct(layout, self._few)
         apart = None if few is None else self._judge(few, self._few, self._apart)
-        if few is None or apart[POSITION].max() > _RESOLVED:
+        if few is None or apart[POSITION].max() > _REFINEMENT.resolved:
             if self._usual is not None and self.whole is not None:
                 raise _TooCoarse
             whole, apart = self._trace(layout, self.whole), None
@@ -218,16 +226,20 @@ class _Search:
                 judged = self.whole if traced else self._all_points(coarse.layout, coarse)
                 if judged.worst.max() <= self._tol:
                     return judged
-            if few.worst.max() <= self._tol and max(layout.counts) < _MOST_ELEMENTS and self._saves(few, judged):
+            if (
+                few.worst.max() <= self._tol
+                and max(layout.counts) < _REFINEMENT.most_elements
+                and self._saves(few, judged)
+            ):
                 self._few, self._apart = coarse, None
                 return few
         return self._all_points(layout, few) if few.worst.max() <= self._tol else few
 
     def _factor_for(self, path):
         """The refinement factor, at most 2, for the intended errors of a path."""
-        above = path.by_mesh.max(axis=1) / (_AIM * self._tol)
+        above = path.by_mesh.max(axis=1) / (_REFINEMENT.aim * self._tol)
         wanted = min(2.0, float((above ** (1 / self._order))[path.bounds].max()))
-        return math.ceil(_QUARTERS * wanted) / _QUARTERS
+        return math.ceil(_REFINEMENT.quarters * wanted) / _REFINEMENT.quarters
 
     def _saves(self, few, coarse):
         """Whether a mesh between those of two paths suffices and is cheaper for all points; it becomes the next one."""
@@ -235,7 +247,7 @@ class _Search:
             return False
         factor = self._factor_for(coarse)
         others = len(self.whole) - len(few)
-        if few.unknowns * ((2 - factor) / 2 * others - factor / 2 * len(few)) <= _CHEAP:
+        if few.unknowns * ((2 - factor) / 2 * others - factor / 2 * len(few)) <= _REFINEMENT.cheap:
             return False
         self._next = coarse.layout.finer(self._scene, factor), factor
         return True
