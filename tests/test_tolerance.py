@@ -7,8 +7,8 @@ import pytest
 from conftest import column
 
 import cosserat_fenicsx as cf
-from cosserat_fenicsx.results.records import Records
 from cosserat_fenicsx import analytic
+from cosserat_fenicsx.results.records import Records
 
 pytestmark = pytest.mark.serial
 TOLERANCES = [1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9]
