@@ -35,7 +35,7 @@ class Sensitivity(Mapping):
 
     @classmethod
     def by(cls, parameters, value, derivatives, error, quantity="value"):
-        """The derivatives by `Parameter`s of a scene, with their values and units."""
+        """The derivatives by several `Parameter` objects of a scene, with their values and units."""
         values, units = ({x.name: getattr(x, what) for x in parameters} for what in ("value", "unit"))
         return cls(value, derivatives, error, values, units, quantity)
 

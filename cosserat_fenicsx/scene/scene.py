@@ -383,6 +383,6 @@ class Scene(Part):
         Raises:
             SceneError: there is none of that name.
         """
-        if name not in self._by_name:
+        if not isinstance(name, str) or name not in self._by_name:
             raise SceneError(f"no rod is named {name!r}, {nearest(name, self._by_name)}")
         return self._by_name[name]

@@ -199,7 +199,7 @@ class Table(FunctionOfTime):
         times = _ascending(self, "times", "ascending times (s)")
         rows = self.values
         if not _as_text(rows):
-            rows = finite_array(self, "values", rows, "finite numbers, one row a time")
+            rows = _numbers_of(self, "values", rows, "finite numbers, one row a time")
         if np.ndim(rows) not in (1, 2) or len(rows) != len(times):
             refuse(self, "values", self.values, f"one vector for each of the {len(times)} times")
 
@@ -229,10 +229,19 @@ def _as_text(rows):
 def _ascending(owner, field, expected):
     """The array (n,) of a field that holds ascending numbers."""
     given = getattr(owner, field)
-    array = finite_array(owner, field, given, expected)
+    array = _numbers_of(owner, field, given, expected)
     if array.ndim != 1 or not len(array) or not (np.diff(array) > 0).all():
         refuse(owner, field, given, expected)
     return array
+
+
+def _numbers_of(owner, field, given, expected):
+    """An array of finite numbers, also of those that a data frame of mixed columns or a list of fractions holds."""
+    try:
+        given_as_floats = np.asarray(given, dtype=float)
+    except (TypeError, ValueError):
+        refuse(owner, field, given, expected)
+    return finite_array(owner, field, given_as_floats, expected)
 
 
 def _times(factor, value):
@@ -308,6 +317,7 @@ class VectorInTime(Either):
         if not isinstance(owner.jumps, tuple | list):
             refuse(owner, "jumps", owner.jumps, "a list of times (s)")
         given = [number(owner, "jumps", t, "finite times (s)", math.isfinite) for t in owner.jumps]
+        store(owner, jumps=tuple(given))
         jumps = tuple(sorted({float(t) for t in (*getattr(function, "jumps", ()), *given)}))
         place = getattr(owner, "station", None) or getattr(owner, "rod", None)
         place = str(getattr(place, "name", place) or "")
@@ -378,6 +388,7 @@ class Along(FunctionAlong):
     """
 
     function: Callable[[float], Numbers]
+    breaks = kinks = ()  # smooth
 
     def validate(self):
         if not callable(self.function):
@@ -418,7 +429,7 @@ class AlongTable(FunctionAlong):
             store(self, s=table[:, 0], values=table[:, 1:])
         s = _ascending(self, "s", "ascending arc lengths (m)")
         expected = f"three finite numbers for each of the {len(s)} arc lengths"
-        values = finite_array(self, "values", self.values, expected)
+        values = _numbers_of(self, "values", self.values, expected)
         if values.shape != (len(s), 3):
             refuse(self, "values", self.values, expected)
         store(self, s=tuple(s.tolist()), values=tuple(map(tuple, values.tolist())))
