@@ -12,7 +12,7 @@ import hashlib
 import sys
 from pathlib import Path
 
-from harness import command, record, save, unfinished
+from harness import command, record, resumed, save
 from mpi4py import MPI
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
@@ -23,25 +23,16 @@ HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
 
 
-class Store:
-    """The file of the cells, rewritten after every cell.
-
-    Args:
-        file: out/failures.json.
-        quick: whether it is the quick table.
-        fresh: whether to ignore an existing file.
-    """
-
-    def __init__(self, file, quick, fresh):
-        self.file = file
-        self.data = {"complete": False, "quick": quick, "machine": record(), "sources": _fingerprint(),
-                     "seed": None,
-                     "programs": {}, "methods": [], "trials": [], "cells": {}}  # fmt: skip
-        before = None if fresh else unfinished(file, self.data, ["quick", "sources"])
-        if before:
-            kept = {key: cell for key, cell in before["cells"].items() if cell["verdict"] != MISSING}
-            self.data |= {"cells": kept, "programs": before["programs"]}
-            print(f"goes on from {file}: {len(kept)} cells kept", file=sys.stderr)
+def begun(file, quick, fresh):
+    """The data of failures.json: without cells, or with those of an interrupted run."""
+    data = {"complete": False, "quick": quick, "machine": record(), "sources": _fingerprint(), "seed": None,
+            "programs": {}, "methods": [], "trials": [], "cells": {}}  # fmt: skip
+    before = resumed(file, data, ["quick", "sources"], fresh)
+    if before:
+        kept = {key: cell for key, cell in before["cells"].items() if cell["verdict"] != MISSING}
+        data |= {"cells": kept, "programs": before["programs"]}
+        print(f"{len(kept)} cells kept", file=sys.stderr)
+    return data
 
 
 def _fingerprint():
@@ -52,9 +43,8 @@ def _fingerprint():
     return hashlib.sha256(b"".join(file.read_bytes() for file in files if file not in drawn)).hexdigest()[:16]
 
 
-def compute(store, columns, rows):
-    """Compute all missing cells."""
-    data = store.data
+def compute(file, data, columns, rows):
+    """Compute all missing cells; the file is rewritten after every cell."""
     data["methods"], data["trials"] = [method.key for method in columns], [trial.key for trial in rows]
     todo = [(trial, method) for method in columns for trial in rows if f"{trial.key}/{method.key}" not in data["cells"]]
     words = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn()
@@ -68,12 +58,12 @@ def compute(store, columns, rows):
             data["cells"][f"{trial.key}/{method.key}"] = cell.plain()
             if getattr(method, "versions", None):
                 data["programs"][method.key] = method.versions
-            save(store.file, data)
+            save(file, data)
             bar.advance(task)
             if not console.is_terminal and trial is rows[-1]:
                 print(f"{name}: done", file=sys.stderr, flush=True)
     data["complete"] = True
-    save(store.file, data)
+    save(file, data)
 
 
 def main(out="out", quick=False, fresh=False):
@@ -88,23 +78,24 @@ def main(out="out", quick=False, fresh=False):
     columns = [method for method in methods.METHODS if not quick or method not in programs.PROGRAMS]
     rows = catalogue.QUICK if quick else catalogue.TRIALS
     out = Path(out)
-    store = Store(out / f"{stem}.json", quick, fresh)
+    file = out / f"{stem}.json"
+    data = begun(file, quick, fresh)
     try:
-        compute(store, columns, rows)
+        compute(file, data, columns, rows)
     finally:
         for program in programs.PROGRAMS:
             program.end()
-    words = table.text(store.data)
+    words = table.text(data)
     (out / f"{stem}.md").write_text(words + "\n", encoding="utf-8")
-    picture.draw(store.data, out / f"{stem}.png")
+    picture.draw(data, out / f"{stem}.png")
     print(words)
-    silent = [key for key, cell in store.data["cells"].items() if Cell.of(cell).verdict == SILENT]
+    silent = [key for key, cell in data["cells"].items() if Cell.of(cell).verdict == SILENT]
     print(
-        f"\n{len(store.data['cells'])} cells, {len(silent)} silently wrong; written to {out}/: {stem}.png, {stem}.md,"
+        f"\n{len(data['cells'])} cells, {len(silent)} silently wrong; written to {out}/: {stem}.png, {stem}.md,"
         f" {stem}.json",
         file=sys.stderr,
     )
-    return store.data
+    return data
 
 
 if __name__ == "__main__":

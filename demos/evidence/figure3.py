@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 from comparison import curves, picture, verdicts
 from comparison.follow import Point
-from harness import command, record, save, unfinished
+from harness import command, record, resumed, save
 from mpi4py import MPI
 
 
@@ -34,12 +34,13 @@ class Store:
         self.folder = Path(folder)
         self.folder.mkdir(parents=True, exist_ok=True)
         self.file = self.folder / "figure3.json"
-        self.data = {"complete": False, "machine": record(), "settings": _plain(asdict(settings)), "curves": {}}
-        before = None if fresh else unfinished(self.file, self.data, ["settings"])
+        self.data = {"complete": False, "machine": record(), "curves": {}}
+        self.data["settings"] = json.loads(json.dumps(asdict(settings)))  # as a file returns them
+        before = resumed(self.file, self.data, ["settings"], fresh)
         if before:
             self.data["curves"] = before["curves"]
             done = [name for name, curve in before["curves"].items() if curve["complete"]]
-            print(f"goes on from {self.file}: {', '.join(done) or 'a part of the first curve'} kept", file=sys.stderr)
+            print(f"{', '.join(done) or 'a part of the first curve'} kept", file=sys.stderr)
         else:
             for name in self.folder.glob("figure3-*.npz"):
                 name.unlink()
@@ -83,11 +84,6 @@ class Store:
         save(self.file, self.data)
         for name in self.folder.glob("figure3-*.npz"):
             name.unlink()
-
-
-def _plain(settings):
-    """The settings as JSON returns them."""
-    return json.loads(json.dumps(settings))
 
 
 def compute(store, settings):

@@ -125,6 +125,14 @@ def unfinished(file, data, keys):
         return None
 
 
+def resumed(file, data, keys, fresh):
+    """What `unfinished` finds, or None for a `fresh` run; says on stderr that the run goes on."""
+    before = None if fresh else unfinished(file, data, keys)
+    if before:
+        print(f"goes on from {file}", end=": ", file=sys.stderr)
+    return before
+
+
 def save(file, data):
     """Replace a file of JSON in one step, so that a killed process leaves a complete one."""
     new = Path(file).with_suffix(".new")

@@ -25,6 +25,7 @@ class Chain:
             refuse("Chain", "elements", elements, "a whole number above zero")
         self.column, self.elements, self.law = column, elements, law_of(1 / elements)
         self.size = 3 * elements
+        self.base = np.zeros(3)  # displacement and rotation of the clamp
         self._e = column.relative[2]
 
     def residual(self, x, eta):
@@ -62,7 +63,7 @@ class Chain:
         return w * self.column.length, -u * self.column.length, theta
 
     def _nodal(self, x):
-        nodes = np.vstack([np.zeros(3), x.reshape(-1, 3)])
+        nodes = np.vstack([self.base, x.reshape(-1, 3)])
         return np.hstack([nodes[:-1], nodes[1:]])
 
     def _tangent(self, x, eta):

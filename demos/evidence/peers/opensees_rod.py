@@ -62,19 +62,26 @@ def prepare(problem, configuration):
     return solve
 
 
+def advance(reached, target, step, smallest):
+    """Load steps from `reached` to `target`, halved where they fail; (the load reached, whether it is the target)."""
+    while reached < target - 1e-12:
+        step = min(step, target - reached)
+        ops.integrator("LoadControl", step)
+        if ops.analyze(1) == 0:
+            reached += step
+        elif step > smallest:
+            step /= 2  # the failed step was undone
+        else:
+            return reached, False
+    return reached, True
+
+
 def _analyse(problem, substeps, tip):
     tips, reached = [], 0.0
     for factor in problem["load_factors"]:
-        step = (factor - reached) / substeps
-        while reached < factor - 1e-12:
-            step = min(step, factor - reached)
-            ops.integrator("LoadControl", step)
-            if ops.analyze(1) == 0:
-                reached += step
-            elif step > 1e-3 * factor:
-                step /= 2  # the failed step was undone
-            else:
-                raise Stopped(f"no convergence beyond the load factor {reached:g}")
+        reached, done = advance(reached, factor, (factor - reached) / substeps, 1e-3 * factor)
+        if not done:
+            raise Stopped(f"no convergence beyond the load factor {reached:g}")
         u = ops.nodeDisp(tip)
         tips.append((u[0], u[1], u[2] if ops.getNDM()[0] == 3 else 0.0))
     return tips

@@ -35,7 +35,6 @@ class LoadedChain(Chain):
         size = 2 / arc * np.sin(arc / 2 / elements) * elements if arc else 1.0  # the chords' length
         super().__init__(column, elements, lambda length: law_of(length * size, axial, shear))
         self.angles = arc * (np.arange(elements) + 0.5) / elements
-        self.base = np.zeros(3)
         self.force = np.array([*problem["force"][:2], problem["moment"][2] / L]) / unit
         self.follows = problem.get("follower", False)
         straight, self._size = self.law, size / elements
@@ -74,10 +73,6 @@ class LoadedChain(Chain):
             c, s = np.cos(x[-1]), np.sin(x[-1])
             f[-3:-1] = np.array([[c, -s], [s, c]]) @ self.force[:2]
         return f
-
-    def _nodal(self, x):
-        nodes = np.vstack([self.base, x.reshape(-1, 3)])
-        return np.hstack([nodes[:-1], nodes[1:]])
 
     def _tangent(self, x, eta):
         band = super()._tangent(x, eta)
@@ -169,11 +164,10 @@ class ChainMethod:
             return self._turned(chain, points[-1], problem["turn"][2])
         x = [point.x if model is chain else model.whole(point.x) for point in points]
         negative = max(point.negative_modes for point in points)
-        said = f"unstable, {negative} negative modes" if negative else ""
         work = sum(point.iterations for point in points)
         stable = np.array([point.negative_modes == 0 for point in points])
         return Answer(
-            np.array([chain.tip_moved(each) for each in x]), said, f"{chain.elements} elements", (), work, stable
+            np.array([chain.tip_moved(each) for each in x]), _said(negative), f"{chain.elements} elements", (), work, stable
         )
 
     def _turned(self, chain, point, angle):
@@ -189,8 +183,7 @@ class ChainMethod:
                     f"Newton's method does not converge when all is turned by {chain.base[2]:.3g} rad", np.nan
                 )
             x = found
-        negative = chain.negative_modes(x, point.eta)
-        return Answer(chain.tip_moved(x)[None], f"unstable, {negative} negative modes" if negative else "")
+        return Answer(chain.tip_moved(x)[None], _said(chain.negative_modes(x, point.eta)))
 
     def _in_stages(self, chain, history):
         whole, x, before = chain.force.copy(), np.zeros(chain.size), (0.0, 0.0)
@@ -206,8 +199,7 @@ class ChainMethod:
                     )
                 x = found
             before = stage
-        negative = chain.negative_modes(x, 1.0)
-        return Answer(chain.tip_moved(x)[None], f"unstable, {negative} negative modes" if negative else "")
+        return Answer(chain.tip_moved(x)[None], _said(chain.negative_modes(x, 1.0)))
 
     def numerics(self, key):
         """(problem, answer, number, unit)."""
@@ -223,6 +215,11 @@ class ChainMethod:
         ratio = problems.column_truth(problem)[0, 1] / chain.tip_moved(further)[1]
         tip = ratio * chain.tip_moved(point.x)[None]
         return problem, Answer(tip, note="against one more iteration on the same mesh"), None, ""
+
+
+def _said(negative):
+    """The warning of a number of negative modes."""
+    return f"unstable, {negative} negative modes" if negative else ""
 
 
 def _elements(problem):

@@ -7,7 +7,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "peers"))
 
 import openseespy.opensees as ops
-from opensees_rod import _analyse, _build
+from opensees_rod import _analyse, _build, advance
 from speak import Stopped, serve
 
 
@@ -34,16 +34,9 @@ def _solve(problem, configuration):
         ops.timeSeries("Path", tag, "-time", *times, "-values", *values)
         ops.pattern("Plain", tag, tag)
         ops.load(tip, *(vector if ops.getNDM()[0] == 3 else (vector[0], vector[1], vector[5])))
-    step, reached = 1.0 / configuration.get("substeps", 1), 0.0
-    while reached < len(history) - 1e-12:
-        step = min(step, len(history) - reached)
-        ops.integrator("LoadControl", step)
-        if ops.analyze(1) == 0:
-            reached += step
-        elif step > 1e-3:
-            step /= 2  # the failed step was undone
-        else:
-            raise Stopped(f"no convergence in stage {reached:.4g} of {len(history)}")
+    reached, done = advance(0.0, len(history), 1.0 / configuration.get("substeps", 1), 1e-3)
+    if not done:
+        raise Stopped(f"no convergence in stage {reached:.4g} of {len(history)}")
     u = ops.nodeDisp(tip)
     return [(u[0], u[1], u[2] if ops.getNDM()[0] == 3 else 0.0)]
 
