@@ -8,15 +8,12 @@ Another checkout is measured by `--package FOLDER`.
 """
 
 import os
-import resource
 import statistics
-import subprocess
 import sys
 import tempfile
-import time
 from pathlib import Path
 
-from harness import command, table, write
+from harness import command, table, whole_process, write
 
 from cosserat_fenicsx import compat
 
@@ -40,10 +37,10 @@ def run(command, cache, package):
     words = [sys.executable, "-m", "cosserat_fenicsx", command[0], str(ROOT / "demos" / command[1])]
     surrounding = {**os.environ, "XDG_CACHE_HOME": str(cache), "PYTHONPATH": str(package)}
     surrounding.pop("COSSERAT_FENICSX_CFLAGS", None)
-    before, began = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
-    subprocess.run(words, env=surrounding, cwd=cache, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, check=True)
-    wall, after = time.perf_counter() - began, resource.getrusage(resource.RUSAGE_CHILDREN)
-    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime, wall
+    _, code, processor, wall = whole_process(words, env=surrounding, cwd=cache)
+    if code:
+        raise SystemExit(f"{' '.join(words[1:])}: expected exit code 0, not {code}")
+    return processor, wall
 
 
 def first_and_next(command, package):

@@ -5,7 +5,9 @@ import datetime
 import json
 import os
 import platform
+import subprocess
 import sys
+import threading
 import time
 from pathlib import Path
 
@@ -28,6 +30,31 @@ def timed(task, clock=time.process_time):
 def in_turns(tasks, runs):
     """Processor times (s) of tasks that take turns, (runs, number of tasks): ratios within a row are of one time."""
     return np.array([[timed(task)[1] for task in tasks] for _ in range(runs)])
+
+
+def whole_process(words, told="", limit=None, **settings):
+    """Run a command to its end.
+
+    Args:
+        told: its input. limit: s, after which it is killed. settings: of `subprocess.Popen`, such as `env` and `cwd`.
+
+    Returns:
+        (output as bytes, exit code, processor time with that of its own processes, wall clock time), s.
+    """
+    began = time.perf_counter()
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.DEVNULL}
+    process = subprocess.Popen(words, **pipes, **settings)
+    watch = threading.Timer(limit or threading.TIMEOUT_MAX, process.kill)
+    watch.daemon = True
+    watch.start()
+    process.stdin.write(told.encode())
+    process.stdin.close()
+    said = process.stdout.read()
+    process.stdout.close()
+    _, status, used = os.wait4(process.pid, 0)
+    watch.cancel()
+    process.returncode = os.waitstatus_to_exitcode(status)
+    return said, process.returncode, used.ru_utime + used.ru_stime, time.perf_counter() - began
 
 
 # -- tables ------------------------------------------------------------------------------------------------------------

@@ -2,15 +2,12 @@
 
 import json
 import math
-import os
 import statistics
-import subprocess
 import sys
 import tempfile
-import threading
-import time
 from pathlib import Path
 
+from harness import whole_process
 from peers.environments import OWN, ROOT, surroundings
 from peers.problems import problems
 from work_precision_table import answered, called, cheapest
@@ -63,31 +60,13 @@ def _times(words, told, surrounding, caches):
                 place = Path(folder, str(run))
                 place.mkdir()
                 empty = {"XDG_CACHE_HOME": str(place), "NUMBA_CACHE_DIR": str(place)}
-            began = time.perf_counter()
-            pipes = {
-                "stdin": subprocess.PIPE,
-                "stdout": subprocess.PIPE,
-                "stderr": subprocess.DEVNULL,
-                "cwd": folder,
-            }
-            process = subprocess.Popen(words, env={**surrounding, **empty}, **pipes)
-            watch = threading.Timer(LIMIT, process.kill)
-            watch.start()
-            process.stdin.write(told.encode())
-            process.stdin.close()
-            said = process.stdout.read()
-            process.stdout.close()
-            _, status, used = os.wait4(process.pid, 0)
-            watch.cancel()
-            process.returncode = os.waitstatus_to_exitcode(status)
-            if process.returncode or b'"failed"' in said:
-                why = (
-                    said.decode(errors="replace")[:100] if not process.returncode else f"exit code {process.returncode}"
-                )
+            said, code, *seconds = whole_process(words, told, LIMIT, env={**surrounding, **empty}, cwd=folder)
+            if code or b'"failed"' in said:
+                why = f"exit code {code}" if code else said.decode(errors="replace")[:100]
                 return {"processor": [], "wall": [], "failed": why}
             if caches == "cold" or run:
-                wall.append(time.perf_counter() - began)
-                processor.append(used.ru_utime + used.ru_stime)
+                for times, spent in zip((processor, wall), seconds, strict=True):
+                    times.append(spent)
             if sum(wall) > ENOUGH:
                 break
     return {"processor": processor, "wall": wall, "failed": None}

@@ -13,6 +13,30 @@ from cosserat_fenicsx import compat
 from cosserat_fenicsx.forms import truncated
 
 
+def assembled(form, free):
+    """A bilinear form as a sparse matrix of scipy, of the unknowns `free`."""
+    A = fem_petsc.assemble_matrix(form)
+    A.assemble()
+    start, column, values = A.getValuesCSR()
+    matrix = csr_matrix((values, column, start), shape=A.size)[free][:, free]
+    A.destroy()
+    return matrix
+
+
+def assembled_vector(form):
+    """A linear form as an array."""
+    vector = fem_petsc.assemble_vector(form)
+    values = vector.array.copy()
+    vector.destroy()
+    return values
+
+
+def unit_mesh(elements):
+    """The interval [0, 1] in equal elements."""
+    ends = np.column_stack([np.arange(elements), np.arange(1, elements + 1)]).astype(np.int64)
+    return compat.create_interval_mesh(MPI.COMM_SELF, ends, np.linspace(0, 1, elements + 1)[:, None])
+
+
 class TruncatedColumn:
     """The column as a problem of `follow`: (u, w, phi) in P_degree, clamped at s = 0, in units of L and EI/L^2.
 
@@ -22,8 +46,7 @@ class TruncatedColumn:
     def __init__(self, elements=32, degree=4, column=None):
         self.column = column = column or Column()
         axial, shear, eccentricity = column.relative
-        ends = np.column_stack([np.arange(elements), np.arange(1, elements + 1)]).astype(np.int64)
-        mesh = compat.create_interval_mesh(MPI.COMM_SELF, ends, np.linspace(0, 1, elements + 1)[:, None])
+        mesh = unit_mesh(elements)
         space = compat.function_space(mesh, compat.lagrange(mesh, degree, 3))
         self._U = fem.Function(space)
         (u_s, w_s, phi_s), phi = (self._U[i].dx(0) for i in range(3)), self._U[2]
@@ -43,10 +66,7 @@ class TruncatedColumn:
     def residual(self, x, eta):
         """Internal minus external forces."""
         self._U.x.array[self._free] = x
-        vector = fem_petsc.assemble_vector(self._first)
-        internal = vector.array[self._free]
-        vector.destroy()
-        return internal - eta * self._load
+        return assembled_vector(self._first)[self._free] - eta * self._load
 
     def load(self, x):
         """Tip force and constant tip moment at eta = 1."""
@@ -68,9 +88,4 @@ class TruncatedColumn:
 
     def _tangent(self, x):
         self._U.x.array[self._free] = x
-        A = fem_petsc.assemble_matrix(self._second)
-        A.assemble()
-        start, column, values = A.getValuesCSR()
-        matrix = csr_matrix((values, column, start), shape=A.size)[self._free][:, self._free]
-        A.destroy()
-        return matrix
+        return assembled(self._second, self._free)

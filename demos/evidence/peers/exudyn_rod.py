@@ -32,12 +32,7 @@ def prepare(problem, configuration):
         factor = factors[i] + (time - i) * (factors[i + 1] - factors[i])
         return [factor * vector[0], factor * vector[1], factor * vector[2]]
 
-    point = mbs.AddMarker(item.MarkerNodePosition(nodeNumber=tip))
-    mbs.AddLoad(item.LoadForceVector(markerNumber=point, loadVector=problem["force"], loadVectorUserFunction=loaded))
-    if any(problem["moment"]):
-        section = mbs.AddMarker(item.MarkerNodeRigid(nodeNumber=tip))
-        moment = {"loadVector": problem["moment"], "loadVectorUserFunction": loaded}
-        mbs.AddLoad(item.LoadTorqueVector(markerNumber=section, **moment))
+    load(mbs, problem, tip, loaded, loaded)
     sensor = mbs.AddSensor(item.SensorNode(nodeNumber=tip, storeInternal=True, outputVariableType=DISPLACEMENT))
     mbs.Assemble()
     settings = _settings(configuration, last, configuration["elements"] * NODES[element] > 16)
@@ -53,6 +48,16 @@ def prepare(problem, configuration):
 
     solve.keep = container
     return solve
+
+
+def load(mbs, problem, tip, force, moment):
+    """A dead force and a dead moment on the tip's node, scaled in time by Exudyn's user functions `force`, `moment`."""
+    point = mbs.AddMarker(item.MarkerNodePosition(nodeNumber=tip))
+    mbs.AddLoad(item.LoadForceVector(markerNumber=point, loadVector=problem["force"], loadVectorUserFunction=force))
+    if any(problem["moment"]):
+        section = mbs.AddMarker(item.MarkerNodeRigid(nodeNumber=tip))
+        given = {"loadVector": problem["moment"], "loadVectorUserFunction": moment}
+        mbs.AddLoad(item.LoadTorqueVector(markerNumber=section, **given))
 
 
 def _settings(configuration, steps, sparse):

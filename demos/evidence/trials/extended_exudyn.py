@@ -9,7 +9,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "peers"))
 import exudyn as exu
 import numpy as np
 from exudyn import itemInterface as item
-from exudyn_rod import DISPLACEMENT, NODES, _rod, _settings
+from exudyn_rod import DISPLACEMENT, NODES, _rod, _settings, load
 from speak import Stopped, serve
 
 
@@ -33,13 +33,7 @@ def _solve(problem, configuration):
 
         return vector
 
-    point = mbs.AddMarker(item.MarkerNodePosition(nodeNumber=tip))
-    mbs.AddLoad(item.LoadForceVector(markerNumber=point, loadVector=problem["force"], loadVectorUserFunction=loaded(0)))
-    if any(problem["moment"]):
-        section = mbs.AddMarker(item.MarkerNodeRigid(nodeNumber=tip))
-        mbs.AddLoad(
-            item.LoadTorqueVector(markerNumber=section, loadVector=problem["moment"], loadVectorUserFunction=loaded(1))
-        )
+    load(mbs, problem, tip, loaded(0), loaded(1))
     if problem.get("guided"):
         ground = mbs.AddMarker(item.MarkerNodeCoordinate(nodeNumber=mbs.AddNode(item.NodePointGround()), coordinate=0))
         for coordinate in (0, 2, 4, 5, 6) if element.endswith("EP") else (0, 2):

@@ -11,10 +11,8 @@ from dataclasses import dataclass
 import basix
 import numpy as np
 import ufl
+from comparison.mcre_limit import assembled, assembled_vector, unit_mesh
 from dolfinx import fem
-from dolfinx.fem import petsc as fem_petsc
-from mpi4py import MPI
-from scipy.sparse import csr_matrix
 from scipy.sparse.linalg import splu
 from scipy.spatial.transform import Rotation
 
@@ -49,8 +47,7 @@ class Rod:
     def __init__(self, problem, elements, degree=1):
         L = self.length = problem["length"]
         unit = problem["EI"] / L**2
-        ends = np.column_stack([np.arange(elements), np.arange(1, elements + 1)]).astype(np.int64)
-        mesh = compat.create_interval_mesh(MPI.COMM_SELF, ends, np.linspace(0, 1, elements + 1)[:, None])
+        mesh = unit_mesh(elements)
         space = compat.function_space(mesh, compat.lagrange(mesh, degree, 6))
         self.U = U = fem.Function(space)  # displacement, rotation vector of the step
         self._points = gauss_function(mesh, degree, 1)
@@ -111,15 +108,9 @@ class Rod:
         before = x.copy()
         x[self._clamp[3:]] = turn
         for _ in range(most):
-            vector = fem_petsc.assemble_vector(self._residual)
-            b = vector.array.copy()
-            vector.destroy()
+            b = assembled_vector(self._residual)
             b[self._tip] -= load
-            A = fem_petsc.assemble_matrix(self._tangent)
-            A.assemble()
-            start, column, values = A.getValuesCSR()
-            K = csr_matrix((values, column, start), shape=A.size)[free][:, free]
-            A.destroy()
+            K = assembled(self._tangent, free)
             change = splu(K.tocsc()).solve(-b[free]) if np.isfinite(K.data).all() else np.full(len(free), np.inf)
             if not np.abs(change).max() < 10:
                 break
