@@ -7,6 +7,7 @@ python demos/evidence/accuracy.py --quick    two meshes and two slendernesses
 import math
 import platform
 
+import harness
 import numpy as np
 from cantilever import ECCENTRICITY, L, column, exact
 from harness import command, table, write
@@ -47,8 +48,7 @@ def _last_order(errors, meshes):
     seen = [i for i in range(1, len(meshes)) if errors[i] > 2e-13]
     if not seen:
         return "round-off"
-    i = seen[-1]
-    return f"{math.log(errors[i - 1] / errors[i]) / math.log(meshes[i] / meshes[i - 1]):.1f}"
+    return f"{harness.orders(errors, meshes)[seen[-1] - 1]:.1f}"
 
 
 def slenderness(ratios):

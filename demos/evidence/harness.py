@@ -57,6 +57,12 @@ def whole_process(words, told="", limit=None, **settings):
     return said, process.returncode, used.ru_utime + used.ru_stime, time.perf_counter() - began
 
 
+def orders(errors, counts):
+    """Observed orders of errors between successive numbers of steps or elements."""
+    with np.errstate(divide="ignore", invalid="ignore"):  # errors may be zero
+        return np.log(np.divide(errors[:-1], errors[1:])) / np.log(np.divide(counts[1:], counts[:-1]))
+
+
 # -- tables ------------------------------------------------------------------------------------------------------------
 
 

@@ -12,6 +12,7 @@ smooth up to its ends. Changes and errors that may be affected by rounding are m
 
 import math
 
+import harness
 import numpy as np
 from harness import command, table, write
 
@@ -91,8 +92,7 @@ def at_ends(rod, scene, elements, degree):
 
 def orders(errors, counts, floor):
     """Orders between errors for numbers of steps or elements; nan where one of two errors is below `floor`."""
-    observed = np.log(errors[:-1] / errors[1:]) / np.log(np.divide(counts[1:], counts[:-1]))
-    return np.where(np.minimum(errors[:-1], errors[1:]) > floor, observed, math.nan)
+    return np.where(np.minimum(errors[:-1], errors[1:]) > floor, harness.orders(errors, counts), math.nan)
 
 
 def last(observed):

@@ -41,24 +41,24 @@ ALONE = {
 }
 #: The pictures of the gallery, by the files of the scenes.
 GALLERY = [f"{file.stem}.png" for file in sorted((ROOT / "demos").glob("**/*.toml"))]
-#: Those of strings in wells, by their names in the documentation: files in out/wells/.
-WELLS = {
-    "volve_f12_broomstick.png": "volve_f12/depth_sweep.png",
-    "volve_f12_stiff_and_soft.png": "volve_f12/stiff_and_soft.png",
-    "well_p_rod.png": "well_p_rod/trip_out_3d.png",
-    "assembly.png": "assembly/assembly.png",
-    "helix.png": "helix/static_3d.png",
-    "cable_in_conduit.png": "cable_in_conduit/cable.png",
+#: The other pictures, by the folders of `out` that hold them: their names in the documentation, and their files.
+FOLDERS = {
+    "wells": {
+        "volve_f12_broomstick.png": "volve_f12/depth_sweep.png",
+        "volve_f12_stiff_and_soft.png": "volve_f12/stiff_and_soft.png",
+        "well_p_rod.png": "well_p_rod/trip_out_3d.png",
+        "assembly.png": "assembly/assembly.png",
+        "helix.png": "helix/static_3d.png",
+        "cable_in_conduit.png": "cable_in_conduit/cable.png",
+    },
+    "strings": {
+        "stick_slip.png": "stick_slip/drilling.png",
+        "off_bottom_map.png": "off_bottom/map.png",
+        "stopped_block_map.png": "stopped_block/map.png",
+        "stability_map.png": "stability_map.png",
+    },
+    "whirl": {"whirl.png": "whirl.png"},
 }
-#: Those of drill-strings in motion: files in out/strings/.
-STRINGS = {
-    "stick_slip.png": "stick_slip/drilling.png",
-    "off_bottom_map.png": "off_bottom/map.png",
-    "stopped_block_map.png": "stopped_block/map.png",
-    "stability_map.png": "stability_map.png",
-}
-#: Those of whirl in a hole: files in out/whirl/.
-WHIRL = {"whirl.png": "whirl.png"}
 WIDTH, COLOURS, MARGIN = 1100, 256, 12  # pixels, number, pixels
 
 
@@ -79,9 +79,7 @@ def main(names, out="out", docs=ROOT / "docs"):
         page, *pictures = PAGES.get(name, (None,))
         title, *more = ALONE.get(name, (None,))
         drawn = {picture: picture for picture in (GALLERY if name == "gallery" else pictures + more)}
-        for group, files in (("wells", WELLS), ("strings", STRINGS), ("whirl", WHIRL)):
-            if name == group:
-                drawn = {picture: f"{group}/{file}" for picture, file in files.items()}
+        drawn |= {picture: f"{name}/{file}" for picture, file in FOLDERS.get(name, {}).items()}
         for picture, file in drawn.items():
             if (out / file).exists():
                 kept(out / file, docs / "pictures" / picture)
@@ -101,7 +99,6 @@ def main(names, out="out", docs=ROOT / "docs"):
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument(
-        "names", nargs="+", choices=sorted({*PAGES, *ALONE, "gallery", "wells", "strings", "whirl"}), metavar="NAME"
-    )
+    names = sorted({*PAGES, *ALONE, *FOLDERS, "gallery"})
+    parser.add_argument("names", nargs="+", choices=names, metavar="NAME")
     main(parser.parse_args().names)

@@ -39,9 +39,8 @@ SLOW = 0.5  # s: from here on there is no warm-up run, and no repetition where t
 BUDGET = 20 * 60.0  # s of measuring; a round that would begin later is left out, and the table says so
 
 
-#: What is measured: peers, problems, how their errors are told, the configurations of a peer, what these are called,
-#: how
-#: many samples are taken first of one that may be slow, and whether all fast ones of this package get all samples.
+#: What is measured: peers, problems, their errors, the configurations of a peer, their names, the first number of
+#: samples of a configuration, and whether all fast ones of this package get all samples.
 Panel = namedtuple("Panel", "peers problems error configurations kind model first whole")
 STATICS = Panel(PEERS, problems, error, configurations, kind, model, 3, True)
 
