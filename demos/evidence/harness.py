@@ -143,27 +143,21 @@ def _cpu():
 # -- files that a later run goes on from -------------------------------------------------------------------------------
 
 
-def unfinished(file, data, keys):
-    """The results of an interrupted run in a file of `save`, if a run with this data can go on from them; else None.
+def resumed(file, data, keys, fresh):
+    """The results of an interrupted run in a file of `save`, if a run with this data can continue from them; else None.
 
     Args:
-        data: with "machine", of `record`; keys: of what must be the same in both.
+        data: with "machine", of `record`. keys: of what must be the same in both. fresh: whether to ignore the file.
     """
     try:
-        before = json.loads(Path(file).read_text(encoding="utf-8"))
-        here, there = data["machine"], before["machine"]
-        same = all(before[key] == data[key] for key in keys) and not before["complete"]
-        return before if same and all(here[k] == there[k] for k in here if k not in ("date", "cores")) else None
+        before = None if fresh else json.loads(Path(file).read_text(encoding="utf-8"))
+        same = before and not before["complete"] and all(before[key] == data[key] for key in keys)
+        if same and all(before["machine"][k] == data["machine"][k] for k in data["machine"].keys() - {"date", "cores"}):
+            print(f"goes on from {file}", end=": ", file=sys.stderr)
+            return before
     except (OSError, ValueError, KeyError):
-        return None
-
-
-def resumed(file, data, keys, fresh):
-    """What `unfinished` finds, or None for a `fresh` run; says on stderr that the run goes on."""
-    before = None if fresh else unfinished(file, data, keys)
-    if before:
-        print(f"goes on from {file}", end=": ", file=sys.stderr)
-    return before
+        pass
+    return None
 
 
 def save(file, data):

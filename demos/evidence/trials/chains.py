@@ -166,9 +166,8 @@ class ChainMethod:
         negative = max(point.negative_modes for point in points)
         work = sum(point.iterations for point in points)
         stable = np.array([point.negative_modes == 0 for point in points])
-        return Answer(
-            np.array([chain.tip_moved(each) for each in x]), _said(negative), f"{chain.elements} elements", (), work, stable
-        )
+        tips = np.array([chain.tip_moved(each) for each in x])
+        return Answer(tips, _said(negative), f"{chain.elements} elements", (), work, stable)
 
     def _turned(self, chain, point, angle):
         """The end of the path, rotated with clamp and loads in parts of the angle, and solved again after each part."""
