@@ -1,6 +1,7 @@
 """buildah, which builds and runs images without a daemon, with all that it stores in one folder."""
 
 import contextlib
+import json
 import re
 import subprocess
 import tempfile
@@ -62,13 +63,18 @@ class Engine:
                 raise
             print(f"--- {image} of {age:.0f} days ago serves, as it could not be made anew: {failure}", flush=True)
 
-    def build(self, suite, certificates):
-        """The Dockerfile as it is, on debian:SUITE; returns the image's name."""
-        image = f"cosserat:{suite}"
-        words = ["--isolation", "chroot", "--pull-never", "--layers", "--volume", certificates]
+    def build(self, suite, stage, certificates):
+        """A stage of the Dockerfile as it is ("run" or "test"), on debian:SUITE; returns the image's name."""
+        image = f"cosserat-{stage}:{suite}"
+        words = ["--isolation", "chroot", "--pull-never", "--layers", "--volume", certificates, "--target", stage]
         self.do("bud", *words, "--build-arg", f"SUITE={suite}", "--tag", image, ".")
         self.do("rmi", "--prune", stdout=subprocess.DEVNULL)  # layers that no step uses any longer
         return image
+
+    def size(self, image):
+        """What an image takes on disk with its base, in words such as "1.8 GB"."""
+        (found,) = json.loads(self.ask("images", "--json", image))
+        return found["size"]
 
     @contextlib.contextmanager
     def container(self, image, *volumes):

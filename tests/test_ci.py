@@ -97,9 +97,9 @@ def test_a_base_is_made_once_and_anew_when_it_is_old(tmp_path, log, monkeypatch,
 
 def test_layers_are_copies_where_overlays_cannot_be(tmp_path, log, monkeypatch):
     monkeypatch.setenv("NO_OVERLAY", "1")
-    engine.Engine(tmp_path / "cache").build("trixie", "certificates:/etc/ssl/certs")
+    engine.Engine(tmp_path / "cache").build("trixie", "run", "certificates:/etc/ssl/certs")
     built = [line for line in log.read_text().splitlines() if " bud " in line][0]
-    assert built.startswith("--storage-driver vfs") and "--build-arg SUITE=trixie" in built
+    assert built.startswith("--storage-driver vfs") and "--target run --build-arg SUITE=trixie" in built
 
 
 def test_the_development_branch_is_tested_once_a_day_and_when_it_may_have_broken(debian, tmp_path):
@@ -107,6 +107,9 @@ def test_the_development_branch_is_tested_once_a_day_and_when_it_may_have_broken
     compat, other = tmp_path / "cosserat_fenicsx/compat.py", tmp_path / "cosserat_fenicsx/other.py"
     compat.write_text("A = 1")
     other.write_text("B = 1")
+    (tmp_path / ".ci").mkdir()
+    for name in ("Dockerfile", ".ci/dpkg.cfg", ".ci/debian-packages.txt"):
+        (tmp_path / name).write_text("C = 1")
     stamp = tmp_path / "tested"
     assert debian.is_due("sid", stamp, tmp_path)
     stamp.write_text(debian.served(tmp_path))
@@ -114,6 +117,9 @@ def test_the_development_branch_is_tested_once_a_day_and_when_it_may_have_broken
     other.write_text("B = 2")
     assert not debian.is_due("sid", stamp, tmp_path)
     other.write_text("from cosserat_fenicsx import compat")
+    assert debian.is_due("sid", stamp, tmp_path)
+    stamp.write_text(debian.served(tmp_path))
+    (tmp_path / "Dockerfile").write_text("C = 2")
     assert debian.is_due("sid", stamp, tmp_path)
     stamp.write_text(debian.served(tmp_path))
     os.utime(stamp, (time.time() - 90000,) * 2)
