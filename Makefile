@@ -18,7 +18,7 @@ export VTK_DEFAULT_OPENGL_WINDOW = vtkEGLRenderWindow
 # A numpy in the user's own site directory would hide the distribution's.
 export PYTHONNOUSERSITE = 1
 
-.PHONY: help setup packages demo animation motion gallery well string whirl test docs tables figure3 work-precision failures rods-in-wells folders random random-wells imperfect mutants clean
+.PHONY: help setup packages demo animation motion gallery well string whirl test docs tables figure3 work-precision failures rods-in-wells folders random random-wells imperfect mutants release clean
 
 help:
 	@echo "make demo    solve the eccentric cantilever of the paper on two processes; writes out/"
@@ -39,6 +39,7 @@ help:
 	@echo "make random-wells  100 random wells, strings and operations against finer meshes in a stiffer wall (about half an hour)"
 	@echo "make imperfect  60 symmetric structures with small imperfections against paths in small steps (about 20 minutes)"
 	@echo "make mutants  120 small errors put into the code: how many do the tests find? (hours)"
+	@echo "make release  the sdist, the wheel and the conda recipe, checked; writes dist/"
 	@echo "make setup   only what all of these need first: the Debian packages and the environment .venv"
 	@echo "make clean   remove .venv, out and whatever else was built here"
 
@@ -124,13 +125,15 @@ work-precision: setup
 
 setup: .venv/.stamp
 
+# What pip installs beside the package itself: extras of pyproject.toml.
+EXTRAS = test
 # dolfinx and petsc4py are compiled against the distribution's numpy and break with a newer one: pip may not replace it.
 .venv/.stamp: pyproject.toml .ci/debian-packages.txt
 	@$(MAKE) --no-print-directory packages
 	/usr/bin/python3 -m venv --clear --system-site-packages .venv
 	/usr/bin/python3 -c 'import numpy, scipy; print(f"numpy=={numpy.__version__}\nscipy=={scipy.__version__}")' \
 	    > .venv/constraints.txt
-	$(PYTHON) -m pip install --disable-pip-version-check --constraint .venv/constraints.txt --editable '.[test]'
+	$(PYTHON) -m pip install --disable-pip-version-check --constraint .venv/constraints.txt --editable '.[$(EXTRAS)]'
 	@touch $@
 
 .venv/.docs: .venv/.stamp
@@ -148,6 +151,14 @@ packages:
 mutants: setup
 	$(PYTHON) -m pip install --disable-pip-version-check --constraint .venv/constraints.txt pytest-cov
 	$(PYTHON) demos/evidence/mutants.py
+
+release: setup
+	$(PYTHON) -m pip install --disable-pip-version-check --constraint .venv/constraints.txt --editable '.[release]'
+	rm -rf dist
+	$(PYTHON) -m build --outdir dist
+	$(PYTHON) -m twine check --strict dist/*
+	$(PYTHON) -c 'import rattler_build as r; print(r.Stage0Recipe.from_file("recipe/recipe.yaml").render())'
+	sha256sum dist/*.tar.gz
 
 clean:
 	rm -rf .venv out build dist *.egg-info .pytest_cache docs/api

@@ -7,7 +7,7 @@ cosserat_fenicsx` and --help stay instant.
 from cosserat_fenicsx.names import public as _public
 from cosserat_fenicsx.ranks import watch as _watch
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 __getattr__, __dir__, __all__ = _public(__name__, __file__)
 
 _watch()

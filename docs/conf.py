@@ -25,7 +25,7 @@ html_css_files = ["site.css"]
 html_math_renderer = "drawn"
 html_show_sourcelink = html_copy_source = False
 templates_path = ["templates"]
-exclude_patterns = ["templates"]
+exclude_patterns = ["templates", "paper"]
 
 default_role = "py:obj"  # `Path` in a docstring becomes a link
 napoleon_use_ivar = True

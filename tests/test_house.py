@@ -1,11 +1,8 @@
 """The structure of the package: allowed imports, the wheel and the plain checkout, the length of files."""
 
 import ast
-import shutil
 import subprocess
 import sys
-import tomllib
-import zipfile
 from pathlib import Path
 
 import pytest
@@ -192,47 +189,6 @@ def test_one_place_says_which_ranks_work_together():
 def test_files_stay_small():
     for file in [*PACKAGE.rglob("*.py"), *(ROOT / "forms").glob("*.py"), *(ROOT / "tests").glob("*.py")]:
         assert len(file.read_text(encoding="utf-8").splitlines()) <= 700, file
-
-
-def test_the_wheel_holds_the_forms_and_works(tmp_path):
-    source = tmp_path / "source"  # a copy, so that no build/ is left in the checkout
-    for name in ("cosserat_fenicsx", "forms"):
-        shutil.copytree(ROOT / name, source / name, symlinks=True)
-    for name in ("pyproject.toml", "README.md", "LICENSE"):
-        shutil.copy(ROOT / name, source)
-    built = subprocess.run(
-        [sys.executable, "-m", "build", "--wheel", "--no-isolation", "--outdir", tmp_path, source],
-        capture_output=True,
-        encoding="utf-8",
-        cwd=tmp_path,
-    )
-    assert built.returncode == 0, built.stdout + built.stderr
-    (wheel,) = tmp_path.glob("*.whl")
-    names = zipfile.ZipFile(wheel).namelist()
-    assert "cosserat_fenicsx/forms/spatial.py" in names and "cosserat_fenicsx/models/spatial.py" in names
-    page = PACKAGE / "pictures" / "page"
-    assert {f"cosserat_fenicsx/pictures/page/{file.name}" for file in page.iterdir()} <= set(names)
-    assert {f"cosserat_fenicsx/algebra/{file.name}" for file in (PACKAGE / "algebra").glob("*.[ch]")} <= set(names)
-    stubs = {f"cosserat_fenicsx/{file.relative_to(PACKAGE)}" for file in PACKAGE.rglob("*.pyi")}
-    assert {"cosserat_fenicsx/py.typed", *stubs} <= set(names) and len(stubs) == 4
-    assert "cosserat_fenicsx/scene/rolled_profiles.csv" in names
-    assert "cosserat_fenicsx/well/standard_sizes.csv" in names
-    sources = (PACKAGE / "drilling").rglob("*.[ch]")
-    assert {f"cosserat_fenicsx/{file.relative_to(PACKAGE)}" for file in sources} <= set(names)
-    zipfile.ZipFile(wheel).extractall(tmp_path / "site")
-    code = "import cosserat_fenicsx.forms.spatial as f, cosserat_fenicsx as cf; print(f.__file__); cf.solve, cf.well.Bit"
-    done = subprocess.run([sys.executable, "-S", "-c",
-                           f"import sys; sys.path[:0] = {[str(tmp_path / 'site'), *sys.path]!r}; {code}"],
-                          capture_output=True, encoding="utf-8", cwd=tmp_path)  # fmt: skip
-    assert str(tmp_path / "site") in done.stdout, done.stderr
-
-
-def test_the_citation_and_the_metadata_agree():
-    citation = (ROOT / "CITATION.cff").read_text(encoding="utf-8").splitlines()
-    told = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-    assert f"version: {cf.__version__}" in citation and f"license: {told['license']['text']}" in citation
-    assert [f"  - name: {author['name']}" for author in told["authors"]] == [x for x in citation if "- name" in x]
-    assert (ROOT / "LICENSE").read_text(encoding="utf-8").startswith(told["license"]["text"])
 
 
 def test_a_plain_checkout_works(tmp_path):
