@@ -4,13 +4,14 @@ from contextlib import contextmanager
 
 import numpy as np
 import pytest
+import scipy.sparse
 from conftest import COMM
 from dense import tangent
 from mpi4py import MPI
 from scipy.linalg import eigvalsh_tridiagonal
 
 import cosserat_fenicsx as cf
-from cosserat_fenicsx.algebra import elimination
+from cosserat_fenicsx.algebra import eigen, elimination
 from cosserat_fenicsx.models.rodmesh import Layout
 from cosserat_fenicsx.statics.problem import solvers_of
 
@@ -313,3 +314,31 @@ def test_signs_of_a_large_system_without_a_pivot_on_its_diagonal(zeros):
     assert expected[1] == zeros and tuple(found) == expected
     product = np.nan if zeros else np.log(np.abs(eigenvalues)).sum()
     np.testing.assert_allclose(logarithm, product, rtol=1e-10)
+
+
+def sparse_system(seed, change):
+    """(starts, columns, values, dense matrix) of a diagonally heavy unsymmetric matrix; `change` of its entries."""
+    rng = np.random.default_rng(seed)
+    matrix = scipy.sparse.random(300, 300, 0.02, random_state=seed, format="csr") + 4 * scipy.sparse.identity(300)
+    matrix = matrix.tocsr()
+    matrix.sort_indices()
+    matrix.data *= 1 + change * rng.standard_normal(matrix.nnz)
+    return matrix.indptr, matrix.indices, matrix.data, matrix.toarray()
+
+
+def test_factors_of_an_earlier_matrix_serve(monkeypatch):
+    """They precondition; a matrix that is too far from the earlier one is factorised, a singular one is found out."""
+    monkeypatch.setattr(eigen, "_KEPT", 100)
+    starts, columns, values, _ = sparse_system(0, 0.0)
+    factors, b = eigen.RepeatedFactors(starts, columns), np.sin(np.arange(300.0))
+    assert factors.factor(values)
+    made = []
+    monkeypatch.setattr(factors, "_renewed", lambda renewed=factors._renewed: made.append(1) or renewed())
+    for change, renewals in ((0.0, 0), (1e-3, 0), (3.0, 1)):
+        *_, values, dense = sparse_system(0, change)
+        assert factors.factor(values)
+        np.testing.assert_allclose(factors.solve(b), np.linalg.solve(dense, b), rtol=0, atol=1e-10)
+        assert len(made) == renewals
+    values[starts[7] : starts[8]] = 0.0
+    assert factors.factor(values) and np.isnan(factors.solve(b)).all()
+    assert not factors.factor(values)

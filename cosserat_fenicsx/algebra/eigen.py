@@ -15,6 +15,9 @@ _UNSYMMETRIC, _REAL = 1e-10, 1e-5
 _PROJECTED = 400
 # Tolerance where eigenvalues of the other sign may lie much nearer to zero: their rounding limits the accuracy.
 _COARSE = 1e-9
+# Fewest unknowns of a matrix whose factors are kept for later ones; the relative residual of a solution with factors of
+# an earlier matrix, and the iterations that cost less than new factors.
+_KEPT, _REUSED, _MOST_REUSES = 2000, 1e-12, 12
 
 
 class _Inverse:
@@ -252,6 +255,63 @@ def constrained_factors(matrix, null=0.0):
     if A is not matrix:
         A.destroy()  # the PC keeps it
     return pc
+
+
+class RepeatedFactors:
+    """Solves with sparse matrices of one pattern on this rank, by LU factors; its symbolic analysis is made once.
+
+    Factors of a large matrix are kept while the matrices change little: they precondition GMRES, until it needs so many
+    iterations that new factors are cheaper.
+
+    Args:
+        starts: (rows + 1,) where each row starts among the entries; columns: (entries,) theirs, ascending in a row.
+    """
+
+    def __init__(self, starts, columns):
+        size = len(starts) - 1
+        self._pattern = starts.astype(PETSc.IntType), columns.astype(PETSc.IntType)
+        entries = *self._pattern, np.ones(len(columns))
+        self._matrix = PETSc.Mat().createAIJ((size, size), csr=entries, comm=PETSc.COMM_SELF)
+        self._b, self._x = self._matrix.createVecs()
+        self._ksp = PETSc.KSP().create(PETSc.COMM_SELF)
+        self._ksp.setType("gmres")
+        self._ksp.setPCSide(PETSc.PC.Side.RIGHT)
+        self._ksp.setTolerances(rtol=_REUSED, atol=0.0, max_it=_MOST_REUSES)
+        self._ksp.setOperators(self._matrix)
+        self._pc = self._ksp.getPC()
+        self._pc.setType("lu")
+        self._factor = _mumps(self._pc, self._matrix)
+        self._keeps, self._old = size >= _KEPT, None  # `_old`: whether the factors are of an earlier matrix, if any
+
+    def factor(self, values):
+        """Take the matrix of these entries (entries,); False where it is found to be singular."""
+        self._matrix.setValuesCSR(*self._pattern, values)
+        self._matrix.assemble()
+        if self._keeps and self._old is not None:
+            self._old = True
+            return True
+        return self._renewed()
+
+    def _renewed(self):
+        self._pc.setReusePreconditioner(False)
+        self._pc.setOperators(self._matrix)
+        self._pc.setUp()
+        self._pc.setReusePreconditioner(True)
+        found = self._factor.getMumpsInfog(1) >= 0
+        self._old = False if found else None
+        return found
+
+    def solve(self, b):
+        """The solution (rows,) for a right-hand side; not a number where the matrix is singular after all."""
+        self._b.array_w[:] = b
+        if self._old:
+            self._ksp.solve(self._b, self._x)
+            if self._ksp.getConvergedReason() > 0:
+                return self._x.array_r
+            if not self._renewed():
+                return np.full(len(b), np.nan)
+        self._pc.apply(self._b, self._x)
+        return self._x.array_r
 
 
 def _factor_constrained(pc, K, null=0.0):

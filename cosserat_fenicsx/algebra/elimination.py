@@ -130,13 +130,14 @@ class Elimination(Pointers):
             setattr(chain, name, self.doubles(array))
 
     def _find_places(self, at, ends, rows, slots):
-        numbering, places = self.numbering, []
-        for t in at:
-            first = self._shape[t, :2].sum()
-            kept = rows[t, first : first + self._shape[t, 2:].sum()] - numbering.size
-            where = np.concatenate([ends[t] + np.arange(slots[t]), kept]).astype(np.int64)
-            places.append(np.stack([np.repeat(where, len(where)), np.tile(where, len(where))]))
-        here = np.concatenate(places, axis=1) if places else np.empty((2, 0), dtype=np.int64)
+        numbering, first, kept = self.numbering, self._shape[at, :2].sum(axis=1), self._shape[at, 2:].sum(axis=1)
+        starts, here = np.cumsum((slots[at] + kept) ** 2), np.empty((2, len(self.condensed)), dtype=np.int64)
+        for shape in set(zip(first.tolist(), kept.tolist(), slots[at].tolist(), strict=True)):  # most have the same
+            a, b, c = shape
+            alike = np.flatnonzero((first == a) & (kept == b) & (slots[at] == c))
+            where = np.hstack([ends[at[alike], None] + np.arange(c), rows[at[alike], a : a + b] - numbering.size])
+            block = (starts[alike] - (b + c) ** 2)[:, None] + np.arange((b + c) ** 2)
+            here[0, block], here[1, block] = np.repeat(where, b + c, axis=1), np.tile(where, b + c)
         comm = numbering.comm
         everywhere = comm.allgather(here) if comm.size > 1 else [here]
         self.places, self._counts = np.concatenate(everywhere, axis=1), [part.shape[1] for part in everywhere]
@@ -288,7 +289,7 @@ class _Dense(Pointers):
 
 
 class _Sparse:
-    """A system by its columns."""
+    """A system by its rows, with factors by MUMPS."""
 
     def __init__(self, size):
         self._size = size
@@ -296,44 +297,24 @@ class _Sparse:
     def entries(self, rows, columns):
         """Where the entries at rows and columns are added."""
         each = np.arange(self._size)  # a diagonal of zeros is part of the pattern
-        keys, entry = np.unique(np.append(columns, each) * self._size + np.append(rows, each), return_inverse=True)
-        self._indices, self.room = (keys % self._size).astype(np.int32), len(keys)
-        self._starts = np.searchsorted(keys // self._size, np.arange(self._size + 1)).astype(np.int32)
+        keys, entry = np.unique(np.append(rows, each) * self._size + np.append(columns, each), return_inverse=True)
+        self._columns, self.room = keys % self._size, len(keys)
+        self._starts = np.searchsorted(keys // self._size, np.arange(self._size + 1))
+        self._factors = eigen.RepeatedFactors(self._starts, self._columns)
         return entry[: len(rows)]
 
-    def _matrix(self, values):
-        from scipy.sparse import csc_matrix  # slow to import, and few scenes need it
-
-        return csc_matrix((values, self._indices, self._starts), shape=(self._size, self._size))
-
     def factor(self, values, zero):
-        from scipy.sparse.linalg import splu
-
-        try:
-            self._solve = splu(self._matrix(values)).solve if np.isfinite(values).all() else None
-        except RuntimeError:  # SuperLU: exactly singular
-            self._solve = None
-        return self._solve is not None
+        return bool(np.isfinite(values).all()) and self._factors.factor(values)
 
     def solve(self, b):
-        b[:] = self._solve(b)
+        b[:] = self._factors.solve(b)
 
     def signs(self, values):
-        from scipy.sparse import diags
-        from scipy.sparse.linalg import splu
+        from scipy.sparse import csr_matrix, diags  # slow to import, and few scenes need it
 
-        matrix = self._matrix(values)
+        matrix = csr_matrix((values, self._columns, self._starts), shape=(self._size, self._size))
         scale = diags(_scale(matrix.diagonal()))
-        matrix = (scale @ matrix @ scale).tocsc()
-        try:
-            factors = splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
-            pivots = factors.U.diagonal()
-            if (factors.perm_r == factors.perm_c).all() and np.abs(pivots).min() > _ROUNDING:
-                logarithm = float(np.log(np.abs(pivots)).sum() - 2 * np.log(scale.diagonal()).sum())
-                return int((pivots < 0).sum()), 0, logarithm
-        except RuntimeError:
-            pass
-        negative, zero, logarithm = _inertia(matrix.tocsr())
+        negative, zero, logarithm = _inertia((scale @ matrix @ scale).tocsr())
         return negative, zero, logarithm - 2 * float(np.log(scale.diagonal()).sum())
 
 

@@ -141,21 +141,17 @@ def rod_data(scene, layout, scales, rule, reference, *, coupled):
         rule: the `ElementRule`; reference: (nodes, 3) positions at rest over the unit of length.
         coupled: whether the law couples strains.
     """
-    parts, first = [], 0
-    for rod, breaks, x in zip(scene.rods, layout.breaks, layout.inside(rule.gauss), strict=True):
-        s, shape = x.ravel() * rod.length, x.shape
-        along, frames = rod.stiffness_at(s.reshape(shape)), rod.curve.frame(s).reshape(*shape, 3, 3)
-        p, cells = len(rule.nodes) - 1, len(breaks) - 1
-        nodes = reference[first + p * np.arange(cells)[:, None] + np.arange(p + 1)]
-        first += p * cells + 1
-        h = np.diff(breaks) * rod.length / scales.length
-        r_s = np.einsum("gj,cji->cgi", rule.slopes, nodes) / h[:, None, None]
-        parts.append(RodData(
-            *law_data(along, scales, coupled=coupled),
-            frames.reshape(*shape, 9),
-            np.einsum("cgij,cgi->cgj", frames, r_s),
-        ))  # fmt: skip
-    return joined(parts)
+    parts, frames = [], []
+    for rod, x in zip(scene.rods, layout.inside(rule.gauss), strict=True):
+        s = x.ravel() * rod.length
+        frames.append(rod.curve.frame(s).reshape(*x.shape, 3, 3))
+        parts.append(law_data(rod.stiffness_at(s.reshape(x.shape)), scales, coupled=coupled))
+    law, frames = joined(parts), np.concatenate(frames)
+    p, counts = len(rule.nodes) - 1, np.array(layout.counts)
+    first = p * np.arange(counts.sum()) + np.repeat(np.arange(len(counts)), counts)
+    h = layout.sizes(scene) / scales.length
+    r_s = np.einsum("gj,cji->cgi", rule.slopes, reference[first[:, None] + np.arange(p + 1)]) / h[:, None, None]
+    return RodData(*law, frames.reshape(*frames.shape[:2], 9), np.einsum("cgij,cgi->cgj", frames, r_s))
 
 
 def joined(parts):

@@ -61,11 +61,16 @@ def compared(coarse, fine, rule):
     local = halfway(rule.nodes)
     ends = (local == local[0]) | (local == local[-1])
     near = np.clip(local, _INWARDS, 1 - _INWARDS)
-    found, xs = [], coarse.inside(local)
-    for breaks, x, sure, of_rod in zip(fine.breaks, xs, coarse.inside(near), cells_of(fine), strict=True):
-        cells, _ = rule.locate_all(breaks, sure.ravel())
-        of_cells = (x.ravel() - breaks[cells]) / np.diff(breaks)[cells]
-        found.append((of_rod.start + cells, rule.basis(np.clip(of_cells, 0.0, 1.0)), np.tile(ends, len(x))))
+    found, xs, sures = [], coarse.inside(local), coarse.inside(near)
+
+    def of_pair(i):
+        breaks = fine.breaks[i]
+        cells, _ = rule.locate_all(breaks, sures[i].ravel())
+        of_cells = (xs[i].ravel() - breaks[cells]) / np.diff(breaks)[cells]
+        return cells, rule.basis(np.clip(of_cells, 0.0, 1.0)), np.tile(ends, len(xs[i]))
+
+    for (cells, *others), of_rod in zip(_by_pair(of_pair, coarse, fine), cells_of(fine), strict=True):
+        found.append((of_rod.start + cells, *others))
     parts = map(np.concatenate, zip(*found, strict=True))
     return Compared(rule.basis(local), *parts, in_turn(x.size for x in xs))
 
@@ -76,12 +81,26 @@ def transferred(coarse, fine, rule):
     and of all its Gauss points the coarse elements with the weights of their Gauss points."""
     at_nodes, at_gauss = [], []
     xs, insides, of_rods = fine.node_s(rule.nodes), fine.inside(rule.gauss), cell_nodes(coarse, len(rule.nodes) - 1)
-    for i, breaks in enumerate(coarse.breaks):
-        cells, weights = rule.locate_all(breaks, xs[i])
+
+    def of_pair(i):
+        breaks = coarse.breaks[i]
+        return rule.locate_all(breaks, xs[i]), rule.locate_all(breaks, insides[i].ravel(), rule.between_gauss)
+
+    for i, ((cells, weights), (of_gauss, at)) in enumerate(_by_pair(of_pair, coarse, fine)):
         at_nodes.append((of_rods[i][0][cells], weights))
-        cells, weights = rule.locate_all(breaks, insides[i].ravel(), rule.between_gauss)
-        at_gauss.append((cells_of(coarse)[i].start + cells, weights))
+        at_gauss.append((cells_of(coarse)[i].start + of_gauss, at))
     return [tuple(map(np.concatenate, zip(*found, strict=True))) for found in (at_nodes, at_gauss)]
+
+
+def _by_pair(of_pair, coarse, fine):
+    """`of_pair(i)` for every rod, found once for rods whose elements end at the same shares of the length on both
+    meshes."""
+    keys = [(a.tobytes(), b.tobytes()) for a, b in zip(coarse.breaks, fine.breaks, strict=True)]
+    found = {}
+    for i, key in enumerate(keys):
+        if key not in found:
+            found[key] = of_pair(i)
+    return [found[key] for key in keys]
 
 
 def halfway(places):

@@ -46,6 +46,7 @@ class FirstMesh:
     straight: float = 0.958
     bending: float = 4.0  # wave number of the displacement of a straight rod that bends by a radian, over its length
     most: int = 3  # elements per unit of the wave number
+    many_rods: int = 32  # fewest rods of a frame in which each is assumed to bend by little: one element of each
     samples: int = 257  # places at which the direction of a rod's axis is compared
     estimated: float = 1.5  # difference of two meshes over the true error, about
     gained: float = 0.25  # share of the gain of a halving that is assumed for the finer mesh
@@ -67,6 +68,8 @@ def meshes_for(scene, degree, tol, many):
     waves = _FIRST.bending + _turning(scene)
     # the best polynomial for a wave is off by (waves/2n)^(p + 1)/((p + 1)! 2^p) of its amplitude, that by 1/waves
     elements = waves / 2 * (wanted * waves * math.factorial(degree + 1) * 2**degree) ** (-1 / (degree + 1))
+    if len(scene.rods) >= _FIRST.many_rods:
+        elements = 1
     layout = first_layout(scene, degree, math.ceil(min(max(elements, 1), _FIRST.most * waves)))
     if elements <= FIRST_ELEMENTS and any(a > b for a, b in zip(layout.counts, usual.counts, strict=True)):
         return usual, None  # which asks less of curves
