@@ -54,6 +54,7 @@ motion: setup
 
 gallery: setup
 	$(PYTHON) demos/gallery.py
+	$(PYTHON) demos/frames.py
 
 well: setup
 	$(PYTHON) demos/wells.py

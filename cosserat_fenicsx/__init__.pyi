@@ -44,6 +44,9 @@ from cosserat_fenicsx.scene.curves import Helix as Helix
 from cosserat_fenicsx.scene.curves import Line as Line
 from cosserat_fenicsx.scene.curves import Spline as Spline
 from cosserat_fenicsx.scene.curves import UniformCurvature as UniformCurvature
+from cosserat_fenicsx.scene.frames import Frame as Frame
+from cosserat_fenicsx.scene.frames import frame as frame
+from cosserat_fenicsx.scene.frames import frame_from as frame_from
 from cosserat_fenicsx.scene.loads import EccentricForce as EccentricForce
 from cosserat_fenicsx.scene.loads import FollowerForce as FollowerForce
 from cosserat_fenicsx.scene.loads import FollowerMoment as FollowerMoment

@@ -1,0 +1,275 @@
+"""Frames: straight rods between points, joined where they meet, from arrays or from a file with a mesh of lines."""
+
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+from os import PathLike
+
+import numpy as np
+
+from cosserat_fenicsx.checks import File, Numbers, Rows, finite_array
+from cosserat_fenicsx.errors import SceneError, nearest
+from cosserat_fenicsx.scene.curves import Line
+from cosserat_fenicsx.scene.profiles import Section
+from cosserat_fenicsx.scene.rod import Rod, Station
+from cosserat_fenicsx.scene.scene import Scene
+from cosserat_fenicsx.scene.sections import Material, Stiffness
+from cosserat_fenicsx.scene.supports import Clamp, Joint
+
+# Arrays of a mesh that may number the groups of its lines, in the order in which they are looked for.
+_GROUPS = ("section", "gmsh:physical", "medit:ref", "cell_tags")
+
+
+class Frame:
+    """Straight rods between points, which `frame` and `frame_from` make.
+
+    Attributes:
+        points: (n, 3) m. edges: (rods, 2) numbers of the points at the start and at the end of each rod.
+        rods: the rods, "rod0", "rod1" and so on where they have no other names.
+        joints: of the rods that meet at a point, each to the first one there.
+        supports: a `Clamp` at each clamped point.
+    """
+
+    def __init__(self, points, edges, rods, clamped, hinged):
+        self.points, self.edges, self.rods, self._hinged = points, edges, rods, frozenset(hinged)
+        self.supports = tuple(Clamp(self.at(point)) for point in clamped)
+
+    def at(self, point: int) -> Station:
+        """The station at a point, to put loads and supports there and to ask for results: an end of the first rod
+        that meets it.
+
+        Raises:
+            SceneError: no such point, or no rod meets it.
+        """
+        if not 0 <= point < len(self.points):
+            raise SceneError(f"Frame.at({point}): expected a number from 0 to {len(self.points) - 1}")
+        if point not in self._ends:
+            raise SceneError(f"Frame.at({point}): no rod meets this point: expected an end of an edge")
+        return self._ends[point][0]
+
+    def nearest(self, place: Numbers) -> int:
+        """The number of the point nearest to a place (x, y, z), m, among those that rods meet."""
+        place = finite_array("Frame.nearest", "place", place, "a point (x, y, z), m")
+        met = np.array(sorted(self._ends))
+        return int(met[np.argmin(np.linalg.norm(self.points[met] - place, axis=1))])
+
+    @cached_property
+    def _ends(self):
+        """{point: the ends of rods there}."""
+        ends = {}
+        for rod, (a, b) in zip(self.rods, self.edges.tolist(), strict=True):
+            ends.setdefault(a, []).append(rod.start)
+            ends.setdefault(b, []).append(rod.end)
+        return ends
+
+    @cached_property
+    def joints(self) -> tuple[Joint, ...]:
+        found = []
+        for point, (first, *others) in self._ends.items():
+            release = "all" if point in self._hinged else None
+            found += [Joint(first, other, release=release) for other in others]
+        return tuple(found)
+
+    def scene(self, loads: Sequence = (), supports: Sequence = (), **more) -> Scene:
+        """The `Scene` of this frame: with these loads, and with supports beside the clamped points.
+
+        Args:
+            more: further arguments of `Scene`, such as velocities.
+
+        Raises:
+            SceneError: see `Scene`.
+        """
+        return Scene(self.rods, (*self.supports, *supports), tuple(loads), self.joints, **more)
+
+    def __len__(self):
+        return len(self.rods)
+
+    def __repr__(self):
+        held = f"{len(self.supports)} clamped" if self.supports else "none clamped"
+        return f"<Frame: {len(self.rods)} rods between {len(self.points)} points, {held}>"
+
+
+def frame(
+    points: Rows,
+    edges: Rows,
+    section: Section | Stiffness | Sequence,
+    material: Material | Sequence | None = None,
+    *,
+    clamped: Sequence[int] = (),
+    hinged: Sequence[int] = (),
+    d1: Numbers | None = None,
+    names: Sequence[str] | None = None,
+) -> Frame:
+    """Straight rods between points, welded where they meet.
+
+    Args:
+        points: (n, 3) m. edges: (rods, 2) numbers of the points that each rod connects, from 0.
+        section, material: of all rods; or one for every edge. Without a material sections are `Stiffness`es.
+        clamped: numbers of points that are clamped.
+        hinged: numbers of points at which rods meet in ball joints.
+        d1: see `Line`, of all rods. names: of the rods.
+
+    Returns:
+        A `Frame`; `frame.scene(loads)` is what `solve`, `buckling` and `modes` take.
+
+    Raises:
+        SceneError: a number of a point that is not there, an edge without length or that occurs twice, or not as many
+            sections, materials or names as edges.
+    """
+    points = finite_array("frame", "points", points, "rows of three numbers, m")
+    if points.ndim != 2 or points.shape[1] != 3 or not len(points):
+        raise SceneError(f"frame.points has the shape {points.shape}: expected (points, 3)")
+    ends = np.asarray(edges)
+    if ends.ndim != 2 or ends.shape[1] != 2 or not len(ends) or not np.issubdtype(ends.dtype, np.integer):
+        raise SceneError(f"frame.edges has the shape {ends.shape}: expected (rods, 2) whole numbers of points")
+    wrong = np.flatnonzero(((ends < 0) | (ends >= len(points))).any(axis=1))
+    if len(wrong):
+        edge, last = ends[wrong[0]].tolist(), len(points) - 1
+        raise SceneError(f"frame.edges[{wrong[0]}] = {edge}: expected numbers of points from 0 to {last}")
+    _, first, count = np.unique(np.sort(ends, axis=1), axis=0, return_index=True, return_counts=True)
+    if (count > 1).any():
+        raise SceneError(f"frame.edges: {ends[first[count > 1][0]].tolist()} occurs twice: expected each rod once")
+    sections, materials = _one_each("section", section, len(ends)), _one_each("material", material, len(ends))
+    names = [f"rod{i}" for i in range(len(ends))] if names is None else _one_each("names", list(names), len(ends))
+    places = [tuple(x) for x in points.tolist()]
+    rods = tuple(
+        Rod(Line(places[a], places[b], d1=d1), sections[i], materials[i], name=names[i])
+        for i, (a, b) in enumerate(ends.tolist())
+    )
+    return Frame(points, ends, rods, _numbers("clamped", clamped), _numbers("hinged", hinged))
+
+
+def _one_each(field, value, count):
+    """One value for every edge, from one or from so many."""
+    if not isinstance(value, list | tuple):
+        return [value] * count
+    if len(value) != count:
+        raise SceneError(f"frame.{field} has {len(value)} values: expected one, or {count}, one for every edge")
+    return value
+
+
+def _numbers(field, value):
+    found = np.atleast_1d(np.asarray(value))
+    if found.size and not np.issubdtype(found.dtype, np.integer):
+        raise SceneError(f"frame.{field} = {value!r}: expected numbers of points")
+    return found.astype(int).tolist()
+
+
+def frame_from(
+    mesh: File,
+    section: Section | Stiffness | Mapping,
+    material: Material | Mapping | None = None,
+    *,
+    clamped: str | Sequence[str] = (),
+    hinged: str | Sequence[str] = (),
+    scale: float = 1.0,
+    d1: Numbers | None = None,
+) -> Frame:
+    """The frame of the lines of a mesh, as gmsh, Abaqus, VTK and other programs write it.
+
+    Args:
+        mesh: a file that meshio reads, or a `meshio.Mesh`.
+        section, material: of all rods; or {group: section}, a group being the name or the number that the mesh gives
+            to its lines: an element set (Abaqus), a physical group (gmsh), or the integers of the cell data "section".
+        clamped, hinged: names of the points that are clamped, or at which rods meet in ball joints: node sets (Abaqus),
+            physical groups of points (gmsh), or point data that are not zero there (VTK).
+        scale: m per unit of the mesh.
+        d1: see `frame`.
+
+    Returns:
+        A `Frame`, whose points have the numbers of the mesh.
+
+    Raises:
+        SceneError: it cannot be read, has no straight lines, or a group or name is not in it, which lists those that
+            are.
+    """
+    import meshio  # slow to import, and few scenes need it
+
+    if isinstance(mesh, str | PathLike):
+        try:
+            mesh = meshio.read(mesh)
+        except (OSError, meshio.ReadError, KeyError, ValueError, SystemExit) as problem:
+            raise SceneError(
+                f"frame_from: {mesh} cannot be read ({problem}): expected a mesh that meshio reads"
+            ) from None
+    blocks = [i for i, block in enumerate(mesh.cells) if block.type == "line"]
+    if not blocks:
+        kinds = ", ".join(sorted({block.type for block in mesh.cells})) or "no cells"
+        raise SceneError(f"frame_from: the mesh has {kinds}: expected cells of the type line, with two points each")
+    edges = np.concatenate([mesh.cells[i].data for i in blocks]).astype(int)
+    points = np.zeros((len(mesh.points), 3))
+    points[:, : mesh.points.shape[1]] = mesh.points * scale
+    groups = _groups(mesh, blocks, len(edges))
+    chosen = [_by_group(field, value, groups, len(edges))
+              for field, value in (("section", section), ("material", material))]  # fmt: skip
+    sets = _point_sets(mesh)
+    held, loose = (_points_named(field, names, sets) for field, names in (("clamped", clamped), ("hinged", hinged)))
+    return frame(points, edges, *chosen, clamped=held, hinged=loose, d1=d1)
+
+
+def _groups(mesh, blocks, count):
+    """{name or number: (count,) of bool} of the lines of a mesh."""
+    groups = {}
+    for name, parts in mesh.cell_sets.items():
+        marked, first = np.zeros(count, dtype=bool), 0
+        for i in blocks:
+            marked[first + np.asarray(parts[i], dtype=int)] = True
+            first += len(mesh.cells[i].data)
+        if marked.any() and ":" not in name:  # meshio's own sets have a colon
+            groups[name] = marked
+    for array in (name for name in _GROUPS if name in mesh.cell_data):
+        numbers = np.concatenate([np.ravel(mesh.cell_data[array][i]) for i in blocks]).astype(int)
+        names = {int(tag): name for name, (tag, dimension) in mesh.field_data.items() if dimension == 1}
+        for number in np.unique(numbers).tolist():
+            groups.setdefault(number, numbers == number)
+            if number in names:
+                groups.setdefault(names[number], numbers == number)
+        break
+    return groups
+
+
+def _by_group(field, value, groups, count):
+    """A section or a material for every line, from one or from {group: it}."""
+    if not isinstance(value, Mapping):
+        return value
+    found = [None] * count
+    for group, item in value.items():
+        if group not in groups:
+            raise SceneError(f"frame_from.{field}: no lines are in the group {group!r}: {_known(group, groups)}")
+        for i in np.flatnonzero(groups[group]).tolist():
+            found[i] = item
+    missing = next((i for i, item in enumerate(found) if item is None), None)
+    if missing is not None:
+        left = [repr(name) for name, marked in groups.items() if marked[missing]] or ["no group"]
+        raise SceneError(f"frame_from.{field}: line {missing} is in {', '.join(left)}: expected a {field} for it")
+    return found
+
+
+def _point_sets(mesh):
+    """{name: numbers of points} of a mesh."""
+    sets = {name: np.asarray(numbers, dtype=int) for name, numbers in mesh.point_sets.items()}
+    tags = mesh.cell_data.get("gmsh:physical")
+    for name, (tag, dimension) in mesh.field_data.items():
+        if dimension == 0 and tags is not None:
+            at = [block.data[np.ravel(numbers) == tag].ravel()
+                  for block, numbers in zip(mesh.cells, tags, strict=True) if block.type == "vertex"]  # fmt: skip
+            sets.setdefault(name, np.concatenate([*at, np.empty(0, dtype=int)]).astype(int))
+    for name, values in mesh.point_data.items():
+        if np.ndim(values) == 1 or np.shape(values)[1:] == (1,):
+            sets.setdefault(name, np.flatnonzero(np.ravel(values)))
+    return sets
+
+
+def _points_named(field, names, sets):
+    """Numbers of the points of these names."""
+    names = [names] if isinstance(names, str) else list(names)
+    for name in names:
+        if name not in sets:
+            raise SceneError(f"frame_from.{field}: no points are named {name!r}: {_known(name, sets)}")
+    return np.unique(np.concatenate([*(sets[name] for name in names), np.empty(0, dtype=int)])).astype(int)
+
+
+def _known(name, known):
+    """What a message says about names that a mesh has."""
+    if not known:
+        return "the mesh names none"
+    return nearest(name, [str(x) for x in known])

@@ -1,0 +1,123 @@
+"""Frames from arrays and from files with meshes, against scenes put together by hand and against statics."""
+
+from pathlib import Path
+
+import meshio
+import numpy as np
+import pytest
+
+import cosserat_fenicsx as cf
+
+pytestmark = pytest.mark.serial
+STEEL = cf.Material(E=210e9, nu=0.3, density=7850.0)
+THICK, THIN = cf.Circle(0.2), cf.Circle(0.1)
+PORTAL = np.array([[0, 0, 0], [0, 0, 3.0], [4.0, 0, 3.0], [4.0, 0, 0], [2.0, 2.0, 0]])
+LEGS = [[0, 1], [1, 2], [2, 3]]
+
+
+def tip(scene, station):
+    return cf.solve(scene, [1.0]).displacement(station)[-1]
+
+
+def test_a_portal_is_the_scene_put_together_by_hand():
+    frame = cf.frame(PORTAL, LEGS, THICK, STEEL, clamped=[0, 3])
+    assert len(frame) == 3 and repr(frame) == "<Frame: 3 rods between 5 points, 2 clamped>"
+    assert frame.nearest((3.9, 0.1, 2.9)) == 2 and frame.at(2).rod.name == "rod1"
+    rods = [cf.Rod(cf.Line(tuple(PORTAL[a]), tuple(PORTAL[b])), THICK, STEEL, name=f"leg{a}") for a, b in LEGS]
+    by_hand = cf.Scene(
+        rods, [cf.Clamp(rods[0].start), cf.Clamp(rods[2].end)], [cf.Force(rods[0].end, (2e5, 3e4, -1e5))],
+        [cf.Joint(rods[0].end, rods[1].start), cf.Joint(rods[1].end, rods[2].start)],
+    )  # fmt: skip
+    found = tip(frame.scene([cf.Force(frame.at(1), (2e5, 3e4, -1e5))]), frame.at(2))
+    np.testing.assert_allclose(found, tip(by_hand, rods[1].end), rtol=1e-12)
+
+
+def test_a_tripod_of_hinged_bars_carries_by_tension_alone():
+    """Three equal bars under a vertical force P: N = -P/(3 cos(angle)), displacement P L/(3 EA cos^2(angle))."""
+    angles = 2 * np.pi * np.arange(3) / 3
+    feet = np.column_stack([np.cos(angles), np.sin(angles), np.zeros(3)])
+    frame = cf.frame([*feet, [0, 0, 2.0]], [[0, 3], [1, 3], [2, 3]], THIN, STEEL, hinged=[3])
+    pins = [cf.Pin(frame.at(k)) for k in range(3)]
+    spin = [cf.Spring(frame.at(k), rotational=1.0) for k in range(3)]  # about its axis a bar is free
+    path = cf.solve(frame.scene([cf.Force(frame.at(3), (0, 0, -3e3)), *spin], pins), [1.0], tol=1e-9)
+    length, cosine = np.sqrt(5), 2 / np.sqrt(5)
+    axial = 3e3 / (3 * cosine)
+    assert np.linalg.norm(path.force(frame.at(0))[-1]) == pytest.approx(axial, rel=1e-6)
+    moved = path.displacement(frame.at(3))[-1]
+    assert moved[2] == pytest.approx(-axial * length / (frame.rods[0].stiffness.axial * cosine), rel=1e-5)
+
+
+def mesh(**more):
+    return meshio.Mesh(PORTAL, [("line", np.array(LEGS[:2])), ("line", np.array(LEGS[2:]))], **more)
+
+
+def abaqus(folder):
+    meshio.Mesh(PORTAL, [("line", np.array(LEGS))], point_sets={"FEET": np.array([0, 3])},
+                cell_sets={"LEGS": [np.array([0, 2])], "BEAM": [np.array([1])]},
+                ).write(folder / "portal.inp")  # fmt: skip
+    return folder / "portal.inp", {"LEGS": THICK, "BEAM": THIN}, "FEET"
+
+
+def gmsh(folder):
+    cells = [("line", np.array(LEGS)), ("vertex", np.array([[0], [3]]))]
+    tags = [np.array([7, 8, 7]), np.array([9, 9])]
+    meshio.Mesh(PORTAL, cells, cell_data={"gmsh:physical": tags, "gmsh:geometrical": tags},
+                field_data={"legs": np.array([7, 1]), "beam": np.array([8, 1]), "feet": np.array([9, 0])},
+                ).write(folder / "portal.msh", file_format="gmsh22")  # fmt: skip
+    return folder / "portal.msh", {"legs": THICK, 8: THIN}, "feet"
+
+
+def vtk(folder):
+    mesh(cell_data={"section": [np.array([1, 2]), np.array([1])]},
+         point_data={"clamped": np.array([1, 0, 0, 1, 0])}).write(folder / "portal.vtu")  # fmt: skip
+    return folder / "portal.vtu", {1: THICK, 2: THIN}, "clamped"
+
+
+@pytest.mark.parametrize("written", [abaqus, gmsh, vtk])
+def test_meshes_of_other_programs_give_the_same_frame(written, tmp_path):
+    file, sections, feet = written(tmp_path)
+    frame = cf.frame_from(file, sections, STEEL, clamped=feet, scale=0.5)
+    given = cf.frame(PORTAL / 2, LEGS, [THICK, THIN, THICK], STEEL, clamped=[0, 3])
+    np.testing.assert_array_equal(frame.points[frame.edges], given.points[given.edges])
+    assert [rod.section for rod in frame.rods] == [rod.section for rod in given.rods]
+    assert [x.station.full_name for x in frame.supports] == [x.station.full_name for x in given.supports]
+    with pytest.raises(cf.SceneError, match="no lines are in the group 'leg'"):
+        cf.frame_from(file, {"leg": THICK}, STEEL)
+    with pytest.raises(cf.SceneError, match=f"no points are named 'foot': .*{feet}"):
+        cf.frame_from(file, THICK, STEEL, clamped="foot")
+    with pytest.raises(cf.SceneError, match=r"line \d is in .*: expected a section for it"):
+        cf.frame_from(file, dict([*sections.items()][:1]), STEEL)
+
+
+@pytest.mark.parametrize(("changed", "words"), [
+    ({"edges": [[0, 1], [1, 5]]}, r"edges\[1\] = \[1, 5\]: expected numbers of points from 0 to 4"),
+    ({"edges": [[0, 1], [1, 0]]}, r"\[0, 1\] occurs twice"),
+    ({"edges": [[0.0, 1.0]]}, r"expected \(rods, 2\) whole numbers"),
+    ({"edges": [[0, 0]]}, "a point apart from start"),
+    ({"points": [[0, 0], [1, 1]]}, r"expected \(points, 3\)"),
+    ({"section": [THICK, THIN]}, "frame.section has 2 values: expected one, or 3"),
+    ({"clamped": [4]}, "no rod meets this point"),
+    ({"clamped": [0.5]}, "expected numbers of points"),
+])  # fmt: skip
+def test_refusals(changed, words):
+    with pytest.raises(cf.SceneError, match=words):
+        cf.frame(**{"points": PORTAL, "edges": LEGS, "section": THICK, "material": STEEL} | changed)
+
+
+def test_files_that_are_no_frames_are_refused(tmp_path):
+    (tmp_path / "a.vtu").write_text("nothing")
+    with pytest.raises(cf.SceneError, match="cannot be read"):
+        cf.frame_from(tmp_path / "a.vtu", THICK, STEEL)
+    with pytest.raises(cf.SceneError, match="the mesh has triangle: expected cells of the type line"):
+        cf.frame_from(meshio.Mesh(PORTAL, [("triangle", [[0, 1, 2]])]), THICK, STEEL)
+
+
+@pytest.mark.slow
+def test_the_demos_give_their_numbers(monkeypatch):
+    """A gridshell up to where it buckles, a lattice tower, a net."""
+    monkeypatch.syspath_prepend(str(Path(__file__).parent.parent / "demos"))
+    import frames
+    from known_numbers import deviation
+
+    for check in frames.main(out=None):
+        assert deviation(check) <= check.allowed, check
