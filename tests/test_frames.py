@@ -114,10 +114,10 @@ def test_files_that_are_no_frames_are_refused(tmp_path):
 
 @pytest.mark.slow
 def test_the_demos_give_their_numbers(monkeypatch):
-    """A gridshell up to where it buckles, a lattice tower, a net."""
+    """A lattice tower and a net; the gridshell takes ten seconds."""
     monkeypatch.syspath_prepend(str(Path(__file__).parent.parent / "demos"))
     import frames
     from known_numbers import deviation
 
-    for check in frames.main(out=None):
+    for check in frames.main(["lattice", "net"], out=None):
         assert deviation(check) <= check.allowed, check
