@@ -18,21 +18,21 @@ from PIL import Image
 ROOT = Path(__file__).resolve().parents[2]
 #: The tables that stand in a page, each with its page and pictures.
 PAGES = {
-    "accuracy": ("accuracy.md",),
-    "orders": ("accuracy.md",),
-    "figure3": ("accuracy.md", "figure3.png"),
-    "rungs": ("speed.md",),
-    "choice": ("speed.md",),
-    "scaling": ("speed.md",),
-    "ranks": ("speed.md",),
-    "steps": ("speed.md",),
-    "overhead": ("speed.md",),
-    "first_runs": ("speed.md",),
-    "work_precision": ("speed.md", "work_precision_sweep.png"),
-    "work_precision_motion": ("speed.md", "work_precision_motion.png"),
-    "work_precision_string": ("speed.md", "work_precision_string.png"),
-    "soft_string": ("wells.md", "soft_string.png"),
-    "rods_in_wells": ("wells.md",),
+    "accuracy": ("evidence/accuracy.md",),
+    "orders": ("evidence/accuracy.md",),
+    "figure3": ("evidence/figure3.md", "figure3.png"),
+    "rungs": ("evidence/cost.md",),
+    "choice": ("evidence/cost.md",),
+    "scaling": ("evidence/cost.md",),
+    "ranks": ("evidence/cost.md",),
+    "steps": ("evidence/cost.md",),
+    "overhead": ("evidence/cost.md",),
+    "first_runs": ("evidence/cost.md",),
+    "work_precision": ("evidence/other_programs.md", "work_precision_sweep.png"),
+    "work_precision_motion": ("evidence/other_programs.md", "work_precision_motion.png"),
+    "work_precision_string": ("evidence/other_programs.md", "work_precision_string.png"),
+    "soft_string": ("evidence/wells.md", "soft_string.png"),
+    "rods_in_wells": ("evidence/wells.md",),
 }
 #: The tables with a page of their own: its title and pictures.
 ALONE = {
