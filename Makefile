@@ -21,14 +21,15 @@ export PYTHONNOUSERSITE = 1
 .PHONY: help setup packages demo animation motion gallery well string whirl test docs tables figure3 work-precision failures rods-in-wells folders random random-wells imperfect mutants release clean
 
 help:
-	@echo "make demo    solve the eccentric cantilever of the paper on two processes; writes out/"
-	@echo "make animation  the animation at the top of the README: the column far past its limit load"
-	@echo "make motion  seven motions, each a scene file, a picture and a number that must come out; writes out/ (a minute)"
-	@echo "make gallery the scene files of demos/, each with a picture and a number that must come out; writes out/"
-	@echo "make well    strings in wells: torque and drag, each with pictures and a number that must come out; writes out/wells/ (half a minute)"
-	@echo "make string  drill-strings in motion: stick-slip, waves, a map of stability, each with pictures and numbers that must come out; writes out/strings/ (a minute)"
-	@echo "make whirl   a collar in its hole from forward to backward whirl, and a map of whirl over speed and friction; writes out/whirl/ (five minutes)"
-	@echo "make docs    the documentation as a site that needs no network; writes out/docs/index.html"
+	@echo "Times are those of two cores and an empty cache of compiled forms, after \`make setup\`."
+	@echo "make demo    solve the eccentric cantilever of the paper on two processes; writes out/ (a quarter of a minute)"
+	@echo "make animation  the animation at the top of the README: the column far past its limit load (a quarter of a minute)"
+	@echo "make motion  seven motions, each a scene file, a picture and a number that must come out; writes out/ (half a minute)"
+	@echo "make gallery the scene files of demos/, each with a picture and a number that must come out; writes out/ (half a minute)"
+	@echo "make well    strings in wells: torque and drag, each with pictures and a number that must come out; writes out/wells/ (a minute)"
+	@echo "make string  drill-strings in motion: stick-slip, waves, a map of stability, each with pictures and numbers that must come out; writes out/strings/ (half a minute)"
+	@echo "make whirl   a collar in its hole from forward to backward whirl, and a map of whirl over speed and friction; writes out/whirl/ (three minutes)"
+	@echo "make docs    the documentation as a site that needs no network; writes out/docs/index.html (a minute)"
 	@echo "make test    all tests, the serial ones on two workers"
 	@echo "make tables  the tables of accuracy and cost in docs/, measured anew and put there"
 	@echo "make figure3 every curve of the paper's Figure 3, and what was found; writes out/ (about 4 minutes)"
