@@ -1,7 +1,7 @@
 """Where methods fail: a table of methods and trials, each cell a number and a verdict (`make failures`).
 
     python demos/evidence/failures.py            at most 15 minutes; writes out/failures.json, .md and .png
-    python demos/evidence/failures.py --quick    this package and the comparison models, fewer steps; at most a minute
+    python demos/evidence/failures.py --quick    this package and the comparison models, fewer steps; under two minutes
     python demos/evidence/failures.py --fresh    from the start, without results of an earlier run
 
 An interrupted run keeps its cells; the same command continues from them. Programs that are not installed are shown as
