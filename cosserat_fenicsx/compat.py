@@ -393,7 +393,7 @@ def expression_address(expression):
     """(address, Functions, Constants) of a compiled expression; valid as long as it is kept.
 
     Its kernel adds (points * components) values to A. w holds the values of the Functions on the cell, all of the first
-    in the order of its dofs, then all of the next; c holds the values of the Constants likewise.
+    in the order of its dofs, then all of the next; c holds the values of the Constants in the same way.
     """
     compiled, of_ufl = expression.ufcx_expression, expression.ufl_expression
     functions = ufl.algorithms.extract_coefficients(of_ufl)

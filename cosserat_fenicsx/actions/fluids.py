@@ -24,9 +24,9 @@ class AddedMass(LineAction):
     around it and inside it.
 
     It has no weight (buoyancy carries it), no rotational inertia and no unbalance: its centre is on the axis also where
-    the rod is eccentric. It does not move along the tangent that the rod has at rest, which suits rods that stay near
-    their line at rest, such as in a hole; rods that do not need `axial`. (Only then is the angular momentum of a free
-    motion constant.)
+    the rod is eccentric. By default it does not move along the tangent that the rod has at rest. This suits
+    rods that stay near their line at rest, such as in a hole; other rods need `axial=True`. (Only then is the angular
+    momentum of a free motion constant.)
 
     Args:
         rod: the rod.

@@ -252,7 +252,7 @@ class TubeWall(_Confined, LineAction):
     known direction.
 
     It is integrated with the nodes as quadrature points and is not multiplied by the load factor. The nearest point of
-    the axis is found again in every Newton iteration. Beyond its ends the tube goes on straight.
+    the axis is found again in every Newton iteration. Beyond its ends the tube is straight.
 
     Args:
         rod: the rod.

@@ -33,7 +33,7 @@ def module(*sources):
 
     C finds the number of arguments of FFCx's kernels as KERNEL_ARGUMENTS, and PETSc's integers as PetscInt. Processes
     that come at the same time wait for the one that compiles; a file that is damaged or belongs to another system is
-    made anew.
+    made again.
 
     Raises:
         InstallationError: there is no C compiler that works, or the cache cannot be used.

@@ -66,7 +66,7 @@ def largest_of_pencil(A, B, count, least):
     """The largest eigenvalues nu of A x = nu B x, A symmetric, B symmetric and positive definite.
 
     How many are above `least` is counted first, by Sylvester's law of inertia: an iteration that looks for more of
-    them would go on among the others, which may lie close together.
+    them would continue among the others, which may lie close together.
 
     Args:
         count: how many to find; least: only eigenvalues above this positive number are wanted.

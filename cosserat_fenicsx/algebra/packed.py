@@ -87,7 +87,7 @@ class Packed(_Kernel):
                     yield numbers, array[:, run], run[0]
 
     def _slots(self, value):
-        """The places of a Constant among the packed ones, found likewise."""
+        """The places of a Constant among the packed ones, found in the same way."""
         kept = value.copy()
         value[...] = _MARK
         found = np.flatnonzero(cpp.fem.pack_constants(self._form) == _MARK)

@@ -60,7 +60,7 @@ def run(options, scene, tables):
 
     def swept():
         sweep = scene.swept(folder)
-        if folder is not None:  # complete: another run begins anew
+        if folder is not None:  # complete: another run starts from the beginning
             on_first(world(), lambda: discard(folder))
         return sweep
 

@@ -327,7 +327,7 @@ class EndCondition:
         raise NotImplementedError
 
     def commit(self, model, h: float) -> None:
-        """The step has been done."""
+        """Accept the step: called once at its end."""
 
     def memory(self) -> dict[str, Any]:
         """All that later steps depend on."""

@@ -44,7 +44,7 @@ class PipeAbove(PointAction):
     Only the schemes that step forwards can take it, and only the spatial model.
 
     Args:
-        station: `rod.start` or `rod.end`; there the pipe goes on away from the rod.
+        station: `rod.start` or `rod.end`; the pipe continues from there, away from the rod.
         pipe: a `DrillPipe` or another component with a length (m), or a `drilling.segments.Segment`; or several of
             them, from the top down.
         drive: a `TopDrive`. Its speed is about the axis that points from the pipe into the rod.

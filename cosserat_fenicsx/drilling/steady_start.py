@@ -87,7 +87,7 @@ def steady_state(velocities, chain, limits, friction, bit):
         x (nodes, dofs); (dofs,) force along the string above the first node: compression (N), torque (N m).
 
     Raises:
-        NotConverged: friction grows by the tension that it makes, without end.
+        NotConverged: friction and the tension that it causes increase each other without end.
     """
     n = len(velocities)
     x = np.zeros((len(chain.depths), n))

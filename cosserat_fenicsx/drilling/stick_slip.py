@@ -116,7 +116,7 @@ def alias(history):
     if len(history) <= 5 or len(history.profile_times) < 3:
         return ""
     apart, period = float(np.diff(history.profile_times).max()), history.stick_slip().period
-    if not apart > period / 2:  # also where there is none
+    if not apart > period / 2:  # also for NaN: without stick-slip there is no period
         return ""
     return (f"profiles are {apart:.3g} s apart, and the period of stick-slip is {period:.3g} s: maps and films show a "
             f"pattern that is not there; profile_every = {period / 10:.2g} (s) avoids it")  # fmt: skip

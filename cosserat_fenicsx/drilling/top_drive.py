@@ -185,7 +185,7 @@ class PI(DriveControl):
             if getattr(self, name) is None:
                 refuse(self, name, None, f"{_GAINS} ({unit})")
         if self.Kp == 0:
-            refuse(self, "Kp", 0.0, f"{_GAINS}; without Kp the speed oscillates for ever")
+            refuse(self, "Kp", 0.0, f"{_GAINS}; without Kp the speed oscillates without end")
 
     def gains(self, impedance):
         return Gains(Kp=self.Kp, Ki=self.Ki)

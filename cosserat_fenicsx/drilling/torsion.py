@@ -47,7 +47,7 @@ class _Settings:
     narrower: float = 0.9  # step over the longest one for which a law of friction has one answer
     cells: int = 300  # default number
     fewest: int = 40
-    length: float = 5.0  # of a default cell, at least, m
+    length: float = 5.0  # least length of a cell by default, m
     most: float = 1e5  # cells
 
 

@@ -17,7 +17,7 @@ static inline friction law_at(const waves *w, int node)
     return f;
 }
 
-/* The speed om with S om + T(om) = F, T the law of friction. Where several speeds fulfil that, it goes on sliding as
+/* The speed om with S om + T(om) = F, T the law of friction. Where several speeds fulfil that, it continues to slide as
    before, with the sign of `before`. */
 static inline double slip(const friction *f, double F, double S, double before, long long *iterations)
 {

@@ -143,7 +143,7 @@ class NodalContact(Pointers):
         for name, array in {**self._numbers, **self._vectors, "compliance": self._compliance}.items():
             setattr(contact, name, self.doubles(array))
         self._usual = np.inf
-        self._known_for = np.nan  # length of the steps that the compliance is of
+        self._known_for = np.nan  # the step length for which the compliance was computed, s
 
     # -- a step ------------------------------------------------------------------------------------------------------
 

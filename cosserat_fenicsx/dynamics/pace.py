@@ -5,7 +5,7 @@ step, looks like a slower or a constant load. So each function of time is sample
 made, at points without a common spacing, so that no frequency aliases at all of them.
 
 Two conditions limit the step:
-- Within the step the function differs from the straight line between its ends by a small share of its range at most. A
+- Within the step the function differs from the straight line between its ends by at most a small share of its range. A
   sine then gets at least ten steps a period.
 - The impulse of a load by the rule of the scheme (its value at mid-step, or at the ends) must be accurate. For a smooth
   load f the accumulated error is h^2/24 (mid-step) or h^2/12 (ends) times the change of f', by the Euler-Maclaurin
@@ -81,11 +81,11 @@ class Adaptive(Fixed):
     _SAFETY = 0.5  #: share of the allowed local error that steps aim at; the error per unit of time grows as h^2
     #: range of the best length over the current one in which the latter is kept; limits of one change
     _KEEP_BELOW, _KEEP_ABOVE, _LARGEST_GROWTH, _LARGEST_CUT = 1.2, 0.9, 4.0, 0.25
-    #: `Stepper.error`, a difference over many steps, hardly shows sudden changes: a step is rejected whose end differs
+    #: `Stepper.error`, a difference over many steps, misses sudden changes: a step is rejected whose end differs
     #: from the predictor by more than the first number times tol, unless it is shorter than the second times the
     # duration
     _PREDICTION, _ALWAYS_ACCEPTED = 0.06, 1e-7
-    _TINY, _MANY = 1e-6, 5000  #: length of tiny steps, over the duration; number of them in a row that is too large
+    _TINY, _MANY = 1e-6, 5000  #: longest tiny step, over the duration; most tiny steps in a row
     _HOLD = 24  #: steps without growth after a load has required a shorter one
 
     def __init__(self, tol, duration):

@@ -117,7 +117,7 @@ class StepForms:
         return self.momentum(self.nodal, self.rates)
 
     def kinetic_before(self):
-        """`kinetic` likewise."""
+        """`kinetic` in the same way."""
         return self.kinetic(self.nodal, self.rates)
 
     def momentum_after(self):

@@ -295,7 +295,7 @@ def _fit_panel(panel):
 
 
 def _fit(text, room):
-    """Whether a text is broken anew, since it is longer than the room, pixels."""
+    """Whether a text is wrapped again, since it is longer than the space for it, pixels."""
     extent = text.get_window_extent()
     length = max(extent.width, extent.height) if text.get_rotation() else extent.width
     if not text.get_text() or length <= room:

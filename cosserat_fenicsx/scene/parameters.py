@@ -1,6 +1,6 @@
 """A number of a scene by its name, and the scene with another value of it.
 
-Scenes are immutable: every object that holds the number, directly or not, is made anew by its constructor, with its
+Scenes are immutable: every object that holds the number, directly or not, is made again by its constructor, with its
 checks. An object that several others share, such as a material, is changed for all of them.
 """
 
@@ -201,7 +201,7 @@ def _put(value, keys, leaf):
 
 
 def _made(item, changes):
-    """A dataclass of the package, made anew with other fields."""
+    """A dataclass of the package, made again with other fields."""
     if isinstance(item, Station):
         return dataclasses.replace(item, **changes)
     given = item.arguments()  # in the order of the fields, whose names may differ

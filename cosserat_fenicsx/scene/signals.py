@@ -71,7 +71,7 @@ class _Timed(FunctionOfTime):
 
 @dataclass(frozen=True)
 class Step(_Timed):
-    """`value` from `start` up to `end`, or for ever; zero otherwise. Times in s.
+    """`value` from `start` up to `end`, or without end; zero otherwise. Times in s.
 
     Raises:
         SceneError: numbers that are not finite, or an end that is not after the start.
@@ -155,7 +155,7 @@ class Triangle(_Timed):
 
 @dataclass(frozen=True)
 class Sine(_Timed):
-    """`value` times sin(2 pi frequency (t - start) + phase) from `start` up to `end`, or for ever; zero otherwise.
+    """`value` times sin(2 pi frequency (t - start) + phase) from `start` up to `end`, or without end; zero otherwise.
 
     Args:
         value: amplitude; frequency: Hz; phase: rad; start, end: s.

@@ -90,7 +90,7 @@ class Problem(Equations):
         return anew
 
     def forget(self):
-        """Load the next scene anew, even if it is the one that is loaded."""
+        """Load the next scene again, even if it is the one that is loaded."""
         self._loaded = None
 
     def _holds(self, scene, layout):

@@ -1,6 +1,6 @@
 """Mesh refinement of a path until the difference of two successive meshes estimates an error below the tolerance.
 
-A path is traced anew on coarse meshes; once it is resolved, its points on a finer mesh follow by Newton's method from
+A path is traced again on coarse meshes; once it is resolved, its points on a finer mesh follow by Newton's method from
 those of the coarser one. A few sample points determine the mesh, on which all points are then computed at once; where
 that is the mesh on which the path was traced, it is not computed again.
 """

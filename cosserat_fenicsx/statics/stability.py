@@ -94,7 +94,7 @@ class Part:
 
     @cached_property
     def K(self):
-        """The matrix, made where it is first needed: for eigenvalues and modes."""
+        """The matrix, assembled at its first use: for eigenvalues and modes."""
         variation = self.variation
         K = variation.numbering.matrix(variation.cell_dofs, variation.tied, self.model.signature.connections.pattern)
         K.setOption(PETSc.Mat.Option.SYMMETRIC, True)

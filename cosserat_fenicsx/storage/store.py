@@ -554,7 +554,7 @@ def resume(
     A motion that fails again in the same way, such as where steps fail however short they are, needs another
     `simulate`, with `start=` if need be.
 
-    A study goes on by the same call that began it: its folder does not hold the task.
+    A study is continued by the same call that began it: its folder does not hold the task.
 
     Args:
         folder: its name, the `folder` of `simulate` or `depth_sweep`.

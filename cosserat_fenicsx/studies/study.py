@@ -23,7 +23,7 @@ from cosserat_fenicsx.storage.store import Kind, Nowhere, Store
 from cosserat_fenicsx.studies.outcome import Study, from_data, to_data
 
 KIND = Kind(
-    what="study", home="studies.study", call="study", again="the same call of study goes on from there",
+    what="study", home="studies.study", call="study", again="the same call of study continues from there",
     differs="it holds another study, expected the same call, or another folder", each_rank=True,
 )  # fmt: skip
 _COMPARABLE = "numbers, texts, arrays, functions, parts of scenes and of wells, lists and dicts of these"
@@ -53,7 +53,7 @@ def study(
             texts, None, or a dict of these by name; where it computes more, it writes that to files of its own.
         cases: dicts of arguments, in a list or another iterable; or one dict {name: values}, whose product is taken,
             the last name running fastest: `{"speed": [40, 60], "weight": [50e3, 100e3]}` has four cases.
-        folder: keeps every outcome as it comes, whatever ends the run; the same call goes on from there, on any
+        folder: keeps every outcome as it comes, whatever ends the run; the same call continues from there, on any
             number of ranks, and computes what is missing. All ranks must see it. None keeps none.
         retry: whether cases that have failed before, by `folder`, are computed again. By default they remain failures.
         progress: True, False, or None to show it in runs of more than two seconds. The cases themselves show none.
@@ -96,7 +96,7 @@ def study(
 
 def go_on(store, *given):
     """`resume` and `read` of a study are refused: its folder does not hold the task."""
-    raise SceneError(f"{store.place}: it holds a study: expected the same call of study, which goes on")
+    raise SceneError(f"{store.place}: it holds a study: expected the same call of study, which continues it")
 
 
 read = go_on
@@ -216,7 +216,7 @@ def _raise_first(own, troubles, found, store):
         return
     name, text = min(troubles, key=lambda trouble: trouble[0] == KeyboardInterrupt.__name__)
     if name == KeyboardInterrupt.__name__:
-        without = "; with a folder they would be kept there, and the same call would go on from them"
+        without = "; with a folder they would be kept there, and the same call would continue from them"
         raise Interrupted(found, store.kept or without) from None
     if name == _CannotKeep.__name__:
         raise store.not_stored(OSError(0, text), found, "an outcome")

@@ -89,7 +89,7 @@ class TorqueAndDrag(Differentiated, Result):
         differences: {model: (N, N m)}: hook load and surface torque less those of the other models that were solved.
         error: estimated error of hook load and surface torque as solutions of the model's equations, over the largest
             tension and torque along the string (over 1 % of that tension times the contact radius where this is more).
-        model_error: estimate, likewise relative, of how far those of the rod in contact may be, which is stiff and has
+        model_error: estimate, also relative, of how far those of the rod in contact may be, which is stiff and has
             a clearance: the error of the model, not of its solution. NaN: not estimated, of the rod itself.
         enough: whether both are within `tol`, as far as they are estimated, of hook load and surface torque alone;
             False warns that the model does not suffice for the accuracy asked for.
@@ -166,7 +166,7 @@ class TorqueAndDrag(Differentiated, Result):
         """Measured depths, m."""
         chain, pieces = self.solved.chain, self.pieces
         below = np.concatenate([[0.0], np.cumsum(chain.length)])[:-1]
-        first = np.flatnonzero(np.diff(chain.origin, prepend=-1))  # parts of each piece, whose ends are exact
+        first = np.flatnonzero(np.diff(chain.origin, prepend=-1))  # first parts of pieces, whose ends are exact
         bottom = pieces.bottom[chain.origin] - (below - np.repeat(below[first], np.diff(first, append=len(below))))
         top = np.append(bottom[1:], 0.0)
         return self._down(bottom[:, None] + (top - bottom)[:, None] * self.solved.at)

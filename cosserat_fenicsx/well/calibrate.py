@@ -85,7 +85,7 @@ class FrictionFit(Result):
 
     Attributes:
         hole: the `Borehole` with these coefficients.
-        friction: (n,) of its sections. interval: (n, 2) confidence intervals; 0 where a coefficient is at this bound.
+        friction: (n,) of its sections. interval: (n, 2) confidence intervals; no end is below 0.
         block_weight: N, as given or found; block_interval: (2,), NaN where it was given.
         confidence: of the intervals, such as 0.95.
         correlation: (m, m) of the estimates: close to 1 or -1 where the readings determine only sums or differences.

@@ -167,7 +167,7 @@ class WellPath(Part):
             near: (n,) measured depths (m) to start from, see `closest`; of any value.
 
         Returns:
-            `Nearest`. Beyond its ends the axis goes on straight: a point there has the measured depth and the position
+            `Nearest`. Beyond its ends the axis is straight: a point there has the measured depth and the position
             of the end, and no curvature.
         """
         at = np.clip(near, 0.0, self.length)

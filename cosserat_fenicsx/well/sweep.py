@@ -35,7 +35,7 @@ from cosserat_fenicsx.well.solve import AUTO, BUCKLED, ROD, SOFT, torque_and_dra
 KEPT = ("hook_load", "surface_torque", "error", "model_error", "locked", "model")
 _MODELS = (SOFT, BUCKLED, ROD)
 KIND = Kind(
-    what="sweep", home="well.sweep", call="depth_sweep", again="the same call of depth_sweep goes on from there",
+    what="sweep", home="well.sweep", call="depth_sweep", again="the same call of depth_sweep continues from there",
     differs="it holds another sweep, expected the same call, or another folder",
 )  # fmt: skip
 #: Arguments that are parts; the others are plain, but for the operations.
@@ -178,7 +178,7 @@ def depth_sweep(
         operations: one or several. depths: measured depths of the bit, m.
         friction: coefficients to compare, each a number for the whole hole, or one for each of its sections; None for
             those of the hole.
-        folder: keeps the answers as they come, as lines of JSON; the same call goes on from there. None keeps none.
+        folder: keeps the answers as they come, as lines of JSON; the same call continues from there. None keeps none.
         progress: True or False; None shows it in runs of more than two seconds.
         hole, string, mud, model, tol, torque_convention: see `torque_and_drag`.
 
@@ -260,7 +260,7 @@ def _asked(store):
     if "missing" in data:
         raise SceneError(
             f"{store.place}: it does not hold the arguments ({data['missing']}): expected the same call of "
-            "depth_sweep, which goes on from there"
+            "depth_sweep, which continues from there"
         )
     parts = {name: data[name] and from_data(cls, data[name]) for name, cls in _PARTS.items()}
     use([module for x in data["operations"] for module in x["data"].get("use", ())])

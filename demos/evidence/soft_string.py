@@ -30,7 +30,7 @@ TRUTH = {
 PEERS = "welleng", "torque-drag"
 WEIGHT, RADIUS, FRICTION = 241.13, 0.0635, 0.25
 TOLS, SPACINGS = (1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12), (100.0, 30.0, 10.0, 3.0, 1.0)
-SAMPLES, LIMIT = 25, 60.0  # of a row; s, of a request
+SAMPLES, LIMIT = 25, 60.0  # samples of each row; time limit of a request to a peer, s
 
 
 def ours(path, tol):

@@ -39,8 +39,8 @@ SLOW = 0.5  # s: from here on there is no warm-up run, and no repetition where t
 BUDGET = 20 * 60.0  # s of measuring; a round that would begin later is left out, and the table says so
 
 
-#: What is measured: peers, problems, their errors, the configurations of a peer, their names, the first number of
-#: samples of a configuration, and whether all fast ones of this package get all samples.
+#: What is measured: the peers, the problems, functions for their errors, for the configurations of a peer and for
+#: their names, the number of samples at first, and whether all fast configurations of this package get all samples.
 Panel = namedtuple("Panel", "peers problems error configurations kind model first whole")
 STATICS = Panel(PEERS, problems, error, configurations, kind, model, 3, True)
 
@@ -68,7 +68,7 @@ class Record:
         same = all(machine.get(key) == self.about["machine"][key] for key in ("cpu", "platform"))
         prints = {peer: fingerprint(peer) for peer in self.panel.peers}
         if not same or any(row["fingerprint"] != prints[row["peer"]] for row in before["samples"]):
-            print(f"{self.file}: from another machine or other sources, so all is measured anew", flush=True)
+            print(f"{self.file}: from another machine or other sources, so everything is measured again", flush=True)
             return  # compared samples must be of one run
         for row in before["samples"]:
             self.rows[self.key(row["problem"], row["peer"], row["configuration"])] = row

@@ -314,7 +314,7 @@ def _at_end(x, along, shortest, usual, bound, jumps):
 
 def _force_at_end(x, along, width):
     """(place of the force, where the regular pressure begins, force, regular pressure as a function of x) of the force
-    at x = 0, near which a contact begins that goes on to larger x; None without one.
+    at x = 0, near which a contact begins that continues to larger x; None without one.
 
     With the regular pressure p0 + p1 x of the part beside the peak, the moments of the pressure up to b, an end of
     elements, are those of the force P at a and of the regular pressure from a to b. Where there is no such place, since

@@ -3,7 +3,7 @@ answers.
 
 Elements: "elastic" is elasticBeamColumn, of second order; "CBDI" is forceBeamColumnCBDI, whose curvature-based
 displacements carry the force's moment inside the element: of high order. A step that fails is halved.
-The sample is the analysis over all load factors. The model is built anew for each sample, which is not counted, since
+The sample is the analysis over all load factors. The model is built again for each sample, which is not counted, since
 `reset` does not restore its spatial corotational transformation.
 """
 
