@@ -130,7 +130,7 @@ static void slip_directions(const contact *c, int i, const place *p, double *acr
     }
 }
 
-/* Size of the slip of every node in the step, whose motion is given, whether it touches or would. */
+/* Size of the slip of every node in the step, for the given motion, also of nodes that do not touch. */
 void slips(const contact *c, double *size)
 {
     for (int i = 0; i < c->nodes; i++) {

@@ -35,7 +35,7 @@ class TieRows:
         links = model.signature.connections
         self._pattern = links.pattern
         self._added, self._count = np.array(links.equations, dtype=np.intp), len(links.ties)
-        # for every added equation: what multiplies its reaction at both stations, the ground has none
+        # factors of each added equation's reaction at its two stations; 0 where the second one is the ground
         signs = [(-1.0, 0.0 if links.ties[i][2] is None else -1.0) for i in self._added]
         self._signs = np.array(signs).reshape(-1, 2)  # in a plane no equation may be added
         count = numbering.multipliers

@@ -99,9 +99,9 @@ static double set_velocity(model *m, int i, int d, double v)
     return added;
 }
 
-/* Velocities of held nodes in one of the unknowns become 0, the velocity of a bit on a rock the rock's, by impulses on
-   these nodes alone. Other nodes keep their momentum, which dissipates energy and never adds any. Returns the impulse
-   on the last node. */
+/* Set the velocities of held nodes in one of the unknowns to 0, and that of a bit on a rock to the rock's, by impulses
+   on these nodes alone. Other nodes keep their momentum, which dissipates energy and never adds any. Returns the
+   impulse on the last node. */
 static double settle(model *m, int d)
 {
     const int n = m->dofs, last = m->nodes - 1, rigid = m->top[d].rigid, mask = bit_of(m, d);

@@ -218,7 +218,8 @@ class Modes(Shapes):
 
     @property
     def growth(self):
-        """(n,) rates 1/s: unstable modes grow as exp(growth t); 0 for stable ones. Without what is `left_out`."""
+        """(n,) rates 1/s: unstable modes grow as exp(growth t); 0 for stable ones. Damping that is `left_out` would
+        change them."""
         return np.sqrt(np.maximum(-self.squares, 0.0))
 
     def label(self, k):

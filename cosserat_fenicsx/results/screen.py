@@ -11,9 +11,9 @@ from rich.table import Table
 
 from cosserat_fenicsx.quantities import as_text as value_text
 
-#: Largest numbers of rows of a table: of `details`, and of `print`, whose page has so many lines of so many characters.
+#: Most rows of a table in `details` and in `print`; lines of a printed page, and characters of a line.
 ROWS, SHORT, LINES, WIDTH = 40, 12, 30, 100
-# Lines that a table has beside its rows, and the fewest rows.
+# Lines of a table besides its rows; fewest rows.
 _FRAME, _FEWEST = 6, 4
 # Most significant digits in the short table.
 _DIGITS = 5

@@ -48,7 +48,7 @@ class _Resultants:
     shorter: float = 0.8  # the error of a force is its difference with a length shorter or longer by this factor
     caution: float = 2.0  # safety factor of a force's change by other lengths
     left: float = 0.25  # remaining share of a force's change from the coarser mesh
-    soft: float = 2.5  # a force's change by the wall's softness, over the square of lam over the free span
+    soft: float = 2.5  # change of a force due to the wall's softness, over (lam / free span)^2
     least: float = 0.05  # smallest force at an end of a contact, over the regular pressure on the length of the peak
     peak: float = 0.2  # smallest force inside a contact, over the regular pressure on lam
 
