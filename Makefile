@@ -18,7 +18,7 @@ export VTK_DEFAULT_OPENGL_WINDOW = vtkEGLRenderWindow
 # A numpy in the user's own site directory would hide the distribution's.
 export PYTHONNOUSERSITE = 1
 
-.PHONY: help setup packages demo animation motion gallery well string whirl test docs tables figure3 work-precision failures rods-in-wells folders random random-wells imperfect mutants release clean
+.PHONY: help setup packages demo animation motion gallery well string whirl test docs tables figure3 work-precision cosseratbench failures rods-in-wells folders random random-wells imperfect mutants release clean
 
 help:
 	@echo "Times are those of two cores and an empty cache of compiled forms, after \`make setup\`."
@@ -34,6 +34,7 @@ help:
 	@echo "make tables  the tables of accuracy and cost in docs/, measured anew and put there"
 	@echo "make figure3 every curve of the paper's Figure 3, and what was found; writes out/ (about 4 minutes)"
 	@echo "make work-precision  speed against accuracy, beside Exudyn, OpenSeesPy, PyElastica, CalculiX, welleng and torque-drag (half an hour at most)"
+	@echo "make cosseratbench  the scenarios of a public suite, cosseratbench, beside the results of other solvers (git gets it; half a minute)"
 	@echo "make failures where methods fail: a map of methods against trials; writes out/ (at most a quarter of an hour)"
 	@echo "make rods-in-wells  the exact rod in three wells: Newton steps, processor time, errors (about 5 minutes)"
 	@echo "make random  200 random scenes against the strong form, at three tolerances (about 5 minutes)"
@@ -124,6 +125,10 @@ work-precision: setup
 	$(PYTHON) demos/evidence/soft_string.py
 	$(PYTHON) demos/evidence/work_precision_string.py
 	$(PYTHON) demos/evidence/put_in_docs.py work_precision work_precision_motion soft_string work_precision_string
+
+cosseratbench: setup
+	$(PYTHON) demos/evidence/cosseratbench_suite.py
+	$(PYTHON) demos/evidence/put_in_docs.py cosseratbench
 
 setup: .venv/.stamp
 

@@ -1,9 +1,11 @@
 """What measures accuracy, cost and failures (demos/evidence/) runs, and measures right results."""
 
 import json
+import math
 import shutil
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -126,6 +128,49 @@ def test_orders_quick(tmp_path):
     for degree, order in spatial.items():
         assert order > 2 * degree - (0.1 if degree < 3 else 1.0), degree
     assert "| 4 | 4, 8 |" in (tmp_path / "orders.md").read_text(encoding="utf-8")
+
+
+def of_the_suite(duration, quasi_static=False, gravity=(0, 0, 0), **rod):
+    """A scenario as cosseratbench describes it: one rod of 1 m, clamped at its start."""
+
+    def end(value):
+        return SimpleNamespace(value=value)
+
+    points = np.array([(0, 0, 0), (0.5, 0, 0), (1.0, 0, 0)])
+    given = {
+        "centerline": points, "radius": 0.02, "length": 1.0, "normal": (0, 0, 1), "loads": (), "start": end("clamped"),
+        "end": end("free"), "start_motion": None, "end_motion": None,
+        "material": SimpleNamespace(youngs_modulus=1e6, shear_modulus=1e6 / 3, density=1000.0),
+        "nodes": lambda n: np.linspace(points[0], points[-1], n + 1),
+    } | rod  # fmt: skip
+    return SimpleNamespace(
+        rods=(SimpleNamespace(**given),), duration=duration, gravity=gravity, obstacles=(), quasi_static=quasi_static,
+        slowest_frequency=lambda: 1.0,
+    )  # fmt: skip
+
+
+def test_scenarios_of_another_suite():
+    """An equilibrium, a motion from a given shape, and an end that is driven."""
+    import cosseratbench_suite as suite
+
+    force, stiffness = 7.5e-3, 1e6 * math.pi * 0.02**4 / 4
+    load = SimpleNamespace(force=(0, 0, -force), at=SimpleNamespace(value="end"))
+    times, (nodes,), (d1,) = suite.solve(of_the_suite(10.0, True, loads=(load,)), 8, 3)
+    assert times.tolist() == [0, 5, 10] and nodes.shape == (3, 9, 3) and d1.shape == (3, 8, 3)
+    assert -nodes[-1, -1, 2] == pytest.approx(force / (3 * stiffness), rel=1e-3) and nodes[0, -1, 2] == 0
+    s = np.linspace(0, 1, 9)
+    bent = np.stack([s, 1e-4 * s**2, 0 * s], axis=1)
+    times, (nodes,), (d1,) = suite.solve(of_the_suite(0.02, nodes=lambda n: bent), 8, 3)
+    np.testing.assert_allclose(nodes[0], bent, atol=1e-9)
+    assert 0 < nodes[-1, -1, 1] < 0.999e-4 and np.abs(np.sum(d1 * np.diff(nodes, axis=1), axis=2)).max() < 1e-12
+    turn = SimpleNamespace(times=(0.0, 0.1), displacement=np.zeros((2, 3)), rotation=((0, 0, 0), (0.5, 0, 0)),
+                           slides_along=(1, 0, 0), axis=np.array([1.0, 0, 0]))  # fmt: skip
+    driven = of_the_suite(0.2, True, end=SimpleNamespace(value="clamped"), end_motion=turn)
+    _, _, (d1,) = suite.solve(driven, 4, 3)
+    assert math.atan2(d1[-1, -1, 1], d1[-1, -1, 2]) == pytest.approx(-0.5 * 7 / 8, abs=0.05)
+    across = of_the_suite(1.0, centerline=np.array([(0, 0, 0), (0, 0, 0.5), (1.0, 0, 0)]))
+    with pytest.raises(NotImplementedError, match="a clamp at the start of a rod across the line between its ends"):
+        suite.solve(across, 4, 2)
 
 
 def test_tables_and_pictures_are_put_into_the_documentation(tmp_path):

@@ -38,6 +38,7 @@ PAGES = {
 ALONE = {
     "failures": ("Where methods fail: the table", "failures.png"),
     "work_precision": ("Speed against accuracy: all times",),
+    "cosseratbench": ("The scenarios of cosseratbench",),
 }
 #: The pictures of the gallery, by the files of the scenes.
 GALLERY = [f"{file.stem}.png" for file in sorted((ROOT / "demos").glob("**/*.toml"))]
