@@ -5,22 +5,21 @@ import inspect
 import itertools
 import json
 import time
-import traceback
 from collections.abc import Callable, Iterable, Mapping
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from mpi4py import MPI
 
-from cosserat_fenicsx.checks import File, instance, refuse
-from cosserat_fenicsx.errors import CosseratError, InstallationError, Interrupted, SceneError
+from cosserat_fenicsx.checks import File, instance, refuse, whole
+from cosserat_fenicsx.errors import InstallationError, Interrupted, SceneError
 from cosserat_fenicsx.interrupts import obey
 from cosserat_fenicsx.progress import CaseProgress
-from cosserat_fenicsx.ranks import apart, communicator
+from cosserat_fenicsx.ranks import communicator
 from cosserat_fenicsx.storage.mark import NotMarked, mark_of
 from cosserat_fenicsx.storage.store import Kind, Nowhere, Store
-from cosserat_fenicsx.studies.outcome import Study, from_data, to_data
+from cosserat_fenicsx.studies.executors import by_executor, computed, executor_of
+from cosserat_fenicsx.studies.outcome import Study, from_data
 
 KIND = Kind(
     what="study", home="studies.study", call="study", again="the same call of study continues from there",
@@ -35,10 +34,12 @@ def study(
     *,
     folder: File | None = None,
     retry: bool = False,
+    workers: int | None = None,
+    executor: Any = None,
     progress: bool | None = None,
     comm: MPI.Comm | None = None,
 ) -> Study:
-    """Call `task(**case)` for every case, on all ranks, and gather what it returns.
+    """Call `task(**case)` for every case, on all ranks or by an executor, and gather what it returns.
 
     Each case is computed by one rank alone: within the task `solve`, `simulate`, `torque_and_drag` and all other
     functions of the package use the communicator of that rank by default, whatever the number of ranks. Cases are
@@ -56,6 +57,11 @@ def study(
         folder: keeps every outcome as it comes, whatever ends the run; the same call continues from there, on any
             number of ranks, and computes what is missing. All ranks must see it. None keeps none.
         retry: whether cases that have failed before, by `folder`, are computed again. By default they remain failures.
+        workers: compute the cases in so many new processes instead of here, as where there is no mpirun: a notebook
+            uses the cores of its machine. Each takes about two seconds to start.
+        executor: compute them by this one: any `concurrent.futures.Executor`, or a dask `Client`. The folder, progress
+            and what is returned stay here. The task and its cases must be such as `pickle` takes: a function of a
+            module, not of a notebook (`ProcessPoolExecutor`; dask takes both). With `mpi4py.futures` one rank calls.
         progress: True, False, or None to show it in runs of more than two seconds. The cases themselves show none.
         comm: MPI communicator; default all ranks. Every rank calls with the same task and cases, every rank gets the
             same Study.
@@ -70,11 +76,16 @@ def study(
         Interrupted: Ctrl-C; `.path` is the Study so far.
         NotStored: the folder can no longer be written to; `.path` is the Study so far.
         InstallationError: a case needs what is not installed.
+        RuntimeError: the executor has broken, as where a worker was killed; a folder keeps what was computed.
     """
-    comm = communicator(comm)
+    comm = communicator(comm if executor is None else MPI.COMM_SELF)
     cases, grid = cases_of(cases)
     check_task(task, cases)
     instance("study", "retry", retry, bool, "True or False")
+    if workers is not None:
+        whole("study", "workers", workers)
+        if comm.size > 1:
+            refuse("study", "workers", workers, "none with several MPI ranks, which share the cases")
     told = _told(task, cases, strictly=folder is not None)
     of_cases = json.dumps({place: found for place, found in told.items() if not place.startswith("task")})
     if len(set(comm.allgather(of_cases))) > 1:
@@ -84,8 +95,9 @@ def study(
     store = Nowhere() if folder is None else Store(folder, KIND, comm).begin(told)
     try:
         rows = _latest(store.lines(lambda row: _outcome_in(row, len(cases))))
-        run = _Run(task, cases, rows, retry, store, comm)
-        rows, troubles = run.over(progress)
+        with executor_of(task, workers, executor) as found:
+            run = _Run(task, cases, rows, retry, store, comm, found)
+            rows, troubles = run.over(progress)
     finally:
         store.release()
     found = {i: (from_data(row.get("result")), row.get("failure", ""), row["seconds"]) for i, row in rows.items()}
@@ -129,8 +141,9 @@ def _outcome_in(row, count):
 class _Run:
     """The computation of the missing cases; `trouble`: the exception that ended it on this rank, or None."""
 
-    def __init__(self, task, cases, rows, retry, store, comm):
+    def __init__(self, task, cases, rows, retry, store, comm, executor):
         self._task, self._cases, self._rows, self._store, self._comm = task, cases, rows, store, comm
+        self._executor = executor
         self._missing = [i for i in range(len(cases)) if i not in rows or (retry and "failure" in rows[i])]
         self.trouble = None
 
@@ -159,10 +172,8 @@ class _Run:
         return found, [kind for _, kind in everywhere if kind]
 
     def _work(self, pool, own):
-        for k in pool:
-            obey()
-            i = self._missing[k]
-            row = {"case": i, "attempt": self._rows.get(i, {}).get("attempt", 0) + 1, **self._computed(i)}
+        for i, found in self._found(pool):
+            row = {"case": i, "attempt": self._rows.get(i, {}).get("attempt", 0) + 1, **found}
             own.append(row)
             try:
                 self._store.keep(row)
@@ -170,29 +181,19 @@ class _Run:
                 raise _CannotKeep(problem.strerror or str(problem)) from problem
             pool.tell("failure" in row)
 
-    def _computed(self, i):
-        began = time.monotonic()
-        try:
-            with apart():
-                found = {"result": to_data(self._task(**unshared(self._cases[i])))}
-        except InstallationError:
-            raise
-        except (Exception, SystemExit) as problem:
-            found = {"failure": _sentence(problem)}
-        return {**found, "seconds": time.monotonic() - began}
+    def _found(self, pool):
+        """(number of a case, what it gave), as they are computed."""
+        todo = (self._missing[k] for k in pool)
+        if self._executor is not None:
+            yield from by_executor(self._executor, self._task, self._cases, todo)
+            return
+        for i in todo:
+            obey()
+            yield i, computed(self._task, self._cases[i])
 
 
 class _CannotKeep(Exception):
     """An outcome cannot be written."""
-
-
-def _sentence(problem):
-    """The exception in words, with its line unless it is an error of this package, which says what is wrong."""
-    said = f"{type(problem).__name__}: {problem}" if str(problem) else type(problem).__name__
-    if isinstance(problem, CosseratError):
-        return said
-    place = traceback.extract_tb(problem.__traceback__)[-1]
-    return f"{said} ({Path(place.filename).name}, line {place.lineno})"
 
 
 def _latest(rows):
@@ -262,16 +263,6 @@ def _values(field, values, what, expected="a list of values"):
     if not found:
         refuse("study", field, values, f"at least one {what}")
     return found
-
-
-def unshared(value):
-    """A case, or a part of one, with lists, dicts and arrays of its own, which a task may change: those given belong to
-    several cases."""
-    if isinstance(value, np.ndarray):
-        return value.copy()
-    if type(value) in (list, tuple):
-        return type(value)(map(unshared, value))
-    return {name: unshared(part) for name, part in value.items()} if type(value) is dict else value
 
 
 def check_task(task, cases):
