@@ -103,7 +103,7 @@ GALLERY = {
     cable: (None, (0.1, 0.5, 1.0)),
     soft_arm: (None, (0.25, 0.5, 0.75, 1.0)),
     tripod: (None, (1.0,)),
-    folding_ring: (None, (0.0, 0.34, 0.58, 0.68, 1.0)),
+    folding_ring: (None, (0.0, 0.34, 0.58, 1.0)),
 }
 
 

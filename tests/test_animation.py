@@ -11,6 +11,7 @@ from moving_scenes import flying_in_space
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.pictures import animation
 from cosserat_fenicsx.pictures.animation import Between
+from cosserat_fenicsx.pictures.colours import EVERY
 
 pytestmark = pytest.mark.serial
 SMALL = {"size": (320, 240), "fps": 4, "speed": 1}
@@ -27,7 +28,7 @@ def test_between_saved_states_the_error_is_of_third_order():
     rod, scene = flying_in_space()
     every, x, errors = cf.simulate(scene, 2, dt=0.0125), np.linspace(0, 1, 11), []
     for often in (0.1, 0.05):
-        between = Between(cf.simulate(scene, 2, dt=0.0125, save_every=often))
+        between = Between(cf.simulate(scene, 2, dt=0.0125, save_every=often), EVERY["bending_moment"])
         assert between.smooth == 1
         bodies = [between.bodies(t, x)[0] for t in every.times]
         shapes = [every.sample(k, rod, x) for k in range(len(every))]
@@ -40,7 +41,7 @@ def test_saved_too_seldom_is_straight_and_says_so(tmp_path):
     rod = cf.Rod(cf.Line((0, 0, 0), (1, 0, 0)), cf.Circle(0.02), cf.Material(200e9, density=7800.0))
     spin = cf.InitialVelocity(rod, angular=(0, 0, 2 * np.pi))
     history = cf.simulate(cf.Scene([rod], velocities=[spin]), 2, dt=0.01, elements=1, degree=2, save_every=0.4)
-    between = Between(history)
+    between = Between(history, EVERY["bending_moment"])
     assert between.smooth == 0
     lines = [between.bodies(t, np.array([0.0, 1.0]))[0].line for t in np.linspace(0, 2, 81)]
     assert max(np.linalg.norm(line[1] - line[0]) for line in lines) < 1.001, "cubics would swing out"

@@ -23,11 +23,13 @@ from cosserat_fenicsx import interrupts, progress
 from cosserat_fenicsx.cli import main as cli
 from cosserat_fenicsx.pictures import viewer
 from cosserat_fenicsx.pictures.charts import asked
-from cosserat_fenicsx.pictures.colours import colour_of, known, peak_of
+from cosserat_fenicsx.pictures.colours import colour_of, known, peak_of, seen
+from cosserat_fenicsx.pictures.default_colour import default_colour
 from cosserat_fenicsx.pictures.drawing import quantity
 from cosserat_fenicsx.pictures.shapes import Drawn
-from cosserat_fenicsx.pictures.signs import has_sign, loads_of, without_sign
-from cosserat_fenicsx.pictures.view import Labels, View, axes_of
+from cosserat_fenicsx.pictures.side_by_side import tangled
+from cosserat_fenicsx.pictures.signs import Resting, has_sign, loads_of, signs_of, without_sign
+from cosserat_fenicsx.pictures.view import Labels, View, axes_of, view_of
 
 STEEL = cf.Material(E=210e9, nu=0.3, density=7850.0)
 
@@ -50,6 +52,62 @@ def test_colours_are_the_fields(solved):
     np.testing.assert_allclose(values(solved, "shear_force"), 1.5 * P * np.abs(fields["d3"][:, 0]), atol=1e-6 * P)
     np.testing.assert_allclose(values(solved, "curvature.2"), fields["curvature"][:, 1])
     assert peak_of(solved, colour_of("m.3"), [values(solved, "m.3")]) == 0, "rounding has no colour"
+
+
+def bars(section, force, *, length=10.0, supports=cf.Clamp):
+    """Two parallel rods, clamped at their starts, with a force on each end, at its load factor 1."""
+    rods = [cf.Rod(cf.Line((0, y, 0), (length, y, 0)), section, STEEL, name=f"r{y}") for y in (0, 1)]
+    return cf.solve(
+        cf.Scene(rods, [supports(rod.start) for rod in rods], [cf.Force(rod.end, force) for rod in rods]),
+        [0.0, 1.0], elements=8,
+    )  # fmt: skip
+
+
+def test_what_matters_colours_the_rods(solved):
+    """Euler's load is the bound between regimes of a beam; a cable is at 100/pi^2 = 10.1 times pi^2 EI/L^2."""
+    thin, EI = cf.Circle(0.01), 210e9 * np.pi * 0.01**4 / 64
+    assert default_colour(solved, [0, 1, 2]) == "bending_moment"
+    for share, name in ((0.9, "bending_moment"), (1.1, "tension")):
+        N = share * EI / 0.1**2 / 10.0**2
+        assert default_colour(bars(thin, (N, 0, 0.02 * N)), [0, 1]) == name, "the energy of bending is larger in both"
+    assert default_colour(bars(cf.Circle(0.2), (-1e4, 0, 0)), [0, 1]) == "tension", "a strut: all energy is axial"
+    rod = cf.Rod(cf.Line((0, 0, 0), (1, 0, 0)), thin, STEEL)
+    twisted = cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Moment(rod.end, (1.0, 0.5, 0))])
+    path = cf.solve(twisted, [0.0, 0.1], elements=4)
+    assert default_colour(path, [0, 1]) == "twisting_moment" and default_colour(path, [0]) == "bending_moment"
+
+
+@pytest.mark.serial
+def test_the_colour_bar_names_its_field(solved):
+    for asked_for, said in ((None, "bending moment (MN m)"), ("tension", "tension (kN)"), ("strain.3", "stretch")):
+        plotter = solved.plot(color=asked_for)
+        (title,) = plotter.scalar_bars.keys()
+        plotter.close()
+        assert " ".join(title.split()) == said
+
+
+@pytest.mark.serial
+def test_tangled_shapes_stand_side_by_side():
+    """A spring and its pulled shape cover disjoint columns of the picture, and its axes belong to the first."""
+    spring = cf.Rod(cf.Helix((0, 0, 0), (0.05, 0, 0), turns=4, pitch=0.02), cf.Circle(0.004), STEEL)
+    scene = cf.Scene([spring], [cf.Clamp(spring.start)], [cf.Force(spring.end, (0, 0, 5.0))])
+    path = cf.solve(scene, [0.0, 1.0], elements=32)
+    lines = [[path.centreline(k)] for k in (0, 1)]
+    _, right, above, _ = view_of(np.ptp(np.concatenate([line for (line,) in lines]), axis=0))
+    assert tangled(lines, right, above) and not tangled(lines[:1], right, above)
+    assert not tangled([lines[0], [lines[1][0] + 0.2 * right]], right, above)
+    for wish, gap in ((None, True), (False, False)):
+        image, _ = drawn(path.plot(side_by_side=wish))
+        coloured = (np.ptp(image[150:800, 250:1080], axis=2) > 60).any(axis=0)
+        first, last = np.flatnonzero(coloured)[[0, -1]]
+        assert (not coloured[first:last].all()) == gap
+
+
+def test_tension_alone_is_coloured_from_zero():
+    tension = colour_of("tension")
+    for array, signed in (([0.0, 3.0], False), ([-1e-9, 3.0], False), ([-0.1, 3.0], True), ([-3.0, -1.0], True)):
+        assert seen(tension, [np.array(array)], 3.0).signed == signed
+    assert seen(tension, [np.zeros(2)], 0.0).signed and not seen(colour_of("shear_force"), [np.ones(2)], 1.0).signed
 
 
 def test_an_unknown_colour_lists_the_names(solved):
@@ -201,6 +259,19 @@ def test_tubes_are_drawn_around_their_rods():
     assert not [mesh for mesh in plotter.meshes if "radius" in mesh.point_data]
     plotter.close()
     assert without_sign(scene, True) == "" and without_sign(scene, False).startswith("TubeWall on r")
+
+
+@pytest.mark.parametrize("lean", [(0, 0, 1), (1, 0, 0), (1, -2, 2)])
+def test_supports_touch_what_they_hold(lean):
+    """The sign of a pin reaches into the rod, whether this stands on it, lies on it or leans, seen from a corner."""
+    pyvista = pytest.importorskip("pyvista")
+    rod = cf.Rod(cf.Line((0, 0, 0), lean), cf.Circle(0.04), STEEL)
+    scene = cf.Scene([rod], [cf.Pin(rod.start)], [])
+    symbols = signs_of(pyvista, scene, [Resting({rod: 0.02})], np.array([[0, 0, 0], lean]), np.ones(3))
+    tangent = np.array(lean) / np.linalg.norm(lean)
+    along = symbols.points @ tangent
+    across = np.linalg.norm(symbols.points - along[:, None] * tangent, axis=1)
+    assert ((along > -1e-9) & (along < 0.02) & (across < 0.02)).any()
 
 
 def test_a_scene_of_twenty_rods_stays_inside_its_picture():

@@ -176,10 +176,11 @@ def test_what_is_refused_in_words(collar):
 def test_a_film_enlarges_the_clearance(collar, tmp_path):
     pytest.importorskip("pyvista")
     from cosserat_fenicsx.pictures.animation import Between, Enlarged
+    from cosserat_fenicsx.pictures.colours import EVERY
 
     rod, _, history = collar
     x = np.array([0.0, 0.5, 1.0])
-    bodies = Between(history).bodies(0.05, x)
+    bodies = Between(history, EVERY["bending_moment"]).bodies(0.05, x)
     (moved,) = Enlarged(history.scene, 40.0, "animate").bodies(bodies, x)
     assert np.hypot(*moved.line[1, :2]) == pytest.approx(40 * np.hypot(*bodies[0].line[1, :2]), rel=1e-12)
     np.testing.assert_allclose(moved.line[:, 2], bodies[0].line[:, 2], atol=1e-12)

@@ -83,8 +83,8 @@ def _outputs(parser):
             "string in a well a .csv and pictures for each operation and for the depth_sweep; of a drill-string in "
             "motion drilling.csv, charts and stability.csv")  # fmt: skip
     parser.add_argument("--color", metavar="FIELD",
-                        help="rods.png: field that colours the rods, such as shear_force, tension, displacement or m.x "
-                        "[bending_moment]")  # fmt: skip
+                        help="rods.png and films: field that colours the rods, such as shear_force, displacement or m.x "
+                        "[tension of cables, else the contact force or moment that stores most energy]")  # fmt: skip
     parser.add_argument("--magnify", type=float, help="pictures: factor on displacements [1]")
     parser.add_argument("--station", metavar="ROD@S",
                         help="station of the table: rod.end, rod@1.5 (m) [of the ends, loads and supports the one that "

@@ -103,9 +103,10 @@ def deliver_rods(computed, options, moving, tables=None):
     from cosserat_fenicsx.checks import positive
     from cosserat_fenicsx.pictures.colours import colour_of
 
-    at, color, picture = _numbers(options.at), options.color or "bending_moment", not options.no_picture
+    at, color, picture = _numbers(options.at), options.color, not options.no_picture
     magnify = 1.0 if options.magnify is None else positive("plot", "magnify", options.magnify, "-")
-    colour_of(color)
+    if color is not None:
+        colour_of(color)
     if at is not None and not options.output:
         say("cosserat: --at has no effect without -o DIR, which pictures are written to")
     name, film = "motion" if moving else "path", options.animate
@@ -120,7 +121,7 @@ def deliver_rods(computed, options, moving, tables=None):
             "rods.png": picture and (lambda file: path.plot(file, shown, magnify=magnify, color=color)),
             "rods.html": picture and path.write,
             "energy.png": picture and several and path.plot_energy,
-            film: film and several and partial(path.animate, speed=options.speed, magnify=magnify),
+            film: film and several and partial(path.animate, speed=options.speed, magnify=magnify, color=color),
         }
 
     names = [f"{name}.csv", f"{name}.xdmf", f"{name}.h5", "result.h5", "rods.png", "rods.html"]

@@ -17,6 +17,8 @@ from cosserat_fenicsx.checks import number, positive, refuse
 from cosserat_fenicsx.errors import LibraryMissing, SceneError
 from cosserat_fenicsx.interrupts import obey
 from cosserat_fenicsx.new_files import replaced
+from cosserat_fenicsx.pictures.colours import colour_of, known, peak_of, seen
+from cosserat_fenicsx.pictures.default_colour import default_colour
 from cosserat_fenicsx.pictures.drawing import (
     add_body,
     add_lines,
@@ -46,7 +48,7 @@ _WHITE = 244
 _PIECES, _LETTER = 100, 16
 
 
-def film(history, file, *, fps=FPS, speed=None, magnify=1.0, enlarge=1.0, size=SIZE, progress=None):
+def film(history, file, *, fps=FPS, speed=None, magnify=1.0, enlarge=1.0, size=SIZE, color=None, progress=None):
     """See `History.animate`."""
     file = check_name(file)
     if len(history) < 2:
@@ -54,13 +56,14 @@ def film(history, file, *, fps=FPS, speed=None, magnify=1.0, enlarge=1.0, size=S
     fps, size = frame_rate(file, fps), pixels(size)
     positive("animate", "magnify", magnify, "-")
     enlarged = Enlarged(history.scene, enlarge, "animate")
+    colour = colour_of(color or default_colour(history, range(len(history))), known(history), "animate")
     duration = history.times[-1] - history.times[0]
     speed = _round_speed(duration) if speed is None else positive("animate", "speed", speed, "-")
     times = _times(history.times[0], duration, speed, fps)
     pace = _pace_in_words(speed)
 
     def prepared():
-        return _Stage(history, times, magnify, enlarged, size, pace)
+        return _Stage(history, times, magnify, enlarged, size, pace, colour)
 
     on_first(history.comm, lambda: record(prepared, file, times, fps, progress))
 
@@ -147,21 +150,23 @@ def record(make_stage, file, times, fps, progress):
 class _Stage:
     """The scene of the film: constant parts are drawn once, meshes of the rods are moved for every frame."""
 
-    def __init__(self, history, times, magnify, enlarged, size, pace):
+    def __init__(self, history, times, magnify, enlarged, size, pace, colour):
         pyvista = load_pyvista()
-        self._between, self._magnify, self._pace = Between(history), magnify, pace
+        self._between, self._magnify, self._pace = Between(history, colour), magnify, pace
         self._x, self._enlarged = np.linspace(0, 1, _PIECES + 1), enlarged
         self._digits = max(0, 2 - math.floor(math.log10(times[-1] - times[0])))
         resting = at_rest(history.scene)
         bodies = [self._bodies(t) for t in times]
         everywhere = np.concatenate([*resting, *(body.line for made in bodies for body in made)])
         extent = float(np.ptp(everywhere, axis=0).max())
-        peak = max(body.values.max() for made in bodies for body in made)
-        self._scale, _ = suited(peak)
+        values = [body.values for made in bodies for body in made]
+        peak = peak_of(history, colour, values)
+        colour = seen(colour, values, peak)
+        self._scale, _ = suited(peak, colour.unit)
         self._plotter = stage(pyvista, size)
         self._factors = [thickening(body, extent) for body in bodies[0]]
         self._meshes = [
-            add_body(self._plotter, pyvista, body, factor, peak, moving=True)
+            add_body(self._plotter, pyvista, body, factor, peak, colour, moving=True)
             for body, factor in zip(bodies[0], self._factors, strict=True)
         ]
         drawn = zip(history.scene.rods, bodies[0], self._factors, strict=True)
@@ -315,10 +320,13 @@ class Between:
     Between two saved states, positions and quaternions are cubic Hermite polynomials by the values and velocities
     there. Where the velocities do not agree with the change of position, because states were saved too seldom,
     interpolation is linear, and where a section turns by more than half a turn the nearest state is taken.
+
+    Args:
+        colour: the `Colour` of the rods, whose values are interpolated linearly.
     """
 
-    def __init__(self, history):
-        self._history, self._times = history, history.times
+    def __init__(self, history, colour):
+        self._history, self._times, self._colour = history, history.times, colour
         self._saved = lru_cache(maxsize=2)(self._read)  # few: all states of a stored motion may exceed the memory
         self._smooth = [self._fits(k) for k in range(len(history) - 1)]
 
@@ -343,11 +351,11 @@ class Between:
         made = []
         for rod in history.scene.rods:
             line, directors = history.sample(state, rod, x)
-            moments = []
+            values = []
             for i in (k, k + 1):
                 fields = history.fields(i, rod)
-                moments.append(np.interp(x, fields["s"] / rod.length, fields["bending_moment"]))
-            made.append(body_of(rod, x, line, directors, (1 - z) * moments[0] + z * moments[1], magnify))
+                values.append(np.interp(x, fields["s"] / rod.length, self._colour.of(fields)))
+            made.append(body_of(rod, x, line, directors, (1 - z) * values[0] + z * values[1], magnify))
         return made
 
     def _fits(self, k):

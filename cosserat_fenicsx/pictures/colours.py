@@ -46,6 +46,8 @@ _WORDS = {
 }
 # Values below this share of the scene's force, moment or length are rounding.
 _ROUNDING = 1e-11
+# Negative values of at most this share of the largest size are taken for zero.
+_UNSIGNED = 1e-6
 
 
 @dataclass(frozen=True)
@@ -108,9 +110,8 @@ def _shear(fields):
     return np.hypot(*(np.einsum("ni,ni->n", fields["force"], fields[d]) for d in ("d1", "d2")))
 
 
-#: {name: `Colour`} of all that rods can be coloured by; and the one they have unless something else is asked for.
+#: {name: `Colour`} of all that rods can be coloured by.
 EVERY = _every()
-BENDING = EVERY["bending_moment"]
 
 
 def known(path):
@@ -119,17 +120,24 @@ def known(path):
     return {name: colour for name, colour in EVERY.items() if colour.field in given}
 
 
-def colour_of(name, among=EVERY):
-    """The `Colour` of that name among some; a SceneError with the names where there is none."""
+def colour_of(name, among=EVERY, where="plot"):
+    """The `Colour` of that name among some; a SceneError with the names, and `where`, where there is none."""
     if isinstance(name, str) and name in among:
         return among[name]
     plain = ", ".join(x for x in among if "." not in x)
     hint = nearest(name, among)
     hint = f"; {hint}" if hint.startswith("did") else ""
     raise SceneError(
-        f"plot.color = {name!r}: expected {plain}, or a component such as n.x or n.3 (x, y, z: inertial; 1, 2, 3: "
+        f"{where}.color = {name!r}: expected {plain}, or a component such as n.x or n.3 (x, y, z: inertial; 1, 2, 3: "
         f"along d1, d2, d3, which strain and curvature have alone){hint}"
     )
+
+
+def seen(colour, values, peak):
+    """The `Colour` for a list of arrays of values up to a size `peak`: where none is negative, its colours begin at 0,
+    so that all of them are used."""
+    least = min(float(np.nan_to_num(array).min()) for array in values)
+    return replace(colour, signed=colour.signed and not (peak and least >= -_UNSIGNED * peak))
 
 
 def peak_of(path, colour, values):

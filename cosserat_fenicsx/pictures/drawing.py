@@ -2,13 +2,13 @@
 
 import math
 import os
+import textwrap
 from dataclasses import dataclass
 
 import numpy as np
 
 from cosserat_fenicsx.errors import LibraryMissing
 from cosserat_fenicsx.pictures.charts import chosen_unit
-from cosserat_fenicsx.pictures.colours import BENDING
 from cosserat_fenicsx.pictures.view import Labels, View, axes_of, draw_axes, round_step
 from cosserat_fenicsx.scene.sections import Circle, Material
 
@@ -18,6 +18,10 @@ _PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, 
 _PREFIXED = ("N", "m", "Pa", "rad")
 # Maximum intervals between the numbers of the colour bar.
 _BAR = 6
+# Width of a picture over the size of its letters; maximum letters of a line over the colour bar.
+_LETTERS, _BAR_LETTERS = 40, 12
+# Maximum intervals between ticks of the longest axis.
+_TICKS = 6
 # Maximum digits after the point; smaller numbers are written with a power of ten.
 _MOST_DIGITS = 3
 _WALL = "peru"
@@ -158,14 +162,14 @@ def surface_of(pyvista, body, factor):
     return surface.triangulate()  # the caps of an I section are not convex
 
 
-def add_body(plotter, pyvista, body, factor, peak, moving=False, colour=BENDING):
+def add_body(plotter, pyvista, body, factor, peak, colour, moving=False):
     """Draw the surface of a `Body`, closed at both ends, coloured by its values.
 
     Args:
         factor: enlarges its sections.
         peak: the largest size of the values in the picture, which the colours reach up to.
-        moving: whether the mesh's points will be changed.
         colour: the `Colour` of its values.
+        moving: whether the mesh's points will be changed.
 
     Returns:
         The mesh.
@@ -174,8 +178,8 @@ def add_body(plotter, pyvista, body, factor, peak, moving=False, colour=BENDING)
     scale, name = suited(peak, colour.unit)
     step = round_step((2 if colour.signed else 1) * peak / scale or 1.0, _BAR)
     low, high = colour.limits(math.ceil(peak / scale / step - 1e-9) * step)
-    font = round(plotter.window_size[0] / 70)
-    unit = ": zero" if peak == 0 else "" if colour.unit == "1" else f" ({name})"
+    unit = "zero" if peak == 0 else "" if colour.unit == "1" else f"({name})"
+    words = "\n".join(filter(None, [*textwrap.wrap(colour.words, _BAR_LETTERS), unit]))
     surface["value"] = np.repeat(body.values / scale, body.outline.shape[1])
     plotter.add_mesh(
         surface,
@@ -185,7 +189,7 @@ def add_body(plotter, pyvista, body, factor, peak, moving=False, colour=BENDING)
         smooth_shading=not moving,
         split_sharp_edges=not moving,
         scalar_bar_args=colour_bar(
-            f"{colour.words}{unit}", font, round((high - low) / step) + 1 if peak else 0, step, (0.86, 0.25, 0.05, 0.55)
+            words, letters(plotter), round((high - low) / step) + 1 if peak else 0, step, (0.86, 0.25, 0.05, 0.5)
         ),
     )
     return surface
@@ -234,7 +238,12 @@ def _format(step):
     return f"%.{digits}f" if digits <= _MOST_DIGITS else "%.3g"
 
 
-def frame(plotter, everywhere, panel=False, *, more=None, labels=None, span=None):
+def letters(plotter):
+    """The size of texts in pixels: they can be read where the picture is 400 pixels wide."""
+    return max(10, round(plotter.window_size[0] / _LETTERS))
+
+
+def frame(plotter, everywhere, panel=False, *, more=None, labels=None, span=None, title=None, most=_TICKS):
     """Place the camera so that it shows points (n, 3), m, and draw axes with units around them.
 
     Args:
@@ -242,18 +251,20 @@ def frame(plotter, everywhere, panel=False, *, more=None, labels=None, span=None
         more: further points of the picture, m, such as arrows.
         span: (3,) the extents that decide on the view, see `view.view_of`; None for the extents of the points.
         labels: a function of the `View` that makes the `Labels` of the drawing; None for labels of the axes alone.
+        title: the height kept free for the title, pixels; None for a share of the window's.
+        most: the maximum number of intervals between ticks on the longest axis.
 
     Returns:
         The `View` and the `Labels`, which are still to be drawn if they were given.
     """
-    axes = axes_of(everywhere)
+    axes = axes_of(everywhere, most)
     corners = np.array(np.meshgrid(*((axis.low, axis.high) for axis in axes))).reshape(3, -1).T
     shown = corners if more is None else np.concatenate([corners, more])
     left, bottom, right, top = plotter.renderer.viewport  # the whole window, or a panel of it
     window = plotter.window_size[0] * (right - left), plotter.window_size[1] * (top - bottom)
-    view = View.of(shown, np.ptp(everywhere, axis=0) if span is None else span, window, panel)
+    view = View.of(shown, np.ptp(everywhere, axis=0) if span is None else span, window, panel, title)
     texts = labels(view) if labels else Labels(view)
-    draw_axes(plotter, load_pyvista(), axes, view, texts)
+    draw_axes(plotter, load_pyvista(), axes, view, texts, None if panel else letters(plotter))
     if labels is None:
         texts.draw(plotter, load_pyvista())
     view.place(plotter)

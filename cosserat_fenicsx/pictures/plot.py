@@ -2,6 +2,7 @@
 
 import math
 import textwrap
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,8 @@ from cosserat_fenicsx.checks import positive
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.new_files import replaced
 from cosserat_fenicsx.pictures.charts import asked
-from cosserat_fenicsx.pictures.colours import colour_of, known, peak_of
+from cosserat_fenicsx.pictures.colours import colour_of, known, peak_of, seen
+from cosserat_fenicsx.pictures.default_colour import default_colour
 from cosserat_fenicsx.pictures.drawing import (
     add_body,
     add_lines,
@@ -18,6 +20,7 @@ from cosserat_fenicsx.pictures.drawing import (
     at_rest,
     body_of,
     frame,
+    letters,
     load_pyvista,
     stage,
     surface_of,
@@ -25,27 +28,33 @@ from cosserat_fenicsx.pictures.drawing import (
     thickening,
     thicker,
 )
-from cosserat_fenicsx.pictures.signs import Deformed, Resting, signs_of, without_sign
-from cosserat_fenicsx.pictures.view import Labels, plain
+from cosserat_fenicsx.pictures.side_by_side import around, shifts, tangled
+from cosserat_fenicsx.pictures.signs import Deformed, Resting, signs_of, span_of, without_sign
+from cosserat_fenicsx.pictures.view import Labels, plain, view_of
 from cosserat_fenicsx.quantities import Units
 from cosserat_fenicsx.ranks import communicator, on_first
 
 # Smallest visible displacement as a share of the extent of the drawing.
 _VISIBLE = 0.01
-# Letters per line of the title; width and height of a picture, pixels; sizes of fonts: of labels, and of the title.
-_TITLE_WIDTH, _WINDOW, _FONT, _TITLE_FONT = 88, (1400, 1000), 20, 12
+# Letters per line of the title; width and height of a picture, pixels; height of a line over that of its letters.
+_TITLE_WIDTH, _WINDOW, _LINE = 60, (1400, 1000), 1.3
+# Height that labels above a drawing have, over that of letters.
+_ABOVE = 2.2
+# Sizes of names in a scene of many rods over those of other letters.
+_SMALLER = 0.7
 # Maximum number of rods that are named in the picture of a scene; maximum number of names in larger letters.
 _NAMED, _FEW = 40, 8
 _AT_REST = "#9db4cc"
 
 
-def rods(path, file=None, points=None, magnify=1.0, color="bending_moment", units="SI"):
+def rods(path, file=None, points=None, magnify=1.0, color=None, side_by_side=None, units="SI"):
     """See `RodResult.plot`."""
     if len(path) == 0:
         raise SceneError("the path has no point to draw")
     positive("plot", "magnify", magnify, "-")
-    colour = colour_of(color, known(path))
-    return deliver(path.comm, file, lambda: _draw(path, points, magnify, colour), units)
+    if color is not None:
+        colour_of(color, known(path))
+    return deliver(path.comm, file, lambda: _draw(path, points, magnify, color, side_by_side), units)
 
 
 def scene(scene, file=None, units="SI"):
@@ -79,11 +88,12 @@ def _save(draw, file):
         plotter.close()
 
 
-def _draw(path, points, magnify, colour):
+def _draw(path, points, magnify, color, side_by_side):
     pyvista = load_pyvista()
     shown = _spread(path) if points is None else [range(len(path))[k] for k in points]
     plotter = stage(pyvista, _WINDOW, "ssaa")
     resting = at_rest(path.scene)
+    colour = colour_of(color or default_colour(path, shown), known(path))
     bodies = {(k, rod): swept(path, k, rod, magnify, colour) for k in shown for rod in path.scene.rods}
     everywhere = np.concatenate([*resting, *(body.line for body in bodies.values())])
     size = float(np.ptp(everywhere, axis=0).max())
@@ -91,20 +101,55 @@ def _draw(path, points, magnify, colour):
     if points is None and _coincide(bodies, shown, factors):  # they would hide each other's colours
         shown = shown[-1:]
         bodies, factors = ({key: of[key] for key in of if key[0] == shown[0]} for of in (bodies, factors))
-    peak = peak_of(path, colour, [body.values for body in bodies.values()])
-    for key, body in bodies.items():
-        add_body(plotter, pyvista, body, factors[key], peak, colour=colour)
-    add_lines(plotter, pyvista, resting)
+    span = span_of(path.scene, [Deformed(path, k, {}, magnify, 0.0) for k in shown], everywhere)
+    moved, apart = dict.fromkeys(shown, np.zeros(3)), _apart(path.scene, shown, bodies, span, side_by_side)
+    title = _title(path, shown, magnify, _small(path, shown, size, magnify))
+    if apart:
+        moved, (*_, up) = apart, view_of(span)
+        title.append("(shapes side by side, the axes beside the first)")
+        everywhere = around([bodies[shown[0], rod].line for rod in path.scene.rods], everywhere, up)
+        bodies = {(k, rod): replace(body, line=body.line + moved[k]) for (k, rod), body in bodies.items()}
+        size = float(np.ptp(np.concatenate([body.line for body in bodies.values()]), axis=0).max())
+        factors = {key: thickening(body, size) for key, body in bodies.items()}
+    values = [body.values for body in bodies.values()]
+    peak = peak_of(path, colour, values)
+    colour = seen(colour, values, peak)
     radii = {rod: factors[shown[-1], rod] * bodies[shown[-1], rod].radius for rod in path.scene.rods}
+    for key, body in bodies.items():
+        add_body(plotter, pyvista, body, factors[key], peak, colour)
+    if not apart:
+        add_lines(plotter, pyvista, resting)
     if magnify == 1:  # elsewhere rods would leave their tubes
         add_tubes(plotter, pyvista, path.scene, radii)
-    shapes = [Deformed(path, k, radii, magnify) for k in shown]
-    symbols = signs_of(pyvista, path.scene, shapes, everywhere)
-    lines = [body.line for body in bodies.values()]
-    title = _title(path, shown, factors.values(), magnify, _small(path, shown, size, magnify))
-    _finish(plotter, pyvista, everywhere, symbols, lines, title + _undrawn(path.scene, magnify == 1),
-            lambda labels: _label(labels, path, shown, bodies))  # fmt: skip
+    lines = [line for key, body in bodies.items() for line in _outline(body, factors[key], span)]
+    shapes = [Deformed(path, k, radii, magnify, moved[k]) for k in shown]
+    symbols = signs_of(
+        pyvista, path.scene, shapes, np.concatenate([everywhere, *(body.line for body in bodies.values())]), span
+    )
+    title += [*_thicker(factors.values()), *_undrawn(path.scene, magnify == 1)]
+    _finish(plotter, pyvista, everywhere, symbols, lines, title,
+            lambda labels: _label(labels, path, shown, bodies, span, apart, letters(plotter)),
+            4 if apart else 6)  # fmt: skip
     return plotter
+
+
+def _apart(scene, shown, bodies, span, wish):
+    """{k: vector (3,), m} by which shapes are moved beside each other; empty where they stay.
+
+    Args:
+        wish: True or False, or None: where they would be tangled otherwise.
+    """
+    shapes, (_, right, above, _) = [[bodies[k, rod].line for rod in scene.rods] for k in shown], view_of(span)
+    if wish is None:
+        wish = all(load.tube() is None for load in scene.loads) and tangled(shapes, right, above)
+    return dict(zip(shown, shifts(shapes, right), strict=True)) if wish and len(shown) > 1 else {}
+
+
+def _outline(body, factor, span):
+    """The centreline of a `Body` and its edges in the picture, (n, 3) m each, which labels keep off."""
+    _, right, above, _ = view_of(span)
+    edge = factor * body.radius
+    return [body.line, *(body.line + sign * edge * way for sign in (-1, 1) for way in (right, above))]
 
 
 def _draw_scene(scene):
@@ -122,44 +167,47 @@ def _draw_scene(scene):
             surface_of(pyvista, body, factors[-1]), color=_AT_REST, split_sharp_edges=True, smooth_shading=True
         )
     add_tubes(plotter, pyvista, scene, radii)
-    symbols = signs_of(pyvista, scene, [Resting(radii)], everywhere)
+    shapes = [Resting(radii)]
+    symbols = signs_of(pyvista, scene, shapes, everywhere, span_of(scene, shapes, everywhere))
     named = len(scene.rods) <= _NAMED
     title = [scene.title or "Scene", *_thicker(factors), *([] if named else [f"({len(scene.rods)} rods, not named)"])]
     if any(load.scaled for load in scene.loads):
         title[0] += ": loads at load factor 1"
     _finish(plotter, pyvista, everywhere, symbols, at_rest(scene), title + _undrawn(scene, True),
-            lambda labels: _name(labels, scene) if named else None)  # fmt: skip
+            lambda labels: _name(labels, scene, letters(plotter)) if named else None)  # fmt: skip
     return plotter
 
 
-def _finish(plotter, pyvista, everywhere, symbols, lines, title, label):
+def _finish(plotter, pyvista, everywhere, symbols, lines, title, label, most=6):
     """Draw signs, axes, labels, key and title, and place the camera.
 
     Args:
-        lines: centrelines that labels keep off. title: lines of text. label: puts the first labels into the `Labels`.
+        lines: centrelines that labels keep off. title: lines of text. label: puts the first labels into the `Labels`. most: see `drawing.frame`.
     """
     symbols.draw(plotter)
-    width, height = plotter.window_size
+    (width, height), font = plotter.window_size, letters(plotter)
     lettered = [line for text in title for line in textwrap.wrap(text, _TITLE_WIDTH)]
+    over = font * _LINE * (len(lettered) + 0.5)
 
     def prepared(view):
         labels = Labels(view, [*lines, *symbols.covers])
-        labels.reserve((0, height - 2.4 * _TITLE_FONT * (len(lettered) + 0.5)), (width, height))
-        labels.reserve((0.8 * width, 0), (width, 0.85 * height))
+        labels.reserve((0, height - over), (width, height))
+        labels.reserve((0.79 * width, 0), (width, 0.85 * height))
         return labels
 
-    _, labels = frame(plotter, everywhere, more=symbols.points, labels=prepared, span=symbols.span)
+    _, labels = frame(plotter, everywhere, more=symbols.points, labels=prepared, span=symbols.span, title=over + _ABOVE * font,
+                      most=most)  # fmt: skip
     label(labels)
     for text, point, towards, colour in symbols.grouped_texts():
-        labels.near(text, point, towards, size=_FONT - 4, colour=colour)
+        labels.near(text, point, towards, size=font, colour=colour)
     labels.draw(plotter, pyvista)
     if labels.left_out:
-        lettered.append(
-            f"(no room for {len(labels.left_out)} labels: {textwrap.shorten(', '.join(labels.left_out), 60)})"
-        )
+        left_out = f"(no room for {len(labels.left_out)} labels: "
+        lettered.append(f"{left_out}{textwrap.shorten(', '.join(labels.left_out), _TITLE_WIDTH - len(left_out) - 1)})")
     for i, (words, colour) in enumerate(reversed(symbols.groups.items())):
-        plotter.add_text(words, position=(0.84 * width, (0.02 + 0.025 * i) * height), color=colour, font_size=8)
-    plotter.add_text(plain("\n".join(lettered)), position="upper_edge", color="black", font_size=_TITLE_FONT)
+        place = 0.79 * width, 0.01 * height + _LINE * font * i
+        plotter.add_text(words, position=place, color=colour, font_size=font / 2)
+    plotter.add_text(plain("\n".join(lettered)), position="upper_edge", color="black", font_size=font / 2)
 
 
 def _small(path, shown, size, magnify):
@@ -171,18 +219,19 @@ def _small(path, shown, size, magnify):
     return f"displacements are at most {largest:.2g} m, magnify={decade:g} (--magnify {decade:g}) shows them"
 
 
-def _title(path, shown, factors, magnify, small):
-    """The lines of the title: the points shown, and notes on what is not to scale."""
+def _title(path, shown, magnify, small):
+    """The lines of the title: the points shown, and notes on displacements."""
     some = "" if len(shown) == len(path) else f" (of {len(path)})"
     values = ", ".join(path.label(k) for k in shown)
     title = f"{path.scene.title or 'Deformed rods'}:"
-    shapes = f"shapes at {path.axis}{'s' if len(shown) > 1 else ''} {values}{some}"
+    several = "s" if len(shown) > 1 else ""
+    shapes = f"shape{several} at {path.axis}{several} {values}{some}"
     lines = [f"{title} {shapes}"] if len(title) + len(shapes) < _TITLE_WIDTH else [title, shapes]
     if magnify != 1:
         lines.append(f"(displacements magnified {magnify:g} times)")
     if small:
         lines.append(f"({small})")
-    return lines + _thicker(factors)
+    return lines
 
 
 def _thicker(factors):
@@ -211,9 +260,20 @@ def _coincide(bodies, shown, factors):
     return apart < 2 * max(factors[key] * body.radius for key, body in bodies.items())
 
 
-def _label(labels, path, shown, bodies):
-    """Label each shape (`path.label`) where the shapes lie farthest apart, or else at the end of another rod."""
+def _label(labels, path, shown, bodies, span, apart, font):
+    """Label each shape (`path.label`) where the shapes lie farthest apart, or else at the end of another rod; of shapes
+    side by side above each; of one alone, which the title names, nothing."""
     rods = path.scene.rods
+    if len(shown) == 1:
+        return
+    if apart:
+        _, right, above, _ = view_of(span)
+        for k in shown:
+            line = np.concatenate([bodies[k, rod].line for rod in rods])
+            middle = (line @ right).max() / 2 + (line @ right).min() / 2 - line.mean(axis=0) @ right
+            top = (line @ above).max() - line.mean(axis=0) @ above
+            labels.near(path.label(k), line.mean(axis=0) + middle * right + top * above, above, size=font)
+        return
     size = max(np.ptp(body.line) for body in bodies.values())
     spread = [np.ptp([bodies[k, rod].line for k in shown], axis=0).max(axis=1) for rod in rods]
     rod = max(range(len(rods)), key=lambda i: (round(spread[i].max() / size, 6), -i))
@@ -225,12 +285,12 @@ def _label(labels, path, shown, bodies):
         towards = _beyond(body.directors[place, :, 2], end)
         if not end and (body.line[place] - middle) @ towards < 0:
             towards = -towards  # off the other shapes
-        labels.near(path.label(k), body.line[place], towards, size=_FONT)
+        labels.near(path.label(k), body.line[place], towards, size=font)
 
 
-def _name(labels, scene):
+def _name(labels, scene, font):
     """Label the rods by their names, in the middle."""
-    size = _FONT - 2 if len(scene.rods) <= _FEW else _FONT - 6
+    size = font if len(scene.rods) <= _FEW else round(_SMALLER * font)
     for rod in scene.rods:
         s = rod.length / 2
         labels.near(rod.name, rod.curve.position(s), _beyond(rod.curve.frame(s)[:, 2], 0), size=size)

@@ -54,11 +54,12 @@ class Resting:
 
 
 class Deformed(Resting):
-    """The rods at point k of a path or a motion, their displacements magnified."""
+    """The rods at point k of a path or a motion, their displacements magnified, and all of it shifted by a vector (3,),
+    m."""
 
-    def __init__(self, result, k, radii, magnify):
+    def __init__(self, result, k, radii, magnify, shift):
         super().__init__(radii)
-        self._result, self._k, self._magnify = result, k, magnify
+        self._result, self._k, self._magnify, self._shift = result, k, magnify, shift
         timed = result.axis == "time"
         self.factor, self.time = (1.0, result.along_axis[k]) if timed else (result.along_axis[k], 0.0)
 
@@ -72,10 +73,10 @@ class Deformed(Resting):
     def _moved(self, rod, x):
         places, directors = self._result.sample(self._k, rod, x)
         reference = rod.curve.position(x * rod.length)
-        return reference + self._magnify * (places - reference), directors
+        return reference + self._magnify * (places - reference) + self._shift, directors
 
 
-def signs_of(pyvista, scene, shapes, everywhere):
+def signs_of(pyvista, scene, shapes, everywhere, span):
     """The `Symbols` of a scene.
 
     Supports and joints are drawn on the last of the shapes, each load on the last one where it is not zero.
@@ -83,9 +84,9 @@ def signs_of(pyvista, scene, shapes, everywhere):
     Args:
         shapes: `Resting` or `Deformed`s.
         everywhere: all points of the drawing (n, 3), m.
+        span: see `span_of`.
     """
     last, supports, loads = shapes[-1], supports_of(scene), _acting(scene, shapes)
-    span = _span(everywhere, [*supports, *(mark for _, mark, _ in loads)])
     to_camera, right, above, _ = view_of(span)
     count = len(supports) + sum(mark.station is not None for _, mark, _ in loads)
     size = _SIZE * float(span.max()) * max(_SMALLEST, min(1.0, (_MANY / max(count, 1)) ** 0.5))
@@ -112,12 +113,12 @@ def signs_of(pyvista, scene, shapes, everywhere):
     return symbols
 
 
-def _span(everywhere, marks):
+def span_of(scene, shapes, everywhere):
     """(3,) the extents that decide on the view: of the points; the largest for all axes where the points lie in a
-    plane, but forces or the normal of a roller do not."""
+    plane, but forces or the normal of a roller do not. The arguments are those of `signs_of`."""
     span = np.ptp(everywhere, axis=0)
     normal = np.abs(view_of(span)[0])
-    for mark in marks:
+    for mark in (*supports_of(scene), *(mark for _, mark, _ in _acting(scene, shapes))):
         if mark.vector is not None and mark.kind in ("force", "line force", "roller", "spring") and normal.max() == 1.0:
             vectors = np.atleast_2d(mark.vector)
             if (np.abs(vectors @ normal) > _OUT_OF_PLANE * np.linalg.norm(vectors, axis=1).max()).any():

@@ -62,7 +62,7 @@ class Symbols:
 
     def __init__(self, pyvista, span, size, lines):
         self._pyvista, self._size, self.texts, self.covers = pyvista, size, [], []
-        self.span, (self._view, self._right, self._up, _) = span, view_of(span)
+        self.span, (self._view, self._right, self._up, self._vertical) = span, view_of(span)
         self._taken = [self._flat(np.concatenate(lines))]
         self._meshes, self._lines = defaultdict(list), defaultdict(list)
 
@@ -107,7 +107,8 @@ class Symbols:
             self._add(mark, self._box(pose.place + 0.17 * a * out, pose.directors, (across, across, 0.34 * a)))
             return
         down = self._below(mark, pose)
-        height, top = 0.75 * a, pose.place + 0.7 * pose.radius * down
+        leaves = pose.inwards is not None and down @ pose.inwards < -1e-6  # beyond the end there is no rod
+        height, top = 0.75 * a, pose.place + (0.0 if leaves else 0.7) * pose.radius * down
         self._cone(mark, top, -down, height, 0.42 * a)
         foot = top + height * down
         if mark.kind == "hinge":
@@ -287,14 +288,14 @@ class Symbols:
         return self._pyvista.PolyData(centre + corners @ frame.T, faces)
 
     def _below(self, mark, pose):
-        """The direction from the rod to the ground: downwards in the picture, or off the rod's end."""
+        """The direction from the rod to the ground: downwards, or off the rod's end."""
         if mark.vector is not None and mark.kind in ("roller", "spring", "dashpot"):
-            return -mark.vector if mark.vector @ (self._up + 0.01 * self._right) > 0 else np.asarray(mark.vector)
-        if pose.inwards is not None and pose.inwards @ -self._up > 0.7:
-            return self._up
-        if pose.inwards is None and abs(pose.directors[:, 2] @ self._up) > 0.7:
+            return -mark.vector if mark.vector @ (self._vertical + 0.01 * self._right) > 0 else np.asarray(mark.vector)
+        if pose.inwards is not None and pose.inwards @ -self._vertical > 0.7:
+            return self._vertical
+        if pose.inwards is None and abs(pose.directors[:, 2] @ self._vertical) > 0.7:
             return self._right
-        return -self._up
+        return -self._vertical
 
     def _across(self, down):
         """A unit vector across a direction, in the plane of the picture; to the right where it is seen end on."""

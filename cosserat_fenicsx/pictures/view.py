@@ -9,11 +9,11 @@ import numpy as np
 
 from cosserat_fenicsx.pictures.charts import chosen_unit
 
-# Shares of the picture's width (left of the colour bar) and height (between title and lowest axis) that the drawing
-# fills; its offsets to the left and upwards, as shares of the picture's half sizes.
-_WHOLE = (0.62, 0.64, 0.12, -0.03)
+# Shares of the picture's width to the left (vertical axis) and to the right (colour bar) of the drawing, and of its
+# height below (horizontal axes) and above (title).
+_WHOLE = (0.19, 0.21, 0.17, 0.17)
 # Likewise for one of several drawings side by side, without a colour bar.
-_PANEL = (0.72, 0.58, -0.06, 0.02)
+_PANEL = (0.17, 0.11, 0.2, 0.22)
 
 
 def view_of(span):
@@ -56,15 +56,18 @@ class View:
     window: tuple
 
     @classmethod
-    def of(cls, points, span, window, panel=False):
+    def of(cls, points, span, window, panel=False, title=None):
         """The view that shows all points (n, 3), m.
 
         Args:
             span: (3,) the extents that decide on its direction.
             window: (width, height), pixels.
             panel: whether it is one of several drawings side by side.
+            title: the height kept free for the title, pixels; None for a share of the window's.
         """
-        wide, tall, left, upwards = _PANEL if panel else _WHOLE
+        before, after, below, over = _PANEL if panel else _WHOLE
+        over = over if title is None else title / window[1]
+        wide, tall, left, upwards = 1 - before - after, 1 - below - over, after - before, over - below
         to_camera, right, above, up = view_of(span)
         across, high = points @ right, points @ above
         width, height = np.ptp(across), np.ptp(high)
@@ -101,10 +104,10 @@ class View:
 
 
 # Mean width of a letter and height of a line over the font's size; pixels between labels, and to the picture's edge.
-_LETTER, _LINE, _GAP, _EDGE = 0.56, 1.15, 3, 4
+_LETTER, _LINE, _GAP, _EDGE = 0.56, 1.15, 8, 4
 # Distances (pixels) of a label from its point, and turns (deg) of its direction, in the order of preference; distance
 # from which on a thin line leads back.
-_DISTANCES, _TURNS, _LEADER = (16, 26, 42, 64, 92, 128), (0, 40, -40, 80, -80, 120, -120, 180), 40
+_DISTANCES, _TURNS, _LEADER = (16, 26, 42, 64, 92, 128, 180, 250), (0, 40, -40, 80, -80, 120, -120, 180), 40
 # Pixels between a label and the middle of a rod; size of the cells in which lines are looked up, pixels.
 _CLEAR, _CELL = 10, 4
 
@@ -165,7 +168,7 @@ class Labels:
         """Put all labels into the drawing."""
         if self._leaders:
             ends = np.concatenate(self._leaders) + self._view.half * self._view.to_camera  # in front of the rods
-            plotter.add_mesh(pyvista.line_segments_from_points(ends), color="darkgrey", line_width=1)
+            plotter.add_mesh(pyvista.line_segments_from_points(ends), color="grey", line_width=2)
             plotter.reset_camera_clipping_range()
         # one by one: of labels that are added together VTK leaves out those near others, by rules of its own
         for text, point, size, colour in self._texts:
@@ -244,14 +247,14 @@ class Axis:
     ticks: tuple
 
 
-def axes_of(points):
-    """The three `Axis` of a drawing of points (n, 3), m."""
+def axes_of(points, most=_INTERVALS):
+    """The three `Axis` of a drawing of points (n, 3), m, with at most so many intervals on the longest one."""
     low, high = points.min(axis=0), points.max(axis=0)
     size = float((high - low).max())
     unit, scale = chosen_unit("m")
     if unit == "m":
         scale, unit = next((scale, unit) for least, scale, unit in _UNITS if size >= least)
-    step = scale * round_step(size / scale, _INTERVALS)
+    step = scale * round_step(size / scale, most)
     first, last = (x.astype(int).tolist() for x in (np.floor(low / step + 1e-9), np.ceil(high / step - 1e-9)))
     axes = []
     for name, a, b, middle in zip("xyz", first, last, (low + high) / 2, strict=True):
@@ -261,14 +264,14 @@ def axes_of(points):
     return tuple(axes)
 
 
-def draw_axes(plotter, pyvista, axes, view, labels):
+def draw_axes(plotter, pyvista, axes, view, labels, font=None):
     """Draw the edges of the box that carry ticks, outside in the picture: z at the left, x and y below; and the floor
     of a box that is not flat.
 
     Args:
-        axes: three `Axis`. view: the `View`. labels: the `Labels` that its texts join.
+        axes: three `Axis`. view: the `View`. labels: the `Labels` that its texts join. font: their size, pixels.
     """
-    font = max(9, round(view.window[1] / 55))
+    font = font or max(9, round(view.window[1] / 55))
     corner = {(i, end): getattr(axes[i], end) for i in range(3) for end in ("low", "high")}
     lines = []
     middle = view.pixels([(axis.low + axis.high) / 2 for axis in axes])

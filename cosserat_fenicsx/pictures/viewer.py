@@ -11,11 +11,12 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from cosserat_fenicsx.new_files import replaced
-from cosserat_fenicsx.pictures.colours import MAPS, known, peak_of
+from cosserat_fenicsx.pictures.colours import MAPS, known, peak_of, seen
+from cosserat_fenicsx.pictures.default_colour import default_colour
 from cosserat_fenicsx.pictures.drawing import at_rest, outlines, thickening, thicker
 from cosserat_fenicsx.pictures.view import axes_of, view_of
 
-#: Fields that can be chosen in the file, where the result has them; the first is shown at first.
+#: Fields that can be chosen in the file, where the result has them, beside that of `default_colour`, which is first.
 FIELDS = ("bending_moment", "twisting_moment", "tension", "shear_force", "displacement", "von_mises")
 # Stands for a missing value, drawn grey.
 _NONE = 1e30
@@ -62,7 +63,8 @@ def _data(result):
     most = max(2, min(_STATES, _MOST // sum(counts)))
     shown = np.unique(np.linspace(0, len(result) - 1, min(len(result), most)).round().astype(int))
     every = known(result)
-    colours = [every[name] for name in FIELDS if name in every]
+    names = dict.fromkeys((default_colour(result, shown), *FIELDS))
+    colours = [every[name] for name in names if name in every]
     shapes = [_Shapes(result, rod, colours, np.linspace(0, 1, n), shown) for rod, n in zip(rods, counts, strict=True)]
     everywhere = np.concatenate([*at_rest(result.scene), *(shape.positions.reshape(-1, 3) for shape in shapes)])
     low, high = everywhere.min(axis=0), everywhere.max(axis=0)
@@ -172,6 +174,7 @@ def _view(span):
 
 def _field(result, channel, colour, values):
     peak = peak_of(result, colour, values)
+    colour = seen(colour, values, peak)
     low, high = colour.limits(peak)
     return {
         "words": colour.words,

@@ -207,8 +207,9 @@ class History(RodResult):
 
         return motion_charts.draw_energy(self, file, units=units, width=width)
 
-    def animate(self, file, *, fps=25, speed=None, magnify=1.0, enlarge=1.0, size=(960, 720), progress=None):
-        """Film of the rods, coloured by bending moment; the camera is fixed and shows the whole motion.
+    def animate(self, file, *, fps=25, speed=None, magnify=1.0, enlarge=1.0, size=(960, 720), color=None,
+                progress=None):  # fmt: skip
+        """Film of the rods, coloured as those of `plot`; the camera is fixed and shows the whole motion.
 
         Frames come at a constant rate, interpolated between the saved times.
 
@@ -220,6 +221,7 @@ class History(RodResult):
             magnify: factor of the displacements in the picture.
             enlarge: factor of the distances from the axes of the holes that rods are in, and of their clearances.
             size: (width, height), pixels, even.
+            color: as of `plot`.
             progress: whether to show a progress bar; None: only if it takes long.
 
         Raises:
@@ -230,7 +232,8 @@ class History(RodResult):
         """
         from cosserat_fenicsx.pictures import animation
 
-        animation.film(self, file, fps=fps, speed=speed, magnify=magnify, enlarge=enlarge, size=size, progress=progress)
+        animation.film(self, file, fps=fps, speed=speed, magnify=magnify, enlarge=enlarge, size=size, color=color,
+                       progress=progress)  # fmt: skip
 
     @property
     def _all_rates(self):

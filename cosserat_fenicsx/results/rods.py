@@ -552,7 +552,7 @@ class RodResult(Result, Extremes, Reactions, Stresses, States):
             written = xdmf.write_series if file.suffix == ".xdmf" else xdmf.write_state
             on_first(self.comm, lambda: written(self, file, k))
 
-    def plot(self, file=None, points=None, *, magnify=1.0, color="bending_moment", units="SI"):
+    def plot(self, file=None, points=None, *, magnify=1.0, color=None, side_by_side=None, units="SI"):
         """Picture of the deformed rods at some points, with the reference as a grey line, supports, joints and loads.
 
         Supports and joints are drawn on the last shape, each load on the last shape where it is not zero.
@@ -563,7 +563,10 @@ class RodResult(Result, Extremes, Reactions, Stresses, States):
             magnify: factor of the displacements in the picture.
             color: what colours the rods: bending_moment, twisting_moment, tension, shear_force, n, m, displacement,
                 strain, curvature, of a motion velocity and angular_velocity too; n.x, n.y, n.z for an inertial
-                component, n.1, n.2, n.3 for one along d_1, d_2, d_3.
+                component, n.1, n.2, n.3 for one along d_1, d_2, d_3. None for what matters: the tension of cables,
+                else of the first four the one that stores most strain energy, see docs/viewing.md.
+            side_by_side: whether shapes are drawn beside each other, without the reference, instead of where they are;
+                None where they would cross each other many times.
             units: "SI", "field", or a dict of units by dimensions, such as {"force": "klbf"}.
 
         Raises:
@@ -573,7 +576,7 @@ class RodResult(Result, Extremes, Reactions, Stresses, States):
         """
         from cosserat_fenicsx.pictures import plot
 
-        return plot.rods(self, file, points, magnify, color, units)
+        return plot.rods(self, file, points, magnify, color, side_by_side, units)
 
 
 def group_names(scene):
