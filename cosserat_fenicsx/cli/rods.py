@@ -119,7 +119,7 @@ def deliver_rods(computed, options, moving, tables=None):
             f"{name}.h5": True,
             "result.h5": path.save,
             "rods.png": picture and (lambda file: path.plot(file, shown, magnify=magnify, color=color)),
-            "rods.html": picture and path.write,
+            "rods.html": picture and partial(path.write, magnify=magnify),
             "energy.png": picture and several and path.plot_energy,
             film: film and several and partial(path.animate, speed=options.speed, magnify=magnify, color=color),
         }

@@ -89,7 +89,7 @@ def signs_of(pyvista, scene, shapes, everywhere, span):
     last, supports, loads = shapes[-1], supports_of(scene), _acting(scene, shapes)
     to_camera, right, above, _ = view_of(span)
     count = len(supports) + sum(mark.station is not None for _, mark, _ in loads)
-    size = _SIZE * float(span.max()) * max(_SMALLEST, min(1.0, (_MANY / max(count, 1)) ** 0.5))
+    size = sign_size(span, count)
     symbols = Symbols(pyvista, span, size, [shape.line(rod) for shape in shapes for rod in scene.rods])
     for mark in supports:
         symbols.support(mark, last.pose(mark.station))
@@ -111,6 +111,11 @@ def signs_of(pyvista, scene, shapes, everywhere, span):
             corner = corner + (everywhere @ to_camera).mean() * to_camera
             symbols.everywhere(mark, corner + 1.5 * size * (right - above), type(load).__name__)
     return symbols
+
+
+def sign_size(span, count):
+    """The size of a sign, m, in a drawing of extents `span` (3,), m, with so many of them."""
+    return _SIZE * float(span.max()) * max(_SMALLEST, min(1.0, (_MANY / max(count, 1)) ** 0.5))
 
 
 def span_of(scene, shapes, everywhere):
@@ -222,7 +227,7 @@ def loads_of(load, scene, factor=1.0, time=None):
         time: s; None for the time at which a load that depends on time is largest.
     """
     times = sample_times(load, scene.horizon) if time is None and signals_of(load) else [time or 0.0]
-    found = max((_marks(at(load, t), scene, factor if load.scaled else 1.0) for t in times), key=_size)
+    found = max((marks_of(at(load, t), scene, factor if load.scaled else 1.0) for t in times), key=_size)
     return [mark for mark in found if mark.kind in _DEVICES.values() or mark.kind == "mass" or _size([mark]) > 0]
 
 
@@ -230,7 +235,8 @@ def _size(marks):
     return max((float(np.abs(mark.vector).max()) for mark in marks if mark.unit), default=0.0)
 
 
-def _marks(load, scene, factor):
+def marks_of(load, scene, factor):
+    """The `Mark`s of a load or another action that does not depend on time, times a factor, also where it is zero."""
     if load.tube() is not None:  # drawn as a tube; its stiffness is no spring
         return []
     if load.station is not None:
@@ -269,4 +275,4 @@ def _along(load, rod, factor, drawn_on):
 
 def has_sign(load, scene):
     """Whether drawings have a sign for a load, whatever its size."""
-    return bool(_marks(at(load, 0.0), scene, 1.0))
+    return bool(marks_of(at(load, 0.0), scene, 1.0))

@@ -18,7 +18,7 @@ COLOURS = {
     "springs": "#1f77b4",
     "masses": "#222222",
 }
-_GROUPS = {
+GROUPS = {
     "clamp": "supports", "pin": "supports", "hinge": "supports", "roller": "supports", "moved": "moved supports",
     "joint": "joints", "hinge joint": "released joints", "ball joint": "released joints", "force": "forces",
     "line force": "forces", "moment": "moments", "line moment": "moments", "spring": "springs",
@@ -148,7 +148,7 @@ class Symbols:
                 self._line(mark, np.array([pose.place, point]))
             force = mark.kind == "force"
             away = self._force(mark, pose, point, along, length) if force else self._moment(mark, pose, along)
-            self.texts.append((text, *away, COLOURS[_GROUPS[mark.kind]]))
+            self.texts.append((text, *away, COLOURS[GROUPS[mark.kind]]))
         elif mark.kind == "mass":
             self._ball(mark, pose.place, max(0.3 * self._size, 2 * pose.radius))
         else:
@@ -229,7 +229,7 @@ class Symbols:
             line: the centreline (n, 3), m. radius: that the rod is drawn with, m.
         """
         way = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1)))
-        count = int(np.clip(round(way[-1] / (_SPACING * self._size)), 3, _MOST))
+        count = arrows_along(way[-1], self._size)
         places, x = np.linspace(0, way[-1], count), np.linspace(0, way[-1], len(mark.vector))
         feet = np.column_stack([np.interp(places, way, column) for column in line.T])
         vectors = np.column_stack([np.interp(places, x, column) for column in mark.vector.T]) / top
@@ -248,7 +248,7 @@ class Symbols:
             self._line(mark, np.array(tails))
         if tails:
             middle = len(tails) // 2
-            self.texts.append((text, tails[middle], tails[middle] - feet[middle], COLOURS[_GROUPS[mark.kind]]))
+            self.texts.append((text, tails[middle], tails[middle] - feet[middle], COLOURS[GROUPS[mark.kind]]))
 
     def everywhere(self, mark, corner, text):
         """One arrow, beside the rods, for a load that acts on all of them."""
@@ -305,12 +305,17 @@ class Symbols:
 
     def _line(self, mark, points):
         self.covers.append(points)
-        self._lines[_GROUPS[mark.kind]].append(self._pyvista.lines_from_points(points))
+        self._lines[GROUPS[mark.kind]].append(self._pyvista.lines_from_points(points))
 
     def _add(self, mark, mesh):
         mesh.clear_data()
         self.covers.append(mesh.points)
-        self._meshes[_GROUPS[mark.kind]].append(mesh)
+        self._meshes[GROUPS[mark.kind]].append(mesh)
+
+
+def arrows_along(length, size):
+    """How many arrows a load along a rod of some length has; size: of a sign, m."""
+    return int(np.clip(round(length / (_SPACING * size)), 3, _MOST))
 
 
 def _frame_along(axis):

@@ -14,6 +14,8 @@ from cosserat_fenicsx.new_files import replaced
 from cosserat_fenicsx.pictures.colours import MAPS, known, peak_of, seen
 from cosserat_fenicsx.pictures.default_colour import default_colour
 from cosserat_fenicsx.pictures.drawing import at_rest, outlines, thickening, thicker
+from cosserat_fenicsx.pictures.page_signs import signs
+from cosserat_fenicsx.pictures.signs import Deformed, span_of
 from cosserat_fenicsx.pictures.view import axes_of, view_of
 
 #: Fields that can be chosen in the file, where the result has them, beside that of `default_colour`, which is first.
@@ -26,23 +28,24 @@ _STATES, _PER_ELEMENT, _SECTIONS, _MOST = 400, 8, 121, 50_000
 _FEWEST = 9
 # Duration (s) of the play of paths, and of motions outside the range of durations that are shown in real time.
 _PLAY, _REAL_TIME = 8.0, (4.0, 20.0)
-_PARTS = ("rods.js", "camera.js", "axes.js", "app.js")
+_PARTS = ("rods.js", "signs.js", "camera.js", "axes.js", "app.js")
 
 
-def write(result, file):
+def write(result, file, magnify=1.0):
     """Write a path or a motion to an interactive .html file (a `pathlib.Path`), on one rank: a slider over the states,
-    turning, zooming and moving by mouse and touch, a play button, and a choice of the field that colours the rods.
+    turning, zooming and moving by mouse and touch, a play button, and choices of the field that colours the rods and of
+    the factor of displacements, which is `magnify` at first.
 
     States beyond some hundreds are left out evenly, which the file says.
     """
     with replaced(file) as fresh:
-        fresh.write_text(page(result), encoding="utf-8")
+        fresh.write_text(page(result, magnify), encoding="utf-8")
 
 
-def page(result):
-    """The text of the file."""
+def page(result, magnify=1.0):
+    """The text of the file, see `write`."""
     place = resources.files(__package__) / "page"
-    data = json.dumps(_data(result), allow_nan=False, ensure_ascii=False).replace("<", "\\u003c")
+    data = json.dumps(_data(result, magnify), allow_nan=False, ensure_ascii=False).replace("<", "\\u003c")
     return string.Template((place / "page.html").read_text("utf-8")).substitute(
         title=html.escape(_title(result)),
         style=(place / "style.css").read_text("utf-8"),
@@ -55,7 +58,7 @@ def _title(result):
     return result.scene.title or ("Deformed rods" if result.axis != "time" else "Motion")
 
 
-def _data(result):
+def _data(result, magnify):
     rods = result.scene.rods
     counts = [min(_SECTIONS, _PER_ELEMENT * n + 1) for n in result.elements]
     while sum(counts) > _MOST // min(len(result), 20) and max(counts) > _FEWEST:
@@ -66,14 +69,21 @@ def _data(result):
     names = dict.fromkeys((default_colour(result, shown), *FIELDS))
     colours = [every[name] for name in names if name in every]
     shapes = [_Shapes(result, rod, colours, np.linspace(0, 1, n), shown) for rod, n in zip(rods, counts, strict=True)]
-    everywhere = np.concatenate([*at_rest(result.scene), *(shape.positions.reshape(-1, 3) for shape in shapes)])
-    low, high = everywhere.min(axis=0), everywhere.max(axis=0)
+    moved = [shape.rest + magnify * (shape.positions - shape.rest) for shape in shapes]
+    everywhere = np.concatenate([*at_rest(result.scene), *(line.reshape(-1, 3) for line in moved)])
+    extent, axes = float(np.ptp(everywhere, axis=0).max()), axes_of(everywhere)
+    low, high = (np.array([getattr(axis, end) for axis in axes]) for end in ("low", "high"))
     middle, size = (low + high) / 2, float(np.linalg.norm(high - low)) / 2
-    factors = [thickening(shape, float((high - low).max())) for shape in shapes]
-    axes = axes_of(everywhere)
+    factors = [thickening(shape, extent) for shape in shapes]
+    for shape, factor in zip(shapes, factors, strict=True):
+        shape.radius *= factor
+    span = span_of(result.scene, [Deformed(result, int(k), {}, magnify, 0.0) for k in shown[-1:]], everywhere)
+    drawn, undrawn = signs(result, shown, shapes, span, lambda points: (points - middle) / size)
+    largest = float(max(np.linalg.norm(shape.positions - shape.rest, axis=-1).max() for shape in shapes))
     return {
         "title": _title(result),
-        "notes": _notes(result, shown, factors),
+        "notes": _notes(result, shown, factors) + undrawn,
+        "magnify": {"start": magnify, "choices": _choices(largest, extent, magnify)},
         "axis": _along(result, shown),
         "axes": [
             {
@@ -85,11 +95,12 @@ def _data(result):
             for i, axis in enumerate(axes)
         ],
         "box": [[(getattr(axis, end) - middle[i]) / size for i, axis in enumerate(axes)] for end in ("low", "high")],
-        "view": _view(high - low),
+        "view": _view(span),
         "fields": [
             _field(result, i, colour, [shape.values[i] for shape in shapes]) for i, colour in enumerate(colours)
         ],
         "maps": MAPS,
+        **drawn,
         "rods": [shape.packed(middle, size, factor) for shape, factor in zip(shapes, factors, strict=True)],
     }
 
@@ -109,7 +120,8 @@ class _Shapes:
             positions.append(line)
             turns.append(np.roll(Rotation.from_matrix(directors).as_quat(), 1, axis=1))
             values.append([np.interp(x, fields["s"] / rod.length, colour.of(fields)) for colour in colours])
-        self.positions, self._turns = np.array(positions), np.array(turns)
+        self.positions, self._turns, self.nodes = np.array(positions), np.array(turns), len(x)
+        self.rest = rod.curve.position(x * rod.length)
         self.values = np.array(values).swapaxes(0, 1)  # (fields, states, n)
 
     def packed(self, middle, size, factor):
@@ -124,8 +136,20 @@ class _Shapes:
             "texels": states.shape[2] // 4,
             "corners": self._outlines.shape[1],
             "outline": _floats(factor / size * self._outlines),
+            "rest": _floats((self.rest - middle) / size),
             "states": _floats(states),
         }
+
+
+def _choices(largest, extent, start):
+    """The factors of displacements that can be chosen: 1, 2, 5, 10 ... up to one by which the largest displacement (m)
+    is about as large as the structure (m), and the first one."""
+    found = {1.0, start}
+    for decade in range(-1, 13):
+        for factor in (f * 10.0**decade for f in (1, 2, 5)):
+            if 1 < factor and 1e-12 * extent < largest and factor * largest <= extent:
+                found.add(float(f"{factor:.0e}"))
+    return sorted(found)
 
 
 def _floats(array):

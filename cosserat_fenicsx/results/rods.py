@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from cosserat_fenicsx.checks import File, instance
+from cosserat_fenicsx.checks import File, instance, positive
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.numerics import directors
 from cosserat_fenicsx.quantities import Quantity, Units
@@ -508,6 +508,7 @@ class RodResult(Result, Extremes, Reactions, Stresses, States):
         rod: RodOrName | None = None,
         station: StationOrName | None = None,
         units: str | Mapping = "SI",
+        magnify: float = 1.0,
     ) -> None:
         """Write a file whose ending says what it holds.
 
@@ -523,6 +524,7 @@ class RodResult(Result, Extremes, Reactions, Stresses, States):
             station: for .csv: a station of the table beside the ends of rods and the places of loads and supports;
                 default the one that moves most.
             units: of a .csv; all other files are in SI.
+            magnify: of a .html: the factor of the displacements when it is opened; it can be changed there.
 
         Raises:
             OSError: the file cannot be written.
@@ -542,12 +544,15 @@ class RodResult(Result, Extremes, Reactions, Stresses, States):
             given = {"rod": rod, "station": station, "units": None if units == "SI" else units}
             for name in (name for name, value in given.items() if value is not None):
                 raise SceneError(f"{file}: {name} is not for the ending '{file.suffix}': expected a file .csv")
+        if magnify != 1 and file.suffix != ".html":
+            raise SceneError(f"{file}: magnify is not for the ending '{file.suffix}': expected a file .html")
         if file.suffix == ".csv":
             on_first(self.comm, lambda: write_columns(file, self._columns(k, rod, station, units)))
         elif file.suffix == ".html":
             from cosserat_fenicsx.pictures import viewer
 
-            on_first(self.comm, lambda: viewer.write(self, file))
+            positive("write", "magnify", magnify, "-")
+            on_first(self.comm, lambda: viewer.write(self, file, magnify))
         else:
             written = xdmf.write_series if file.suffix == ".xdmf" else xdmf.write_state
             on_first(self.comm, lambda: written(self, file, k))

@@ -3,7 +3,8 @@
 const $ = (name) => document.getElementById(name);
 const data = JSON.parse($("data").textContent), values = data.axis.values, last = values.length - 1;
 $("title").textContent = data.title;
-$("note").textContent = data.notes.join("; ");
+const notes = (magnify) => [...data.notes, ...(magnify == 1 ? [] : [`displacements magnified ${magnify} times`])].join("; ");
+$("note").textContent = notes(data.magnify.start);
 const gl = $("picture").getContext("webgl2", { antialias: true, preserveDrawingBuffer: true });
 if (!gl) $("note").textContent = "This browser offers no WebGL 2, which the picture needs.";
 
@@ -39,16 +40,17 @@ function bar(field) {
 }
 
 if (gl) {
-  const painter = new Painter(gl, data), camera = new Camera(data.box, data.view), axes = new Axes(data, $("labels"));
-  let now = to, playing = false, before = null, waiting = false, field = data.fields[0];
+  const painter = new Painter(gl, data), camera = new Camera(data.box, data.view), axes = new Axes(data, $("labels")), signs = new Signs(data);
+  let now = to, playing = false, before = null, waiting = false, field = data.fields[0], magnify = data.magnify.start;
 
   function draw() {
     waiting = false;
     const ratio = devicePixelRatio || 1;
     [gl.canvas.width, gl.canvas.height] = [innerWidth * ratio, innerHeight * ratio];
     const { camera: matrix, turned } = camera.matrices(), place = at(now);
-    painter.draw(matrix, turned, place, field, axes.lines);
-    axes.label(camera);
+    const { vertices, labels } = $("signs").checked ? signs.build(place, magnify, data.box) : { vertices: new Float32Array(), labels: [] };
+    painter.draw(matrix, turned, place, field, magnify, [...axes.lines, ...signs.resting], vertices);
+    axes.label(camera, labels);
     const [k, next] = place.frames, value = values[k] + place.share * (values[next] - values[k]), shown = place.share < .5 ? k : next;
     const number = timed ? value.toFixed(data.axis.digits) : +value.toPrecision(4);
     $("now").textContent = `${data.axis.name} ${number}${data.axis.unit}${data.axis.stable[shown] ? "" : " (unstable)"}`;
@@ -84,6 +86,9 @@ if (gl) {
   });
   for (const [i, one] of data.fields.entries()) $("field").add(new Option(one.words, i));
   $("field").addEventListener("change", (e) => { field = data.fields[e.target.value]; bar(field); changed(); });
+  for (const factor of data.magnify.choices) $("magnify").add(new Option(`${factor} ×`, factor, false, factor == magnify));
+  $("magnify").addEventListener("change", (e) => { magnify = +e.target.value; $("note").textContent = notes(magnify); changed(); });
+  $("signs").addEventListener("change", changed);
   steer(gl.canvas, camera, changed);
   addEventListener("resize", changed);
   bar(field);

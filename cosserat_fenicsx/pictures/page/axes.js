@@ -24,7 +24,7 @@ class Axes {
     return x;
   }
 
-  label(camera) {
+  label(camera, more) {  // more: [text, place, colour]
     this.holder.replaceChildren();
     const taken = [], middle = camera.project(this.axes.map((axis) => (axis.low + axis.high) / 2));
     this.axes.forEach((axis, i) => {
@@ -44,16 +44,26 @@ class Axes {
       for (const [value, text] of axis.ticks)
         this.put(text, at((value - axis.low) / (axis.high - axis.low), 6 + room / 2), taken, "i");
     });
+    const alike = new Map();
+    for (const [text, place, colour] of more) alike.set(text, [...(alike.get(text) || []), [place, colour]]);
+    for (const [text, [[place, colour], ...others]] of alike) {
+      const [x, y] = camera.project(place), words = others.length ? `${text} (each of ${others.length + 1})` : text;
+      // as near as there is room
+      [[0, 0], [0, -1], [0, 1], [.5, 0], [-.5, 0], [.5, -1], [.5, 1], [0, -2], [0, 2], [.5, -2], [.5, 2]].some(([i, j]) =>
+        this.put(words, [x + i * LETTER * words.length, y + j * LINE * 1.2], taken, "i", colour));
+    }
   }
 
-  put(text, [x, y], taken, kind) {  // unless it overlaps a label that is there
+  put(text, [x, y], taken, kind, colour = "") {  // unless it overlaps a label that is there: false
     const w = text.length * LETTER + 4;
-    if (taken.some((t) => Math.abs(t[0] - x) < (t[2] + w) / 2 && Math.abs(t[1] - y) < LINE)) return;
+    if (taken.some((t) => Math.abs(t[0] - x) < (t[2] + w) / 2 && Math.abs(t[1] - y) < LINE)) return false;
     taken.push([x, y, w]);
     const label = document.createElement(kind);
     label.textContent = text;
     label.style.left = `${x}px`;
     label.style.top = `${y}px`;
+    label.style.color = colour;
     this.holder.append(label);
+    return true;
   }
 }

@@ -1,7 +1,7 @@
 // A parallel projection that turns about the middle of the box; z points upwards. Positions are those of the data.
 
 const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-const margin = () => ({ ...(innerWidth < 600 ? { left: 60, right: 80 } : { left: 90, right: 150 }), top: 80, bottom: 110 });
+const margin = () => innerWidth < 600 ? { left: 70, right: 95, top: 160, bottom: 140 } : { left: 100, right: 170, top: 80, bottom: 110 };
 
 class Camera {
   constructor(box, view) {

@@ -4,8 +4,8 @@
 
 const VERTEX = `#version 300 es
 precision highp float; precision highp sampler2D;
-in vec3 place, normal;  // number of the node and the point of its section; normal along d1, d2, d3
-uniform sampler2D states; uniform ivec2 frames; uniform float share; uniform mat4 camera; uniform mat3 turned;
+in vec3 place, normal, rest;  // number of the node and the point of its section; normal along d1, d2, d3; the node at rest
+uniform sampler2D states; uniform ivec2 frames; uniform float share, magnify; uniform mat4 camera; uniform mat3 turned;
 uniform int field, texels; uniform vec2 range;
 out vec3 across; out float value;
 vec4 at(int part) {
@@ -16,7 +16,7 @@ vec4 at(int part) {
 vec3 turn(vec4 q, vec3 v) { return v + 2. * cross(q.yzw, cross(q.yzw, v) + q.x * v); }
 void main() {
   vec4 first = at(0), q = normalize(at(1));
-  gl_Position = camera * vec4(first.xyz + turn(q, vec3(place.yz, 0.)), 1.);
+  gl_Position = camera * vec4(mix(rest, first.xyz, magnify) + turn(q, vec3(place.yz, 0.)), 1.);
   across = turned * turn(q, normal);
   float held = field == 0 ? first.w : at(2 + (field - 1) / 4)[max(field - 1, 0) % 4];
   value = held > 1e20 ? -1e9 : (held - range.x) / (range.y - range.x);  // no value: far below 0
@@ -30,7 +30,13 @@ void main() {
 }`, LINE_VERTEX = `#version 300 es
 in vec3 point; uniform mat4 camera; void main() { gl_Position = camera * vec4(point, 1.); }`,
 LINE_FRAGMENT = `#version 300 es
-precision mediump float; out vec4 colour; void main() { colour = vec4(.75, .75, .75, 1.); }`;
+precision mediump float; out vec4 colour; void main() { colour = vec4(.75, .75, .75, 1.); }`, SIGN_VERTEX = `#version 300 es
+in vec3 point, normal, tint; uniform mat4 camera; uniform mat3 turned; out vec3 shade;
+void main() {
+  gl_Position = camera * vec4(point, 1.);
+  shade = tint * (.6 + .4 * abs((turned * normal).z));
+}`, SIGN_FRAGMENT = `#version 300 es
+precision mediump float; in vec3 shade; out vec4 colour; void main() { colour = vec4(shade, 1.); }`;
 
 const floats = (text) => new Float32Array(Uint8Array.from(atob(text), (c) => c.charCodeAt(0)).buffer);
 
@@ -39,6 +45,7 @@ class Painter {
     this.gl = gl;
     this.surface = program(gl, VERTEX, FRAGMENT);
     this.lines = program(gl, LINE_VERTEX, LINE_FRAGMENT);
+    this.solids = program(gl, SIGN_VERTEX, SIGN_FRAGMENT);
     this.rods = data.rods.map((rod) => this.upload(rod, data.axis.values.length));
     this.maps = Object.fromEntries(Object.entries(data.maps).map(([name, stops]) => [name, colourMap(gl, stops)]));
     this.buffer = gl.createBuffer();
@@ -51,11 +58,7 @@ class Painter {
     gl.bindVertexArray(holder);
     gl.bindBuffer(gl.ARRAY_BUFFER, gl.createBuffer());
     gl.bufferData(gl.ARRAY_BUFFER, vertices, gl.STATIC_DRAW);
-    for (const [name, offset] of [["place", 0], ["normal", 12]]) {
-      const where = gl.getAttribLocation(this.surface, name);
-      gl.enableVertexAttribArray(where);
-      gl.vertexAttribPointer(where, 3, gl.FLOAT, false, 24, offset);
-    }
+    this.attributes(this.surface, ["place", "normal", "rest"]);
     gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, gl.createBuffer());
     gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, indices, gl.STATIC_DRAW);
     gl.bindVertexArray(null);
@@ -64,8 +67,18 @@ class Painter {
     return { holder, count: indices.length, states, texels: rod.texels };
   }
 
-  // camera: 4 x 4 and 3 x 3 matrices, column by column; field: {channel, map, low, high}; lines: points of the box
-  draw(camera, turned, { frames, share }, field, lines) {
+  attributes(program, names) {  // vectors that lie one after the other in the buffer
+    const gl = this.gl;
+    names.forEach((name, k) => {
+      const where = gl.getAttribLocation(program, name);
+      gl.enableVertexAttribArray(where);
+      gl.vertexAttribPointer(where, 3, gl.FLOAT, false, 12 * names.length, 12 * k);
+    });
+  }
+
+  // camera: 4 x 4 and 3 x 3 matrices, column by column; field: {channel, map, low, high}; magnify: factor of
+  // displacements; lines: pairs of points; solids: corners of triangles with normals and colours
+  draw(camera, turned, { frames, share }, field, magnify, lines, solids) {
     const gl = this.gl, at = (name) => gl.getUniformLocation(this.surface, name);
     gl.viewport(0, 0, gl.canvas.width, gl.canvas.height);
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
@@ -73,15 +86,20 @@ class Painter {
     gl.uniformMatrix4fv(gl.getUniformLocation(this.lines, "camera"), false, camera);
     gl.bindBuffer(gl.ARRAY_BUFFER, this.buffer);
     gl.bufferData(gl.ARRAY_BUFFER, new Float32Array(lines), gl.DYNAMIC_DRAW);
-    const point = gl.getAttribLocation(this.lines, "point");
-    gl.enableVertexAttribArray(point);
-    gl.vertexAttribPointer(point, 3, gl.FLOAT, false, 0, 0);
+    this.attributes(this.lines, ["point"]);
     gl.drawArrays(gl.LINES, 0, lines.length / 3);
+    gl.useProgram(this.solids);
+    gl.uniformMatrix4fv(gl.getUniformLocation(this.solids, "camera"), false, camera);
+    gl.uniformMatrix3fv(gl.getUniformLocation(this.solids, "turned"), false, turned);
+    gl.bufferData(gl.ARRAY_BUFFER, solids, gl.DYNAMIC_DRAW);
+    this.attributes(this.solids, ["point", "normal", "tint"]);
+    gl.drawArrays(gl.TRIANGLES, 0, solids.length / 9);
     gl.useProgram(this.surface);
     gl.uniformMatrix4fv(at("camera"), false, camera);
     gl.uniformMatrix3fv(at("turned"), false, turned);
     gl.uniform2iv(at("frames"), frames);
     gl.uniform1f(at("share"), share);
+    gl.uniform1f(at("magnify"), magnify);
     gl.uniform1i(at("field"), field.channel);
     gl.uniform2f(at("range"), field.low, field.high);
     gl.uniform1i(at("states"), 0);
@@ -101,7 +119,7 @@ class Painter {
 
 // The surface of a rod, its edges sharp where the outline of the section has corners, closed at both ends.
 function surface(rod) {
-  const outline = floats(rod.outline), c = rod.corners, varies = outline.length > 2 * c, vertices = [], indices = [];
+  const outline = floats(rod.outline), rest = floats(rod.rest), at = (node) => rest.slice(3 * node, 3 * node + 3), c = rod.corners, varies = outline.length > 2 * c, vertices = [], indices = [];
   const corner = (node, i) => {
     const k = 2 * ((varies ? node * c : 0) + (i + c) % c);
     return [outline[k], outline[k + 1]];
@@ -118,8 +136,8 @@ function surface(rod) {
   };
   for (let node = 0; node < rod.nodes; node++)
     for (let i = 0; i < c; i++) {
-      vertices.push(node, ...corner(node, i), ...smooth(node, i, i - 1), 0);
-      vertices.push(node, ...corner(node, i + 1), ...smooth(node, i, i + 1), 0);
+      vertices.push(node, ...corner(node, i), ...smooth(node, i, i - 1), 0, ...at(node));
+      vertices.push(node, ...corner(node, i + 1), ...smooth(node, i, i + 1), 0, ...at(node));
     }
   for (let node = 0; node + 1 < rod.nodes; node++)
     for (let i = 0; i < c; i++) {
@@ -127,8 +145,8 @@ function surface(rod) {
       indices.push(a, a + 1, b, a + 1, b + 1, b);
     }
   for (const [node, normal] of [[0, -1], [rod.nodes - 1, 1]]) {
-    const first = vertices.length / 6;
-    for (let i = 0; i < c; i++) vertices.push(node, ...corner(node, i), 0, 0, normal);
+    const first = vertices.length / 9;
+    for (let i = 0; i < c; i++) vertices.push(node, ...corner(node, i), 0, 0, normal, ...at(node));
     for (let i = 1; i + 1 < c; i++) indices.push(first, first + i, first + i + 1);
   }
   return { vertices: new Float32Array(vertices), indices: new Uint32Array(indices) };
