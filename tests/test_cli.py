@@ -75,6 +75,38 @@ def test_run_prints_a_table_and_writes_files(tmp_path):
     assert done.stderr == ""
 
 
+WATCHED = """
+import os, sys
+from cosserat_fenicsx.cli.main import main
+
+class Watch:
+    def find_spec(self, name, path=None, target=None):
+        if name in ("pyvista", "matplotlib"):
+            print(f"{name} is imported beside", *sorted(os.listdir(out)), flush=True)
+
+scene, out = sys.argv[1:]
+sys.meta_path.insert(0, Watch())
+for more in (["--no-picture"], []):
+    print(main(["run", scene, "--load-factors", "0.5", "--elements", "4", "-o", out, *more]))
+    print("loaded:", sorted({"pyvista", "vtkmodules", "matplotlib", "meshio"} & set(sys.modules)))
+"""
+
+
+def test_tables_and_files_wait_for_no_library_of_pictures(tmp_path):
+    """Without pictures none is imported; else once all other files are written and said."""
+    command = [sys.executable, "-c", WATCHED, DEMO, tmp_path]
+    done = subprocess.run(list(map(str, command)), check=True, capture_output=True, encoding="utf-8", cwd=ROOT)
+    lines = [line for line in done.stdout.splitlines() if line.startswith(("written", "loaded", "pyvista", "matplot"))]
+    files = ["path.csv", "path.h5", "path.xdmf", "result.h5"]
+    assert lines[:3] == [
+        f"written to {tmp_path}/: path.csv, path.xdmf, path.h5, result.h5",
+        "loaded: []",
+        f"written to {tmp_path}/: path.csv, path.xdmf, path.h5, result.h5, rods.html",
+    ]
+    assert lines[3] == f"pyvista is imported beside {' '.join([*files, 'rods.html'])}"
+    assert lines[-2] == f"written to {tmp_path}/: rods.png" and "'pyvista'" in lines[-1]
+
+
 def test_the_table_shows_a_station_and_the_reaction():
     """Reactions against the equilibrium of the whole column: the force, and its moment about the foot."""
     from cosserat_fenicsx import euler_load

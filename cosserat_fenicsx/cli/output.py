@@ -18,6 +18,8 @@ _TAKEN = {
     "a well": ("tol", "model"),
     "a drill-string in motion": ("duration", "dt", "elements", "model", "save_every", "folder", "animate", "speed"),
 }
+# Endings of files that are written last, since their libraries take seconds and hundreds of MB.
+_PICTURES = (".png", ".gif", ".mp4")
 
 
 def given(options, names):
@@ -74,10 +76,17 @@ def deliver(computed, options, names, files_of, tables=None, *, moving=False, ob
 
 
 def _write(files, out, stops):
-    """Write files, see `deliver`, and say which; pictures whose library is missing are left out.
+    """Write files, see `deliver`, and say which: first all that need no library for pictures, then the pictures.
 
     With `stops`, a signal ends the writing between two files by a KeyboardInterrupt.
     """
+    for pictures in (False, True):
+        some = {name: write for name, write in files.items() if write and name.endswith(_PICTURES) == pictures}
+        _write_some(some, out, stops)
+
+
+def _write_some(files, out, stops):
+    """Write some of the files, and say which; pictures whose library is missing are left out."""
     written, left_out = [], {}
     try:
         for name, write in files.items():
@@ -86,7 +95,7 @@ def _write(files, out, stops):
             try:
                 if callable(write):
                     write(out / name)
-                written += [name] if write else []
+                written.append(name)
             except LibraryMissing as problem:
                 left_out.setdefault(str(problem), []).append(name)
     finally:
