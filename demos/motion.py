@@ -100,7 +100,7 @@ def whirling_shaft(history):
     check = Check("speed of the largest whirl (rad/s)", *largest, 1e-2 * omega, "Jeffcott's rotor and cf.modes")
     lines = [("middle of the shaft", speed, 1e3 * r), ("Jeffcott's rotor", speed, 1e3 * rotor, "k--")]
     lines.append(("first frequency", [omega, omega], [0, 1e3 * r.max()], "r:"))
-    return check, Shapes("xy", middle, stretched=True), Curve("speed (rad/s)", "radius of the whirl (mm)", lines)
+    return check, Shapes("xyz", middle, stretched=True), Curve("speed (rad/s)", "radius of the whirl (mm)", lines)
 
 
 def _jeffcott(times, omega, drag, angle, eccentricity):

@@ -1,19 +1,20 @@
-"""A motion in three panels: shapes over time, a curve, energies."""
+"""A motion in four panels: shapes over time; a curve; what is stored; works and losses."""
 
 from collections import namedtuple
 from pathlib import Path
 
 import numpy as np
 
-from cosserat_fenicsx.pictures.charts import draw_chart, empty_figure, legend
+from cosserat_fenicsx.pictures.charts import draw_chart, draw_energies, empty_figure, legend
+from cosserat_fenicsx.pictures.motion_charts import energies_of
 
 #: The first panel: axes ("xy", "xz" or "xyz"), the station whose track is drawn, the last time (s) or None, and whether
 #: the axes have different scales.
 Shapes = namedtuple("Shapes", "axes station until stretched", defaults=(None, False))
 #: The second panel: axes with units, and lines (label, x, y[, style]).
 Curve = namedtuple("Curve", "xlabel ylabel lines")
-# Number of superposed shapes.
-_SHAPES = 16
+# Number of superposed shapes; extent, m, below which an axis is in mm.
+_SHAPES, _SMALL = 16, 0.05
 
 
 def draw(history, file, shapes, curve):
@@ -29,35 +30,21 @@ def draw(history, file, shapes, curve):
 
 
 def _figure(history, shapes, curve):
-    figure = empty_figure(14, 6.5)
-    grid = figure.add_gridspec(2, 2, width_ratios=(1.4, 1))
+    stored, done = energies_of(history)
+    count = 3 if any(values.any() for _, values, *_ in done) else 2
+    figure = empty_figure(11, 7.0)
+    left, right = figure.add_gridspec(1, 2, width_ratios=(1.2, 1))
+    right = right.subgridspec(count, 1)
     figure.suptitle(history.scene.title)
-    _draw_shapes(figure, grid[:, 0], history, shapes)
-    above, below = figure.add_subplot(grid[0, 1]), figure.add_subplot(grid[1, 1])
+    _draw_shapes(figure, left, history, shapes)
+    above, *below = (figure.add_subplot(right[i]) for i in range(count))
     for label, x, y, *style in curve.lines:
         above.plot(x, y, *style, label=label, lw=1.2)
     above.set(xlabel=curve.xlabel, ylabel=curve.ylabel)
-    for name, colour in (
-        ("kinetic", "tab:blue"),
-        ("strain", "tab:orange"),
-        ("energy", "black"),
-        ("work", "tab:green"),
-        ("dissipated", "tab:red"),
-    ):
-        values = getattr(history, name)
-        if np.abs(values).max() > 0:
-            label = "kinetic + strain" if name == "energy" else name
-            below.plot(
-                history.times,
-                values,
-                "--" if name in ("work", "dissipated") else "-",
-                color=colour,
-                label=label,
-                lw=1.2,
-            )
-    below.set(xlabel="time (s)", ylabel="energy (J)")
-    for axes in (above, below):
-        legend(axes)
+    legend(above)
+    draw_energies(below, history.times, stored, done)
+    for panel in below:
+        panel.set_xlabel("time (s)")
     return figure
 
 
@@ -71,27 +58,26 @@ def _draw_shapes(figure, place, history, shapes):
     flat = len(picked) == 2
     axes = figure.add_subplot(place, projection=None if flat else "3d", **({} if flat else {"computed_zorder": False}))
     colours = cm.ScalarMappable(Normalize(0.0, end), "viridis")
-    for t in np.linspace(0.0, end, _SHAPES):
-        k = int(np.argmin(np.abs(history.times - t)))
-        for rod in history.scene.rods:
-            line, _ = history.sample(k, rod, np.linspace(0, 1, 101))
-            axes.plot(*line[:, picked].T, color=colours.to_rgba(history.times[k]), lw=2)
+    rows = [int(np.argmin(np.abs(history.times - t))) for t in np.linspace(0.0, end, _SHAPES)]
+    lines = [(k, history.sample(k, rod, np.linspace(0, 1, 101))[0]) for k in rows for rod in history.scene.rods]
     way = history.position(shapes.station)[history.times <= end]
-    axes.plot(*way[:, picked].T, color="black", lw=0.7, alpha=0.7, label=f"way of {shapes.station}")
-    axes.set(**{f"{name}label": f"{axis} (m)" for name, axis in zip("xyz", shapes.axes, strict=False)})
+    extent = np.ptp(np.concatenate([way, *(line for _, line in lines)]), axis=0)
+    units = [("mm", 1e-3) if size < _SMALL else ("m", 1.0) for size in extent[picked]]
+    sizes = np.array([size for _, size in units])
+    for k, line in lines:
+        axes.plot(*(line[:, picked] / sizes).T, color=colours.to_rgba(history.times[k]), lw=2)
+    axes.plot(*(way[:, picked] / sizes).T, color="black", lw=0.7, alpha=0.7, label=f"track of {shapes.station}")
+    named = zip("xyz", shapes.axes, units, strict=False)
+    axes.set(**{f"{name}label": f"{axis} ({unit})" for name, axis, (unit, _) in named})
     if flat and not shapes.stretched:
         axes.set_aspect("equal")
     if not flat:
-        ranges = np.array([axes.get_xlim(), axes.get_ylim(), axes.get_zlim()])
-        axes.set_box_aspect(np.ptp(ranges, axis=1), zoom=1.1)
-        for axis, size in zip((axes.xaxis, axes.yaxis, axes.zaxis), np.ptp(ranges, axis=1), strict=True):
-            axis.set_major_locator(MaxNLocator(max(2, round(6 * size / np.ptp(ranges, axis=1).max()))))
+        ranges = np.ptp([axes.get_xlim(), axes.get_ylim(), axes.get_zlim()], axis=1)
+        box = (1.6, 1.0, 1.0) if shapes.stretched else ranges * sizes
+        axes.set_box_aspect(box, zoom=1.1)
+        axes.set_in_layout(False)  # matplotlib does not know where labels in space will be
+        for axis, size in zip((axes.xaxis, axes.yaxis, axes.zaxis), box, strict=True):
+            axis.labelpad = 4.0 + 24.0 * size / max(box)
+            axis.set_major_locator(MaxNLocator(max(2, round(5 * size / max(box)))))
     legend(axes)
-    figure.colorbar(
-        colours,
-        ax=axes,
-        label="time of the shape (s)",
-        shrink=0.7,
-        location="left" if flat else "bottom",
-        pad=0.02 if flat else 0.08,
-    )
+    figure.colorbar(colours, ax=axes, label="time of the shape (s)", shrink=0.8, location="bottom", pad=0.08)

@@ -15,11 +15,12 @@ import cosserat_fenicsx as cf
 from cosserat_fenicsx.cli.main import main
 from cosserat_fenicsx.dimensions import DIMENSIONS
 from cosserat_fenicsx.drilling.bit_laws import BitLaw
+from cosserat_fenicsx.drilling.charts import advance_unit
 from cosserat_fenicsx.drilling.choose import BOTH, TORSION, chosen
+from cosserat_fenicsx.drilling.film import Stage
 from cosserat_fenicsx.drilling.history import DrillingHistory
 from cosserat_fenicsx.drilling.protocol import LEDGER, PROFILE, SERIES
 from cosserat_fenicsx.drilling.scenefile import DrillingScene, SimulateDrilling, StabilityMap
-from cosserat_fenicsx.drilling.charts import advance_unit
 from cosserat_fenicsx.drilling.top_drive import DriveControl
 from cosserat_fenicsx.parts import arguments_of, from_data, members, to_data
 
@@ -409,9 +410,35 @@ def test_phase_and_energy(drawn):
     assert panel.get_xlabel().endswith("(rad)") and panel.lines[0].get_xdata()[0] == pytest.approx(
         drawn.drive_angle[999] - drawn.bit_angle[999]
     )
-    above, below = drawn.plot_energy().axes
-    assert {line.get_label() for line in above.lines} == {"kinetic", "strain", "work of the drive", "lost at the bit"}
+    stored, done, below = drawn.plot_energy().axes
+    assert [line.get_label() for line in stored.lines] == ["total", "kinetic", "strain"]
+    assert {line.get_label() for line in done.lines} == {"work of the drive", "lost at the bit"}
     assert below.lines[0].get_ydata() == pytest.approx(drawn.balance) and below.get_ylabel().endswith("(J)")
+
+
+@pytest.mark.parametrize("rpm", [0, 20])
+def test_heave_is_drawn_along_the_axis(rpm, tmp_path):
+    """Of a string off bottom, with and without rotation: velocities of block and lower end, in map and film too."""
+    pytest.importorskip("matplotlib")
+    pipe = cf.well.DrillString([cf.well.DrillPipe(500.0, size="5 in 19.50 lb/ft")])
+    hook = cf.drilling.Hook(speed=lambda t: 0.5 * np.cos(6.0 * t))  # upwards
+    drilling = cf.drilling.Drilling(pipe, cf.drilling.TopDrive(rpm * cf.units.rpm), hook=hook)
+    history = cf.drilling.simulate(drilling, 1.5, profile_every=0.1)
+    panels = {panel.get_ylabel(): panel for panel in history.plot().axes}
+    lines = {line.get_label(): line for line in panels["velocity downwards (m/s)"].lines}
+    assert lines["of the block"].get_ydata() == pytest.approx(-0.5 * np.cos(6.0 * history.times))
+    assert lines["of the lower end"].get_ydata() == pytest.approx(history.bit_velocity)
+    written = [text.get_text() for panel in panels.values() if panel.get_legend() for text in panel.get_legend().texts]
+    assert not any("bit" in text for text in [*written, *panels, history.plot().get_suptitle()])
+    assert ("speed (rpm)" in panels) == (rpm > 0)
+    assert history.plot_map().axes[1].get_ylabel() == "velocity downwards (m/s)"
+    stage = Stage(history, 1.0)
+    along, over = stage._figure.axes[1:]
+    assert along.get_xlabel() == over.get_ylabel() == "velocity downwards (m/s)"
+    pictures = [stage.at(t) for t in history.profile_times[[2, 8]]]
+    bands = [picture[:, 100, 0] for picture in pictures]  # down the middle of the string
+    assert (np.abs(np.diff(bands[0].astype(int))) > 40).sum() > 20 and (bands[0] != bands[1]).mean() > 0.02
+    assert along.lines[0].get_xdata() == pytest.approx(history.velocity[8], abs=1e-9)
 
 
 def test_charts_refused(drawn, tmp_path):

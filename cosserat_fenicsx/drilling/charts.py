@@ -1,4 +1,4 @@
-"""Charts, maps and films of a drill-string in motion, and charts of its stability, by matplotlib."""
+"""Charts and maps of a drill-string in motion, and charts of its stability, by matplotlib."""
 
 import functools
 import math
@@ -6,16 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from cosserat_fenicsx.checks import finite_array, positive, refuse
+from cosserat_fenicsx.checks import finite_array, refuse
 from cosserat_fenicsx.drilling.protocol import LEDGER
 from cosserat_fenicsx.drilling.stick_slip import AT_REST, alias, turns
-from cosserat_fenicsx.drilling.top_drive import PI
+from cosserat_fenicsx.drilling.top_drive import PI, Hook
 from cosserat_fenicsx.errors import SceneError, nearest
-from cosserat_fenicsx.pictures.animation import MOST_FRAMES, check_name, frame_rate, record
 from cosserat_fenicsx.pictures.charts import (
     COLOURS,
     STYLES,
-    arrange,
     draw_chart,
     empty_figure,
     ledger,
@@ -23,10 +21,9 @@ from cosserat_fenicsx.pictures.charts import (
     room_for,
     scale,
     stacked,
-    styled,
 )
 from cosserat_fenicsx.quantities import Quantity
-from cosserat_fenicsx.ranks import on_first, world
+from cosserat_fenicsx.ranks import world
 from cosserat_fenicsx.units import rpm
 
 _SPEED = Quantity("speed", unit="rad/s", shown="rpm")
@@ -35,7 +32,7 @@ _FORCE = Quantity("force", unit="N", shown="kN")
 _WEIGHT = Quantity("weight on bit", unit="N", shown="kN")
 _DEPTH = Quantity("measured depth", unit="m", shown="m", dimension="length")
 #: {name: (quantity, whether it has values of either sign)} of what maps show.
-_MAPPED = {
+MAPPED = {
     "speed": (Quantity("speed of rotation", unit="rad/s", shown="rpm"), False),
     "torque": (_TORQUE, True),
     "angle": (Quantity("turns"), False),
@@ -44,8 +41,8 @@ _MAPPED = {
     "velocity": (Quantity("velocity downwards", unit="m/s"), True),
 }
 DRIVE, BIT = "tab:blue", "tab:red"
-# Bands of a chart of a long run.
-_BANDS = 400
+# Bands of a chart of a long run; about the most times at which the motion of the block is looked at.
+_BANDS, _SOME = 400, 2000
 
 
 def _drawn(figure):
@@ -97,28 +94,86 @@ def swings(values):
     return int((above[1:] != above[:-1]).sum()) // 2
 
 
+def lower_end(history):
+    """The name of what is at the lower end: a string off bottom has no bit on rock."""
+    return "lower end" if history.scene.bit is None else "bit"
+
+
+def velocity_of_block(history, times):
+    """(n,) m/s, downwards positive, of the travelling block at times (s)."""
+    signal = (history.scene.hook or Hook()).signal()
+    return np.full(len(times), -signal(0.0)) if signal.constant else -np.array([signal(float(t)) for t in times])
+
+
+def is_axial(history):
+    """Whether the model has motion along the axis."""
+    return not np.isnan(history.bit_velocity).all()
+
+
+def moves_along(history):
+    """Whether the motion along the axis is of more interest than the rotation: nothing turns, or the block moves up and
+    down, as by heave."""
+    if not is_axial(history):
+        return False
+    block = velocity_of_block(history, _some(history.times))
+    return not turns(history) or block.min() < 0 < block.max()
+
+
+def _some(times):
+    return times[:: 1 + len(times) // _SOME]
+
+
 def title_of(history):
-    """Model, drive and bit, for titles; gains of a PI control over the impedance: 1 of SoftTorque, 4 of SoftSpeed."""
-    scene, drive, bit = history.scene, history.scene.drive, history.scene.bit
+    """Model, drive, block and bit, for titles; gains of a PI control over the impedance: 1 of SoftTorque, 4 of
+    SoftSpeed."""
+    bit, words = history.scene.bit, []
+    if turns(history) or not is_axial(history):
+        words.append(_words_on_drive(history.scene))
+    block = velocity_of_block(history, _some(history.times))
+    if is_axial(history) and block.any():
+        steady = np.ptp(block) < 1e-9 * np.abs(block).max()
+        way, fastest = "down" if block[0] > 0 else "up", f"{np.abs(block).max():.4g} m/s"
+        words.append(f"block {way} at {fastest}" if steady else f"block moves at up to {fastest}")
+    words.append("off bottom" if bit is None else f"{type(bit.law).__name__} bit")
+    if bit is not None and bit.weight:
+        words.append(f"{bit.weight / 1e3:.4g} kN on bit")
+    return f"{history.model}: {', '.join(words)}"
+
+
+def _words_on_drive(scene):
+    drive = scene.drive
     control = type(drive.control).__name__
     if isinstance(drive.control, PI):
         Kp = drive.control.Kp
         impedance = None if scene.discs else scene.segments[0].torsional_impedance
         control = f"PI (Kp = {Kp / impedance:.3g} impedances)" if impedance else f"PI (Kp = {Kp:.4g} N m s/rad)"
     asked = f" at {drive.signal()(0.0) / rpm:.4g} rpm" if drive.signal().constant and drive.speed is not None else ""
-    at = "bit off bottom" if bit is None else f"{type(bit.law).__name__} bit"
-    weight = f", {bit.weight / 1e3:.4g} kN on bit" if bit is not None and bit.weight else ""
-    return f"{history.model}: {control} drive{asked}, {at}{weight}"
+    return f"{control} drive{asked}"
 
 
-#: Panels over time: (quantity, ((attribute, label, colour), ...)).
-_PANELS = (
-    (_SPEED, (("drive_speed", "drive", DRIVE), ("bit_speed", "bit", BIT))),
-    (_TORQUE, (("surface_torque", "at the surface", DRIVE), ("torque_on_bit", "on bit", BIT))),
-    (_FORCE, (("hook_load", "hook load", DRIVE), ("weight_on_bit", "weight on bit", BIT))),
-    (Quantity("impulse", unit="N s"), (("impulse_on_bit", "impacts on rigid rock, their sum", BIT),)),
-    (Quantity("bit advance", unit="m"), (("bit_advance", "bit advance", BIT),)),
-)
+def _panels(history, rows):
+    """[(quantity, [(values, label, colour)])] of panels over time, without what stays zero or is unknown."""
+    lower = lower_end(history)
+
+    def line(name, label, colour):
+        return getattr(history, name)[rows], label, colour
+
+    advance = line("bit_advance", None, BIT)
+    shown = advance_unit(advance[0])[0]
+    panels = [
+        (_SPEED, [line("drive_speed", "drive", DRIVE), line("bit_speed", lower, BIT)]),
+        (_TORQUE, [line("surface_torque", "at the surface", DRIVE), line("torque_on_bit", "on bit", BIT)]),
+        (_FORCE, [line("hook_load", "hook load", DRIVE), line("weight_on_bit", "weight on bit", BIT)]),
+        (Quantity("impulse", unit="N s"), [line("impulse_on_bit", "impacts on rigid rock, their sum", BIT)]),
+        (Quantity(f"advance of the {lower}", unit="m", shown=shown, dimension="length"), [advance]),
+    ]
+    if is_axial(history):
+        block = velocity_of_block(history, history.times[rows]), "of the block", DRIVE
+        panels.append((MAPPED["velocity"][0], [block, line("bit_velocity", f"of the {lower}", BIT)]))
+    panels = [(quantity, [line for line in lines if np.nan_to_num(line[0]).any()]) for quantity, lines in panels]
+    return [(quantity, lines) for quantity, lines in panels if lines]
+
+
 #: Colours of the ledger; styles by the beginnings of its names.
 _COLOURS = ("tab:blue", "tab:orange", "tab:green", "tab:olive", "tab:cyan", "tab:red", "tab:brown", "tab:purple")
 _STYLES = {"work": "--", "lost": ":"}
@@ -131,19 +186,13 @@ def draw_over_time(history, between=None):
     """See `DrillingHistory.plot`."""
     rows = times_between("plot", history.times, between)
     t = history.times[rows]
-    panels = [(quantity, [(getattr(history, name)[rows], *style) for name, *style in lines])
-              for quantity, lines in _PANELS]  # fmt: skip
-    panels = [(quantity, [line for line in lines if np.nan_to_num(line[0]).any()]) for quantity, lines in panels]
-    panels = [(quantity, lines) for quantity, lines in panels if lines]  # without what stays zero, or is unknown
+    panels = _panels(history, rows)
     many = max(swings(history.bit_speed[rows]), swings(np.nan_to_num(history.bit_velocity[rows]))) > _SWINGS
     figure, axes = stacked(10, [2.3] * len(panels))
     for panel, (quantity, lines) in zip(axes, panels, strict=True):
         every = [values for values, *_ in lines]
-        if quantity.label == "bit advance":
-            quantity = replace(quantity, shown=advance_unit(every[0])[0], dimension="length")
         heading, size = scale(quantity, *every)
         for values, label, colour in lines[::-1]:
-            label = label if label != quantity.label else None
             if many:
                 middles, ((least, most),) = bands(t, values / size)
                 panel.fill_between(middles, least, most, color=colour, label=label, alpha=0.4)
@@ -151,8 +200,8 @@ def draw_over_time(history, between=None):
                 panel.plot(t, values / size, color=colour, label=label, linewidth=1.1)
         panel.set_ylabel(heading)
         if panel is axes[0] and turns(history) and not many:
-            lower = "bit" if history.scene.bit is not None else "lower end"
-            _shade_rest(panel, t, history.bit_speed[rows], history.drive_speed[rows], f"{lower} at rest")
+            label = f"{lower_end(history)} at rest"
+            _shade_rest(panel, t, history.bit_speed[rows], history.drive_speed[rows], label)
     legend(*axes)
     axes[-1].set_xlabel("time (s)")
     figure.suptitle(title_of(history) + ("\nbands between the extremes of oscillations" if many else ""))
@@ -180,10 +229,11 @@ def draw_phase(history, since=None):
     twist = history.drive_angle[rows] - history.bit_angle[rows]
     figure = empty_figure(6.5, 5.5)
     panel = figure.subplots()
-    heading, size = scale(_SPEED)
-    panel.plot(twist, history.bit_speed[rows] / size, color=BIT, label="bit")
+    lower = lower_end(history)
+    heading, size = scale(replace(_SPEED, label=f"speed of the {lower}"))
+    panel.plot(twist, history.bit_speed[rows] / size, color=BIT, label=lower)
     panel.axhline(float(history.drive_speed[rows].mean()) / size, color=DRIVE, label="drive, mean speed")
-    panel.set(xlabel="twist between drive and bit (rad)", ylabel=f"bit {heading}")
+    panel.set(xlabel=f"twist between drive and {lower} (rad)", ylabel=heading)
     legend(panel)
     figure.suptitle(f"{title_of(history)}\nfrom {since:.4g} to {last:.4g} s")
     return figure
@@ -193,13 +243,13 @@ def draw_phase(history, since=None):
 def draw_energy(history):
     """See `DrillingHistory.plot_energy`."""
     times_between("plot_energy", history.times, None)
-    curves = []
+    curves = {}
     for name, colour in zip(LEDGER, _COLOURS, strict=True):
         label, style = name.replace("_", " ", 1).replace("_", " the "), _STYLES.get(name[:4], "-")
-        curves.append((label, np.nan_to_num(getattr(history, name)), colour, style))
-    axial = not np.isnan(history.hook_load).all()
-    about = "; strain: less the energy of the string as it hangs at rest" if axial else ""
-    return ledger(history.times, curves, history.balance, f"{title_of(history)}: energy", about)
+        curves[name] = label, np.nan_to_num(getattr(history, name)), colour, style
+    stored = [curves.pop(name) for name in ("kinetic", "strain")]
+    about = "; strain: less the energy of the string as it hangs at rest" if is_axial(history) else ""
+    return ledger(history.times, stored, list(curves.values()), history.balance, f"{title_of(history)}: energy", about)
 
 
 # At most so many depths are drawn; the colour of places that stick.
@@ -212,15 +262,15 @@ _BIT = 0.03
 def draw_map(history, what=None, between=None):
     """See `DrillingHistory.plot_map`."""
     if what is None:
-        what = "speed" if turns(history) else "velocity"
-    if not isinstance(what, str) or what not in _MAPPED:
-        raise SceneError(f"plot_map.what = {what!r}: {nearest(what, _MAPPED)}")
+        what = "velocity" if moves_along(history) else "speed"
+    if not isinstance(what, str) or what not in MAPPED:
+        raise SceneError(f"plot_map.what = {what!r}: {nearest(what, MAPPED)}")
     rows = times_between("plot_map", history.profile_times, between)
     if np.isnan(getattr(history, what)).all():
         raise SceneError(
             f"plot_map.what = {what!r}: the {history.model} model has none: expected model='axial and torsional'"
         )
-    quantity, signed = _MAPPED[what]
+    quantity, signed = MAPPED[what]
     places = np.unique(np.linspace(0, len(history.depths) - 1, _DEPTHS).astype(int))
     along, length = scale(_DEPTH)
     t, depths = history.profile_times[rows], history.depths[places] / length
@@ -247,7 +297,7 @@ def draw_map(history, what=None, between=None):
         if sticks[-1].any():  # a row of the map is too thin to be seen
             panel.fill_between(t, 0, _BIT, where=sticks[-1], transform=panel.get_xaxis_transform(), step="mid",
                                color=_STICKS, edgecolor="0.3", linewidth=0.3)  # fmt: skip
-            text += " (at the lower edge: the bit)"
+            text += f" (at the lower edge: the {lower_end(history)})"
     panel.set(xlabel="time (s)", ylabel=along, ylim=(depths[-1], depths[0]), xlim=(t[0], t[-1]))
     panel.grid(visible=False)
     caution = alias(history)
@@ -367,85 +417,3 @@ def draw_bounce(answer):
     panel.set(xlabel=along, ylabel=across, yscale="log", xlim=(x[0], x[-1]))
     legend(panel)
     return figure
-
-
-# Longest film, s, where no speed is asked for; pixels across the string and along it; dots per inch.
-_LONGEST, _ACROSS, _ALONG, _DPI = 10.0, 60, 400, 100
-
-
-def film(history, file, speed=None, fps=25, progress=None):
-    """See `DrillingHistory.animate`."""
-    file = check_name(file)
-    times_between("animate", history.profile_times, None)
-    fps = frame_rate(file, fps)
-    first, last = history.profile_times[[0, -1]]
-    speed = max(1.0, (last - first) / _LONGEST) if speed is None else positive("animate", "speed", speed, "-")
-    count = int(np.ceil((last - first) * fps / speed)) + 1
-    if count > MOST_FRAMES:
-        raise SceneError(
-            f"animate.speed = {speed:g}: expected one that needs at most {MOST_FRAMES} frames, not {count}"
-        )
-    times = np.linspace(first, last, count)
-    on_first(world(), lambda: record(lambda: _Stage(history, speed), file, times, fps, progress))
-
-
-class _Stage:
-    """The picture at a time; the constant parts are drawn once."""
-
-    def __init__(self, history, speed):
-        self._history, self._speed = history, speed
-        with styled():
-            self._figure = self._constant_parts(history)
-
-    def _constant_parts(self, history):
-        figure = empty_figure(9.6, 6.0)
-        figure.set_dpi(_DPI)
-        string, along, over = figure.subplots(1, 3, width_ratios=(0.35, 1.0, 2.0))
-        top, bottom = history.depths[[0, -1]]
-        self._places = np.linspace(top, bottom, _ALONG)
-        self._across = np.arcsin(np.linspace(-1, 1, _ACROSS) * 0.999)  # round a string that is seen from the side
-        blank, box = np.zeros((_ALONG, _ACROSS)), (0, 1, bottom, top)
-        self._stripes = string.imshow(blank, extent=box, aspect="auto", cmap="gray", vmin=-0.4, vmax=1.2)
-        string.set(xticks=[], ylabel="measured depth (m)", title="string")
-        speeds = history.speed / rpm
-        (self._line,) = along.plot(speeds[0], history.depths, color="tab:purple")
-        (self._held,) = along.plot([], [], ".", color="0.6", markersize=4, label="held by friction")
-        low, high = float(min(np.nanmin(speeds), 0.0)), float(np.nanmax(speeds))
-        room = 0.05 * max(high - low, 1.0)
-        along.set(xlim=(low - room, high + room), ylim=(bottom, top), xlabel="speed (rpm)", yticklabels=[])
-        if history.sticking.any():
-            legend(along)
-        over.plot(history.times, history.drive_speed / rpm, color=DRIVE, label="drive", linewidth=1.0)
-        over.plot(history.times, history.bit_speed / rpm, color=BIT, label="bit", linewidth=1.0)
-        over.set(xlabel="time (s)", ylabel="speed (rpm)", xlim=(0, history.times[-1]))
-        legend(over)
-        self._now = over.axvline(0.0, color="black", linewidth=0.8)
-        string.grid(visible=False)
-        figure.suptitle(self._title(float(history.profile_times[0])))
-        arrange(figure)
-        figure.set_layout_engine("none")  # found once: it would take half of the time of each frame
-        return figure
-
-    def at(self, t):
-        """(height, width, 3) the picture at t (s)."""
-        history = self._history
-        k = int(np.clip(np.searchsorted(history.profile_times, t) - 1, 0, len(history.profile_times) - 2))
-        begin, end = history.profile_times[k : k + 2]
-        share = (t - begin) / (end - begin)
-        angle, speed = ((1 - share) * x[k] + share * x[k + 1] for x in (history.angle, history.speed))
-        turned = np.interp(self._places, history.depths, angle)[:, None] + self._across
-        self._stripes.set_data(np.cos(self._across) * np.where(np.cos(turned) > 0.0, 1.0, 0.25))
-        self._line.set_xdata(speed / rpm)
-        held = history.sticking[k + round(share)]
-        self._held.set_data(speed[held] / rpm, history.depths[held])
-        self._now.set_xdata([t, t])
-        self._figure.suptitle(self._title(t))
-        self._figure.canvas.draw()
-        return np.asarray(self._figure.canvas.buffer_rgba())[..., :3].copy()
-
-    def _title(self, t):
-        pace = "real time" if self._speed == 1 else f"{self._speed:.3g} times faster than real"
-        return f"{title_of(self._history)}\nt = {t:.2f} s ({pace})"
-
-    def close(self):
-        """Nothing to free."""

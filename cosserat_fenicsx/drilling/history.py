@@ -235,8 +235,8 @@ class DrillingHistory(Result):
         units: Any = "SI",
         width: int | None = None,
     ):
-        """Draw the speeds of drive and bit and the torques over time, with hook load and weight on bit where the model
-        has them.
+        """Draw the speeds of drive and bit and the torques over time; of a model with motion along the axis also hook
+        load, weight on bit, and the velocities of block and bit.
 
         Args:
             file: .png, .pdf or another format of matplotlib (rank 0 writes); None returns the Figure.
@@ -264,7 +264,7 @@ class DrillingHistory(Result):
 
         Args:
             what: "speed", "torque", "angle", "tension", "displacement" or "velocity"; None for the speed of rotation,
-                or the velocity along the axis where nothing turns.
+                or the velocity along the axis where nothing turns or the block moves up and down.
             file, between, units, width: see `plot`.
 
         Raises:
@@ -299,7 +299,8 @@ class DrillingHistory(Result):
         return draw_energy(self, file, units=units, width=width)
 
     def animate(self, file: File, *, speed: float | None = None, fps: float = 25, progress: bool | None = None) -> None:
-        """Write a film of the string that turns: twist and speed of rotation along it.
+        """Write a film of the string: twist and speed of rotation along it, or displacement and velocity along the axis
+        where nothing turns or the block moves up and down.
 
         Args:
             file: .gif, or .mp4, which needs ffmpeg (rank 0 writes).
@@ -309,7 +310,7 @@ class DrillingHistory(Result):
         Raises:
             SceneError: matplotlib, Pillow or ffmpeg is missing, another ending, or fewer than two profiles.
         """
-        from cosserat_fenicsx.drilling.charts import film
+        from cosserat_fenicsx.drilling.film import film
 
         film(self, file, speed, fps, progress)
 

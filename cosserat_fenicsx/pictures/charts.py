@@ -35,7 +35,8 @@ _DPI, _LEAST_DPI, _WIDTHS = 150, 90, (300, 10_000)
 _SQUEEZED, _TALL = 1.3, 1.2
 # Maximum passes of the arrangement of texts; mean width of a letter over the size of its font.
 _PASSES, _LETTER = 5, 0.55
-_ENERGY, _UNACCOUNTED = Quantity("energy", unit="J"), Quantity("not accounted for", unit="J")
+_ENERGY, _DONE = Quantity("stored energy", unit="J"), Quantity("work, losses", unit="J")
+_UNACCOUNTED = Quantity("not accounted for", unit="J")
 # Lines of up to this many points have markers.
 _FEW = 40
 # Energies below this share of the largest are not drawn.
@@ -218,26 +219,45 @@ def _in_columns(panel, names):
     return lines, max(1, min(len(names), int(room / ((_LETTER * longest + 4) * size))))
 
 
-def ledger(times, curves, balance, title, about=""):
-    """The Figure of energies over time, and of the error of their balance below.
+def ledger(times, stored, done, balance, title, about=""):
+    """The Figure of a ledger of energy over time: what is stored; works and losses, which may be many times as large;
+    and the error of their balance.
 
     Args:
-        times: (n,) s. curves: (label, values (n,) in J, colour, style); those that stay zero are left out.
-        balance: (n,) unaccounted energy, J. about: words after the label of the axis.
+        times: (n,) s. stored, done: see `draw_energies`. balance: (n,) unaccounted energy, J.
+        about: words after the label of the axis of what is stored.
     """
-    figure, (above, below) = stacked(10, (3.6, 1.2))
-    most = max(np.abs(values).max() for _, values, *_ in curves)
-    heading, size = scale(_ENERGY, most)
-    for label, values, colour, style in curves:
-        if np.abs(values).max() > _LITTLE * most:
-            above.plot(times, values / size, style, color=colour, label=label)
-    above.set_ylabel(f"{heading}{about}")
+    heights = (2.6, 2.2, 1.2) if any(values.any() for _, values, *_ in done) else (3.6, 1.2)
+    figure, panels = stacked(10, heights)
+    draw_energies(panels[:-1], times, stored, done, about)
     heading, size = scale(_UNACCOUNTED, balance)
-    below.plot(times, balance / size, color=GREY)
-    below.set(xlabel="time (s)", ylabel=heading)
-    legend(above)
+    panels[-1].plot(times, balance / size, color=GREY)
+    panels[-1].set(xlabel="time (s)", ylabel=heading)
     figure.suptitle(title)
     return figure
+
+
+def draw_energies(panels, times, stored, done, about=""):
+    """Draw what is stored, with its sum, into the first panel, and works and losses into the next one, if there is one.
+
+    Args:
+        times: (n,) s.
+        stored: parts of the energy, done: works and losses: (label, values (n,) in J, colour, style) each; those that
+            stay zero are left out.
+    """
+    most = max(np.abs(values).max() for _, values, *_ in (*stored, *done))
+    for panel, curves, quantity in zip(panels, (stored, done), (_ENERGY, _DONE), strict=False):
+        curves = [curve for curve in curves if np.abs(curve[1]).max() > _LITTLE * most]
+        heading, size = scale(quantity, *(values for _, values, *_ in curves))
+        if panel is panels[0]:
+            heading += about
+            if len(curves) > 1:  # a broad line below the others, which it would hide where it equals one of them
+                total = sum(values for _, values, *_ in curves)
+                panel.plot(times, total / size, color="0.8", linewidth=5, solid_capstyle="butt", label="total")
+        for label, values, colour, style in curves:
+            panel.plot(times, values / size, style, color=colour, label=label)
+        panel.set_ylabel(heading)
+    legend(*panels)
 
 
 def draw_quantity(over, shown, title="", file=None, comm=Alone, **look):

@@ -16,13 +16,8 @@ from cosserat_fenicsx.pictures.charts import (
 )
 from cosserat_fenicsx.quantities import Quantity
 
-_CURVES = (
-    ("kinetic", "kinetic", "tab:blue", "-"),
-    ("strain", "strain", "tab:orange", "-"),
-    ("energy", "kinetic + strain", "black", "-"),
-    ("work", "work of loads and supports", "tab:green", "--"),
-    ("dissipated", "dissipated", "tab:red", "--"),
-)
+_STORED = (("kinetic", "kinetic", "tab:blue", "-"), ("strain", "strain", "tab:orange", "-"))
+_DONE = (("work", "work of loads and supports", "tab:green", "-"), ("dissipated", "dissipated", "tab:red", "--"))
 _DISTANCE = Quantity("distance from the axis of the hole", unit="m", shown="mm", dimension="diameter")
 _RATE = Quantity("rate, forward in the direction of the spin", unit="rad/s", shown="rpm")
 _OF_AXIS = Quantity("rate of the section's axis, forward positive", unit="rad/s", shown="rpm")
@@ -52,9 +47,13 @@ def _with_times(what):
 @chart(_with_times("energies"))
 def draw_energy(history):
     """See `History.plot_energy`."""
-    curves = [(label, getattr(history, name), *style) for name, label, *style in _CURVES]
     title = f"{history.scene.title or 'Motion'}: energy, scheme {history.scheme}"
-    return ledger(history.times, curves, history.balance, title)
+    return ledger(history.times, *energies_of(history), history.balance, title)
+
+
+def energies_of(history):
+    """What is stored, and works and losses, see `draw_energies`."""
+    return [[(label, getattr(history, name), *style) for name, label, *style in curves] for curves in (_STORED, _DONE)]
 
 
 @chart(_with_times("orbit"))
