@@ -419,7 +419,6 @@ def test_phase_and_energy(drawn):
 @pytest.mark.parametrize("rpm", [0, 20])
 def test_heave_is_drawn_along_the_axis(rpm, tmp_path):
     """Of a string off bottom, with and without rotation: velocities of block and lower end, in map and film too."""
-    pytest.importorskip("matplotlib")
     pipe = cf.well.DrillString([cf.well.DrillPipe(500.0, size="5 in 19.50 lb/ft")])
     hook = cf.drilling.Hook(speed=lambda t: 0.5 * np.cos(6.0 * t))  # upwards
     drilling = cf.drilling.Drilling(pipe, cf.drilling.TopDrive(rpm * cf.units.rpm), hook=hook)

@@ -24,6 +24,7 @@ from cosserat_fenicsx.quantities import Units
 from cosserat_fenicsx.scene import action
 from cosserat_fenicsx.statics.problem import solvers_of
 from cosserat_fenicsx.well import sweep as module
+from cosserat_fenicsx.well.in_space import axes_of
 from cosserat_fenicsx.well.rod import rod_in_hole
 from cosserat_fenicsx.well.rod.rod_in_hole import solve_in_hole
 
@@ -291,6 +292,19 @@ def test_the_largest_error_of_a_sweep_names_its_quantity_and_place():
         assert "hook load and surface torque" in last and last.endswith(f"{told} (trip in, bit at 2000 m)")
 
 
+def test_axes_in_space_have_two_numbers_or_none():
+    """Across the hole, whose radius is enlarged, none; of a short extent a finer step than of the others."""
+    along = np.linspace(0, 1, 50)[:, None]
+    vertical = along * (0.0, 0.0, -500.0)
+    east, north, depth = axes_of(vertical, 7.5)
+    assert (east.name, east.ticks, north.ticks) == ("east", (), ()) and depth.name == "depth (m)"
+    assert [text for _, text in depth.ticks] == ["500", "400", "300", "200", "100", "0"]
+    for lean in (8.0, 20.0, 33.0, 60.0, 77.0, 110.0, 400.0):
+        axes = axes_of(vertical + along * (lean, 0.0, 0.0) + (310.0, 0.0, 0.0), 7.5)
+        assert 2 <= len(axes[0].ticks) <= 8 and axes[0].name == "east (m)"
+        assert all(axes[0].low <= x <= axes[0].high and float(text) == x for x, text in axes[0].ticks)
+
+
 @pytest.mark.slow
 def test_the_string_in_its_hole_in_space(tmp_path):
     pytest.importorskip("pyvista")
@@ -298,7 +312,7 @@ def test_the_string_in_its_hole_in_space(tmp_path):
     answer = cf.well.torque_and_drag(HOLE, STRING, cf.well.TripOut(), mud=MUD, model="soft")
     for how in ({}, {"enlarge": 1}, {"between": (2400, 2500)}):
         answer.plot_3d(tmp_path / "hole.png", **how)
-        pixels = image.imread(tmp_path / "hole.png")[:, :-230, :3]  # without the colour bar
+        pixels = image.imread(tmp_path / "hole.png")[:, :-280, :3]  # without the colour bar
         extents = np.ptp(np.argwhere(np.ptp(pixels, axis=2) > 0.15), axis=0)
         assert (extents > 0.5 * np.array(pixels.shape[:2])).any()  # the string crosses the page, however thin it is
     with pytest.raises(cf.SceneError, match="ends in .png"):

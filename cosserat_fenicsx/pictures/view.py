@@ -132,6 +132,10 @@ class Labels:
         if self._free(box):
             self._keep(text, point, box, size, colour)
 
+    def keep_off(self, lines):
+        """Keep labels that come later off these lines (n, 3), m, too, where possible."""
+        self._covered |= _cells_of([self._view.pixels(_dense(line)) for line in lines], self._view.window)
+
     def reserve(self, low, high):
         """Keep a rectangle free of labels: its lower left and upper right corners, pixels."""
         self._placed.append((*low, *high))
@@ -309,6 +313,7 @@ def draw_axes(plotter, pyvista, axes, view, labels, font=None):
         (x0, x1), (y0, y1), z = *((axis.low, axis.high) for axis in axes[:2]), axes[2].low
         floor = np.array([[x0, y0, z], [x1, y0, z], [x1, y1, z], [x0, y1, z], [x0, y0, z]])
         plotter.add_mesh(pyvista.lines_from_points(floor), color="lightgrey", line_width=1)
+    labels.keep_off(lines)
     for line in lines:
         plotter.add_mesh(pyvista.Line(*line), color="dimgrey", line_width=1)
 

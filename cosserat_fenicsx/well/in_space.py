@@ -19,7 +19,9 @@ from cosserat_fenicsx.well.charts import (
 # Height of the drawing and bounds of its width, pixels.
 _HEIGHT, _WIDTHS = 1000, (560, 1300)
 # Margins, pixels: left (numbers of depths), right (colour bar), top (title), bottom (names of axes).
-_MARGINS = (240, 230, 130, 130)
+_MARGINS = (290, 280, 170, 180)
+# Maximum intervals between the numbers of the longest axis.
+_INTERVALS = 6
 
 
 def draw_in_space(answer, file, enlarge, between, units):
@@ -39,7 +41,7 @@ def _draw(answer, enlarge, top, bottom):
     if enlarge is None:
         shown = (0.015 if whole else 0.045) * size  # radius of the hole in the picture
         enlarge = max(1.0, float(f"{shown / radius.max():.1g}"))
-    axes = _axes_of(axis, enlarge * radius.max())
+    axes = axes_of(axis, enlarge * radius.max())
     view = _view_of(axis, axes)
     plotter = stage(pyvista, view.window, smooth=None)
     tubes = enlarge * radius.max() > view.pixel
@@ -52,13 +54,16 @@ def _draw(answer, enlarge, top, bottom):
     _add_string(plotter, pyvista, answer, md, line, np.maximum(thick, 0.0), tubes)
     if tubes:
         _add_hole(plotter, pyvista, answer, md, axis, enlarge * radius)
-    _add_surroundings(plotter, pyvista, axes, axis, top == 0 and axes[2].high == axis[:, 2].max())
     beside = enlarge * radius[:, None]
-    labels = Labels(view, [axis, *(axis + sign * beside * way for sign in (-1, 1) for way in (view.above, view.right))])
+    beside = [axis + sign * beside * way for sign in (-1, 1) for way in (view.above, view.right)]
+    surface = top == 0 and axes[2].high == axis[:, 2].max()
+    outlines = _add_surroundings(plotter, pyvista, axes, axis, surface)
+    labels = Labels(view, [axis, *beside, *outlines])
     labels.reserve(
         (view.window[0] - 0.85 * _MARGINS[1], 0.15 * view.window[1]), (view.window[0], 0.85 * view.window[1])
     )
-    draw_axes(plotter, pyvista, axes, view, labels)
+    draw_axes(plotter, pyvista, axes, view, labels, _font(view.window))
+    _add_directions(axes, view, labels)
     _add_names(plotter, pyvista, answer, labels, view, (md, axis, line, enlarge * radius), (top, bottom))
     labels.draw(plotter, pyvista)
     _add_title(plotter, answer, enlarge, title_of(answer, top, bottom), view.window)
@@ -83,21 +88,32 @@ def _picture(rows):
     return np.stack([rows[..., 1], rows[..., 0], -rows[..., 2]], axis=-1)
 
 
-def _axes_of(points, room):
+def axes_of(points, room):
     """Three `Axis` around points (n, 3), m, with room beside them: to the east, to the north, and depth."""
     low, high = points.min(axis=0) - room, points.max(axis=0) + room
     if low[2] + 10 * room < high[2]:  # not horizontal
         high[2] = points[:, 2].max()  # the surface
     thin = np.maximum(0.15 * (high - low).max() - (high - low), 0.0) * (1, 1, 0) / 2  # to a minimum aspect of the box
     low, high = low - thin, high + thin
-    (unit, size), most, least = unit_of(DEPTH), 6, 3  # intervals of the longest axis, and of the others at least
+    unit, size = unit_of(DEPTH)
     found = []
-    for name, a, b, sign in zip(("east", "north", "depth"), low, high, (1, 1, -1), strict=True):
-        step = min(round_step(float((high - low).max()) / size, most), round_step(float(b - a) / size, least)) * size
-        ticks = step * np.arange(math.ceil(a / step - 1e-6), math.floor(b / step + 1e-6) + 1)
+    for name, a, b, sign, way in zip(
+        ("east", "north", "depth"), low, high, (1, 1, -1), np.ptp(points, axis=0), strict=True
+    ):
+        if way < room:  # across the hole, whose radius is enlarged: a direction without numbers
+            found.append(Axis(name, float(a), float(b), ()))
+            continue
+        step = min(round_step(float((high - low).max()) / size, _INTERVALS), round_step(float(b - a) / size, 3)) * size
+        while len(ticks := _between(a, b, step)) < 2:  # one number is no scale
+            step = round_step(step / size, 2.5) * size  # the next smaller one
         texts = tuple((float(x), text_of(sign * x, step, size)) for x in ticks)
         found.append(Axis(f"{name} ({unit})", float(a), float(b), texts))
     return tuple(found)
+
+
+def _between(low, high, step):
+    """The multiples of a step from low to high."""
+    return step * np.arange(math.ceil(low / step - 1e-6), math.floor(high / step + 1e-6) + 1)
 
 
 def _view_of(points, axes):
@@ -131,13 +147,15 @@ def _add_string(plotter, pyvista, answer, md, line, radius, tube):
     string = pyvista.MultipleLines(line)
     string["side force"], string["radius"] = force, radius
     usual = usual_side_force(answer, distributed[rows], answer.md[rows]) / size or force.max(initial=0.0)
-    step = round_step(usual, 8) if usual > 0 else 1.0
+    font = _font(plotter.window_size)
+    room = max(2, min(8, int(0.5 * plotter.window_size[1] / (2 * font))))
+    step = round_step(usual, room) if usual > 0 else 1.0
     most = math.ceil(usual / step - 1e-9) * step or step
     labels = round(most / step) + 1
-    (width, height), beside = plotter.window_size, _MARGINS[1]
+    width, beside = plotter.window_size[0], _MARGINS[1]
     more = "\n(more: yellow)" if force.max(initial=0.0) > most else ""
     box = 1 - 0.75 * beside / width, 0.2, 0.4 * beside / width, 0.5
-    bar = colour_bar(f"side force\n({unit}){more}", round(height / 60), labels, step, box)
+    bar = colour_bar(f"side force\n({unit}){more}", font, labels, step, box)
     if tube:
         string = string.tube(scalars="radius", absolute=True, n_sides=24)
     shading = {"smooth_shading": tube, "lighting": tube, "line_width": 4}
@@ -158,22 +176,46 @@ def _add_hole(plotter, pyvista, answer, md, axis, radius):
 
 
 def _add_surroundings(plotter, pyvista, axes, axis, surface):
-    """The outline of the surface, where the well begins there, and the well's shadow below."""
+    """Draw the outline of the surface, where the well begins there, and the well's shadow below.
+
+    Returns:
+        lines (n, 3), m: these, and the outline of the floor.
+    """
     (x0, x1), (y0, y1), (low, high) = ((each.low, each.high) for each in axes)
+    corners = np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1], [x0, y0]])
+    floor, outline = (np.column_stack([corners, np.full(5, z)]) for z in (low, high))
+    lines = [floor]
     if surface:
-        corners = np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1], [x0, y0]])
-        outline = np.column_stack([corners, np.full(5, high)])
         plotter.add_mesh(pyvista.lines_from_points(outline), color="darkseagreen", line_width=2)
+        lines.append(outline)
     some = axis[np.unique(np.linspace(0, len(axis) - 1, 300).astype(int)), :2]
     if np.ptp(some, axis=0).max() > 0:
-        shadow = pyvista.lines_from_points(np.column_stack([some, np.full(len(some), low)]))
-        plotter.add_mesh(shadow, color="silver", line_width=2)
+        shadow = np.column_stack([some, np.full(len(some), low)])
+        plotter.add_mesh(pyvista.lines_from_points(shadow), color="silver", line_width=2)
+        lines.append(shadow)
+    return lines
+
+
+def _add_directions(axes, view, labels):
+    """Names of the directions across the hole, which have no numbers, behind the floor: the numbers are before it."""
+    middle = np.array([(axes[0].low + axes[0].high) / 2, (axes[1].low + axes[1].high) / 2, axes[2].low])
+    for i, names in enumerate((("west", "east"), ("south", "north"))):
+        if not axes[i].ticks:
+            ends = np.array([middle, middle])
+            ends[:, i] = axes[i].low, axes[i].high
+            k = int(np.argmax(view.pixels(ends)[:, 1]))
+            labels.near(names[k], ends[k], ends[k] - middle, size=_font(view.window))
+
+
+def _font(window):
+    """Size of texts, pixels: they can be read where the picture is 400 pixels wide."""
+    return round(window[0] / 42)
 
 
 def _add_names(plotter, pyvista, answer, labels, view, lines, ends):
     """Spheres at forces at points, the largest with numbers; ends of sections; components of a part of the string."""
     md, axis, line, radius = lines
-    font = max(9, round(view.window[1] / 75))
+    font = _font(view.window)
 
     def at(depth, curve):
         return np.array([np.interp(depth, md, curve[:, i]) for i in range(3)])
@@ -202,5 +244,5 @@ def _add_title(plotter, answer, enlarge, title, window):
     how = f"radii and clearance {enlarge:g} times as large" if enlarge != 1 else "radii and clearance as they are"
     straight = "; its helix is drawn straight" if answer.model != "rod" and answer.helical.any() else ""
     lines = [title, how + straight]
-    size = round(min(window[1] / 80, window[0] / (0.62 * max(map(len, lines))) / 1.5))
+    size = round(min(0.6 * _font(window), window[0] / (0.62 * max(map(len, lines))) / 1.5))
     plotter.add_text("\n".join(lines), font_size=size, color="black", position="upper_left")
