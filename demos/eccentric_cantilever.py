@@ -13,12 +13,14 @@ import argparse
 import sys
 import textwrap
 import time
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 from mpi4py import MPI
 from rich.table import Table
+from two_widths import draw_both
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx import analytic
@@ -183,7 +185,7 @@ def draw(rod, path, file):
         axes.legend(frameon=True)
         return figure
 
-    draw_chart(chart, file)
+    draw_both(partial(draw_chart, chart), file)
 
 
 def main(out="out", load_factors=TABULATED, formulation=None, **mesh):

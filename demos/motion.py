@@ -63,8 +63,8 @@ def spin_up(history):
     out, lag = x * np.cos(angle) + y * np.sin(angle) - 10.0, y * np.cos(angle) - x * np.sin(angle)
     steady = history.times > 15.0
     check = Check("mean extension after 15 s (m)", np.mean(out[steady]), 5.14e-4, 5e-6, "rho A omega^2 L^3/(3 EA)")
-    lines = [("behind the hub", history.times, lag), ("along the blade, 100 times", history.times, 100 * out)]
-    return check, Shapes("xy", tip, until=9.0), Curve("time (s)", "displacement of the tip (m)", lines)
+    lines = [("tip, behind the hub", history.times, lag), ("tip, along the blade, 100 times", history.times, 100 * out)]
+    return check, Shapes("xy", tip, until=9.0), Curve("time (s)", "displacement (m)", lines)
 
 
 def damped_column(history):
@@ -79,7 +79,7 @@ def damped_column(history):
     check = Check("rate of decay (1/s)", -rate, expected, 1e-2 * expected, "tau omega^2/2")
     hull = np.exp(height - expected * t)
     lines = [("tip", t, x), ("exp(-tau omega^2 t/2)", t, hull, "k--"), (None, t, -hull, "k--")]
-    return check, Shapes("xz", rod.end, stretched=True), Curve("time (s)", "displacement of the tip (m)", lines)
+    return check, Shapes("xz", rod.end, stretched=True), Curve("time (s)", "displacement (m)", lines)
 
 
 def whirling_shaft(history):
@@ -100,7 +100,7 @@ def whirling_shaft(history):
     check = Check("speed of the largest whirl (rad/s)", *largest, 1e-2 * omega, "Jeffcott's rotor and cf.modes")
     lines = [("middle of the shaft", speed, 1e3 * r), ("Jeffcott's rotor", speed, 1e3 * rotor, "k--")]
     lines.append(("first frequency", [omega, omega], [0, 1e3 * r.max()], "r:"))
-    return check, Shapes("xyz", middle, stretched=True), Curve("speed (rad/s)", "radius of the whirl (mm)", lines)
+    return check, Shapes("xyz", middle, stretched=True), Curve("speed (rad/s)", "radius of whirl (mm)", lines)
 
 
 def _jeffcott(times, omega, drag, angle, eccentricity):

@@ -1,11 +1,12 @@
 """A motion in four panels: shapes over time; a curve; what is stored; works and losses."""
 
 from collections import namedtuple
-from pathlib import Path
+from functools import partial
 
 import numpy as np
+from two_widths import draw_both
 
-from cosserat_fenicsx.pictures.charts import draw_chart, draw_energies, empty_figure, legend
+from cosserat_fenicsx.pictures.charts import draw_chart, draw_energies, empty_figure, legend, room_for
 from cosserat_fenicsx.pictures.motion_charts import energies_of
 
 #: The first panel: axes ("xy", "xz" or "xyz"), the station whose track is drawn, the last time (s) or None, and whether
@@ -13,8 +14,8 @@ from cosserat_fenicsx.pictures.motion_charts import energies_of
 Shapes = namedtuple("Shapes", "axes station until stretched", defaults=(None, False))
 #: The second panel: axes with units, and lines (label, x, y[, style]).
 Curve = namedtuple("Curve", "xlabel ylabel lines")
-# Number of superposed shapes; extent, m, below which an axis is in mm.
-_SHAPES, _SMALL = 16, 0.05
+# Number of superposed shapes; extent, m, below which an axis is in mm; width, inches, for panels beside each other.
+_SHAPES, _SMALL, _BESIDE = 16, 0.05, 7.0
 
 
 def draw(history, file, shapes, curve):
@@ -25,19 +26,29 @@ def draw(history, file, shapes, curve):
         file: a .png.
         shapes: see `Shapes`; curve: see `Curve`.
     """
-    Path(file).parent.mkdir(parents=True, exist_ok=True)
-    draw_chart(lambda: _figure(history, shapes, curve), file, history.comm)
+    draw_both(partial(draw_chart, lambda: _figure(history, shapes, curve)), file)
 
 
 def _figure(history, shapes, curve):
     stored, done = energies_of(history)
     count = 3 if any(values.any() for _, values, *_ in done) else 2
-    figure = empty_figure(11, 7.0)
-    left, right = figure.add_gridspec(1, 2, width_ratios=(1.2, 1))
-    right = right.subgridspec(count, 1)
+    narrow, flat = room_for(11) < _BESIDE, len(shapes.axes) == 2
+    if narrow and flat:
+        figure = empty_figure(11, 4.2 + 2.2 * count)
+        grid = figure.add_gridspec(1 + count, 1, height_ratios=[4.2] + [2.2] * count)
+        first, *places = (grid[i] for i in range(1 + count))
+    elif narrow:
+        figure = empty_figure(11, 4.2 + 2.2 * count)
+        first, second = figure.add_gridspec(2, 1, height_ratios=(4.2, 2.2 * count))
+    else:
+        figure = empty_figure(11, 7.0)
+        first, second = figure.add_gridspec(1, 2, width_ratios=(1.2, 1))
+    if not (narrow and flat):
+        grid = second.subgridspec(count, 1)
+        places = [grid[i] for i in range(count)]
     figure.suptitle(history.scene.title)
-    _draw_shapes(figure, left, history, shapes)
-    above, *below = (figure.add_subplot(right[i]) for i in range(count))
+    _draw_shapes(figure, first, history, shapes)
+    above, *below = map(figure.add_subplot, places)
     for label, x, y, *style in curve.lines:
         above.plot(x, y, *style, label=label, lw=1.2)
     above.set(xlabel=curve.xlabel, ylabel=curve.ylabel)
@@ -73,11 +84,13 @@ def _draw_shapes(figure, place, history, shapes):
         axes.set_aspect("equal")
     if not flat:
         ranges = np.ptp([axes.get_xlim(), axes.get_ylim(), axes.get_zlim()], axis=1)
-        box = (1.6, 1.0, 1.0) if shapes.stretched else ranges * sizes
-        axes.set_box_aspect(box, zoom=1.1)
+        box = np.array([1.6, 1.0, 1.0]) if shapes.stretched else ranges * sizes
+        long = box.max() / np.sort(box)[1]
+        axes.set_box_aspect(box, zoom=0.9 if long < 2 else 0.85 if figure.get_figwidth() > _BESIDE else 1.1)
         axes.set_in_layout(False)  # matplotlib does not know where labels in space will be
-        for axis, size in zip((axes.xaxis, axes.yaxis, axes.zaxis), box, strict=True):
-            axis.labelpad = 4.0 + 24.0 * size / max(box)
-            axis.set_major_locator(MaxNLocator(max(2, round(5 * size / max(box)))))
+        for axis, share in zip((axes.xaxis, axes.yaxis, axes.zaxis), box / box.max(), strict=True):
+            axis.labelpad = 5.0 * long * share
+            axis.set_major_locator(MaxNLocator(max(2, round(4 * share))))
     legend(axes)
-    figure.colorbar(colours, ax=axes, label="time of the shape (s)", shrink=0.8, location="bottom", pad=0.08)
+    figure.colorbar(colours, ax=axes, label="time of the shape (s)", shrink=0.8, location="bottom",
+                    pad=0.08 if flat else 0.12)  # fmt: skip

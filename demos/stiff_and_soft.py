@@ -1,6 +1,9 @@
 """The exact rod in contact beside the soft string: hook loads over the depth of the bit, and the side force."""
 
+from functools import partial
+
 import numpy as np
+from two_widths import draw_both
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.pictures.charts import beside, draw_chart, legend
@@ -20,11 +23,11 @@ def stiff_and_soft(scene, drilling, file):
         cf.well.depth_sweep(scene.hole, scene.string, OPERATIONS, depths, mud=scene.mud, model=model, tol=1e-3)
         for model in ("soft", "rod")
     )
-    draw_chart(lambda: _figure(scene, drilling, depths, soft, stiff), file)
+    draw_both(partial(draw_chart, lambda: _figure(scene, drilling, depths, soft, stiff)), file)
 
 
 def _figure(scene, drilling, depths, soft, stiff):
-    figure, (hook, apart, side), _ = beside([4.5, 4.5, 4.5], 6.5)
+    figure, (hook, apart, side), _ = beside([3.6, 3.6, 3.6], 6.0)
     for i, (operation, colour) in enumerate(zip(OPERATIONS, COLOURS, strict=True)):
         loads, given = (sweep.hook_load[i, 0] / 1e3 for sweep in (stiff, soft))
         hook.plot(given, depths, color=colour, label=f"{operation.name}, soft string")

@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 from known_numbers import Check, chosen, report, verdict
 from mpi4py import MPI
+from two_widths import draw_both
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.drilling.torsion import TorsionWaves
@@ -120,12 +121,12 @@ def run(demo, out="out/strings"):
     history = found.run()
     if folder is not None:
         folder.mkdir(parents=True, exist_ok=True)
-        history.plot(folder / "drilling.png")
+        draw_both(history.plot, folder / "drilling.png")
         if len(history.depths) > 10:
-            history.plot_map(folder / "map.png")
-        history.plot_energy(folder / "energy.png")
+            draw_both(history.plot_map, folder / "map.png")
+        draw_both(history.plot_energy, folder / "energy.png")
         if history.bit_speed.any():
-            history.plot_phase(folder / "phase.png")
+            draw_both(history.plot_phase, folder / "phase.png")
     return history.model, list(demo(found, history, folder))
 
 

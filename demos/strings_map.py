@@ -11,11 +11,13 @@ other way round it may stick and slip where no mode grows: small disturbances di
 import argparse
 import sys
 import time
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 from known_numbers import Check, report, verdict
 from mpi4py import MPI
+from two_widths import draw_both
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.pictures.charts import draw_chart, empty_figure
@@ -85,8 +87,8 @@ def main(quick=False, out="out/strings"):
         print(f"{severity.size} simulations of {FOUND.settings['duration']:g} s on {MPI.COMM_WORLD.size} rank(s): "
               f"{took:.1f} s; the bit oscillates in {moves.sum()}, a mode grows in {grows.sum()}")  # fmt: skip
         if not quick:
-            Path(out).mkdir(parents=True, exist_ok=True)
-            draw_chart(lambda: picture(severity, growth, speeds, weights), Path(out) / "stability_map.png")
+            draw_both(partial(draw_chart, lambda: picture(severity, growth, speeds, weights)),
+                      Path(out) / "stability_map.png")  # fmt: skip
     return checks
 
 

@@ -11,12 +11,14 @@ without slip, at minus contact radius over clearance times the speed of the driv
 
 import argparse
 import sys
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 from known_numbers import Check, report, verdict
 from mpi4py import MPI
 from scipy.integrate import solve_ivp
+from two_widths import draw_both
 from whirling_collar import ARM, CLEARANCE, DRAG, EI, LENGTH, MESH, MUD_MASS, OFFSET, STEEL_MASS, spun_up
 
 import cosserat_fenicsx as cf
@@ -81,9 +83,8 @@ def main(out="out/whirl", film=False, duration=DURATION):
         print(report("Whirl: what must come out", [("collar", history.model, check) for check in checks]))
         print(late)
     if out is not None:
-        Path(out).mkdir(parents=True, exist_ok=True)
         for name in ("orbit", "whirl", "campbell"):
-            getattr(history, f"plot_{name}")(middle, wall, Path(out) / f"{name}.png")
+            draw_both(partial(getattr(history, f"plot_{name}"), middle, wall), Path(out) / f"{name}.png")
         if film:
             turned = np.flatnonzero((history.times > 6.0) & (history.times < 8.2))
             history.at_points(turned).animate(Path(out) / "whirl.gif", enlarge=60, speed=0.2, fps=15)

@@ -11,11 +11,13 @@ what steady rolling takes, it slips, slows down and leaves the wall; with time i
 import argparse
 import sys
 import time
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 from known_numbers import Check, report, verdict
 from mpi4py import MPI
+from two_widths import draw_both
 from whirling_collar import LENGTH, MESH, least_friction, rolling
 
 import cosserat_fenicsx as cf
@@ -63,8 +65,7 @@ def main(quick=False, out="out/whirl"):
         print(f"{ratio.size} simulations of {DURATION:g} s on {MPI.COMM_WORLD.size} rank(s): {took:.1f} s; rolling "
               f"backward in {int(rolls.sum())}, forward already in {int((ratio > 0).sum())}")  # fmt: skip
         if not quick:
-            Path(out).mkdir(parents=True, exist_ok=True)
-            draw_chart(lambda: picture(ratio, rolls > 0, speeds, frictions), Path(out) / "map.png")
+            draw_both(partial(draw_chart, lambda: picture(ratio, rolls > 0, speeds, frictions)), Path(out) / "map.png")
     return checks
 
 

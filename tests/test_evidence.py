@@ -178,7 +178,7 @@ def test_tables_and_pictures_are_put_into_the_documentation(tmp_path):
     from PIL import Image
 
     out, docs = tmp_path / "out", tmp_path / "docs"
-    for folder in (out, docs / "pictures", docs / "tables", docs / "evidence"):
+    for folder in (out, docs / "pictures" / "narrow", docs / "tables", docs / "evidence"):
         folder.mkdir(parents=True)
     (docs / "evidence" / "figure3.md").write_text(
         "before\n<!-- figure3 -->\nold\n<!-- /figure3 -->\nafter\n", encoding="utf-8"
@@ -188,11 +188,13 @@ def test_tables_and_pictures_are_put_into_the_documentation(tmp_path):
     image = np.full((300, 400, 3), 255, dtype=np.uint8)
     image[100:200, 150:250] = 0
     Image.fromarray(image).save(out / "figure3.png")
+    Image.fromarray(image[::-1]).save(out / "figure3_narrow.png")
     put_in_docs.main(["figure3", "failures", "orders"], out, docs)
     page = (docs / "evidence" / "figure3.md").read_text(encoding="utf-8")
     assert page == "before\n<!-- figure3 -->\n| figure3 |\n<!-- /figure3 -->\nafter\n"
     assert "# Where methods fail" in (docs / "tables" / "failures.md").read_text(encoding="utf-8")
     assert Image.open(docs / "pictures" / "figure3.png").size == (123, 123)
+    assert (docs / "pictures" / "narrow" / "figure3.png").exists()
 
 
 def test_every_table_has_its_place_in_the_documentation():

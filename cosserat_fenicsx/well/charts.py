@@ -93,7 +93,7 @@ def over_depth(widths, quantity):
 def sweep_figure(sweep):
     """Hook load and surface torque over the depth of the bit, with marks where there is no answer."""
     turns = any(operation.direction(1.0)[1] for operation in sweep.operations)
-    figure, panels, _, length = over_depth([6.5] * (1 + bool(turns)), _BIT_DEPTH)
+    figure, panels, _, length = over_depth([5.0, 5.0] if turns else [6.5], _BIT_DEPTH)
     (hook_label, force), (torque_label, moment) = scale(_HOOK), scale(_SURFACE)
     depths, (low, high) = sweep.depths / length, _usual_range(sweep.hook_load / force)
     by_rod = sweep.models == "rod"
@@ -178,7 +178,7 @@ def fit_figure(fit):
     quantities = {"hook_load": _HOOK, "surface_torque": _SURFACE}
     queries = list(dict.fromkeys(reading.query for reading, _ in rows))
     operations = list(dict.fromkeys(m.operation for m in fit.measurements))
-    figure, panels, unit, length = over_depth([6.5] * len(queries), _BIT_DEPTH)
+    figure, panels, unit, length = over_depth([5.0, 5.0] if len(queries) > 1 else [6.5], _BIT_DEPTH)
     weight_unit, weight = unit_of(_HOOK)
     for panel, query in zip(panels, queries, strict=True):
         heading, size = scale(quantities[query])
@@ -476,7 +476,7 @@ def _draw_forces(axes, answer, top, width):
         begin, end, at = max(start, top) / metre, end / metre, start / metre
         if not contact.at_point:
             axes.plot([begin, end], [wall, wall], color=_FORCE, linewidth=3, solid_capstyle="butt")
-            words = f"{told:.3g} {unit} from {at:.1f} to {end:.1f} {length_unit}"
+            words = f"{told:.3g} {unit} from\n{at:.1f} to {end:.1f} {length_unit}"
             if side in ("high", "low"):
                 axes.text((begin + end) / 2, wall + sign * 0.05 * width, words, fontsize=SMALL, **note)
         elif side in ("high", "low") and force > 0.01 * most:

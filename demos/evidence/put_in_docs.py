@@ -2,20 +2,26 @@
 
     python demos/evidence/put_in_docs.py accuracy orders      these tables and their pictures
     python demos/evidence/put_in_docs.py gallery wells strings whirl    the pictures of these
+    python demos/evidence/put_in_docs.py column    that of `demos/eccentric_cantilever.py -o out/column`
 
 A table replaces what stands between <!-- name --> and <!-- /name --> in a page of docs/; one that is too long for that
 has a page of its own in docs/tables/. Pictures are cut to what is drawn, reduced to few colours and put in
-docs/pictures/.
+docs/pictures/, those for pages of 400 pixels, which demos write beside them (demos/two_widths.py), in its folder narrow/.
 """
 
 import argparse
 import re
+import sys
 from pathlib import Path
 
 import numpy as np
 from PIL import Image
 
 ROOT = Path(__file__).resolve().parents[2]
+sys.path.append(str(ROOT / "demos"))
+
+from two_widths import narrow  # noqa: E402
+
 #: The tables that stand in a page, each with its page and pictures.
 PAGES = {
     "accuracy": ("evidence/accuracy.md",),
@@ -59,17 +65,20 @@ FOLDERS = {
         "stability_map.png": "stability_map.png",
     },
     "whirl": {"whirl.png": "whirl.png"},
+    "column": {"eccentric_cantilever_delta.png": "figure.png"},
 }
 WIDTH, COLOURS, MARGIN = 1100, 256, 12  # pixels, number, pixels
+NARROW = 800, 4000  # pixels, of a picture for narrow pages
 
 
-def kept(picture, file):
-    """Write the picture as the documentation keeps it: without white margins, at most 1100 pixels wide, 256 colours."""
+def kept(picture, file, most=(WIDTH, WIDTH)):
+    """Write the picture as the documentation keeps it: without white margins, at most 1100 pixels wide and high, or
+    `most` (width, height), 256 colours."""
     image = Image.open(picture).convert("RGB")
     rows, columns = np.nonzero((np.asarray(image) < 250).any(axis=2))
     box = columns.min() - MARGIN, rows.min() - MARGIN, columns.max() + MARGIN, rows.max() + MARGIN
     image = image.crop((max(box[0], 0), max(box[1], 0), min(box[2], image.width), min(box[3], image.height)))
-    image.thumbnail((WIDTH, WIDTH))
+    image.thumbnail(most)
     image.quantize(COLOURS, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE).save(file, optimize=True)
 
 
@@ -84,6 +93,8 @@ def main(names, out="out", docs=ROOT / "docs"):
         for picture, file in drawn.items():
             if (out / file).exists():
                 kept(out / file, docs / "pictures" / picture)
+            if narrow(out / file).exists():
+                kept(narrow(out / file), docs / "pictures" / "narrow" / picture, NARROW)
         if not (out / f"{name}.md").exists():
             continue
         found = (out / f"{name}.md").read_text(encoding="utf-8").strip()
