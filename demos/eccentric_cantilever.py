@@ -24,7 +24,7 @@ from two_widths import draw_both
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx import analytic
-from cosserat_fenicsx.pictures.charts import draw_chart, empty_figure
+from cosserat_fenicsx.pictures.charts import draw_chart, empty_figure, legend
 from cosserat_fenicsx.results.path import stability
 from cosserat_fenicsx.results.screen import as_text
 
@@ -181,8 +181,9 @@ def draw(rod, path, file):
         for x, y, label, style in curves:
             axes.plot(x, y, label=label, **style)
         axes.set(xlabel=r"load factor $\eta = F / P_{cr}$", ylabel=r"transverse tip displacement $\delta$ (m)")
-        axes.set(title="Eccentrically compressed cantilever, e = L/100", ylim=(0, 18))
-        axes.legend(frameon=True)
+        axes.set_ylim(0, 18)
+        legend(axes)
+        figure.suptitle("Eccentrically compressed cantilever, e = L/100")
         return figure
 
     draw_both(partial(draw_chart, chart), file)

@@ -20,7 +20,7 @@ from mpi4py import MPI
 from two_widths import draw_both
 
 import cosserat_fenicsx as cf
-from cosserat_fenicsx.pictures.charts import draw_chart, empty_figure
+from cosserat_fenicsx.pictures.charts import draw_chart, empty_figure, legend
 
 FOUND = cf.read(Path(__file__).parent / "strings" / "stability_map.toml")
 #: A bit whose speed has this severity at the end does not rotate steadily; modes that grow faster than this (1/s) have
@@ -49,9 +49,9 @@ def picture(severity, growth, speeds, weights):
         if (values < 0).any():
             panel.contour(x, y, values, levels=[0.0], colors="white", linewidths=1.2)
     panel.plot([], [], color="white", label="left of each line one more mode grows (linear theory)")
-    panel.legend(loc="lower right", facecolor="0.4", labelcolor="white", frameon=True)
+    legend(panel, facecolor="0.4", labelcolor="white", frameon=True)
     panel.set(xlabel="speed (rpm)", ylabel="weight on bit (kN)")
-    panel.set_title(f"Stick-slip after {FOUND.settings['duration']:g} s from rest, {severity.size} simulations")
+    figure.suptitle(f"Stick-slip after {FOUND.settings['duration']:g} s from rest, {severity.size} simulations")
     panel.grid(visible=False)
     return figure
 

@@ -18,7 +18,7 @@ for module in (defaults, scene_keys):  # pages that follow from the code
 project, copyright = "cosserat_fenicsx", "MIT licence"
 version = release = cosserat_fenicsx.__version__
 html_title = f"cosserat_fenicsx {release}"
-extensions = ["sphinx.ext.autodoc", "sphinx.ext.autosummary", "sphinx.ext.napoleon", "myst_nb", "formulas"]
+extensions = ["sphinx.ext.autodoc", "sphinx.ext.autosummary", "sphinx.ext.napoleon", "myst_nb", "formulas", "responsive"]
 html_theme = "furo"
 html_static_path = ["site.css"]
 html_css_files = ["site.css"]

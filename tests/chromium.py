@@ -42,15 +42,8 @@ class Page:
         self._session = self.send("Target.attachToTarget", targetId=target["targetId"], flatten=True)["sessionId"]
         for domain in ("Page", "Runtime", "Network", "Log"):
             self.send(f"{domain}.enable")
-        self._file = f"file://{file}"
-        self.send(
-            "Emulation.setDeviceMetricsOverride", width=size[0], height=size[1], deviceScaleFactor=1, mobile=False
-        )
-        self._loaded = False
-        self.send("Page.navigate", url=self._file)
-        while not self._loaded:
-            self._read()
-        self.frame()
+        self.resize(*size)
+        self.open(file)
 
     def __enter__(self):
         return self
@@ -62,6 +55,18 @@ class Page:
         os.close(self._to)
         os.close(self._from)
         self._folder.cleanup()
+
+    def open(self, file):
+        """Load the page of a file."""
+        self._file, self._loaded = f"file://{file}", False
+        self.send("Page.navigate", url=self._file)
+        while not self._loaded:
+            self._read()
+        self.frame()
+
+    def resize(self, width, height):
+        """Give the page another size, pixels."""
+        self.send("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=False)
 
     def send(self, method, **params):
         """The result of a command."""
