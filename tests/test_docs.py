@@ -20,10 +20,9 @@ def text_of(page):
 
 
 def blocks(language):
-    """The fenced blocks of all pages in a language: (page's name, text)."""
-    found = [
-        (page.name, block) for page in PAGES for block in re.findall(rf"```{language}\n(.*?)```", text_of(page), re.S)
-    ]
+    """The fenced blocks of all pages in a language: (page's name, text, block `text` right below it: what it prints)."""
+    block = re.compile(rf"```{language}\n(.*?)```(?:\n\n```text\n(.*?)```)?", re.S)
+    found = [(page.name, *texts) for page in PAGES for texts in block.findall(text_of(page))]
     assert found, language
     return found
 
@@ -65,11 +64,23 @@ def test_every_public_name_is_in_the_reference():
     assert {package: sorted(names) for package, names in listed.items()} == packages
 
 
-@pytest.mark.parametrize(
-    ("page", "program"),
-    [x for x in blocks("python") if re.search(r"import cosserat_fenicsx|from cosserat_fenicsx import", x[1])],
-)
-def test_programs_run(page, program, tmp_path, monkeypatch, capsys):
+NUMBER = re.compile(r"-?\d+(?:\.(\d*))?(?:e[+-]\d+)?")
+
+
+def assert_prints(printed, shown):
+    """The same words, and numbers that differ by at most one in the last digit that is shown."""
+    assert NUMBER.sub("#", printed).split() == NUMBER.sub("#", shown).split(), printed
+    for a, b in zip(NUMBER.finditer(printed), NUMBER.finditer(shown), strict=True):
+        digits, _, power = b[0].partition("e")
+        last = 10.0 ** (int(power or 0) - len(digits.partition(".")[2])) if {"e", "."} & set(b[0]) else 0
+        assert abs(float(a[0]) - float(b[0])) <= 1.01 * last, printed
+
+
+PROGRAMS = [x for x in blocks("python") if re.search(r"import cosserat_fenicsx|from cosserat_fenicsx import", x[1])]
+
+
+@pytest.mark.parametrize(("page", "program", "shown"), PROGRAMS, ids=[page for page, _, _ in PROGRAMS])
+def test_programs_run(page, program, shown, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     for family in list(FAMILIES.values()):  # whose members other tests find as they were; imported now, not in the copy
         members(family)
@@ -77,6 +88,11 @@ def test_programs_run(page, program, tmp_path, monkeypatch, capsys):
         monkeypatch.setattr(family, "_twice", set(family._twice))
     names = {"__name__": "program"}
     exec(compile(program, page, "exec", dont_inherit=True), names)
+    if shown:
+        assert_prints(capsys.readouterr().out, shown)
+        for picture in re.findall(r'"(\w+\.png)"', program):
+            assert (tmp_path / picture).stat().st_size > 10_000 and (DOCS / "pictures" / picture).exists()
+        return
     if "column" in program:
         assert "2.2006154" in capsys.readouterr().out and (tmp_path / "cantilever.png").stat().st_size > 20_000
     if "whirl" in names:
@@ -90,7 +106,7 @@ def test_programs_run(page, program, tmp_path, monkeypatch, capsys):
         assert end == pytest.approx((40.6897, 0.1578, -3.0316), abs=1e-4)
 
 
-@pytest.mark.parametrize(("page", "scene"), [x for x in blocks("toml") if "my_rig" not in x[1]])
+@pytest.mark.parametrize(("page", "scene"), [x[:2] for x in blocks("toml") if "my_rig" not in x[1]])
 def test_scene_files_are_read(page, scene, tmp_path):
     file = tmp_path / "scene.toml"
     file.write_text(scene, encoding="utf-8")
