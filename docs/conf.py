@@ -31,6 +31,6 @@ default_role = "py:obj"  # `Path` in a docstring becomes a link
 napoleon_use_ivar = True
 autodoc_typehints = "none"
 autosummary_imported_members = True
-myst_enable_extensions = ["dollarmath"]
+myst_enable_extensions = ["dollarmath", "colon_fence"]
 myst_heading_anchors = 3
 nb_execution_mode = "off"  # the tests execute the notebook, and compare what it prints

@@ -20,7 +20,7 @@ def text_of(page):
 
 
 def blocks(language):
-    """The fenced blocks of all pages in a language: (page's name, text, block `text` right below it: what it prints)."""
+    """The fenced blocks of all pages in a language: (page's name, text, what the block `text` below says)."""
     block = re.compile(rf"```{language}\n(.*?)```(?:\n\n```text\n(.*?)```)?", re.S)
     found = [(page.name, *texts) for page in PAGES for texts in block.findall(text_of(page))]
     assert found, language
@@ -46,6 +46,20 @@ def test_links_lead_somewhere(page):
             target = (page.parent / name).resolve() if name else page
             assert target.exists() and ROOT in target.parents, link
             assert not anchor or anchor in headings(target), link
+
+
+def test_recipes_and_terms_are_found():
+    """Every recipe is in the index of concepts; the terms of the glossary are in order, each with a page to read on."""
+    asked = [
+        (page, words) for page in DOCS.glob("recipes_*.md") for words in re.findall("^## (.*)$", text_of(page), re.M)
+    ]
+    index, terms = " ".join(text_of(DOCS / "concepts.md").split()), []
+    assert len(asked) >= 40 and all(words.endswith("?") for _, words in asked)
+    assert [words for page, words in asked if f"[{words}]({page.name}#" not in index] == []
+    for term, said in re.findall(r"^(\w.*)\n((?:  .*\n|\n)+)", text_of(DOCS / "glossary.md").partition(":::")[2], re.M):
+        assert re.search(r"\]\(\w+\.md", said) and 1 <= len(re.findall(r"[.:](?:\s|$)", said)) <= 5, term
+        terms.append(term.lower())
+    assert len(terms) >= 50 and terms == sorted(terms)
 
 
 def test_pictures_are_small_and_shown():
