@@ -18,7 +18,7 @@ export VTK_DEFAULT_OPENGL_WINDOW = vtkEGLRenderWindow
 # A numpy in the user's own site directory would hide the distribution's.
 export PYTHONNOUSERSITE = 1
 
-.PHONY: help setup packages demo animation motion gallery well string whirl test docs tables figure3 work-precision cosseratbench failures rods-in-wells folders random random-wells imperfect mutants release clean
+.PHONY: help setup packages demo animation motion gallery well string whirl recipes test docs tables figure3 work-precision cosseratbench failures rods-in-wells folders random random-wells imperfect mutants release clean
 
 help:
 	@echo "Times are those of two cores and an empty cache of compiled forms, after \`make setup\`."
@@ -29,6 +29,7 @@ help:
 	@echo "make well    strings in wells: torque and drag, each with pictures and a number that must come out; writes out/wells/ (a minute)"
 	@echo "make string  drill-strings in motion: stick-slip, waves, a map of stability, each with pictures and numbers that must come out; writes out/strings/ (half a minute)"
 	@echo "make whirl   a collar in its hole from forward to backward whirl, and a map of whirl over speed and friction; writes out/whirl/ (three minutes)"
+	@echo "make recipes the recipes of docs/recipes_*.md, and whether they print what is shown; writes out/recipes/ (half a minute)"
 	@echo "make docs    the documentation as a site that needs no network; writes out/docs/index.html (a minute)"
 	@echo "make test    all tests, the serial ones on two workers"
 	@echo "make tables  the tables of accuracy and cost in docs/, measured anew and put there"
@@ -68,6 +69,9 @@ string: setup
 whirl: setup
 	$(PYTHON) demos/whirl.py --film
 	$(MPIRUN) -n 2 $(PYTHON) demos/whirl_map.py
+
+recipes: setup
+	$(PYTHON) demos/recipes.py
 
 # Warnings are errors. What Sphinx keeps between two builds lies beside the pages.
 docs: setup .venv/.docs

@@ -1,7 +1,7 @@
 """Put into the documentation what the measurements and the gallery have left in out/.
 
     python demos/evidence/put_in_docs.py accuracy orders      these tables and their pictures
-    python demos/evidence/put_in_docs.py gallery wells strings whirl    the pictures of these
+    python demos/evidence/put_in_docs.py gallery wells strings whirl recipes    the pictures of these
     python demos/evidence/put_in_docs.py column    that of `demos/eccentric_cantilever.py -o out/column`
 
 A table replaces what stands between <!-- name --> and <!-- /name --> in a page of docs/; one that is too long for that
@@ -48,6 +48,12 @@ ALONE = {
 }
 #: The pictures of the gallery, by the files of the scenes.
 GALLERY = [f"{file.stem}.png" for file in sorted((ROOT / "demos").glob("**/*.toml"))]
+#: The pictures that recipes write, as their pages show them.
+RECIPES = {
+    picture: f"{page.stem.removeprefix('recipes_')}/{picture}"
+    for page in sorted((ROOT / "docs").glob("recipes_*.md"))
+    for picture in re.findall(r"\(pictures/(\w+\.png)\)", page.read_text(encoding="utf-8"))
+}
 #: The other pictures, by the folders of `out` that hold them: their names in the documentation, and their files.
 FOLDERS = {
     "wells": {
@@ -66,6 +72,7 @@ FOLDERS = {
     },
     "whirl": {"whirl.png": "whirl.png"},
     "column": {"eccentric_cantilever_delta.png": "figure.png"},
+    "recipes": RECIPES,
 }
 WIDTH, COLOURS, MARGIN = 1100, 256, 12  # pixels, number, pixels
 NARROW = 800, 4000  # pixels, of a picture for narrow pages
