@@ -20,6 +20,8 @@ _PREFIXED = ("N", "m", "Pa", "rad")
 _BAR = 6
 # Width of a picture over the size of its letters; maximum letters of a line over the colour bar.
 _LETTERS, _BAR_LETTERS = 40, 12
+# Largest letters of one of several drawings side by side, pixels.
+_PANEL_LETTERS = 24
 # Maximum intervals between ticks of the longest axis.
 _TICKS = 6
 # Maximum digits after the point; smaller numbers are written with a power of ten.
@@ -243,7 +245,9 @@ def letters(plotter):
     return max(10, round(plotter.window_size[0] / _LETTERS))
 
 
-def frame(plotter, everywhere, panel=False, *, more=None, labels=None, span=None, title=None, most=_TICKS):
+def frame(
+    plotter, everywhere, panel=False, *, more=None, labels=None, span=None, title=None, most=_TICKS, heights=None
+):
     """Place the camera so that it shows points (n, 3), m, and draw axes with units around them.
 
     Args:
@@ -253,6 +257,7 @@ def frame(plotter, everywhere, panel=False, *, more=None, labels=None, span=None
         labels: a function of the `View` that makes the `Labels` of the drawing; None for labels of the axes alone.
         title: the height kept free for the title, pixels; None for a share of the window's.
         most: the maximum number of intervals between ticks on the longest axis.
+        heights: bounds of the height of the window, pixels, which is made as high as the drawing; None to keep it.
 
     Returns:
         The `View` and the `Labels`, which are still to be drawn if they were given.
@@ -260,11 +265,16 @@ def frame(plotter, everywhere, panel=False, *, more=None, labels=None, span=None
     axes = axes_of(everywhere, most)
     corners = np.array(np.meshgrid(*((axis.low, axis.high) for axis in axes))).reshape(3, -1).T
     shown = corners if more is None else np.concatenate([corners, more])
+    span = np.ptp(everywhere, axis=0) if span is None else span
+    if heights is not None:
+        width = plotter.window_size[0]
+        plotter.window_size = width, round(float(np.clip(View.height(shown, span, width, title), *heights)))
     left, bottom, right, top = plotter.renderer.viewport  # the whole window, or a panel of it
     window = plotter.window_size[0] * (right - left), plotter.window_size[1] * (top - bottom)
-    view = View.of(shown, np.ptp(everywhere, axis=0) if span is None else span, window, panel, title)
+    view = View.of(shown, span, window, panel, title)
     texts = labels(view) if labels else Labels(view)
-    draw_axes(plotter, load_pyvista(), axes, view, texts, None if panel else letters(plotter))
+    font = min(_PANEL_LETTERS, round(window[0] / 28)) if panel else letters(plotter)
+    draw_axes(plotter, load_pyvista(), axes, view, texts, font)
     if labels is None:
         texts.draw(plotter, load_pyvista())
     view.place(plotter)

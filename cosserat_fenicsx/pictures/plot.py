@@ -38,6 +38,8 @@ from cosserat_fenicsx.ranks import communicator, on_first
 _VISIBLE = 0.01
 # Letters per line of the title; width and height of a picture, pixels; height of a line over that of its letters.
 _TITLE_WIDTH, _WINDOW, _LINE = 60, (1400, 1000), 1.3
+# Least and largest height of a picture, pixels.
+_HEIGHTS = 740, 1000
 # Height that labels above a drawing have, over that of letters.
 _ABOVE = 2.2
 # Sizes of names in a scene of many rods over those of other letters.
@@ -185,18 +187,18 @@ def _finish(plotter, pyvista, everywhere, symbols, lines, title, label, most=6):
         lines: centrelines that labels keep off. title: lines of text. label: puts the first labels into the `Labels`. most: see `drawing.frame`.
     """
     symbols.draw(plotter)
-    (width, height), font = plotter.window_size, letters(plotter)
+    font = letters(plotter)
     lettered = [line for text in title for line in textwrap.wrap(text, _TITLE_WIDTH)]
     over = font * _LINE * (len(lettered) + 0.5)
 
     def prepared(view):
-        labels = Labels(view, [*lines, *symbols.covers])
+        (width, height), labels = view.window, Labels(view, [*lines, *symbols.covers])
         labels.reserve((0, height - over), (width, height))
         labels.reserve((0.79 * width, 0), (width, 0.85 * height))
         return labels
 
-    _, labels = frame(plotter, everywhere, more=symbols.points, labels=prepared, span=symbols.span, title=over + _ABOVE * font,
-                      most=most)  # fmt: skip
+    view, labels = frame(plotter, everywhere, more=symbols.points, labels=prepared, span=symbols.span,
+                         title=over + _ABOVE * font, most=most, heights=_HEIGHTS)  # fmt: skip
     label(labels)
     for text, point, towards, colour in symbols.grouped_texts():
         labels.near(text, point, towards, size=font, colour=colour)
@@ -205,7 +207,7 @@ def _finish(plotter, pyvista, everywhere, symbols, lines, title, label, most=6):
         left_out = f"(no room for {len(labels.left_out)} labels: "
         lettered.append(f"{left_out}{textwrap.shorten(', '.join(labels.left_out), _TITLE_WIDTH - len(left_out) - 1)})")
     for i, (words, colour) in enumerate(reversed(symbols.groups.items())):
-        place = 0.79 * width, 0.01 * height + _LINE * font * i
+        place = 0.79 * view.window[0], _LINE * font * (i + 0.2)
         plotter.add_text(words, position=place, color=colour, font_size=font / 2)
     plotter.add_text(plain("\n".join(lettered)), position="upper_edge", color="black", font_size=font / 2)
 

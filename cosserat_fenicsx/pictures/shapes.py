@@ -27,13 +27,13 @@ from cosserat_fenicsx.ranks import on_first
 # Panels of a picture, and in a row of it.
 _MOST_PANELS, _IN_A_ROW = 6, 3
 # Width of a panel, its least and largest height, height of the title, pixels.
-_WIDTH, _HEIGHTS, _TITLE = 640, (520, 640), 70
+_WIDTH, _HEIGHTS, _TITLE = 640, (560, 680), 90
 # Largest rotation that is drawn, as the tangent of its angle.
 _STEEPEST = 1.0
 # Memory for frames of a film, which are drawn once, bytes.
 _MEMORY = 200_000_000
 # Pieces along a rod; mean width of a letter of the titles, pixels.
-_PIECES, _LETTER = 200, 11
+_PIECES, _LETTER = 200, 15
 
 
 def draw(found, file, which, amplitude):
@@ -138,12 +138,12 @@ def _panels(found, shown, amplitude):
         row_weights=[_TITLE, *[panel] * down], groups=[(0, slice(None))],
     )  # fmt: skip
     plotter.subplot(0, 0)
-    plotter.add_text(_head(found, width), position="upper_edge", color="black", font_size=12)
+    plotter.add_text(_head(found, width), position="upper_edge", color="black", font_size=14)
     for i, (k, shape) in enumerate(zip(shown, drawn, strict=True)):
         plotter.subplot(1 + i // across, i % across)
         _add(plotter, pyvista, shape, shape.bodies(), everywhere)
         text = f"k = {k}: {found.label(k)}\n{_below(shape, shape.bodies(), everywhere, _WIDTH)}"
-        plotter.add_text(text, position="upper_edge", color="black", font_size=9)
+        plotter.add_text(text, position="upper_edge", color="black", font_size=11)
         frame(plotter, everywhere, panel=True)
     return plotter
 
@@ -166,7 +166,7 @@ def _below(shape, bodies, everywhere, width):
     """The lines under a title: notes on what is not to scale."""
     extent = float(np.ptp(everywhere, axis=0).max())
     notes = [shape.note, *thicker(thickening(body, extent) for body in bodies)]
-    return "\n".join(textwrap.fill(note, width // _LETTER * 2) for note in notes)
+    return "\n".join(textwrap.fill(note, round(width / _LETTER * 1.2)) for note in notes)
 
 
 def _add(plotter, pyvista, shape, bodies, everywhere):

@@ -12,8 +12,10 @@ from cosserat_fenicsx.pictures.charts import chosen_unit
 # Shares of the picture's width to the left (vertical axis) and to the right (colour bar) of the drawing, and of its
 # height below (horizontal axes) and above (title).
 _WHOLE = (0.19, 0.21, 0.17, 0.17)
+# Height below a drawing with a title of its own, over the width, which letters are in proportion to.
+_BELOW = 0.12
 # Likewise for one of several drawings side by side, without a colour bar.
-_PANEL = (0.17, 0.11, 0.2, 0.22)
+_PANEL = (0.24, 0.07, 0.22, 0.24)
 
 
 def view_of(span):
@@ -66,7 +68,8 @@ class View:
             title: the height kept free for the title, pixels; None for a share of the window's.
         """
         before, after, below, over = _PANEL if panel else _WHOLE
-        over = over if title is None else title / window[1]
+        if title is not None:
+            below, over = _BELOW * window[0] / window[1], title / window[1]
         wide, tall, left, upwards = 1 - before - after, 1 - below - over, after - before, over - below
         to_camera, right, above, up = view_of(span)
         across, high = points @ right, points @ above
@@ -78,6 +81,13 @@ class View:
         # at the depth of the points, which the clipping of the camera needs
         focus = focus + (points @ to_camera).mean() * to_camera
         return cls(to_camera, right, above, up, focus, half, tuple(window))
+
+    @staticmethod
+    def height(points, span, width, title):
+        """The height of a window of some width, pixels, which a drawing fills as `of` places it with a title."""
+        (before, after, _, _), (_, right, above, _) = _WHOLE, view_of(span)
+        aspect = np.ptp(points @ above) / max(np.ptp(points @ right), 1e-300)
+        return title + width * (_BELOW + (1 - before - after) * aspect)
 
     @property
     def pixel(self):
