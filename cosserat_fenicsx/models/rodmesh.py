@@ -130,7 +130,12 @@ class Layout:
 
     def node_s(self, nodes):
         """Arc length over rod length of every node of each rod, for reference nodes sorted in [0, 1]."""
-        return [np.append(x.ravel(), 1.0) for x in self.inside(nodes[:-1])]
+        return [self.nodes_of(i, nodes) for i in range(len(self.breaks))]
+
+    def nodes_of(self, i, nodes):
+        """`node_s` of the i-th rod alone."""
+        b = self.breaks[i]
+        return np.append((b[:-1, None] + np.diff(b)[:, None] * nodes[:-1]).ravel(), 1.0)
 
 
 @per_scene

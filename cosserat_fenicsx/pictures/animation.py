@@ -20,7 +20,7 @@ from cosserat_fenicsx.new_files import replaced
 from cosserat_fenicsx.pictures.colours import colour_of, known, peak_of, seen
 from cosserat_fenicsx.pictures.default_colour import default_colour
 from cosserat_fenicsx.pictures.drawing import (
-    add_body,
+    add_bodies,
     add_lines,
     add_tubes,
     at_rest,
@@ -166,7 +166,7 @@ class _Stage:
         self._plotter = stage(pyvista, size)
         self._factors = [thickening(body, extent) for body in bodies[0]]
         self._meshes = [
-            add_body(self._plotter, pyvista, body, factor, peak, colour, moving=True)
+            add_bodies(self._plotter, pyvista, [body], [factor], peak, colour, moving=True)
             for body, factor in zip(bodies[0], self._factors, strict=True)
         ]
         drawn = zip(history.scene.rods, bodies[0], self._factors, strict=True)

@@ -29,6 +29,8 @@ _MOST_DIGITS = 3
 _WALL = "peru"
 # Minimum drawn radius over the extent of the drawing; the picture says which rods are enlarged.
 _SMALLEST_RADIUS = 1 / 120
+# Pieces of a drawn rod: at most, at least, and of all rods together where these are many.
+_PIECES, _FEWEST_PIECES, _ALL_PIECES = 200, 12, 12_000
 
 
 def load_pyvista():
@@ -98,13 +100,19 @@ class Body:
 
 
 def at_rest(scene):
-    """The centrelines of all rods in the reference, a list of (201, 3), m."""
-    return [rod.curve.position(np.linspace(0, rod.length, 201)) for rod in scene.rods]
+    """The centrelines of all rods in the reference, a list of (n, 3), m."""
+    x = places(len(scene.rods))
+    return [rod.curve.position(x * rod.length) for rod in scene.rods]
 
 
-def swept(path, k, rod, magnify, colour, pieces=200):
+def places(rods):
+    """(n,) arc lengths over a rod's length at which its sections are drawn where there are so many rods."""
+    return np.linspace(0, 1, max(_FEWEST_PIECES, min(_PIECES, _ALL_PIECES // rods)) + 1)
+
+
+def swept(path, k, rod, magnify, colour):
     """The `Body` of a rod at point k of a path; `colour`: the `Colour` of its values."""
-    x = np.linspace(0, 1, pieces + 1)
+    x = places(len(path.scene.rods))
     line, directors = path.sample(k, rod, x)
     fields = path.fields(k, rod)
     values = np.interp(x, fields["s"] / rod.length, colour.of(fields))
@@ -164,25 +172,32 @@ def surface_of(pyvista, body, factor):
     return surface.triangulate()  # the caps of an I section are not convex
 
 
-def add_body(plotter, pyvista, body, factor, peak, colour, moving=False):
-    """Draw the surface of a `Body`, closed at both ends, coloured by its values.
+def together(surfaces):
+    """Several surfaces as one, which is drawn as fast as one of them."""
+    return surfaces[0].append_polydata(*surfaces[1:]) if len(surfaces) > 1 else surfaces[0]
+
+
+def add_bodies(plotter, pyvista, bodies, factors, peak, colour, moving=False):
+    """Draw the surfaces of `Body`s, closed at both ends, coloured by their values.
 
     Args:
-        factor: enlarges its sections.
+        bodies, factors: lists of them, and of what enlarges their sections.
         peak: the largest size of the values in the picture, which the colours reach up to.
         colour: the `Colour` of its values.
         moving: whether the mesh's points will be changed.
 
     Returns:
-        The mesh.
+        The mesh of all.
     """
-    surface = surface_of(pyvista, body, factor)
     scale, name = suited(peak, colour.unit)
     step = round_step((2 if colour.signed else 1) * peak / scale or 1.0, _BAR)
     low, high = colour.limits(math.ceil(peak / scale / step - 1e-9) * step)
     unit = "zero" if peak == 0 else "" if colour.unit == "1" else f"({name})"
     words = "\n".join(filter(None, [*textwrap.wrap(colour.words, _BAR_LETTERS), unit]))
-    surface["value"] = np.repeat(body.values / scale, body.outline.shape[1])
+    surfaces = [surface_of(pyvista, body, factor) for body, factor in zip(bodies, factors, strict=True)]
+    for surface, body in zip(surfaces, bodies, strict=True):
+        surface["value"] = np.repeat(body.values / scale, body.outline.shape[1])
+    surface = together(surfaces)
     plotter.add_mesh(
         surface,
         scalars="value",

@@ -14,7 +14,7 @@ from cosserat_fenicsx.pictures.charts import asked
 from cosserat_fenicsx.pictures.colours import colour_of, known, peak_of, seen
 from cosserat_fenicsx.pictures.default_colour import default_colour
 from cosserat_fenicsx.pictures.drawing import (
-    add_body,
+    add_bodies,
     add_lines,
     add_tubes,
     at_rest,
@@ -22,11 +22,13 @@ from cosserat_fenicsx.pictures.drawing import (
     frame,
     letters,
     load_pyvista,
+    places,
     stage,
     surface_of,
     swept,
     thickening,
     thicker,
+    together,
 )
 from cosserat_fenicsx.pictures.side_by_side import around, shifts, tangled
 from cosserat_fenicsx.pictures.signs import Deformed, Resting, signs_of, span_of, without_sign
@@ -117,8 +119,7 @@ def _draw(path, points, magnify, color, side_by_side):
     peak = peak_of(path, colour, values)
     colour = seen(colour, values, peak)
     radii = {rod: factors[shown[-1], rod] * bodies[shown[-1], rod].radius for rod in path.scene.rods}
-    for key, body in bodies.items():
-        add_body(plotter, pyvista, body, factors[key], peak, colour)
+    add_bodies(plotter, pyvista, [*bodies.values()], [*map(factors.get, bodies)], peak, colour)
     if not apart:
         add_lines(plotter, pyvista, resting)
     if magnify == 1:  # elsewhere rods would leave their tubes
@@ -158,16 +159,15 @@ def _draw_scene(scene):
     pyvista = load_pyvista()
     plotter = stage(pyvista, _WINDOW, "ssaa")
     everywhere = np.concatenate(at_rest(scene))
-    size, radii, factors = float(np.ptp(everywhere, axis=0).max()), {}, []
-    x = np.linspace(0, 1, 201)
+    size, radii, factors, surfaces = float(np.ptp(everywhere, axis=0).max()), {}, [], []
+    x = places(len(scene.rods))
     for rod in scene.rods:
         line, directors = rod.curve.position(x * rod.length), rod.curve.frame(x * rod.length)
         body = body_of(rod, x, line, directors, np.zeros(len(x)))
         factors.append(thickening(body, size))
         radii[rod] = factors[-1] * body.radius
-        plotter.add_mesh(
-            surface_of(pyvista, body, factors[-1]), color=_AT_REST, split_sharp_edges=True, smooth_shading=True
-        )
+        surfaces.append(surface_of(pyvista, body, factors[-1]))
+    plotter.add_mesh(together(surfaces), color=_AT_REST, split_sharp_edges=True, smooth_shading=True)
     add_tubes(plotter, pyvista, scene, radii)
     shapes = [Resting(radii)]
     symbols = signs_of(pyvista, scene, shapes, everywhere, span_of(scene, shapes, everywhere))

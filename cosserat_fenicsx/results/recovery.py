@@ -87,7 +87,7 @@ def viscous_contact(history, which, rod):
     Args:
         history: a `History`; which: indices of states (n,); rod: a rod with a `Damping`.
     """
-    s = history.layout.node_s(history.rule.nodes)[history._rows(rod)[0]] * rod.length
+    s = history.layout.nodes_of(history._rows(rod)[0], history.rule.nodes) * rod.length
     law = rod.damping.viscosity(rod.stiffness_at(s, "left"))
     rates = np.array([_strain_rates(history, history._records[k], rod) for k in which])
     return law.contact(rates[..., :3], rates[..., 3:])

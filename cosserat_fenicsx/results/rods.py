@@ -187,7 +187,7 @@ class RodResult(Result, Extremes, Reactions, Stresses, States):
         """
         rod = self.rod(rod)
         i, rows = self._rows(rod)
-        s = self.layout.node_s(self.rule.nodes)[i] * rod.length
+        s = self.layout.nodes_of(i, self.rule.nodes) * rod.length
         rq = np.array([self._records[k].rq[rows] for k in which])
         contact = np.array([at_nodes(self._contact_of(k)[self._cells(i)]) for k in which])
         displacement = (rq[..., :3] - self._rest[rows]) * self.scales.length
@@ -458,7 +458,7 @@ class RodResult(Result, Extremes, Reactions, Stresses, States):
         named = max((station for rod in rods for station in (rod.end, *self.scene.stations(rod))), key=moves)
         inside = []
         for i, rod in enumerate(rods):
-            x = self.layout.node_s(self.rule.nodes)[i]
+            x = self.layout.nodes_of(i, self.rule.nodes)
             moved = np.linalg.norm(self.motion(rod, x)[:, :, :3], axis=2).max(axis=0)
             inside.append(rod.at(x[np.argmax(moved)] * rod.length))
         other = max(inside, key=moves)

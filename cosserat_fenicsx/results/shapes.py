@@ -49,7 +49,7 @@ class Equilibrium(OnNodes):
     def s(self, rod=None):
         """(nodes,) arc lengths of the nodes of a rod (default the first), m."""
         i, _ = self._rows(rod)
-        return self.layout.node_s(self.rule.nodes)[i] * self.scene.rods[i].length
+        return self.layout.nodes_of(i, self.rule.nodes) * self.scene.rods[i].length
 
     def position(self, rod=None):
         """(nodes, 3) positions of the nodes of a rod (default the first), m, inertial."""
