@@ -164,7 +164,7 @@ class _Stage:
         colour = seen(colour, values, peak)
         self._scale, _ = suited(peak, colour.unit)
         self._plotter = stage(pyvista, size)
-        self._factors = [thickening(body, extent) for body in bodies[0]]
+        self._factors = [thickening(body, extent, len(bodies[0])) for body in bodies[0]]
         self._meshes = [
             add_bodies(self._plotter, pyvista, [body], [factor], peak, colour, moving=True)
             for body, factor in zip(bodies[0], self._factors, strict=True)

@@ -29,6 +29,7 @@ _MOST_DIGITS = 3
 _WALL = "peru"
 # Minimum drawn radius over the extent of the drawing; the picture says which rods are enlarged.
 _SMALLEST_RADIUS = 1 / 120
+_FEW_RODS = 10  # most rods that are enlarged to it
 # Pieces of a drawn rod: at most, at least, and of all rods together where these are many.
 _PIECES, _FEWEST_PIECES, _ALL_PIECES = 200, 12, 12_000
 
@@ -148,10 +149,11 @@ def _resampled(outline, corners):
     return np.column_stack([np.interp(at, way, closed[:, i]) for i in range(2)])
 
 
-def thickening(body, size):
+def thickening(body, size, rods=1):
     """The factor by which the sections of a `Body`, or of anything with a `radius` (m), are enlarged in a drawing of
-    extent `size`, m."""
-    return max(1.0, size * _SMALLEST_RADIUS / body.radius)
+    extent `size`, m, with so many rods: less where they would hide each other."""
+    smallest = size * _SMALLEST_RADIUS / max(1.0, math.sqrt(rods / _FEW_RODS))
+    return max(1.0, smallest / body.radius)
 
 
 def points_of(body, factor):

@@ -94,14 +94,15 @@ def _save(draw, file):
 
 def _draw(path, points, magnify, color, side_by_side):
     pyvista = load_pyvista()
-    shown = _spread(path) if points is None else [range(len(path))[k] for k in points]
+    most = 5 if len(path.scene.rods) <= _NAMED else 1
+    shown = _spread(path, most) if points is None else [range(len(path))[k] for k in points]
     plotter = stage(pyvista, _WINDOW, "ssaa")
     resting = at_rest(path.scene)
     colour = colour_of(color or default_colour(path, shown), known(path))
     bodies = {(k, rod): swept(path, k, rod, magnify, colour) for k in shown for rod in path.scene.rods}
     everywhere = np.concatenate([*resting, *(body.line for body in bodies.values())])
     size = float(np.ptp(everywhere, axis=0).max())
-    factors = {key: thickening(body, size) for key, body in bodies.items()}
+    factors = {key: thickening(body, size, len(path.scene.rods)) for key, body in bodies.items()}
     if points is None and _coincide(bodies, shown, factors):  # they would hide each other's colours
         shown = shown[-1:]
         bodies, factors = ({key: of[key] for key in of if key[0] == shown[0]} for of in (bodies, factors))
@@ -114,7 +115,7 @@ def _draw(path, points, magnify, color, side_by_side):
         everywhere = around([bodies[shown[0], rod].line for rod in path.scene.rods], everywhere, up)
         bodies = {(k, rod): replace(body, line=body.line + moved[k]) for (k, rod), body in bodies.items()}
         size = float(np.ptp(np.concatenate([body.line for body in bodies.values()]), axis=0).max())
-        factors = {key: thickening(body, size) for key, body in bodies.items()}
+        factors = {key: thickening(body, size, len(path.scene.rods)) for key, body in bodies.items()}
     values = [body.values for body in bodies.values()]
     peak = peak_of(path, colour, values)
     colour = seen(colour, values, peak)
@@ -164,7 +165,7 @@ def _draw_scene(scene):
     for rod in scene.rods:
         line, directors = rod.curve.position(x * rod.length), rod.curve.frame(x * rod.length)
         body = body_of(rod, x, line, directors, np.zeros(len(x)))
-        factors.append(thickening(body, size))
+        factors.append(thickening(body, size, len(scene.rods)))
         radii[rod] = factors[-1] * body.radius
         surfaces.append(surface_of(pyvista, body, factors[-1]))
     plotter.add_mesh(together(surfaces), color=_AT_REST, split_sharp_edges=True, smooth_shading=True)
@@ -245,8 +246,11 @@ def _undrawn(scene, tubes):
     return [f"(not drawn: {textwrap.shorten(words, _TITLE_WIDTH, placeholder=' ...')})"] if words else []
 
 
-def _spread(path, most=5):
-    """Indices of up to `most` points of a path, evenly spaced by the distance that the rods' ends have moved."""
+def _spread(path, most):
+    """Indices of up to `most` points of a path, evenly spaced by the distance that the rods' ends have moved; the last
+    point where that is one."""
+    if most == 1:
+        return [len(path) - 1]
     ends = np.hstack([path.position(rod.end) for rod in path.scene.rods])
     # a small fictitious motion spaces the points evenly by index where the ends do not move
     ends = np.hstack([ends, 1e-6 * path.scales.length * np.arange(len(path))[:, None]])

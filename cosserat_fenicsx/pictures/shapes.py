@@ -165,7 +165,7 @@ def _head(found, width):
 def _below(shape, bodies, everywhere, width):
     """The lines under a title: notes on what is not to scale."""
     extent = float(np.ptp(everywhere, axis=0).max())
-    notes = [shape.note, *thicker(thickening(body, extent) for body in bodies)]
+    notes = [shape.note, *thicker(thickening(body, extent, len(bodies)) for body in bodies)]
     return "\n".join(textwrap.fill(note, round(width / _LETTER * 1.2)) for note in notes)
 
 
@@ -173,7 +173,7 @@ def _add(plotter, pyvista, shape, bodies, everywhere):
     """Draw the equilibrium as grey lines, and rods whose surfaces are returned."""
     extent, surfaces = float(np.ptp(everywhere, axis=0).max()), []
     for body in bodies:
-        surface = surface_of(pyvista, body, thickening(body, extent))
+        surface = surface_of(pyvista, body, thickening(body, extent, len(bodies)))
         surface["values"] = np.repeat(body.values, body.outline.shape[1])
         plotter.add_mesh(surface, scalars="values", cmap="viridis", clim=(0, 1), show_scalar_bar=False)
         surfaces.append(surface)
@@ -192,7 +192,7 @@ class _Stage:
         self._plotter = stage(pyvista, size)
         self._surfaces = _add(self._plotter, pyvista, self._shape, bodies, self._everywhere)
         extent = float(np.ptp(self._everywhere, axis=0).max())
-        self._factors = [thickening(body, extent) for body in bodies]
+        self._factors = [thickening(body, extent, len(bodies)) for body in bodies]
         below = _below(self._shape, bodies, self._everywhere, size[0])
         text = f"{_head(found, size[0])}\nk = {k}: {found.label(k)}\n{below}"
         self._plotter.add_text(text, position="upper_edge", color="black", font_size=10)

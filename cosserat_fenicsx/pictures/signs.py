@@ -158,6 +158,8 @@ def _words(load, mark, shape):
     return f"{'up to ' if changes else ''}{quantity(sizes.max(), mark.unit)}{' (follows)' if mark.turns else ''}"
 
 
+# Most joints that are drawn where they are rigid.
+_MANY_JOINTS = 40
 # Samples along a rod of a load on it.
 _SAMPLES = 33
 _POINT_LOADS = {"N": "force", "N m": "moment"}
@@ -209,12 +211,13 @@ def _support(support):
 
 
 def joints_of(scene):
-    """The `Mark`s of the joints."""
+    """The `Mark`s of the joints; of a frame with many, of those alone that are not rigid."""
+    many = len(scene.joints) > _MANY_JOINTS
     return [
         Mark("joint", joint.first) if joint.rigid
         else Mark("ball joint", joint.first) if joint.release == "all"
         else Mark("hinge joint", joint.first, vector=np.array(joint.release))
-        for joint in scene.joints
+        for joint in scene.joints if not (joint.rigid and many)
     ]  # fmt: skip
 
 

@@ -74,7 +74,7 @@ def _data(result, magnify):
     extent, axes = float(np.ptp(everywhere, axis=0).max()), axes_of(everywhere)
     low, high = (np.array([getattr(axis, end) for axis in axes]) for end in ("low", "high"))
     middle, size = (low + high) / 2, float(np.linalg.norm(high - low)) / 2
-    factors = [thickening(shape, extent) for shape in shapes]
+    factors = [thickening(shape, extent, len(shapes)) for shape in shapes]
     for shape, factor in zip(shapes, factors, strict=True):
         shape.radius *= factor
     span = span_of(result.scene, [Deformed(result, int(k), {}, magnify, 0.0) for k in shown[-1:]], everywhere)

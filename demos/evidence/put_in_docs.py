@@ -73,6 +73,7 @@ FOLDERS = {
     "whirl": {"whirl.png": "whirl.png"},
     "column": {"eccentric_cantilever_delta.png": "figure.png"},
     "recipes": RECIPES,
+    "frames": {f"{name}.png": f"{name}.png" for name in ("gridshell", "lattice", "net")},
 }
 WIDTH, COLOURS, MARGIN = 1100, 256, 12  # pixels, number, pixels
 NARROW = 800, 4000  # pixels, of a picture for narrow pages
