@@ -18,7 +18,7 @@ export VTK_DEFAULT_OPENGL_WINDOW = vtkEGLRenderWindow
 # A numpy in the user's own site directory would hide the distribution's.
 export PYTHONNOUSERSITE = 1
 
-.PHONY: help setup packages demo animation motion gallery well string whirl recipes test docs tables figure3 work-precision cosseratbench failures rods-in-wells folders random random-wells imperfect mutants release clean
+.PHONY: help setup packages demo animation motion gallery well string whirl recipes test docs tables figure3 work-precision benchmarks cosseratbench failures rods-in-wells folders random random-wells imperfect mutants release clean
 
 help:
 	@echo "Times are those of two cores and an empty cache of compiled forms, after \`make setup\`."
@@ -35,6 +35,7 @@ help:
 	@echo "make tables  the tables of accuracy and cost in docs/, measured anew and put there"
 	@echo "make figure3 every curve of the paper's Figure 3, and what was found; writes out/ (about 4 minutes)"
 	@echo "make work-precision  speed against accuracy, beside Exudyn, OpenSeesPy, PyElastica, CalculiX, welleng and torque-drag (half an hour at most)"
+	@echo "make benchmarks  published problems, each solved, drawn and compared with its printed numbers; writes out/benchmarks.md (a few minutes)"
 	@echo "make cosseratbench  the scenarios of a public suite, cosseratbench, beside the results of other solvers (git gets it; half a minute)"
 	@echo "make failures where methods fail: a map of methods against trials; writes out/ (at most a quarter of an hour)"
 	@echo "make rods-in-wells  the exact rod in three wells: Newton steps, processor time, errors (about 5 minutes)"
@@ -105,6 +106,11 @@ figure3: setup
 failures: setup
 	$(PYTHON) demos/evidence/failures.py
 	$(PYTHON) demos/evidence/put_in_docs.py failures
+
+# What an interrupted run has finished is kept here, too. A number that disagrees fails the target.
+benchmarks: setup
+	$(PYTHON) demos/benchmarks
+	$(PYTHON) demos/evidence/put_in_docs.py benchmarks
 
 rods-in-wells: setup
 	$(PYTHON) demos/evidence/rods_in_wells.py

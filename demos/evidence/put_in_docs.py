@@ -3,6 +3,7 @@
     python demos/evidence/put_in_docs.py accuracy orders      these tables and their pictures
     python demos/evidence/put_in_docs.py gallery wells strings whirl recipes    the pictures of these
     python demos/evidence/put_in_docs.py column    that of `demos/eccentric_cantilever.py -o out/column`
+    python demos/evidence/put_in_docs.py benchmarks    the verification manual, with a small picture of each problem
 
 A table replaces what stands between <!-- name --> and <!-- /name --> in a page of docs/; one that is too long for that
 has a page of its own in docs/tables/. Pictures are cut to what is drawn, reduced to few colours and put in
@@ -39,6 +40,7 @@ PAGES = {
     "work_precision_string": ("evidence/other_programs.md", "work_precision_string.png"),
     "soft_string": ("evidence/wells.md", "soft_string.png"),
     "rods_in_wells": ("evidence/wells.md",),
+    "benchmarks": ("benchmarks.md",),
 }
 #: The tables with a page of their own: its title and pictures.
 ALONE = {
@@ -75,19 +77,22 @@ FOLDERS = {
     "recipes": RECIPES,
     "frames": {f"{name}.png": f"{name}.png" for name in ("gridshell", "lattice", "net")},
 }
+#: Of the tables here, all pictures of a folder of `out` are kept, small, in a folder of docs/pictures/.
+MANY = ("benchmarks",)
 WIDTH, COLOURS, MARGIN = 1100, 256, 12  # pixels, number, pixels
 NARROW = 800, 4000  # pixels, of a picture for narrow pages
+SMALL, FEW = 600, 32  # pixels, colours
 
 
-def kept(picture, file, most=(WIDTH, WIDTH)):
+def kept(picture, file, most=(WIDTH, WIDTH), colours=COLOURS):
     """Write the picture as the documentation keeps it: without white margins, at most 1100 pixels wide and high, or
-    `most` (width, height), 256 colours."""
+    `most` (width, height)."""
     image = Image.open(picture).convert("RGB")
     rows, columns = np.nonzero((np.asarray(image) < 250).any(axis=2))
     box = columns.min() - MARGIN, rows.min() - MARGIN, columns.max() + MARGIN, rows.max() + MARGIN
     image = image.crop((max(box[0], 0), max(box[1], 0), min(box[2], image.width), min(box[3], image.height)))
-    image.thumbnail(most)
-    image.quantize(COLOURS, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE).save(file, optimize=True)
+    image.thumbnail(most, Image.Resampling.LANCZOS)
+    image.quantize(colours, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE).save(file, optimize=True)
 
 
 def main(names, out="out", docs=ROOT / "docs"):
@@ -103,9 +108,13 @@ def main(names, out="out", docs=ROOT / "docs"):
                 kept(out / file, docs / "pictures" / picture)
             if narrow(out / file).exists():
                 kept(narrow(out / file), docs / "pictures" / "narrow" / picture, NARROW)
+        for picture in sorted((out / name).glob("*.png")) if name in MANY else ():
+            (docs / "pictures" / name).mkdir(exist_ok=True)
+            kept(picture, docs / "pictures" / name / picture.name, (SMALL, SMALL), FEW)
         if not (out / f"{name}.md").exists():
             continue
         found = (out / f"{name}.md").read_text(encoding="utf-8").strip()
+        found = found.replace("](benchmarks/", "](pictures/benchmarks/")
         if title:
             (docs / "tables" / f"{name}.md").write_text(f"# {title}\n\n{found}\n", encoding="utf-8")
         if page:

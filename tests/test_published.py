@@ -1,0 +1,50 @@
+"""Published problems (demos/benchmarks): each is solved and agrees with its printed numbers; the tables have no blank."""
+
+import re
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+sys.path.append(str(Path(__file__).parent.parent / "demos" / "benchmarks"))
+import manual
+
+pytestmark = pytest.mark.serial
+PROBLEMS = manual.load()
+
+
+@pytest.fixture(scope="module")
+def results():
+    """Of the problems that this process has solved: the `Row`s of each."""
+    return {}
+
+
+@pytest.mark.parametrize("name", PROBLEMS)
+def test_it_agrees_with_its_published_numbers(name, results):
+    found = results[name] = manual.solved(PROBLEMS[name])
+    for row in found["rows"]:
+        off = np.abs(np.subtract(row["ours"], row["published"]))
+        assert (off <= row["allowed"]).all(), f"{row['quantity']}: {row['ours']} for {row['published']}"
+        assert (np.asarray(row["estimate"]) >= 0).all() and row["agrees"], row["quantity"]
+        assert abs(row["difference"]) in off
+
+
+def test_the_tables_have_no_blank(results):
+    """Of what this process has solved, or of one problem."""
+    name = next(iter(PROBLEMS))
+    found = results or {name: manual.solved(PROBLEMS[name])}
+    lines = list(manual.text(PROBLEMS, found, manual.record()))
+    tables = [line for line in lines if line.startswith("|")]
+    assert len(tables) >= sum(len(x["rows"]) for x in found.values()) + 2
+    for line in tables:
+        cells = [cell.strip() for cell in re.split(r"(?<!\\)\|", line)[1:-1]]
+        assert len(cells) == manual.HEADS.count("|") + 1 and all(cells), line
+
+
+def test_every_problem_says_where_it_comes_from():
+    assert {x.chapter for x in PROBLEMS.values()} <= set(manual.CHAPTERS)
+    for problem in PROBLEMS.values():
+        assert min(map(len, (problem.title, problem.given, problem.source))) > 10, problem.name
+    page = (manual.HERE.parents[1] / "docs" / "benchmarks.md").read_text(encoding="utf-8")
+    assert "<!-- benchmarks -->" in page
