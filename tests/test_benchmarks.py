@@ -1,4 +1,4 @@
-"""Published problems of statics, Figure 3, and imperfect symmetric structures."""
+"""A hinged frame, Figure 3, and imperfect symmetric structures; see test_published.py for published problems."""
 
 import json
 from pathlib import Path
@@ -27,63 +27,10 @@ from cosserat_fenicsx.statics.problem import solvers_of
 
 pytestmark = pytest.mark.serial
 TRUTH = json.loads((Path(__file__).parent / "reference" / "statics.json").read_text(encoding="utf-8"))
-RIGID = (np.inf, np.inf)
-
-
-def unit_line(section, **more):
-    return cf.Rod(cf.Line((0, 0, 0), (1.0, 0, 0), **more), section)
 
 
 def held(rod, *loads):
     return cf.Scene([rod], [cf.Clamp(rod.start)], loads)
-
-
-def number(x):
-    return np.inf if x == "inf" else x
-
-
-def test_elastica():
-    """Mattiasson 1981: w, u and tip angle of an inextensible cantilever."""
-    rod = unit_line(cf.Stiffness(RIGID, np.inf, (1.0, 1.0), 1.0))
-    values = TRUTH["elastica"]["values"]
-    path = cf.solve(held(rod, cf.Force(rod.end, (0, 0, 1.0))), [v["load"] for v in values], tol=1e-9)
-    exact = [(-v["u"], 0, v["w"]) for v in values]
-    np.testing.assert_allclose(path.displacement(rod.end), exact, atol=2e-10)
-    np.testing.assert_allclose(path.rotation_angle(rod.end), [v["angle"] for v in values], atol=2e-10)
-
-
-@pytest.mark.parametrize("value", TRUTH["bend_45"]["values"], ids=lambda v: f"{v['section']}, {v['load']}")
-def test_45_degree_bend(value):
-    """Bathe & Bolourchi 1979; tol 1e-7 holds between element ends too."""
-    rod = cf.Rod(
-        cf.Arc((0, 100.0, 0), (0, 0, 0), np.pi / 4),
-        cf.Stiffness((value["GA"],) * 2, 1e7, (1e7 / 12,) * 2, value["GJ"]),
-    )
-    path = cf.solve(held(rod, cf.Force(rod.end, (0, 0, value["load"]))), [1.0], tol=1e-7)
-    np.testing.assert_allclose(path.position(rod.end)[0], value["position"], rtol=1e-8)
-    np.testing.assert_allclose(path.rotation(rod.end)[0], value["quaternion"], atol=1e-8)
-    assert path.stable[0] and path.error[0] <= 1e-7
-
-
-def test_helical_roll_up():
-    """Ibrahimbegovic 1997: ten turns under an end moment and a force normal to their plane."""
-    rod = cf.Rod(cf.Line((0, 0, 0), (10.0, 0, 0)), cf.Stiffness((1e4, 1e4), 1e4, (1e2, 1e2), 1e2))
-    scene = held(rod, cf.Force(rod.end, (0, 0, 50.0)), cf.Moment(rod.end, (0, 0, 200 * np.pi)))
-    values = TRUTH["helical_roll_up"]["values"]
-    path = cf.solve(scene, [v["load_factor"] for v in values], elements=40)
-    np.testing.assert_allclose(path.position(rod.end), [v["position"] for v in values], atol=1e-6)
-    found = path.rotation(rod.end)
-    for q, v in zip(found, values, strict=True):
-        assert abs(q @ v["quaternion"]) == pytest.approx(1, abs=1e-10)
-
-
-@pytest.mark.parametrize("value", [v for v in TRUTH["follower_force"]["values"] if v["load"] <= 10],
-                         ids=lambda v: f"{v['load']}, EA {v['EA']}")  # fmt: skip
-def test_follower_force(value):
-    rod = unit_line(cf.Stiffness((number(value["GA"]),) * 2, number(value["EA"]), (1.0, 1.0), 1.0), d1=(0, 1, 0))
-    path = cf.solve(held(rod, cf.FollowerForce(rod.end, (1.0, 0, 0))), [value["load"]], tol=1e-7)
-    np.testing.assert_allclose(path.position(rod.end)[0], (value["x"], value["y"], 0), atol=1e-8)
-    assert path.rotation_angle(rod.end)[0] == pytest.approx(abs(value["angle"]), abs=1e-8)
 
 
 def test_hinged_frame():

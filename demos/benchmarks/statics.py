@@ -173,12 +173,20 @@ def hanging_cable():
     return rows, lambda file: path.plot(file, color="tension")
 
 
-#: Load, and (x, y, angle) of the tip by quadrature.
+#: Axial and shear stiffness: the place (x, y) and the angle of the tip under the four loads, by quadrature.
 FOLLOWER = {
-    1.0: (0.935645669480692, 0.32064199467501253, 0.4958846424226547),
-    2.0: (0.7673621915346397, 0.5738390625609318, 0.9682388025171631),
-    5.0: (0.17227787539915096, 0.7806901427781027, 2.098157239940928),
-    10.0: (-0.09212318118936946, 0.5469832645937337, 2.992714816235361),
+    (np.inf, np.inf): (
+        (0.935645669480692, 0.32064199467501253, 0.4958846424226547),
+        (0.7673621915346397, 0.5738390625609318, 0.9682388025171631),
+        (0.17227787539915096, 0.7806901427781027, 2.098157239940928),
+        (-0.09212318118936946, 0.5469832645937337, 2.992714816235361),
+    ),
+    (400.0, 100.0): (
+        (0.9319876524046942, 0.32989552590066806, 0.4961831565181062),
+        (0.753902837872126, 0.5880274286900784, 0.9703297317867079),
+        (0.1309096876218342, 0.7676897973720263, 2.1130084540021694),
+        (-0.10204921753205468, 0.4679105607689557, 3.0089743246527023),
+    ),
 }
 
 
@@ -187,18 +195,22 @@ FOLLOWER = {
     "statics",
     "J. H. Argyris & Sp. Symeonidis, Comput. Methods Appl. Mech. Eng. 26 (1981) 75, doi:10.1016/0045-7825(81)90131-6; "
     "numbers by quadrature of the elastica",
-    "L = 1 m, EI = 1 N m^2, inextensible; force across the tip, P L^2/EI = 1, 2, 5, 10",
-    "The article shows curves; the numbers are of the inextensible rod. A static equilibrium may flutter before.",
+    "L = 1 m, EI = 1 N m^2, inextensible, or EA = 400 N, GA = 100 N; force across the tip, P L^2/EI = 1, 2, 5, 10",
+    "The article shows curves, of the inextensible rod. A static equilibrium may flutter before.",
 )
 def follower_force():
-    rod = cf.Rod(X_AXIS, cf.Stiffness(**RIGID, bending=(1.0, 1.0), torsion=1.0))
-    path = cf.solve(held(rod, cf.FollowerForce(rod.end, (1.0, 0, 0))), list(FOLLOWER), tol=1e-8)
-    exact, error = np.array(list(FOLLOWER.values())), moved(path).repeat(2)
-    tip = path.position(rod.end)[:, :2]
-    rows = [
-        Row("tip (x, y), m", exact[:, :2].ravel(), tip.ravel(), error, 1e-8, "tol = 1e-8"),
-        Row("angle of the tip, rad", exact[:, 2], path.rotation_angle(rod.end), turned(path), 1e-8, "tol = 1e-8"),
-    ]
+    rows, because = [], "tol = 1e-8"
+    for (EA, GA), truth in FOLLOWER.items():
+        rod = cf.Rod(X_AXIS, cf.Stiffness((GA, GA), EA, (1.0, 1.0), 1.0))
+        path = cf.solve(held(rod, cf.FollowerForce(rod.end, (1.0, 0, 0))), [1.0, 2.0, 5.0, 10.0], tol=1e-8)
+        exact, name = np.array(truth), "inextensible" if np.isinf(EA) else "EA = 400 N"
+        tip = path.position(rod.end)[:, :2].ravel()
+        rows += [
+            Row(f"tip (x, y), {name}, m", exact[:, :2].ravel(), tip, moved(path).repeat(2), 1e-8, because),
+            Row(
+                f"angle of the tip, {name}, rad", exact[:, 2], path.rotation_angle(rod.end), turned(path), 1e-8, because
+            ),
+        ]
     return rows, path.plot
 
 
