@@ -36,60 +36,81 @@ class FollowerLineForce(cf.LineAction):
         return ufl.dot(point.R * f, test.phi_r)
 
 
-def exponents(samples, step, count):
-    """The exponents s (1/s) of a sum of exponentials exp(s t), (channels, times), by the matrix pencil method.
+def exponents(scene, stations, duration, dt, count, *, after=0.0, every=1, **settings):
+    """The exponents s (1/s) of small motions along y, sums of exp(s t), by the matrix pencil method.
 
     Those of the trapezoidal rule, which the steps of small motions obey, are turned back to those in time.
+
+    Args:
+        stations: that are watched, `every` so many steps from the time `after` on, s. count: of exponents.
+        settings: of `simulate`.
     """
+    history = cf.simulate(scene, duration, dt=dt, **settings)
+    first = round(after / dt)
+    samples = np.array([history.displacement(station)[first::every, 1] for station in stations])
     rows = samples.shape[1] // 2
     window = np.lib.stride_tricks.sliding_window_view
     hankel = np.concatenate([window(channel, samples.shape[1] - rows + 1) for channel in samples], axis=1)
     basis = np.linalg.svd(hankel, full_matrices=False)[0][:, :count]
-    z = np.linalg.eigvals(np.linalg.lstsq(basis[:-1], basis[1:], rcond=None)[0])
-    return 2 / step * (z - 1) / (z + 1)
+    z = np.linalg.eigvals(np.linalg.lstsq(basis[:-1], basis[1:], rcond=None)[0]) ** (1 / every)
+    found = 2 / dt * (z - 1) / (z + 1)
+    found = found[found.imag > 0]
+    return found[np.argsort(found.imag)][:2]
 
 
-def first_two(load, elements, dt=5e-3):
-    """The two lowest circular frequencies of a clamped column of 1 m, EI = 1, 1 kg/m, under follower loads, squared.
-
-    Args:
-        load: a function of the rod that returns them. elements: of degree 4. dt: s.
-    """
+def column(load, P, elements):
+    """The two lowest exponents of a clamped column of 1 m, EI = 1, 1 kg/m, under a follower load of size P."""
     section = cf.Stiffness((1e6, 1e6), 1e6, (1.0, 1.0), 1.0, mass=1.0, inertia=(1e-7,) * 3)
     rod = cf.Rod(cf.Line((0, 0, 0), (1, 0, 0)), section, name="column")
     kick = cf.InitialVelocity(rod, lambda s: (0, 1e-4 * s**2, 0), lambda s: (0, 0, 2e-4 * s))
-    scene = cf.Scene([rod], [cf.Clamp(rod.start)], [load(rod)], velocities=[kick])
-    history = cf.simulate(scene, 4.0, dt=dt, start=1.0, elements=elements)
-    found = exponents(np.array([history.displacement(rod.at(s))[:, 1] for s in (0.5, 1.0)]), dt, 8)
-    return np.sort(found.imag[found.imag > 0])[:2] ** 2
+    scene = cf.Scene([rod], [cf.Clamp(rod.start)], [load(rod, P)], velocities=[kick])
+    return exponents(scene, [rod.at(0.5), rod.end], 4.0, 5e-3, 8, start=1.0, elements=elements)
 
 
-def flutter(load, near, elements):
-    """The load at which the two lowest frequencies meet, and that frequency.
+def two_links(P, hinge, damping=0.0):
+    """The two exponents of Ziegler's pendulum: links of 1 m, 2 kg between them, 1 kg at the tip, springs of 1 N m/rad.
 
-    The square of the difference of their squares is smooth in the load and zero there: a parabola through three loads.
+    Args:
+        P: the follower force, N. hinge: length of the two soft pieces of the rod that stand for springs, m.
+        damping: of the springs, over their stiffness, s.
+    """
+    soft, stiff = (cf.Stiffness((1e6, 1e6), 1e6, (EI, EI), 1.0, mass=1e-6, inertia=(1e-8,) * 3) for EI in (hinge, 1e5))
+    pieces = [(hinge, soft), (1.0, stiff), (1.0 + hinge, soft), (None, stiff)]
+    line = cf.Line((0, 0, 0), (2 + hinge / 2, 0, 0))
+    rod = cf.Rod(line, pieces, name="pendulum", damping=cf.Damping(time=damping) if damping else None)
+    masses = [cf.PointMass(rod.at(1 + hinge / 2), 2.0), cf.PointMass(rod.end, 1.0)]
+    push = cf.Force(rod.end, cf.signals.Step((0, 1e-3, 0), 0.0, 0.5))
+    scene = cf.Scene([rod], [cf.Clamp(rod.start)], [cf.FollowerForce(rod.end, (0, 0, -P)), push, *masses])
+    stations = [rod.at(1 + hinge / 2), rod.end]
+    return exponents(scene, stations, 40.0, 0.02, 4, after=1.0, every=5, elements=4, degree=2)
+
+
+def meeting(pair_at, near):
+    """Where the two frequencies meet: the square of the difference of their squares is smooth in the load, and zero.
+
+    Args:
+        pair_at: a function of the load, which gives two exponents. near: the load, roughly.
 
     Returns:
-        [load, frequency], the squares of the frequencies (3, 2) at the three loads, these loads.
+        [load, frequency], the frequencies (3, 2) at three loads below it, these loads.
     """
-    loads = near * np.array([0.96, 0.98, 0.996])
-    pairs = np.array([first_two(lambda rod, P=P: load(rod, P), elements) for P in loads])
-    curve = np.polyfit(loads, np.diff(pairs)[:, 0] ** 2, 2)
-    critical = np.roots(curve)[np.argmin(np.abs(np.roots(curve) - near))].real
-    return np.array([critical, math.sqrt(np.polyval(np.polyfit(loads, pairs.mean(axis=1), 2), critical))]), pairs, loads
+    loads = near * np.array([0.92, 0.96, 0.99])
+    pairs = np.array([pair_at(P).imag for P in loads])
+    curve = np.polyfit(loads, np.diff(pairs**2)[:, 0] ** 2, 2)
+    load = np.roots(curve)[np.argmin(np.abs(np.roots(curve) - near))].real
+    return np.array([load, math.sqrt(np.polyval(np.polyfit(loads, (pairs**2).mean(axis=1), 2), load))]), pairs, loads
 
 
-def fluttering(title, load, published, allowed):
-    """Rows and picture of a column of follower loads; published: the load and the frequency, or the load alone."""
-    (found, pairs, loads), (coarse, _, _) = (flutter(load, published[0], elements) for elements in (6, 4))
-    names = ("flutter load, EI/L^2 (of a load per length, EI/L^3)", "frequency there, sqrt(EI/(m L^4))")
+def fluttering(fine, coarse, published, allowed, because, label):
+    """Rows and picture; fine, coarse: functions of the load; published: [load, frequency], or the load alone."""
+    (found, pairs, loads), (rough, _, _) = meeting(fine, published[0]), meeting(coarse, published[0])
     rows = [
-        Row(name, value, ours, abs(ours - rough), allowed, "digits printed; the extrapolation")
-        for name, value, ours, rough in zip(names, published, found, coarse, strict=False)
+        Row(name, value, ours, abs(ours - other), allowed, because)
+        for name, value, ours, other in zip((label, "frequency there, rad/s"), published, found, rough, strict=False)
     ]
-    lines = [(f"frequency {k + 1}", loads, np.sqrt(pairs[:, k]), "o-") for k in (0, 1)]
-    lines.append(("published", [published[0]] * 2, [np.sqrt(pairs).min(), np.sqrt(pairs).max()], "k--"))
-    return rows, charted(f"{title}, EI = 1, L = 1 (-)", "circular frequency (rad/s)", lines)
+    lines = [(f"frequency {k + 1}", loads, pairs[:, k], "o-") for k in (0, 1)]
+    lines.append(("published", [published[0]] * 2, [pairs.min(), pairs.max()], "k--"))
+    return rows, charted(label, "circular frequency (rad/s)", lines)
 
 
 _BY_MOTION = (
@@ -101,23 +122,50 @@ _BY_MOTION = (
 @problem(
     "Beck's column",
     "motion",
-    "Beck, Z. angew. Math. Phys. 3 (1952) 225, doi:10.1007/BF02008828: 20.05; more digits by Bolotin's equation",
-    "clamped column, compressed by a force that follows its tip",
+    "Beck, Z. angew. Math. Phys. 3 (1952) 225, doi:10.1007/BF02008828: 20.05; more digits by his frequency equation",
+    "clamped column of EI = 1, L = 1, m = 1, compressed by a force that follows its tip",
     _BY_MOTION,
 )
 def beck_column():
-    return fluttering("force", lambda rod, P: cf.FollowerForce(rod.end, (0, 0, -P)), (20.05095, 11.01556), 1e-3)
+    fine, coarse = (
+        lambda P, n=n: column(lambda rod, P: cf.FollowerForce(rod.end, (0, 0, -P)), P, n) for n in (6, 4)
+    )  # fmt: skip
+    because = "digits printed; the extrapolation"
+    return fluttering(fine, coarse, (20.05095, 11.01556), 1e-3, because, "flutter load, EI/L^2 (-)")
 
 
 @problem(
     "Column under distributed follower loads",
     "motion",
     "Leipholz, Z. angew. Math. Phys. 13 (1962) 581: 40.05 EI/L^3",
-    "clamped column, compressed by a uniform load per length along its tangent",
+    "clamped column of EI = 1, L = 1, m = 1, compressed by a uniform load per length along its tangent",
     _BY_MOTION + " The load is an action of ten lines in this file.",
 )
 def leipholz_column():
-    return fluttering("load per length", lambda rod, q: FollowerLineForce(rod, -q), (40.05,), 6e-3)
+    fine, coarse = (lambda q, n=n: column(lambda rod, q: FollowerLineForce(rod, -q), q, n) for n in (6, 4))
+    return fluttering(fine, coarse, (40.05,), 6e-3, "digits printed", "flutter load per length, EI/L^3 (-)")
+
+
+@problem(
+    "Ziegler's pendulum",
+    "motion",
+    "Ziegler, Ing.-Arch. 20 (1952) 49, doi:10.1007/BF00536796: 7/2 - sqrt(2) = 2.086 without damping, 41/28 = 1.464 "
+    "with little damping, which destabilises; numbers of Herrmann & Jong, J. Appl. Mech. 32 (1965) 592",
+    "two rigid links of 1 m, springs of 1 N m/rad, masses of 2 and 1 kg, a force that follows the tip; equal dampers",
+    _BY_MOTION + " With damping the load is where the decay of the slower motion changes its sign.",
+)
+def ziegler_pendulum():
+    exact, near, found = np.array([3.5 - math.sqrt(2), 41 / 28]), np.array([1.44, 1.46, 1.48]), []
+    for hinge in (0.02, 0.01):
+        (load, _), pairs, loads = meeting(lambda P, hinge=hinge: two_links(P, hinge), exact[0])
+        decay = [two_links(P, hinge, 0.01)[0].real for P in near]
+        found.append([load, np.polyval(np.polyfit(decay, near, 2), 0.0)])
+    ours = 2 * np.array(found[1]) - found[0]
+    row = Row("flutter loads without and with damping, c/l (-)", exact, ours, np.abs(ours - found[1]), 1e-3,
+              "springs are hinges of 20 and 10 mm, extrapolated to no length")  # fmt: skip
+    lines = [(f"frequency {k + 1}, hinges of 10 mm", loads, pairs[:, k], "o-") for k in (0, 1)]
+    lines.append(("published, springs", [exact[0]] * 2, [pairs.min(), pairs.max()], "k--"))
+    return [row], charted("force, c/l (-)", "circular frequency (rad/s)", lines)
 
 
 def from_file(name, **settings):
