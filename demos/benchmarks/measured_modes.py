@@ -38,6 +38,24 @@ def double_cross():
 
 
 @problem(
+    "Free square frame (NAFEMS, test 3)",
+    "motion",
+    f"{SELECTED}, test 3; input as in the verification problems of SolidWorks Simulation",
+    "four beams of 10 m, 250 mm square, E 200 GPa, nu = 0.3, 8000 kg/m^3, in one plane, free",
+)
+def square_frame():
+    corners = [(0, 0, 0), (10, 0, 0), (10, 10, 0), (0, 10, 0), (0, 0, 0)]
+    beams = [cf.Rod(cf.Line(a, b), cf.Rectangle(0.25, 0.25), STEEL, name=f"from {a[:2]}") for a, b in pairwise(corners)]
+    joints = [cf.Joint(beams[k].end, beams[(k + 1) % 4].start) for k in range(4)]
+    flat = [cf.Foundation(beam, 1e12, (0, 0, 1)) for beam in beams]  # modes across the plane become fast
+    found = cf.modes(cf.Scene(beams, [], flat, joints), 11)
+    published = [3.261, 5.668, 11.136, 11.136, 12.849, 24.570, 28.695, 28.695]
+    because = "published without shear and rotary inertia"
+    row = compared("in the plane, Hz", published, found, list(range(3, 11)), 1e-2, because)
+    return [row], lambda file: found.plot(file, which=[3, 4, 5, 7, 8, 9])
+
+
+@problem(
     "Cantilever with masses off its axis (NAFEMS FV4)",
     "motion",
     f"{SELECTED}, test 4; input as in the OptiStruct verification manual, OS-V 0410",

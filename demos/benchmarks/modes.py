@@ -39,15 +39,15 @@ def pictured(found):
     return lambda file: found.plot(file)
 
 
-def charted(xlabel, ylabel, lines):
-    """Draws lines (label, x, y, style) in one panel."""
+def charted(xlabel, ylabel, lines, equal=False):
+    """Draws lines (label, x, y, style) in one panel; equal: whether both axes have one scale."""
 
     def figure():
         made = empty_figure(7.5, 4.5)
         axes = made.add_subplot()
         for label, x, y, style in lines:
             axes.plot(x, y, style, label=label)
-        axes.set(xlabel=xlabel, ylabel=ylabel)
+        axes.set(xlabel=xlabel, ylabel=ylabel, aspect="equal" if equal else "auto")
         legend(axes)
         return made
 

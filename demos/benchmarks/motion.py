@@ -186,7 +186,7 @@ def tracked(history, station, axes):
     return charted("time (s)", f"position of {station} (m)", lines)
 
 
-def shapes(history, axes, count=9):
+def shapes(history, axes, count=6):
     """Draws the first rod at times of equal distance, projected along the third axis."""
     (i, j), rod = ("xyz".index(axis) for axis in axes), history.scene.rods[0]
     lines = []
@@ -194,7 +194,7 @@ def shapes(history, axes, count=9):
         k = int(np.argmin(np.abs(history.times - t)))
         line, _ = history.sample(k, rod, np.linspace(0, 1, 101))
         lines.append((f"{history.times[k]:.3g} s", line[:, i], line[:, j], "-"))
-    return charted(f"{axes[0]} (m)", f"{axes[1]} (m)", lines)
+    return charted(f"{axes[0]} (m)", f"{axes[1]} (m)", lines, equal=True)
 
 
 _EXUDYN = (
@@ -243,7 +243,7 @@ def flying_spaghetti_3d():
         Row("change of angular momentum in flight, N m s", 0.0,
             np.ptp(history.angular_momentum[history.times >= 5.0], axis=0).max(), 0.0, 1e-8, "rounding"),
     ]  # fmt: skip
-    return rows, shapes(history, "xz")
+    return rows, shapes(history, "xy")
 
 
 @problem(
