@@ -64,7 +64,7 @@ def column(load, P, elements):
     rod = cf.Rod(cf.Line((0, 0, 0), (1, 0, 0)), section, name="column")
     kick = cf.InitialVelocity(rod, lambda s: (0, 1e-4 * s**2, 0), lambda s: (0, 0, 2e-4 * s))
     scene = cf.Scene([rod], [cf.Clamp(rod.start)], [load(rod, P)], velocities=[kick])
-    return exponents(scene, [rod.at(0.5), rod.end], 4.0, 5e-3, 8, start=1.0, elements=elements)
+    return exponents(scene, [rod.at(0.5), rod.end], 4.0, 5e-3, 8, every=2, start=1.0, elements=elements)
 
 
 def two_links(P, hinge, damping=0.0):
@@ -82,7 +82,7 @@ def two_links(P, hinge, damping=0.0):
     push = cf.Force(rod.end, cf.signals.Step((0, 1e-3, 0), 0.0, 0.5))
     scene = cf.Scene([rod], [cf.Clamp(rod.start)], [cf.FollowerForce(rod.end, (0, 0, -P)), push, *masses])
     stations = [rod.at(1 + hinge / 2), rod.end]
-    return exponents(scene, stations, 40.0, 0.02, 4, after=1.0, every=5, elements=4, degree=2)
+    return exponents(scene, stations, 40.0, 0.05, 4, after=1.0, every=2, elements=4, degree=2)
 
 
 def meeting(pair_at, near):
