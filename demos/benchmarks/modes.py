@@ -251,7 +251,7 @@ def flapping_blade():
 
 
 @problem(
-    "Thin ring",
+    "Frequencies of a thin ring",
     "motion",
     "Hoppe, J. reine angew. Math. 73 (1871) 158: n (n^2 - 1)/sqrt(n^2 + 1) in its plane; Love, Mathematical Theory of "
     "Elasticity (1927), section 293: n (n^2 - 1)/sqrt(n^2 + 1 + nu) across it",
@@ -266,7 +266,7 @@ def thin_ring():
     within = [k for k in range(6, 18) if k not in across]
     rows = []
     for name, which, extra in (("in its plane", within, 1.0), ("across it", across, 1.3)):
-        exact = np.repeat(n * (n**2 - 1) / np.sqrt(n**2 + extra), 2)
-        rows.append(compared(f"{name}, pairs with n = 2, 3, 4, -", exact, found, which, 1e-4,
+        exact = n * (n**2 - 1) / np.sqrt(n**2 + extra)
+        rows.append(compared(f"{name}, pairs with n = 2, 3, 4, -", exact, found, which[::2], 1e-4,
                              "the bar is 1/500 of the radius thick", factor))  # fmt: skip
     return rows, lambda file: found.plot(file, which=[6, 8, 10, 12, 14, 16])
