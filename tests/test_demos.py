@@ -73,13 +73,16 @@ def test_bare_dolfinx():
 @pytest.mark.slow
 @pytest.mark.serial
 def test_motion_quick(capsys):
-    """All seven motions."""
+    """The motions that are no problems of demos/benchmarks."""
     import motion
 
-    for check, off in motion.main(out=None, quick=True):
+    names = ["right_angle_cantilever", "damped_column", "whirling_shaft", "released_column"]
+    for check, off in motion.main(names, out=None, quick=True):
         assert off <= check.allowed, check
     printed = capsys.readouterr().out
-    assert all(demo.__name__ in printed for demo in motion.DEMOS) and len(motion.DEMOS) == 7
+    published = {"flying_spaghetti_2d", "flying_spaghetti_3d", "spin_up"}
+    assert {demo.__name__ for demo in motion.DEMOS} == {*names, *published}
+    assert all(name in printed for name in names)
 
 
 @pytest.mark.ranks
