@@ -196,7 +196,7 @@ def drill_string_torsion():
     ours = 2 * math.pi * found.frequencies
     errors = 2 * math.pi * np.abs(found.frequencies - coarse.frequencies)
     row = Row("rad/s", np.array([2.41, 7.93]), ours, errors, np.array([0.01, 0.02]),
-              "solved with rounded numbers in the source")  # fmt: skip
+              "the source rounds: 3.722/0.470 = 7.92 is printed as 7.93")  # fmt: skip
     s = np.linspace(0, pipe.length, 101)
     lines = [(f"{w:.4g} rad/s", s, found.equilibrium.between(pipe, s / pipe.length, found.turns(k, pipe))[:, 2], "-")
              for k, w in enumerate(ours)]  # fmt: skip

@@ -292,7 +292,7 @@ def large_swing():
 
 
 @problem(
-    "Heavy top",
+    "Heavy symmetric top",
     "motion",
     "Bruels, Cardona & Arnold, Mech. Mach. Theory 48 (2012) 121, doi:10.1016/j.mechmachtheory.2011.07.017; position by "
     "steps of 2 us in kynema, tests/.../dynamic_heavy_top.cpp",
