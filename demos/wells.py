@@ -7,13 +7,13 @@ python demos/wells.py --quick            without pictures
 """
 
 import argparse
-import itertools
 import math
 import sys
 from functools import partial
 from pathlib import Path
 
 import numpy as np
+from conduit import FRICTION, pulled_cable
 from known_numbers import Check, chosen, report, verdict
 from mpi4py import MPI
 from scipy.integrate import trapezoid
@@ -95,29 +95,12 @@ def helix(scene, answers, sweep, folder):
 def cable_in_conduit(folder):
     """A cable of 12 mm is pulled round a bend of 90 degrees in a conduit of 32 mm: from end to end its tension grows by
     exp(mu times the angle that it turns by); its little bending stiffness changes that by about EI/(T R^2)."""
-    bend, straight, mu = 1.0, 0.5, 0.3  # m, m, -
-    md = np.cumsum([0.0, straight, bend * math.pi / 2, straight])
-    axis = cf.well.WellPath.from_survey(md, [90, 90, 90, 90], [0, 0, 90, 90])  # a horizontal one
-    cable, polymer = cf.Circle(0.012), cf.Material(E=2e9, nu=0.4)
-    ends = [tuple(row) for row in axis.position(md)]
-    curves = cf.Line(*ends[:2]), cf.Arc((straight, bend, 0.0), ends[1], math.pi / 2), cf.Line(*ends[2:])
-    names = "held", "bend", "pulled"
-    rods = [cf.Rod(curve, cable, polymer, name=name) for curve, name in zip(curves, names, strict=True)]
-    conduit = [
-        cf.well.TubeWall(rod, axis, radius=0.016, contact_radius=0.006, stiffness=1e6, friction=mu, slip=(-1.0, 0.0),
-                    begins=begin, has_arm=False)
-        for rod, begin in zip(rods, md.tolist(), strict=False)
-    ]  # fmt: skip
-    held, pulled = cf.Clamp(rods[0].start), cf.Prescribed(rods[2].end, displacement=(0.0, 0.03, 0.0))
-    joints = [cf.Joint(a.end, b.start) for a, b in itertools.pairwise(rods)]
-    scene = cf.Scene(rods, [held, pulled], conduit, joints=joints, title="A cable pulled round a bend in a conduit")
-    path = cf.solve(scene, [0.0, 1.0], tol=1e-4)
-    near, far = (path.reaction(support)[0][-1] for support in (held, pulled))
+    path, near, far = pulled_cable()
     sizes = np.linalg.norm([near, far], axis=1)
     angle = math.acos(-near @ far / sizes.prod())
     if folder is not None:
         path.plot(folder / "cable.png", [1], color="tension")
-    check = Check("tension grows", sizes[1] / sizes[0], math.exp(mu * angle), 1.5e-3, "capstan: exp(mu angle)")
+    check = Check("tension grows", sizes[1] / sizes[0], math.exp(FRICTION * angle), 1.5e-3, "capstan: exp(mu angle)")
     return path.model, [check]
 
 

@@ -1,14 +1,14 @@
 """Published problems of strings in wells: surveys, torque and drag, buckling, and contact."""
 
-import itertools
 import math
 
 import numpy as np
+from conduit import FRICTION, pulled_cable
+from curves import curve
 from problem import Row, problem
 from scipy.integrate import trapezoid
 
 import cosserat_fenicsx as cf
-from cosserat_fenicsx.pictures.charts import draw_chart, stacked
 from cosserat_fenicsx.well.rod.rod_in_hole import solve_in_hole
 
 INCH, FOOT, POUND, PSI = 0.0254, 0.3048, 4.4482216152605, 6894.757293168
@@ -17,19 +17,6 @@ KLBF = 1e3 * POUND
 #: clearance and contact radius (m), and its `Stiffness`.
 EI, WEIGHT, CLEARANCE, RADIUS = 1228200.0, 241.13, 0.04445, 0.0635
 PIPE = cf.Stiffness((1.35359e8, 1.35359e8), 7.03868e8, (EI, EI), 9.4e5)
-
-
-def curve(file, lines, across, up):
-    """A chart of lines {name: (x, y)} with labels of its axes."""
-
-    def make():
-        figure, (axes,) = stacked(6.0, [3.0])
-        for name, (x, y) in lines.items():
-            axes.plot(x, y, label=name)
-        axes.set(xlabel=across, ylabel=up)
-        return figure
-
-    return draw_chart(make, file)
 
 
 def straight(length, inclination, clearance, friction=0.0, radius=RADIUS):
@@ -44,8 +31,7 @@ def straight(length, inclination, clearance, friction=0.0, radius=RADIUS):
     "N. J. Lapeyrouse, Formulas and Calculations for Drilling, Production and Workover (2nd ed., 2002); printed in "
     "www.drillingformulas.com/minimum-curvature-method",
     "stations at 3500 ft (15 degrees, azimuth 20) and 3600 ft (25 degrees, azimuth 45)",
-    "The printed dogleg is 0.22605 rad, the printed ratio factor 1.00408, which is 1.00428 by its formula; the "
-    "coordinates do not show it.",
+    "The ratio factor is printed as 1.00408; by its formula it is 1.00428, which the coordinates agree with.",
 )
 def minimum_curvature():
     above = 1000 * FOOT  # a first station, from which the axis goes straight to the first one that is given
@@ -63,8 +49,9 @@ def minimum_curvature():
         Row("dogleg, rad", 0.22605, well.dogleg[-1], 0.0, 6e-6, "digits printed"),
     ]
     hole = cf.well.Borehole(well, cf.well.HoleSection(well.length, 8.5 * INCH, 0.2))
-    answer = cf.well.torque_and_drag(hole, cf.well.DrillString([cf.well.Component(None, PIPE, WEIGHT, RADIUS)]),
-                                     cf.well.Static(), model="soft")  # fmt: skip
+    answer = cf.well.torque_and_drag(
+        hole, cf.well.DrillString([cf.well.Component(None, PIPE, WEIGHT, RADIUS)]), cf.well.Static(), model="soft"
+    )
     return rows, answer.plot_3d
 
 
@@ -72,7 +59,8 @@ def minimum_curvature():
     "Free length of a stuck pipe by its stretch",
     "wells",
     "N. J. Lapeyrouse, Formulas and Calculations for Drilling, Production and Workover (2nd ed., 2002): 735 294 e W/F; "
-    "www.netwasgroup.us/formulas-calculations/determine-free-point-constant-fpc.html",
+    "www.netwasgroup.us/formulas-calculations/determine-free-point-constant-fpc.html and "
+    "www.drillingformulas.com/tag/stuck-depth",
     "5 in x 4.276 in pipe, pulled by 30 000 lbf more: 24 in; 3 1/2 in x 2.992 in tubing, by 25 000 lbf: 20 in",
 )
 def free_point():
@@ -85,8 +73,16 @@ def free_point():
             for F in (10.0, 10.0 + pull)
         )
         found = printed * stretch * INCH / (more.stretch - one.stretch)
-        rows.append(Row(f"free length of {size:g} in pipe, ft", printed, found, 1e-8 * printed, 3e-4 * printed,
-                        "digits printed; their area is W/3.4 in 2"))  # fmt: skip
+        rows.append(
+            Row(
+                f"free length of {size:g} in pipe, ft",
+                printed,
+                found,
+                1e-8 * printed,
+                3e-4 * printed,
+                "digits printed; their area is W/3.4 in 2",
+            )
+        )
     return rows, more.plot
 
 
@@ -110,40 +106,33 @@ def build_section():
         A, B = -WEIGHT * R * (1 - m**2) / (1 + m**2), -2 * m * WEIGHT * R / (1 + m**2)
         C = (pull - A * math.sin(i2) - B * math.cos(i2)) * math.exp(m * i2)
         exact = A * math.sin(i1) + B * math.cos(i1) + C * math.exp(-m * i1)
-        rows.append(Row(f"hook load, {angles[0]:g} to {angles[1]:g} degrees, N", exact, answer.hook_load,
-                        answer.error * pull, 1e-4, "closed form"))  # fmt: skip
+        rows.append(
+            Row(
+                f"hook load, {angles[0]:g} to {angles[1]:g} degrees, N",
+                exact,
+                answer.hook_load,
+                answer.error * pull,
+                1e-4,
+                "closed form",
+            )
+        )
     return rows, answer.plot
 
 
 @problem(
     "A cable pulled round a bend: the capstan",
     "wells",
-    "L. Euler, Mem. Acad. Sci. Berlin 18 (1762) 265; J. A. Eytelwein, Handbuch der Statik fester Koerper (1808)",
+    "capstan equation exp(mu angle): L. Euler, Mem. Acad. Sci. Berlin 18 (1762) 265; J. A. Eytelwein, Handbuch der "
+    "Statik fester Koerper (1808)",
     "cable of 12 mm, E = 2 GPa, in a conduit of 32 mm with a bend of 90 degrees and 1 m radius, friction 0.3",
-    "The capstan equation is that of a string without bending stiffness; the cable's changes the ratio by about "
-    "EI/(T R^2), and its ends do not leave the bend along the conduit.",
+    "The equation is that of a string without bending stiffness, which counts by EI/(T R^2) = 0.2 % here; the wall "
+    "gives way by 1 mm.",
 )
 def capstan():
-    bend, run, mu = 1.0, 0.5, 0.3  # m, m, -
-    md = np.cumsum([0.0, run, bend * math.pi / 2, run])
-    axis = cf.well.WellPath.from_survey(md, [90] * 4, [0, 0, 90, 90])
-    ends = [tuple(row) for row in axis.position(md)]
-    curves = cf.Line(*ends[:2]), cf.Arc((run, bend, 0.0), ends[1], math.pi / 2), cf.Line(*ends[2:])
-    rods = [cf.Rod(curve, cf.Circle(0.012), cf.Material(E=2e9, nu=0.4)) for curve in curves]
-    conduit = [
-        cf.well.TubeWall(rod, axis, radius=0.016, contact_radius=0.006, stiffness=1e6, friction=mu, slip=(-1.0, 0.0),
-                         begins=begin, has_arm=False)
-        for rod, begin in zip(rods, md.tolist(), strict=False)
-    ]  # fmt: skip
-    held, pulled = cf.Clamp(rods[0].start), cf.Prescribed(rods[2].end, displacement=(0.0, 0.03, 0.0))
-    joints = [cf.Joint(a.end, b.start) for a, b in itertools.pairwise(rods)]
-    scene = cf.Scene(rods, [held, pulled], conduit, joints=joints)
-    path = cf.solve(scene, [0.0, 1.0], tol=1e-4)
-    near, far = (path.reaction(support)[0][-1] for support in (held, pulled))
-    sizes = np.linalg.norm([near, far], axis=1)
-    angle = math.acos(-near @ far / sizes.prod())
-    row = Row("ratio of the tensions at its ends", math.exp(mu * angle), sizes[1] / sizes[0], 3e-4, 1.5e-3,
-              "bending stiffness of the cable")  # fmt: skip
+    path, near, far = pulled_cable()
+    low, high = np.linalg.norm([near, far], axis=1)
+    angle = math.acos(-near @ far / (low * high))
+    row = Row("ratio of the tensions at its ends", math.exp(FRICTION * angle), high / low, 2e-4, 1.5e-3, "stiffness")
     return [row], lambda file: path.plot(file, [1], color="tension")
 
 
@@ -154,22 +143,25 @@ def capstan():
     "first zero of Ai', NIST Digital Library of Mathematical Functions, table 9.9.1",
     "hanging pipe of length 8 (EI/w)^(1/3), hinged at its upper end, pushed up at the lower one, hinged or free",
     "The loads of hinged ends fall with the length: 2.23, 1.94, 1.82 and 4.62, 4.10, 3.99 at 4, 8 and 12 (EI/w)^(1/3), "
-    "as Airy functions give them too. No length has both printed numbers; the second one comes from a power series "
-    "whose terms become large in long strings.",
+    "as Airy functions give them too; no length has both printed numbers. They come from a power series, whose terms "
+    "become large in long strings, as J. C. Cunha (2004) noted.",
 )
 def lubinski_critical():
     unit, length, loads = (EI * WEIGHT**2) ** (1 / 3), 8 * (EI / WEIGHT) ** (1 / 3), {}
     rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, -length)), cf.Stiffness((math.inf,) * 2, math.inf, (EI, EI), EI))
-    given = [cf.LineForce(rod, (0, 0, -WEIGHT), permanent=True), cf.Force(rod.end, (0, 0, unit)),
-             cf.Spring(rod.start, rotational=1e-3)]  # which only stops the free rotation about its axis  # fmt: skip
+    given = [
+        cf.LineForce(rod, (0, 0, -WEIGHT), permanent=True),
+        cf.Force(rod.end, (0, 0, unit)),
+        cf.Spring(rod.start, rotational=1e-3),
+    ]  # which only stops the free rotation about its axis
     hinged = [cf.Roller(rod.end, axis) for axis in ((1, 0, 0), (0, 1, 0))]
     for ends, held in (("hinged", [cf.Pin(rod.start), *hinged]), ("free", [cf.Clamp(rod.start)])):
         loads[ends] = cf.buckling(cf.Scene([rod], held, given), 4)
     first, _, second, _ = loads["hinged"].load_factors
-    of = "its length is not told"
+    of = "length of the string"
     rows = [
         Row("first order, (EI w^2)^(1/3)", 1.94, first, 1e-5, 5e-3, of),
-        Row("second order, (EI w^2)^(1/3)", 3.75, second, 1e-5, 0.36, f"{of}; his series"),
+        Row("second order, (EI w^2)^(1/3)", 3.75, second, 1e-5, 0.36, f"{of}; power series"),
         Row("free lower end, (EI w^2)^(1/3)", 1.0187929716, loads["free"].load_factors[0], 1e-5, 1e-5, "long string"),
     ]
     return rows, loads["hinged"].plot
@@ -190,8 +182,19 @@ def lubinski_packer():
     path = cf.well.WellPath.from_survey([0, long + 10], [0, 0], [0, 0])
     pipe, found = cf.Stiffness((math.inf,) * 2, math.inf, (stiff, stiff), stiff / 1.3), []
     for elements in (1536, 2048):
-        answer = solve_in_hole(path, [long], pipe, weight, body, helix=True, radius=body + r, bottom_tension=-F,
-                               rings=[(long, 0.0, body)], elements=elements, degree=3)  # fmt: skip
+        answer = solve_in_hole(
+            path,
+            [long],
+            pipe,
+            weight,
+            body,
+            helix=True,
+            radius=body + r,
+            bottom_tension=-F,
+            rings=[(long, 0.0, body)],
+            elements=elements,
+            degree=3,
+        )
         s, wound = answer.s, (answer.s > long - 0.95 * F / weight) & (answer.s < long - 20.0)
         helix = np.ptp(s) - np.ptp(answer.position[:, 2])
         hooke = F * 10000 * FOOT / (30e6 * PSI * area)
@@ -199,17 +202,24 @@ def lubinski_packer():
         wall = answer.side_force[wound] @ np.gradient(s[wound])
         found.append(np.array([(hooke + helix) / INCH, turns, wall / POUND]))
     thrust = np.clip(F - weight * (long - s[wound]), 0, None)
-    formulas = [trapezoid(np.sqrt(thrust / (2 * stiff)), s[wound]) / (2 * math.pi),
-                trapezoid(r * thrust**2 / (4 * stiff), s[wound]) / POUND]  # fmt: skip
+    formulas = [
+        trapezoid(np.sqrt(thrust / (2 * stiff)), s[wound]) / (2 * math.pi),
+        trapezoid(r * thrust**2 / (4 * stiff), s[wound]) / POUND,
+    ]
     ours, errors = found[1], np.abs(found[1] - found[0])
-    told = [("shortening, in", 49.7, 0.06, "digits printed"),
-            ("turns from 50 m below the neutral point on", formulas[0], 0.02, "small slopes; ends of the helix"),
-            ("force of the wall there, lbf", formulas[1], 60.0, "small slopes; ends of the helix")]  # fmt: skip
-    rows = [Row(name, printed, found, error, allowed, because)
-            for (name, printed, allowed, because), found, error in zip(told, ours, errors, strict=True)]  # fmt: skip
+    told = [
+        ("shortening, in", 49.7, 0.06, "digits printed"),
+        ("turns from 50 m below the neutral point on", formulas[0], 0.02, "small slopes; ends of the helix"),
+        ("force of the wall there, lbf", formulas[1], 60.0, "small slopes; ends of the helix"),
+    ]
+    rows = [
+        Row(name, printed, found, error, allowed, because)
+        for (name, printed, allowed, because), found, error in zip(told, ours, errors, strict=True)
+    ]
     lower = s > long - 100.0
-    return rows, lambda file: curve(file, {"": (long - s[lower], 1e3 * answer.position[lower, 0])},
-                                    "above the packer (m)", "north of the axis (mm)")  # fmt: skip
+    return rows, lambda file: curve(
+        file, {"": (long - s[lower], 1e3 * answer.position[lower, 0])}, "above the packer (m)", "north of the axis (mm)"
+    )
 
 
 @problem(
@@ -227,8 +237,14 @@ def dawson_paslay():
         middle = (low + high) / 2
         answer = solve_in_hole(path, [length], PIPE, WEIGHT, RADIUS, bottom_tension=-middle, **given)
         low, high = (middle, high) if answer.negative_modes == 0 else (low, middle)
-    row = Row("least thrust at which the string on the low side is unstable, N", formula, (low + high) / 2,
-              (high - low) / 2, 5e-3 * formula, "300 m instead of an infinite length; held ends")  # fmt: skip
+    row = Row(
+        "least thrust at which the string on the low side is unstable, N",
+        formula,
+        (low + high) / 2,
+        (high - low) / 2,
+        5e-3 * formula,
+        "300 m instead of an infinite length; held ends",
+    )
     snake = solve_in_hole(path, [length], PIPE, WEIGHT, RADIUS, bottom_tension=-1.2 * formula, helix=True, **given)
     inside = (snake.s > 20) & (snake.s < length - 20)
     _, y, z = snake.position[inside].T
@@ -249,15 +265,19 @@ def dawson_paslay():
 def lock_up():
     rows = []
     for name, stiff, weight, printed, integrated in (
-        ("steel", 2063790.0, 315.0, 5700.0, 5409.096127), ("composite", 348950.0, 16.6, 10100.0, 9688.906878),
-    ):  # fmt: skip
+        ("steel", 2063790.0, 315.0, 5700.0, 5409.096127),
+        ("composite", 348950.0, 16.6, 10100.0, 9688.906878),
+    ):
         pipe = cf.well.Component(None, cf.Stiffness((1e9, 1e9), 2.6e9, (stiff, stiff), 1.6e6), weight, RADIUS)
         hole = straight(1.05 * printed, 90.0, 0.041, 0.3)
-        sweep = cf.well.depth_sweep(hole, cf.well.DrillString([pipe]), cf.well.TripIn(),
-                                    np.linspace(0.5, 1.05, 12) * printed, model="buckled")  # fmt: skip
+        sweep = cf.well.depth_sweep(
+            hole, cf.well.DrillString([pipe]), cf.well.TripIn(), np.linspace(0.5, 1.05, 12) * printed, model="buckled"
+        )
         length = 1.05 * printed - sweep.values["locked"][0, 0, -1]
-        rows += [Row(f"{name}: longest push, m", printed, length, 0.2, 0.06 * printed, "weight of the helix"),
-                 Row(f"{name}: the same with weight, m", integrated, length, 0.2, 0.5, "closed form")]  # fmt: skip
+        rows += [
+            Row(f"{name}: longest push, m", printed, length, 0.2, 0.06 * printed, "weight of the helix"),
+            Row(f"{name}: the same with weight, m", integrated, length, 0.2, 0.5, "closed form"),
+        ]
     return rows, sweep.plot
 
 
@@ -274,8 +294,9 @@ def helix_friction():
     for length in (300.0, 1000.0, 2500.0):
         below = limit * math.tanh(rate * length + math.atanh(50e3 / limit))
         string = cf.well.DrillString([cf.well.Component(None, PIPE, WEIGHT, RADIUS)])
-        answer = cf.well.torque_and_drag(straight(length, 0.0, CLEARANCE, mu), string, cf.well.Sliding(below),
-                                         model="buckled", tol=1e-9)  # fmt: skip
+        answer = cf.well.torque_and_drag(
+            straight(length, 0.0, CLEARANCE, mu), string, cf.well.Sliding(below), model="buckled", tol=1e-9
+        )
         exact.append(50e3)
         found.append(-answer.hook_load)
     rows = [Row("thrust at the top that makes it, N", np.array(exact), np.array(found), 1e-3, 1.0, "closed form")]
@@ -296,13 +317,33 @@ def slick_assembly():
     for inclination, allowed, because in ((90.0, 3e-3, "small slopes"), (10.0, 0.02, "tension of the collars")):
         bit = cf.well.Bit(2 * (0.1 + r), length=1e-3, body_diameter=0.2, mass=weight / 9.81)
         string = cf.well.DrillString([bit, cf.well.Component(None, part, weight, 0.1)])
-        answer = cf.well.torque_and_drag(straight(length + 20, inclination, r, 0.0, 0.1), string, cf.well.Static(),
-                                         mud=cf.well.Mud(1e-3), depth=length, model="rod")  # fmt: skip
+        answer = cf.well.torque_and_drag(
+            straight(length + 20, inclination, r, 0.0, 0.1),
+            string,
+            cf.well.Static(),
+            mud=cf.well.Mud(1e-3),
+            depth=length,
+            model="rod",
+        )
         *_, tangency, force = (x for x in answer.contacts if x.at_point)
         q = weight * math.sin(math.radians(inclination))
         exact = (24 * stiff * r / q) ** 0.25
-        rows += [Row(f"{inclination:g} degrees: from bit to tangency, m", exact, length - tangency.top, 2e-3,
-                     allowed * exact, because),
-                 Row(f"{inclination:g} degrees: side force on bit, N", q * exact / 2, force.force, force.error,
-                     allowed * q * exact / 2, because)]  # fmt: skip
+        rows += [
+            Row(
+                f"{inclination:g} degrees: from bit to tangency, m",
+                exact,
+                length - tangency.top,
+                2e-3,
+                allowed * exact,
+                because,
+            ),
+            Row(
+                f"{inclination:g} degrees: side force on bit, N",
+                q * exact / 2,
+                force.force,
+                force.error,
+                allowed * q * exact / 2,
+                because,
+            ),
+        ]
     return rows, lambda file: answer.plot_from_side(file, 40.0)
