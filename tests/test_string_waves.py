@@ -78,30 +78,6 @@ def test_a_soft_drive_calms_it(axial):
     assert unbalanced(rows) < 1e-11
 
 
-@pytest.mark.parametrize(
-    ("weight", "torque", "releases", "peak"),
-    [
-        (97347.0, 10e3, (167.50634780, 175.81200608, 184.11850238), 6.694376635),
-        (53018.0, 6e3, (175.02624880, 181.82270104, 188.61915386), 5.092853190),
-    ],
-)
-def test_four_discs(weight, torque, releases, peak):
-    """E. M. Navarro-Lopez & D. Cortes, J. Sound Vib. 307 (2007) 152, doi:10.1016/j.jsv.2007.06.037: limit cycles."""
-    discs = cf.drilling.Discs(
-        (930.0, 2782.25, 750.0, 471.9698), (698.063, 1080.0, 907.48), (139.6126, 190.0, 181.49), (0.0, 0.0, 0.0, 50.0)
-    )
-    bit = cf.drilling.BitOnRock(cf.drilling.Stribeck(0.8, 0.5, 1 / 0.9, radius=0.155575), weight)
-    model = AxialTorsional(
-        cf.drilling.Drilling(discs, cf.drilling.TopDrive(control=cf.drilling.Motor(torque, 425.0)), bit), 0.0025
-    )
-    rows = model.advance(80000)
-    t, om = rows[:, 0], column(rows, "bit_speed")
-    starts = t[:-1][(om[1:] > 0) & (om[:-1] == 0) & (t[:-1] > releases[0] - 1)]
-    assert starts[:3] == pytest.approx(releases, abs=0.01)
-    assert om[t > 160].max() == pytest.approx(peak, rel=1e-3)
-    assert unbalanced(rows) < 1e-11 and np.isnan(column(rows, "hook_load")).all()
-
-
 def test_discs_at_the_speed_where_their_steady_motion_becomes_unstable():
     """2.7652598516 rad/s under 97 347 N, for a constant torque of the motor."""
     W, R, grows = 97347.0, 0.155575, []

@@ -227,23 +227,6 @@ def test_well_p_with_collars_casing_and_open_hole():
     assert both[0].hook_load < both[0].hook_load - both[0].drag < both[1].hook_load
 
 
-@pytest.mark.parametrize("angles", [(0.0, 60.0), (20.0, 100.0), (70.0, 10.0)])
-def test_closed_forms_of_planar_arcs(angles):
-    """Out: Aadnoy's form where the string lies on the high side (build); on the low side of a drop it is the same with
-    the other sign of friction."""
-    i1, i2 = np.radians(angles)
-    radius, w, mu, pull = 400.0, 241.13, 0.3, 900e3
-    sign = 1 if i2 > i1 else -1
-    path = cf.well.WellPath.from_survey([0, radius * abs(i2 - i1)], angles, [350, 350])
-    answer = solved(path, cf.well.TripOut(weight=-pull), mu=mu, tol=1e-12)
-    m, R = sign * mu, sign * radius  # a drop is a build with the signs of curvature and of the wall's side reversed
-    A, B = -w * R * (1 - m**2) / (1 + m**2), -2 * m * w * R / (1 + m**2)
-    C = (pull - A * math.sin(i2) - B * math.cos(i2)) * math.exp(m * i2)
-    exact = A * math.sin(i1) + B * math.cos(i1) + C * math.exp(-m * i1)
-    assert answer.hook_load == pytest.approx(exact, rel=1e-12)
-    assert math.cos(answer.contact_side[10]) == pytest.approx(sign)  # the high side, or the low one
-
-
 def by_vectors(path, w, mu, operation, radius):
     """Hook load and torque by SciPy, from vectors in space, section by section and split where |q| is least."""
     c, e = operation.direction(radius)

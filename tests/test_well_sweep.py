@@ -13,7 +13,6 @@ import pytest
 import random_wells
 import ufl
 from reference_wells import well
-from scipy.integrate import trapezoid
 from scipy.special import ai_zeros
 
 import cosserat_fenicsx as cf
@@ -582,16 +581,6 @@ def test_the_snake_begins_at_its_load_and_has_its_amplitude():
         assert pressure.max() == pytest.approx(1.858649, rel=3e-3)
 
 
-@pytest.mark.parametrize("share, stable", [(0.9, True), (1.1, False)])
-def test_a_long_string_on_the_low_side_says_that_it_would_snake(share, stable):
-    path = cf.well.WellPath.from_survey([0, 300], [90, 90], [0, 0])
-    pipe = cf.Stiffness((1.35e8, 1.35e8), 7e8, (EI, EI), 1e6)
-    given = {"radius": 0.0635 + R, "rings": [(200.0, 0.0, 0.1)], "bottom_tension": -share * F_SNAKE}
-    answer = solve_in_hole(path, [200.0], pipe, W, 0.0635, elements=512, **given)
-    assert (answer.negative_modes == 0) is stable
-    assert answer.hook_load == pytest.approx(-share * F_SNAKE, rel=1e-9)
-
-
 @pytest.mark.parametrize("name", ["helix", "helix at 400 kN"])
 def test_the_helix_of_a_thrust(name):
     """A weightless rod with finite EA and GA in a frictionless cylinder: a Cosserat helix in the middle."""
@@ -610,28 +599,6 @@ def test_the_helix_of_a_thrust(name):
     s, z = answer.s[middle], answer.position[middle, 2]
     shortening = 1 - (z[-1] - z[0]) / (s[-1] - s[0])
     assert shortening == pytest.approx(case["shortening"], rel=3e-5)  # the wall gives way
-
-
-def test_a_string_that_is_pressed_on_its_bit_is_a_helix():
-    """In a vertical hole, hung from a clamp: it is as slender a helix everywhere as its compression F there asks for,
-    with sqrt(F/(2 EI)) rad per m and r F^2/(4 EI) of the wall, and it is stable, unlike the straight string."""
-    length, thrust = 500.0, 150e3
-    path = cf.well.WellPath.from_survey([0, length + 10], [0, 0], [0, 0])
-    pipe = cf.Stiffness((1.35e8, 1.35e8), 7e8, (EI, EI), 1e6)
-    given = {"radius": 0.0635 + R, "rings": [(length, 0.0, 0.1)], "bottom_tension": -thrust}
-    straight = solve_in_hole(path, [length], pipe, W, 0.0635, elements=256, **given)
-    answer = solve_in_hole(path, [length], pipe, W, 0.0635, helix=True, **given)
-    assert straight.distance.max() < 1e-9 and straight.negative_modes > 10
-    assert answer.negative_modes == 0 and answer.error < 1e-4
-    assert answer.hook_load == pytest.approx(W * length - thrust, rel=1e-9)
-    wound = (answer.s > 50) & (answer.s < 480)
-    F = thrust - W * (length - answer.s)
-    rate = np.gradient(np.unwrap(answer.side), answer.s)
-    assert rate[wound] == pytest.approx(np.sqrt(F / (2 * EI))[wound], rel=1e-3)
-    pressure = (answer.node_force / answer.node_length)[wound]
-    assert pressure == pytest.approx((R * F**2 / (4 * EI))[wound], rel=2e-2)
-    s, z = answer.s[wound], answer.position[wound, 2]
-    assert np.ptp(s) - np.ptp(z) == pytest.approx(trapezoid((R**2 * F / (4 * EI))[wound], s), rel=1e-3)
 
 
 @pytest.mark.parametrize(("inclination", "operation"), [(45, cf.well.Static(250e3)), (60, cf.well.Sliding(240e3))])
