@@ -129,14 +129,16 @@ def pendulum():
     discs = cf.drilling.Discs((1.0, J), (k,))
     bit = cf.drilling.BitOnRock(cf.drilling.Stribeck(static, slip))
     scene = cf.drilling.Drilling(discs, cf.drilling.TopDrive(speed), bit)
-    history = cf.drilling.simulate(scene, 60.0, dt=2e-3)
-    cycle = history.stick_slip(since=20.0)
-    w, a = math.sqrt(k / J), (static - slip) / k
-    slips = 2 / w * (math.pi - math.atan(a * w / speed))
+    history = cf.drilling.simulate(scene, 60.0, dt=2e-3, check=True)
+    cycle, errors = history.stick_slip(since=20.0), history.errors
+    w, a = math.sqrt(k / J), (static - slip) / k  # frequency; how far the drive turns while the bit rests
+    slips, rests = 2 / w * (math.pi - math.atan(a * w / speed)), 2 * a / speed
+    rest, peak = rests / (slips + rests), speed + w * math.hypot(a, speed / w)
+    steps = "steps of 2 ms"
     rows = [
-        Row("period, s", slips + 2 * a / speed, cycle.period, 4e-3, 8e-3, "steps of 2 ms"),
-        Row("share of the time at rest", 2 * a / speed / (slips + 2 * a / speed), cycle.stuck, 1e-3, 2e-3, "the same"),
-        Row("largest bit speed, rad/s", speed + w * math.hypot(a, speed / w), cycle.peak, 1e-2, 2e-2, "the same"),
+        Row("period, s", slips + rests, cycle.period, errors.period, 4e-3, steps),
+        Row("share of the time at rest", rest, cycle.stuck, errors.period / cycle.period, 1e-3, steps),
+        Row("largest bit speed, rad/s", peak, cycle.peak, errors.peak, 2e-2, steps),
     ]
     return rows, lambda file: history.plot(file, (20.0, 40.0))
 
@@ -171,12 +173,12 @@ def navarro_lopez():
         discs, bit = cf.drilling.Discs(J, k, c, drags), cf.drilling.BitOnRock(law, weight=weight)
         motor = cf.drilling.Drilling(discs, cf.drilling.TopDrive(control=cf.drilling.Motor(torque)), bit)
         least, exact = cf.drilling.limit_speed(motor), brentq(growth, 0.5, 6.0)
-        history = cf.drilling.simulate(motor, 200.0, dt=2.5e-3)
-        cycle, at = history.stick_slip(since=160.0), f"{weight / 1e3:.3g} kN"
+        history = cf.drilling.simulate(motor, 200.0, dt=2.5e-3, check=True)
+        cycle, at, steps = history.stick_slip(since=120.0), f"{weight / 1e3:.3g} kN", "steps of 2.5 ms"
         rows += [
             Row(f"{at}: least stable speed, rad/s", exact, least, 1e-9, 1e-6, "eigenvalues of their equations"),
-            Row(f"{at}: the bit starts at, s", np.array(starts), cycle.starts[-4:], 5e-3, 0.01, "step of 2.5 ms"),
-            Row(f"{at}: largest bit speed, rad/s", peak, cycle.peak, 2e-3, 5e-3, "step of 2.5 ms"),
+            Row(f"{at}: the bit starts at, s", np.array(starts), cycle.starts[-4:], 2.5e-3, 0.01, steps),
+            Row(f"{at}: largest bit speed, rad/s", peak, cycle.peak, history.errors.peak, 5e-3, steps),
         ]
     return rows, history.plot_phase
 
@@ -265,23 +267,17 @@ def block_stops():
         hook=cf.drilling.Hook(speed=1.0),
     )
     pipe, collars = scene.segments
-    history = cf.drilling.simulate(scene, 1.3, dt=5e-4, elements=1000)
-    weight = sum(part.weight * part.length for part in scene.segments)
     first, second = pipe.axial_impedance, collars.axial_impedance
-    back = 2 * pipe.length / pipe.axial_speed
-    levels = []
-    for start, end in ((0.1, back - 0.02), (back + 0.02, back + 0.07)):
-        within = (history.times > start) & (history.times < end)
-        levels.append((history.hook_load[within].mean() - weight) / 1e3)
+    back, weight = 2 * pipe.length / pipe.axial_speed, sum(part.weight * part.length for part in scene.segments)
+    found = []
+    for elements in (500, 1000):
+        history = cf.drilling.simulate(scene, 1.3, dt=0.5 / elements, elements=elements)
+        t, load = history.times, history.hook_load - weight
+        spans = (0.1, back - 0.02), (back + 0.02, back + 0.07)
+        found.append(np.array([load[(t > start) & (t < end)].mean() for start, end in spans]) / 1e3)
     exact = np.array([first, first * (1 + 2 * (second - first) / (second + first))]) / 1e3
-    row = Row(
-        "hook load beyond the weight, until 1.17 s and then, kN",
-        exact,
-        np.array(levels),
-        0.5,
-        1.0,
-        "1000 elements: jumps ring",
-    )
+    error = np.abs(found[1] - found[0])
+    row = Row("hook load beyond the weight, until 1.17 s and then, kN", exact, found[1], error, 1.0, "ringing of jumps")
     return [row], history.plot
 
 
@@ -371,27 +367,20 @@ def forward_whirl():
         b = ((mass + mud) * (share * critical) ** 2 / stiff) ** 0.25
         return 1e3 * e * mass / (mass + mud) * ((1 / np.cos(b * half) + 1 / np.cosh(b * half)) / 2 - 1)
 
-    shares, found = np.array([0.3, 0.5, 0.7, 0.9, 1.3, 2.0]), []
+    shares, rows = np.array([0.3, 0.5, 0.7, 0.9, 1.3, 2.0]), []
     for share in shares:
         turning = cf.Scene([rod], held, [*loads, cf.Centrifugal((0, 0, share * critical))])
-        path = cf.solve(turning, [1.0], elements=8, degree=2, model="spatial")
-        found.append(1e3 * path.displacement(rod.at(half))[-1, 0])
-    rows = [
-        Row(
-            f"deflection at {share:g} of the critical speed, mm",
-            exact(share),
-            x,
-            1e-4 * abs(x),
-            2e-3 * abs(x),
-            "shear; stretching",
+        coarse, x = (
+            1e3 * cf.solve(turning, [1.0], elements=n, degree=2, model="spatial").displacement(rod.at(half))[-1, 0]
+            for n in (8, 16)
         )
-        for share, x in zip(shares, found, strict=True)
-    ]
+        name = f"deflection at {share:g} of the critical speed, mm"
+        rows.append(Row(name, exact(share), x, abs(x - coarse), 2e-3 * abs(x), "shear; stretching"))
     fine = np.linspace(0.05, 2.2, 400)
     beam = np.where(np.abs(fine - 1) > 0.08, exact(fine), np.nan)
     return rows, lambda file: curve(
         file,
-        {"beam": (fine, beam), "rod": (shares, found)},
+        {"beam": (fine, beam), "rod": (shares, [row.ours for row in rows])},
         "speed over critical speed (134.1 rpm)",
         "deflection of the middle (mm)",
     )
@@ -406,7 +395,10 @@ def forward_whirl():
 )
 def backward_whirl():
     collar, ring, scene, start = rolling(100 * RPM, 0.5, 1.2)
-    history = cf.simulate(scene, 1.2, dt=1e-3, save_every=5e-3, start=start, **MESH)
-    whirl = history.whirl(collar.at(LENGTH / 2), since=0.6)
-    row = Row("rate of whirl over that of rotation", -ARM / CLEARANCE, whirl.ratio, 5e-3, 0.01, "elastic wall; torsion")
+    found = []
+    for dt in (2e-3, 1e-3):
+        history = cf.simulate(scene, 1.2, dt=dt, save_every=2e-3, start=start, **MESH)
+        found.append(history.whirl(collar.at(LENGTH / 2), since=0.2).ratio)
+    error = abs(found[1] - found[0])
+    row = Row("rate of whirl over that of rotation", -ARM / CLEARANCE, found[1], error, 0.01, "elastic wall; torsion")
     return [row], lambda file: history.plot_orbit(collar.at(LENGTH / 2), ring, file)
