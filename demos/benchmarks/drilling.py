@@ -118,6 +118,36 @@ def bailey_finnie():
 
 
 @problem(
+    "Collars that a three-cone bit shakes",
+    "drilling",
+    "D. W. Dareing & B. J. Livesay, J. Eng. Ind. 90 (1968) 671; D. W. Dareing, Drill Collar Length Is a Major Factor "
+    "in Vibration Control, J. Petr. Technol. 36 (1984): waves in a bar with a free upper end, 3 Om = (k + 1/2) pi c/L",
+    "600 ft of 8 x 3 in collars below a pipe of no stiffness; bit lifted three times a revolution by 1/8 in",
+    "Weight on bit Z w a tan(w L/c) with w = 3 Om.",
+)
+def shaken_collars():
+    lobes, a, length = 3, INCH / 8, 600 * FOOT
+    bit = cf.drilling.BitOnRock(cf.drilling.Lobes(lobes, a), weight=150e3)
+    scene = cf.drilling.Drilling(
+        tubes((length, 8 * INCH, 3 * INCH)), cf.drilling.TopDrive(1.0), bit, hook=cf.drilling.Hook(1.0)
+    )
+    (part,) = scene.segments
+    travel = part.length / part.axial_speed
+    critical = (np.arange(3) + 0.5) * math.pi / travel / lobes / RPM
+    found = cf.drilling.campbell(scene, 800 * RPM, up_to=80.0).critical_speeds()["axial", "3 x (lobes)"][:3] / RPM
+    speeds = np.array([60.0, 100.0, 180.0, 250.0])
+    bounce = cf.drilling.bit_bounce(scene, np.linspace(40.0, 250.0, 421) * RPM)
+    force = [cf.drilling.bit_bounce(scene, [x * RPM]).amplitude[0] for x in speeds]
+    w = lobes * speeds * RPM
+    exact = np.abs(part.axial_impedance * w * a * np.tan(w * travel))
+    rows = [
+        Row("critical speeds, rpm", critical, found, 1e-9, 1e-4, "hook of 1 N/m"),
+        Row("weight on bit at 60, 100, 180 and 250 rpm, N", exact, np.array(force), 1e-6, 1.0, "hook of 1 N/m"),
+    ]
+    return rows, bounce.plot
+
+
+@problem(
     "Stick-slip of a torsional pendulum",
     "drilling",
     "A. Kyllingstad & G. W. Halsey, SPE Drilling Eng. 3 (1988) 369, doi:10.2118/16659-PA: one degree of freedom, "

@@ -258,7 +258,7 @@ def dawson_paslay():
         file,
         {"": (snake.s[inside], angle)},
         "along the string (m)",
-        "from the low side (degrees), at 1.2 times the load",
+        "angle from the low side (degrees)",
     )
 
 
