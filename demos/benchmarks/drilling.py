@@ -29,7 +29,7 @@ def tubes(*sections, material=STEEL):
     "W. T. Thomson, Theory of Vibration with Applications, example 9.3-3: 2.41 and 7.93 rad/s",
     "5000 ft of pipe, 4 1/2 x 3.83 in (J = 0.00094 ft^4), above 120 ft of collar as a disk of 29.3 lb ft s^2; "
     "G = 12e6 psi, 490 lb/ft^3",
-    "The collar as a rod of 7 5/8 x 2 in, as Thomson describes it, gives the third row.",
+    "The collar as a rod of 7 5/8 x 2 in, as Thomson describes it, gives the second row.",
 )
 def thomson_pipe_and_collar():
     J, slug = 0.00094 * FOOT**4, POUND * FOOT  # m^4; lbf ft s^2 in kg m^2
@@ -176,11 +176,11 @@ def pendulum():
 @problem(
     "Four discs: speed at which steady rotation loses stability, and limit cycles",
     "drilling",
-    "E. M. Navarro-Lopez & D. Cortes, J. Sound Vib. 307 (2007) 152, doi:10.1016/j.jsv.2007.06.037; data as in their "
-    "public MATLAB files (alwaysuu/active-control-for-drill-string-systems)",
+    "E. M. Navarro-Lopez & D. Cortes, J. Sound Vib. 307 (2007) 152, doi:10.1016/j.jsv.2007.06.037; data as in "
+    "github.com/alwaysuu/active-control-for-drill-string-systems",
     "930, 2782, 750 and 472 kg m^2 on springs and dampers; weight on bit 53.0 and 97.3 kN, motor torque 6 and 10 kN m",
-    "Their plots have no printed numbers: the speeds are those at which an eigenvalue of their equations crosses the "
-    "imaginary axis; the limit cycle is that of an event-driven Runge-Kutta integration with tight tolerances.",
+    "No printed number of theirs was at hand: the speeds are those at which an eigenvalue of their equations crosses "
+    "the imaginary axis; the limit cycle is that of an event-driven Runge-Kutta integration with tight tolerances.",
 )
 def navarro_lopez():
     J, k, c = (930.0, 2782.25, 750.0, 471.9698), (698.063, 1080.0, 907.48), (139.6126, 190.0, 181.49)
@@ -284,7 +284,7 @@ def matched_drive():
 
 
 @problem(
-    "The block stops while the string is run in",
+    "The block takes up a string at once: waves along the axis",
     "drilling",
     "waves in bars: S. P. Timoshenko & J. N. Goodier, Theory of Elasticity, section on longitudinal impact: F = Z v; "
     "reflection at a change of section (Z2 - Z1)/(Z2 + Z1)",

@@ -293,7 +293,7 @@ def lock_up():
     "Friction of a helix in a vertical hole",
     "wells",
     "R. F. Mitchell, SPE Drilling Eng. 1 (1986) 457, doi:10.2118/13064-PA: dF/dz = w - mu r F^2/(4 EI)",
-    "5 in drill pipe pushed down, 50 kN at the top, friction 0.25; load at 300, 1000 and 2500 m; limit 326.5 kN",
+    "5 in drill pipe pushed down, 50 kN at the top, friction 0.25; 300, 1000 and 2500 m; limit 326.5 kN",
 )
 def helix_friction():
     mu = 0.25
@@ -308,7 +308,7 @@ def helix_friction():
         exact.append(50e3)
         found.append(-answer.hook_load)
     exact, found, error = np.array(exact), np.array(found), answer.error * limit
-    rows = [Row("thrust at the top that makes it, N", exact, found, error, 1.0, "closed form")]
+    rows = [Row("thrust at the top, for that below, N", exact, found, error, 1.0, "closed form")]
     return rows, answer.plot
 
 
