@@ -153,6 +153,25 @@ def test_labels_keep_off_each_other_and_off_the_edge():
         assert a[2] <= b[0] or b[2] <= a[0] or a[3] <= b[1] or b[3] <= a[1]
 
 
+def test_numbers_of_an_axis_are_even():
+    """Every n-th one, from that on which leaves most room where another label stands at an end."""
+    view = View.of(np.array([[0.0, 0, 0], [10, 0, 5]]), np.array([10.0, 0, 5]), (700, 500))
+    ticks = [(f"{k:.3f}", np.array([2.0 * k, 0, 0])) for k in range(6)]
+    kept = {}
+    for size, taken in ((10, None), (32, None), (32, ticks[0])):
+        labels = Labels(view)
+        if taken:
+            labels.fix("x", taken[1], size=size)
+        before = len(labels.boxes)
+        labels.evenly(ticks, size=size, away=(0, 0))
+        kept[size, taken is None] = [text for text, *_ in labels._texts[before:]]
+    assert kept == {
+        (10, True): [text for text, _ in ticks],
+        (32, True): ["0.000", "2.000", "4.000"],
+        (32, False): ["1.000", "3.000", "5.000"],
+    }
+
+
 @pytest.mark.serial
 def test_labels_that_are_close_are_all_drawn():
     """VTK would leave one of these out."""

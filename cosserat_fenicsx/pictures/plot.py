@@ -43,7 +43,7 @@ _TITLE_WIDTH, _WINDOW, _LINE = 60, (1400, 1000), 1.3
 # Least and largest height of a picture, pixels.
 _HEIGHTS = 740, 1000
 # Height that labels above a drawing have, over that of letters.
-_ABOVE = 2.2
+_ABOVE = 2.6
 # Sizes of names in a scene of many rods over those of other letters.
 _SMALLER = 0.7
 # Maximum number of rods that are named in the picture of a scene; maximum number of names in larger letters.

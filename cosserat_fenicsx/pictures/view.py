@@ -114,7 +114,7 @@ class View:
 
 
 # Mean width of a letter and height of a line over the font's size; pixels between labels, and to the picture's edge.
-_LETTER, _LINE, _GAP, _EDGE = 0.56, 1.15, 8, 4
+_LETTER, _LINE, _GAP, _EDGE = 0.56, 1.15, 5, 4
 # Distances (pixels) of a label from its point, and turns (deg) of its direction, in the order of preference; distance
 # from which on a thin line leads back.
 _DISTANCES, _TURNS, _LEADER = (16, 26, 42, 64, 92, 128, 180, 250), (0, 40, -40, 80, -80, 120, -120, 180), 40
@@ -145,6 +145,21 @@ class Labels:
     def keep_off(self, lines):
         """Keep labels that come later off these lines (n, 3), m, too, where possible."""
         self._covered |= _cells_of([self._view.pixels(_dense(line)) for line in lines], self._view.window)
+
+    def evenly(self, texts, *, size, away):
+        """Labels of the ticks of an axis, every n-th of them, such that as many as possible have room.
+
+        Args:
+            texts: [(text, point (3,), m)] in the order of the ticks. away: as of `fix`.
+        """
+        boxes, best = [_box(text, self._view.pixels(point) + away, size) for text, point in texts], []
+        for n, first in ((n, first) for n in range(1, len(texts) + 1) for first in range(n)):
+            some = range(first, len(texts), n)
+            apart = not any(_overlap(boxes[i], boxes[j]) for i, j in itertools.pairwise(some))
+            kept = [i for i in some if self._free(boxes[i])] if apart else []
+            best = max(best, kept, key=len)  # the first of equal ones
+        for i in best:
+            self._keep(*texts[i], boxes[i], size, "black")
 
     def reserve(self, low, high):
         """Keep a rectangle free of labels: its lower left and upper right corners, pixels."""
@@ -202,16 +217,19 @@ class Labels:
         low, high = np.array(box[:2]), np.array(box[2:])
         if (low < _EDGE).any() or (high > np.array(self._view.window) - _EDGE).any():
             return False
-        return not any(
-            box[0] < x1 + _GAP and x0 < box[2] + _GAP and box[1] < y1 + _GAP and y0 < box[3] + _GAP
-            for x0, y0, x1, y1 in self._placed
-        )
+        return not any(_overlap(box, other) for other in self._placed)
 
     def _clear(self, box):
         """Whether a rectangle lies off all rods."""
         low = np.maximum(np.array(box[:2]) - _CLEAR, 0) // _CELL
         high = np.maximum(np.array(box[2:]) + _CLEAR, 0) // _CELL
         return not self._covered[int(low[0]) : int(high[0]) + 1, int(low[1]) : int(high[1]) + 1].any()
+
+
+def _overlap(box, other):
+    """Whether rectangles overlap, or are nearer than a gap."""
+    (a, b, c, d), (x0, y0, x1, y1) = box, other
+    return a < x1 + _GAP and x0 < c + _GAP and b < y1 + _GAP and y0 < d + _GAP
 
 
 def _box(text, at, size):
@@ -310,11 +328,11 @@ def draw_axes(plotter, pyvista, axes, view, labels, font=None):
         lines.append(edge)
         longest = max(len(text) for _, text in axis.ticks)
         room = font * (0.28 * longest * abs(out[0]) + 0.55 * abs(out[1]))
-        for value, text in axis.ticks:
-            point = edge[0].copy()
-            point[i] = value
-            lines.append(np.array([point, point + view.offset(*(-_TICK * out))]))
-            labels.fix(text, point, size=font, away=(font / 2 + room) * out)
+        points = np.repeat(edge[:1], len(axis.ticks), axis=0)
+        points[:, i] = [value for value, _ in axis.ticks]
+        lines += [np.array([point, point + view.offset(*(-_TICK * out))]) for point in points]
+        numbers = [(text, point) for (_, text), point in zip(axis.ticks, points, strict=True)]
+        labels.evenly(numbers, size=font, away=(font / 2 + room) * out)
         away = (font / 2 + 2 * room + font * (0.35 * len(axis.name) * abs(out[0]) + abs(out[1]))) * out
         names.append((axis.name, edge.mean(axis=0), away))
     for name, point, away in names:
