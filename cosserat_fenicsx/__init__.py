@@ -1,4 +1,5 @@
-"""Geometrically exact rods on FEniCSx: equilibrium paths of special Cosserat rods under large displacements.
+"""Geometrically exact (Cosserat) rods on FEniCSx: equilibria at large displacements, buckling and motion of frames,
+cables, springs; strings in wells (`well`: torque and drag, buckling) and drilling (`drilling`: stick-slip, whirl).
 
 The public names stand in `__init__.pyi`. Modules are imported when their names are first used, so that `import
 cosserat_fenicsx` and --help stay instant.
