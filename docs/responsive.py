@@ -6,7 +6,7 @@ import shutil
 from pathlib import Path
 
 _NARROW = Path(__file__).parent / "pictures" / "narrow"
-#: Pictures with so many small texts that narrow pages show them at a least width, in a box that scrolls.
+#: Pictures with so many small texts that narrow pages show them larger than the page, in a box that scrolls.
 _SCROLL = (
     "failures", "figure3", "soft_string", "work_precision_motion", "work_precision_string", "work_precision_sweep",
 )  # fmt: skip
@@ -20,8 +20,8 @@ def _responsive(found):
     if (_NARROW / name).exists():
         image = f'<source media="(max-width: {_UP_TO}px)" srcset="{folder}_images/narrow/{name}">{image}'
         image = f"<picture>{image}</picture>"
-    scrolls = Path(name).stem in _SCROLL and not (_NARROW / name).exists()
-    return f'<a class="picture{" scrolls" * scrolls}" href="{folder}_images/{name}">{image}</a>'
+    kind = "picture scrolls" if Path(name).stem in _SCROLL and not (_NARROW / name).exists() else "picture"
+    return f'<a class="{kind}" href="{folder}_images/{name}">{image}</a>'
 
 
 def _page(app, pagename, templatename, context, doctree):

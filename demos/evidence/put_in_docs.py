@@ -82,6 +82,8 @@ MANY = ("benchmarks",)
 WIDTH, COLOURS, MARGIN = 1100, 256, 12  # pixels, number, pixels
 NARROW = 800, 4000  # pixels, of a picture for narrow pages
 SMALL, FEW = 600, 32  # pixels, colours
+#: Pictures with more small texts than others, and their sizes in pixels.
+LARGE = {"failures.png": (1380, 1380)}
 
 
 def kept(picture, file, most=(WIDTH, WIDTH), colours=COLOURS):
@@ -105,7 +107,7 @@ def main(names, out="out", docs=ROOT / "docs"):
         drawn |= {picture: f"{name}/{file}" for picture, file in FOLDERS.get(name, {}).items()}
         for picture, file in drawn.items():
             if (out / file).exists():
-                kept(out / file, docs / "pictures" / picture)
+                kept(out / file, docs / "pictures" / picture, LARGE.get(picture, (WIDTH, WIDTH)))
             if narrow(out / file).exists():
                 kept(narrow(out / file), docs / "pictures" / "narrow" / picture, NARROW)
         for picture in sorted((out / name).glob("*.png")) if name in MANY else ():

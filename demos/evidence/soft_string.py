@@ -11,12 +11,14 @@ the stations as they are and a tolerance. Times are processor times of one warm 
 """
 
 import statistics
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 from harness import command, in_words, table, timed, write
 from peers.environments import Missing
 from peers.process import Peer
+from two_widths import draw_both
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.pictures.charts import beside, draw_chart, legend
@@ -103,7 +105,7 @@ def lines(rows, silent):
 
 def chart(rows):
     """Error over time, one panel a well."""
-    figure, panels, _ = beside([6.0, 6.0], 5.0)
+    figure, panels, _ = beside([5.0, 5.0], 5.0)
     for panel, name in zip(panels, TRUTH, strict=True):
         for program, colour in zip(("cosserat_fenicsx", *PEERS), ("#08519c", "#d95f02", "#7570b3"), strict=True):
             here = [(seconds, error) for well, by, _, error, seconds in rows if (well, by) == (name, program)]
@@ -125,7 +127,7 @@ def main(install=True, out="out"):
     """
     rows, silent = measure(install)
     print(write("soft_string", lines(rows, silent), out))
-    draw_chart(lambda: chart(rows), Path(out) / "soft_string.png")
+    draw_both(partial(draw_chart, lambda: chart(rows)), Path(out) / "soft_string.png")
     return rows
 
 

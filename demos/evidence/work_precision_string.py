@@ -12,17 +12,19 @@ are processor times of a whole computation, in C all three, on one thread: media
 """
 
 import statistics
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 from harness import command, in_words, table, timed, write
 from peers import upwind_torsion
+from two_widths import draw_both
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.drilling.elements import AxialTorsional
 from cosserat_fenicsx.drilling.protocol import SERIES
 from cosserat_fenicsx.drilling.torsion import TorsionWaves
-from cosserat_fenicsx.pictures.charts import SMALL, draw_chart, empty_figure, legend
+from cosserat_fenicsx.pictures.charts import SMALL, draw_chart, empty_figure, legend, room_for
 
 #: Mean of the last four periods (s), largest speed of the bit after 60 s (rad/s); and how far these may be wrong, as
 #: relative errors: the differences of meshes, and of the levels at which a period is measured.
@@ -103,10 +105,12 @@ def lines(rows):
 
 def chart(rows):
     """Errors over time, one panel for the period and one for the largest speed."""
-    figure = empty_figure(12, 5.2)
+    beside = room_for(12) > 7
+    figure = empty_figure(12, 5.2 if beside else 8.5)
+    panels = figure.subplots(*((1, 2) if beside else (2, 1)))
     colours = dict(zip(CASES, ("#08519c", "#31a354", "#d95f02"), strict=True))
     titles = {"period": "period of stick-slip", "peak": "largest speed of the bit"}
-    for panel, (name, title) in zip(figure.subplots(1, 2), titles.items(), strict=True):
+    for panel, (name, title) in zip(panels, titles.items(), strict=True):
         panel.axhspan(KNOWN[name] / 100, KNOWN[name], color="0.9", zorder=0)
         panel.text(
             0.99,
@@ -140,7 +144,7 @@ def main(out="out", quick=False):
     rows = measure(QUICK if quick else CASES, 1 if quick else SAMPLES)
     stem = "work_precision_string_quick" if quick else "work_precision_string"
     print(write(stem, lines(rows), out))
-    draw_chart(lambda: chart(rows), Path(out) / f"{stem}.png")
+    draw_both(partial(draw_chart, lambda: chart(rows)), Path(out) / f"{stem}.png")
     return rows
 
 

@@ -35,7 +35,7 @@ def draw(data, file):
 def _figure(data):
     columns = [method for method in methods.METHODS if method.key in data["methods"]]
     rows = [trial for trial in catalogue.TRIALS if trial.key in data["trials"]]
-    figure = empty_figure(3.1 + 1.02 * len(columns), 2.6 + 0.5 * len(rows))
+    figure = empty_figure(2.9 + 0.84 * len(columns), 2.6 + 0.42 * len(rows))
     axes = figure.subplots()
     axes.set(xlim=(-0.5, len(columns) - 0.5), ylim=(len(rows) - 0.5, -0.5))
     for j, trial in enumerate(rows):
