@@ -26,10 +26,11 @@ def draw(history, file, shapes, curve):
         file: a .png.
         shapes: see `Shapes`; curve: see `Curve`.
     """
-    draw_both(partial(draw_chart, lambda: _figure(history, shapes, curve)), file)
+    draw_both(partial(draw_chart, lambda: figure_of(history, shapes, curve)), file)
 
 
-def _figure(history, shapes, curve):
+def figure_of(history, shapes, curve):
+    """The Figure."""
     stored, done = energies_of(history)
     count = 3 if any(values.any() for _, values, *_ in done) else 2
     narrow, flat = room_for(11) < _BESIDE, len(shapes.axes) == 2

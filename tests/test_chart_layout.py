@@ -1,16 +1,19 @@
 """Texts of every kind of chart, at 1280 and at 400 pixels: they can be read, overlap nothing, and stay inside."""
 
 import itertools
+from functools import partial
 
 import numpy as np
 import pytest
 import test_well_sweep as wells
 import test_whirl
 from fake_string import scene, use
+from motion_chart import Curve, Shapes, figure_of
 from reference_strings import pipe_and_collars
 from test_whirl import collar  # noqa: F401
 
 import cosserat_fenicsx as cf
+from cosserat_fenicsx.pictures.charts import draw_chart
 
 pytest.importorskip("matplotlib")
 pytestmark = pytest.mark.serial
@@ -95,6 +98,9 @@ def test_sections_in_holes(collar):  # noqa: F811
         lambda **look: history.plot_whirl(station, **look),
         history.plot_energy,
     )
+    curve = Curve("time (s)", "displacement (m)", [("x", history.times, history.displacement(station)[:, 0])])
+    motion = partial(draw_chart, lambda: figure_of(history, Shapes("yz", station), curve))
+    check_all(motion, units=False)
 
 
 @pytest.mark.slow
