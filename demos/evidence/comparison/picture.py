@@ -1,24 +1,32 @@
 """The chart of Figure 3: the whole path, the part below eta = 1, and the differences of the models."""
 
+from functools import partial
+
 import numpy as np
+from two_widths import draw_both
 
 from comparison.column import Column
 from comparison.curves import MANY, exact
 from cosserat_fenicsx import analytic
-from cosserat_fenicsx.pictures.charts import draw_chart, empty_figure
+from cosserat_fenicsx.pictures.charts import SMALL, draw_chart, empty_figure, room_for
 
 _GREEN = {"1": "#98d594", "2": "#4daf4a", str(MANY): "#1b7837"}
+# Width, inches, for panels beside each other.
+_BESIDE = 7.0
 _ETA = r"load factor $\eta = F/P_{cr}$ (-)"
 
 
 def draw(data, file):
     """Draw the curves of figure3.json into `file`."""
-    draw_chart(lambda: _figure(data["curves"]), file)
+    draw_both(partial(draw_chart, lambda: _figure(data["curves"])), file)
 
 
 def _figure(curves):
-    figure = empty_figure(13, 8.5)
-    panels = figure.subplot_mosaic([["whole", "near"], ["whole", "apart"]])
+    wide = room_for(13) > _BESIDE
+    figure = empty_figure(13, 7.0 if wide else 13.5)
+    panels = figure.subplot_mosaic(
+        [["whole", "near"], ["whole", "apart"]] if wide else [["whole"], ["near"], ["apart"]]
+    )
     whole, near, apart = panels["whole"], panels["near"], panels["apart"]
     for axes in (whole, near):
         _curves(axes, curves)
@@ -28,15 +36,18 @@ def _figure(curves):
     _differences(apart, curves)
     for axes in panels.values():
         axes.axvline(1.0, color="tab:red", lw=0.8, alpha=0.5)
-    whole.text(0.94, 17.1, "pole of eq. (8)", ha="right", color="tab:red", fontsize=9)
+    whole.text(0.94, 17.1, "pole of eq. (8)", ha="right", color="tab:red", fontsize=SMALL)
     whole.plot([0, 1, 1], [2.5, 2.5, 0], color="grey", lw=0.8)
-    whole.text(0.03, 2.7, "enlarged on the right", color="grey", fontsize=9)
+    enlarged = f"enlarged {'on the right' if wide else 'below'}"
+    whole.text(0.03, 2.7, enlarged, color="grey", fontsize=SMALL)
     _limit_points(near, curves["mcre"]["elements"])
     figure.suptitle(
         "Eccentrically compressed column: steel, 20 m, diameter 0.2 m, eccentricity e = L/100, clamped below, free"
         " above"
     )
-    figure.legend(*whole.get_legend_handles_labels(), loc="outside lower center", ncols=3, frameon=False, fontsize=9)
+    shown = zip(whole.get_legend_handles_labels(), apart.get_legend_handles_labels(), strict=True)
+    handles, names = (first + second for first, second in shown)
+    figure.legend(handles, names, loc="outside lower center", ncols=2 if wide else 1, frameon=False)
     return figure
 
 
@@ -93,7 +104,6 @@ def _differences(axes, curves):
     axes.set_title(
         f"Difference from the exact rod under the same load\n(the Cosserat rod here: {rods:.0e} %, below the chart)"
     )
-    axes.legend(loc="upper right", frameon=True)
 
 
 def _branch(curves, name):
@@ -120,4 +130,6 @@ def _limit_points(axes, found):
     for name, place in (("1", (0.03, 0.72)), ("2", (0.17, 1.15)), (str(MANY), (0.33, 1.6))):
         top = found[name]["limit_point"]
         words = f"limit point, {_elements(name)}:\n" rf"$\eta$ = {top['eta']:.3f}, $\delta$ = {top['delta']:.2f} m"
-        axes.annotate(words, (top["eta"], top["delta"]), place, fontsize=9, arrowprops={"arrowstyle": "->", "lw": 0.8})
+        axes.annotate(
+            words, (top["eta"], top["delta"]), place, fontsize=SMALL, arrowprops={"arrowstyle": "->", "lw": 0.8}
+        )
