@@ -164,6 +164,17 @@ def text_of(file, expected, *, pipes=False):
     Raises:
         SceneError: it cannot be read, is no plain file, is too large, holds a workbook, or is not UTF-8.
     """
+    data = bytes_of(file, expected, pipes=pipes)
+    if data.startswith(_WORKBOOKS):
+        raise SceneError(f"{file}: a workbook or another archive: expected {expected}; save the sheet as .csv (UTF-8)")
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError as problem:
+        raise SceneError(f"{file}: not UTF-8 ({problem.reason} at byte {problem.start}): save it as UTF-8") from None
+
+
+def bytes_of(file, expected, *, pipes=False):
+    """The content of a user's file; arguments and errors as of `text_of`, but for what is in it."""
     file = Path(file)
     try:
         mode = file.stat().st_mode
@@ -180,12 +191,7 @@ def text_of(file, expected, *, pipes=False):
         raise SceneError(f"{file}: no plain file: expected {expected}")
     if len(data) > MOST_TEXT:
         raise SceneError(f"{file}: larger than {MOST_TEXT / 2**20:g} MiB: expected {expected}")
-    if data.startswith(_WORKBOOKS):
-        raise SceneError(f"{file}: a workbook or another archive: expected {expected}; save the sheet as .csv (UTF-8)")
-    try:
-        return data.decode("utf-8-sig")
-    except UnicodeDecodeError as problem:
-        raise SceneError(f"{file}: not UTF-8 ({problem.reason} at byte {problem.start}): save it as UTF-8") from None
+    return data
 
 
 def call(function, x, name, where):

@@ -75,7 +75,7 @@ SURVEYS = {
     "an endless device": ('survey = "/dev/zero"', "", "/dev/zero: no plain file: expected a survey as .csv"),
     "a folder": ('survey = "."', "", "Is a directory"),
     "a null character": (r'survey = "s\u0000.csv"', "", "cannot be read .*null"),
-    "a workbook": ('survey = "s.xlsx"', "", "s.xlsx: a workbook or another archive: .* save the sheet as .csv"),
+    "a sheet of text": ('survey = "s.csv"\nsheet = "A"', "", "sheet = 'A': expected an .xlsx file as survey"),
 }  # fmt: skip
 
 
@@ -83,10 +83,37 @@ SURVEYS = {
 def test_surveys(case, tmp_path):
     survey, text, words = SURVEYS[case]
     (tmp_path / "s.csv").write_text(text, encoding="utf-8")
-    with zipfile.ZipFile(tmp_path / "s.xlsx", "w") as book:
-        book.writestr("sheet", "1")
     with pytest.raises(cf.SceneError, match=words):
         cf.read(written(tmp_path, survey))
+
+
+def test_workbooks_that_are_refused(tmp_path, monkeypatch):
+    with zipfile.ZipFile(tmp_path / "s.xlsx", "w") as book:
+        book.writestr("sheet", "1")
+    with pytest.raises(cf.SceneError, match=r"s.xlsx: a workbook or another archive: .* save the sheet as .csv"):
+        cf.well.WellPath.from_csv(tmp_path / "s.xlsx")
+    scene = written(tmp_path, 'survey = "s.xlsx"')
+    with monkeypatch.context() as without:
+        without.setitem(sys.modules, "openpyxl", None)
+        with pytest.raises(cf.InstallationError, match=r"saved as .csv instead, needs openpyxl, .*fenicsx\[data\]"):
+            cf.read(scene)
+    openpyxl = pytest.importorskip("openpyxl")
+    with pytest.raises(cf.SceneError, match=r"s.xlsx: expected a workbook that openpyxl reads"):
+        cf.read(scene)
+    book = openpyxl.Workbook()
+    book.active.append(["MD", "Inc", "Azi"])
+    book.active.append([0, 0, "none"])
+    book.save(tmp_path / "s.xlsx")
+    with pytest.raises(cf.SceneError, match=r"s.xlsx: line 2, .*expected numbers in MD, Inc, Azi"):
+        cf.read(scene)
+    with pytest.raises(cf.SceneError, match=r"no sheet 'Shet': did you mean 'Sheet'"):
+        cf.well.WellPath.from_xlsx(tmp_path / "s.xlsx", "Shet")
+    book.active.append([0, 0, 0, "x" * 30_000])  # a large text, well compressed
+    book.save(tmp_path / "s.xlsx")
+    for bound, words in ((20_000, "text in a sheet"), (200, "s.xlsx: larger than")):
+        monkeypatch.setattr(checks, "MOST_TEXT", bound)
+        with pytest.raises(cf.SceneError, match=words):
+            cf.well.WellPath.from_xlsx(tmp_path / "s.xlsx")
 
 
 def test_a_unit_says_which_of_two_columns(tmp_path):

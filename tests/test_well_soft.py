@@ -118,6 +118,30 @@ def test_a_survey_from_a_file(tmp_path):
     assert cf.well.WellPath.from_csv(file).inclination[1] == 0.3
 
 
+def test_a_survey_from_a_workbook(tmp_path):
+    """Title rows, an empty column, a formula without a value, a note beside the numbers, units in the names or below."""
+    book = pytest.importorskip("openpyxl").Workbook()
+    book.active.append(["Well A-1, 2024", None, "1, 2, 3, 4"])
+    plan = book.create_sheet("as drilled")
+    for below, rows in (
+        (book.active, [[], [None, "MD\n(ft)", "Inc, deg", "Azimuth (deg)"]]),
+        (plan, [["md", "inclination", "azi", "=1+1"], ["ft", "deg", "deg"]]),
+    ):
+        first = [None] * (below is book.active)
+        for row in [*rows, [*first, 0, 0, 0], [*first, 1000, 0, 0.0, "a note"], [*first, 2000.0, 30, 45]]:
+            below.append(row)
+    book.save(tmp_path / "survey.xlsx")
+    for well in (
+        cf.well.WellPath.from_xlsx(tmp_path / "survey.xlsx", inc="inc, deg"),
+        cf.well.WellPath.from_xlsx(tmp_path / "survey.xlsx", "as drilled"),
+        cf.well.Borehole.from_survey(
+            [cf.well.HoleSection("2000 ft", 0.2, 0.2)], str(tmp_path / "survey.xlsx"), sheet="as drilled"
+        ).path,
+    ):
+        assert well.md.tolist() == pytest.approx([0, 304.8, 609.6])
+        assert np.degrees([well.inclination[2], well.azimuth[2]]) == pytest.approx([30, 45])
+
+
 @pytest.mark.parametrize(("text", "given", "words"), [
     ("md,inc,azi\n0,0,0\n\n10,none,0", {}, "line 4, '10,none,0': expected numbers in md, inc, azi"),
     ("md;inc;azi\n0;0;0\n10;10,5;20", {}, "line 3.*decimals stand behind a point"),

@@ -83,26 +83,37 @@ class Borehole(Part):
         degrees: bool | None = None,
         length_unit: str | None = None,
         wall_stiffness: WallStiffness | None = None,
+        sheet: str | None = None,
     ) -> "Borehole":
         """A hole from its survey, as in a scene file.
 
         Args:
             sections, wall_stiffness: see the class.
-            survey: the name of a .csv file, see `WellPath.from_csv`; or
+            survey: the name of a .csv file or of an .xlsx file, see `WellPath.from_csv` and `WellPath.from_xlsx`; or
             stations: rows of measured depth, inclination and azimuth; depths in m or text with a unit.
             columns: names of the columns of the file. degrees: see `WellPath.from_survey`.
             length_unit: of the measured depths of survey or stations, such as "ft".
+            sheet: of an .xlsx file; None for the first one.
 
         Raises:
-            SceneError: neither survey nor stations, or both; see also `WellPath`.
+            SceneError: neither survey nor stations, or both; a sheet without an .xlsx file; see also `WellPath`.
         """
         if (survey is None) == (stations is None):
-            raise SceneError("expected either survey, the name of a .csv file, or stations, rows of md, inc, azi")
+            raise SceneError(
+                "expected either survey, the name of a .csv or .xlsx file, or stations, rows of md, inc, azi"
+            )
+        workbook = survey is not None and str(survey).lower().endswith((".xlsx", ".xlsm"))
+        if sheet is not None and not workbook:
+            refuse("Borehole", "sheet", sheet, "an .xlsx file as survey")
         unit = None if length_unit is None else size_of("Borehole.length_unit", length_unit, "length")
         if stations is None:
             if not isinstance(columns, list | tuple) or len(columns) != 3:
                 refuse("Borehole", "columns", columns, "three names of columns: md, inclination, azimuth")
-            path = WellPath.from_csv(survey, *columns, degrees=degrees, length_unit=unit)
+            given = {"degrees": degrees, "length_unit": unit}
+            if workbook:
+                path = WellPath.from_xlsx(survey, sheet, *columns, **given)
+            else:
+                path = WellPath.from_csv(survey, *columns, **given)
         else:
             try:
                 rows = [(_depth(i, md, unit or 1.0), *angles) for i, (md, *angles) in enumerate(stations)]

@@ -1,4 +1,4 @@
-"""The axis of a hole from a survey, checked or read from a .csv file: circular arcs of minimum curvature.
+"""The axis of a hole from a survey, which is checked: circular arcs of minimum curvature.
 
 Frame: (north, east, down), m, its origin at the first station. md is the measured depth, the arc length along the axis
 from there. Between two stations the axis is the circular arc that is tangent to both directions (straight where they
@@ -8,21 +8,16 @@ described by its first tangent t and curvature vector k alone, so that nothing i
     r(x) = r + t x sinc(kx) + k x^2/2 sinc(kx/2)^2,    t(x) = t cos(kx) + k x sinc(kx),    sinc(a) = sin(a)/a
 """
 
-import csv
 import math
-import os
-import re
 from collections import namedtuple
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
-from cosserat_fenicsx import units
-from cosserat_fenicsx.checks import File, Numbers, finite_array, instance, positive, refuse, text_of, warn
-from cosserat_fenicsx.dimensions import size_of
-from cosserat_fenicsx.errors import SceneError, nearest
+from cosserat_fenicsx.checks import File, Numbers, finite_array, instance, refuse, warn
+from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.parts import Part
+from cosserat_fenicsx.well.survey import read_columns
 
 #: The arcs between stations, arrays over these: md of the start (m), there position (m, 3), tangent (3) and curvature
 #: vector (1/m, 3), and length (m).
@@ -34,7 +29,7 @@ Nearest = namedtuple("Nearest", "md position tangent curvature")
 
 @dataclass(frozen=True, eq=False)
 class WellPath(Part):
-    """The axis of a hole, of circular arcs and straight lines. Made by `from_survey` or `from_csv`.
+    """The axis of a hole, of circular arcs and straight lines. Made by `from_survey`, `from_csv` or `from_xlsx`.
 
     Attributes:
         md: (n,) measured depth of the stations, m.
@@ -108,7 +103,35 @@ class WellPath(Part):
         Raises:
             SceneError: the file cannot be read, a column is missing or not of numbers; see also `from_survey`.
         """
-        return cls.from_survey(*read_columns(file, md, inc, azi, degrees, length_unit))
+        return cls.from_survey(*read_columns("WellPath.from_csv", file, (md, inc, azi), degrees, length_unit))
+
+    @classmethod
+    def from_xlsx(
+        cls,
+        file: File,
+        sheet: str | None = None,
+        md: str = "md",
+        inc: str = "inc",
+        azi: str = "azi",
+        *,
+        degrees: bool | None = None,
+        length_unit: float | str | None = None,
+    ) -> "WellPath":
+        """The axis from a sheet of a workbook, an .xlsx file, with one row of names above the numbers.
+
+        Rows above that row are skipped, and formulas have the values that they had when the file was saved. Needs
+        openpyxl, which `pip install 'cosserat-fenicsx[data]'` installs.
+
+        Args:
+            file: its path.
+            sheet: its name; None for the first one.
+            md, inc, azi, degrees, length_unit: see `from_csv`.
+
+        Raises:
+            SceneError: see `from_csv`; or the workbook cannot be read or has no such sheet.
+            InstallationError: openpyxl is missing.
+        """
+        return cls.from_survey(*read_columns("WellPath.from_xlsx", file, (md, inc, azi), degrees, length_unit, sheet))
 
     def position(self, md: float | Numbers) -> np.ndarray:
         """(..., 3) north, east, down at measured depths, m."""
@@ -265,22 +288,6 @@ def _arc(sections, i, x):
 
 
 _FULL = math.radians(360)
-# Names of the same column in files.
-_NAMES = (
-    ("md", "measured depth", "meas depth", "meas. depth", "depth md", "md depth"),
-    ("inc", "incl", "inclination"),
-    ("azi", "az", "azim", "azimuth"),
-)
-# Units in headings: of lengths, m; of angles, whether it is a degree.
-_LENGTHS = {
-    **dict.fromkeys(("m", "meter", "meters", "metre", "metres"), 1.0),
-    **dict.fromkeys(("ft", "foot", "feet"), units.foot),
-}
-_ANGLES = {
-    **dict.fromkeys(("deg", "degree", "degrees", "\N{DEGREE SIGN}"), True),
-    **dict.fromkeys(("rad", "radian", "radians"), False),
-}
-_UNITS = {*_LENGTHS, *_ANGLES}
 
 
 def checked_survey(md, inc, azi, degrees):
@@ -332,140 +339,3 @@ def _doubt_degrees(inc, azi, degrees):
             f"WellPath: {text}. Say degrees=False if they are, degrees=True if they are not (in a scene file "
             "degrees = false and degrees = true)"
         )
-
-
-def read_columns(file, md, inc, azi, degrees, length_unit):
-    """Three columns of a .csv file, see `WellPath.from_csv`: depths (m), inclinations, azimuths; and its `degrees`."""
-    who = "WellPath.from_csv"
-    file = Path(instance(who, "file", file, str | os.PathLike, "the name of a .csv file"))
-    for field, name in (("md", md), ("inc", inc), ("azi", azi)):
-        instance(who, field, name, str, "the name of a column")
-    whole = text_of(file, "a survey as .csv")
-    lines = [(i, line) for i, line in enumerate(whole.splitlines(), start=1) if line.strip()]
-    first, separator, heading, columns = _heading(file, lines, (md, inc, azi))
-    says = [_split(heading[column])[1] for column in columns]
-    values = []
-    for k, (i, line) in enumerate(lines[first + 1 :]):
-        row = _cells(file, i, line, separator)
-        cells = [row[column].strip() if column < len(row) else "" for column in columns]
-        if k == 0 and all(cell.lower() in _UNITS for cell in cells):
-            says = [cell.lower() for cell in cells]
-            continue
-        try:
-            if any(cell.strip() for cell in row[len(heading) :]):
-                raise ValueError
-            values.append([_number(cell) for cell in cells])
-        except ValueError:
-            point = any("," in cell for cell in row) or len(row) > len(heading)
-            hint = "; decimals stand behind a point, as in 10.5" if point else ""
-            raise SceneError(
-                f"{file}: line {i}, {line!r:.100}: expected numbers in {', '.join(heading[x] for x in columns)}, and "
-                f"no more columns than names{hint}"
-            ) from None
-    if len(values) < 2:
-        raise SceneError(f"{file}: {len(values)} stations below the row of names, expected at least two")
-    depth, inclination, azimuth = np.array(values).T
-    depth = depth * _length_unit(file, heading[columns[0]], says[0], length_unit)
-    return depth, inclination, azimuth, _degrees(file, [heading[x] for x in columns[1:]], says[1:], degrees)
-
-
-def _cells(file, i, line, separator):
-    """The cells of line i."""
-    try:
-        return next(csv.reader([line], delimiter=separator))
-    except csv.Error as problem:
-        raise SceneError(f"{file}: line {i} is no row of a .csv file ({problem})") from None
-
-
-def _heading(file, lines, wanted):
-    """Of the row of names: its index in `lines`, the separator, the names, and the columns of those that are wanted."""
-    likely = None
-    for k, (i, line) in enumerate(lines):
-        separator = max(",;\t", key=line.count)
-        heading = _cells(file, i, line, separator)
-        columns = [_columns(heading, name) for name in wanted]
-        if all(columns):
-            for name, found in zip(wanted, columns, strict=True):
-                if len(found) > 1:
-                    raise SceneError(
-                        f"{file}: line {i}: columns {' and '.join(str(x + 1) for x in found)} are both named '{name}' "
-                        f"({', '.join(heading[x].strip() for x in found)}): expected one, or that columns (in Python "
-                        "md, inc, azi) say which, with its unit"
-                    )
-            one = [found[0] for found in columns]
-            if len(set(one)) < len(one):
-                raise SceneError(f"{file}: {', '.join(wanted)}: expected three columns, each of another name")
-            return k, separator, heading, one
-        if sum(_is_number(cell) for cell in heading) > 1:
-            break
-        if likely is None or len(heading) > len(likely):
-            likely = heading
-    if likely is None or len(likely) < 2:
-        raise SceneError(f"{file}: expected a row of names, such as 'MD (m),Inc (deg),Azi (deg)', above the stations")
-    known = [_split(name)[0] for name in likely]
-    missing = next(name for name in wanted if not _columns(likely, name))
-    raise SceneError(
-        f"{file}: no column '{missing}' in {', '.join(likely):.500}: {nearest(missing.lower(), known)}. Expected the "
-        "names of the columns of measured depth, inclination and azimuth: columns = ['...', '...', '...'] in a scene "
-        "file, md=, inc=, azi= in Python"
-    )
-
-
-def _columns(heading, name):
-    """The columns of a name: written as it is there, else without its unit, else under another usual name."""
-    whole, wanted = [" ".join(x.lower().split()) for x in heading], " ".join(name.lower().split())
-    names, short = [_split(x)[0] for x in heading], _split(name)[0]
-    same = next((group for group in _NAMES if short in group), ())
-    for found in ([x == wanted for x in whole], [x == short for x in names]):
-        if any(found):
-            return np.flatnonzero(found).tolist()
-    usual = [i for i, x in enumerate(names) if x in same]
-    return usual if len(usual) == 1 else []
-
-
-def _split(heading):
-    """Name in lower case, and unit ("" where it has none) of the heading of a column: "MD (ft)", "inc_deg", "MD"."""
-    name, bracket, unit = re.match(r"([^\[(]*)([\[(]?)([^\])]*)", heading.replace("_", " ").strip().lower()).groups()
-    words = name.split()
-    if bracket:
-        return " ".join(words), "ft" if unit.startswith("ft") else unit.strip()  # feet below something: "ftKB"
-    last = words.pop() if len(words) > 1 and words[-1] in _UNITS else ""
-    return " ".join(words), last
-
-
-def _number(cell):
-    if "_" in cell or not cell.isascii():  # Python takes 10_00 for a number, and digits of all scripts
-        raise ValueError
-    return float(cell)
-
-
-def _is_number(cell):
-    try:
-        return math.isfinite(_number(cell))
-    except ValueError:
-        return False
-
-
-def _length_unit(file, heading, says, given):
-    """The unit (m) of measured depths: as given, or as the heading says."""
-    if isinstance(given, str):
-        given = size_of("WellPath.from_csv.length_unit", given, "length")
-    says = _LENGTHS.get(says)
-    if given is not None:
-        given = positive("WellPath.from_csv", "length_unit", given, "m")
-        if says is not None and not math.isclose(says, given, rel_tol=1e-3):
-            raise SceneError(
-                f"{file}: '{heading}' says a unit of {says:g} m, and length_unit {given:g} m: expected one of them, or "
-                "none given"
-            )
-    return given or says or 1.0
-
-
-def _degrees(file, headings, says, given):
-    """Whether angles are in degrees, see `WellPath.from_survey`."""
-    stated = {_ANGLES[unit] for unit in says if unit in _ANGLES} | ({given} - {None})
-    if len(stated) > 1:
-        raise SceneError(
-            f"{file}: '{headings[0]}', '{headings[1]}' and degrees = {given} contradict each other: expected one unit"
-        )
-    return False if stated == {False} else given
