@@ -18,7 +18,7 @@ export VTK_DEFAULT_OPENGL_WINDOW = vtkEGLRenderWindow
 # A numpy in the user's own site directory would hide the distribution's.
 export PYTHONNOUSERSITE = 1
 
-.PHONY: help setup packages demo animation motion gallery well string whirl recipes test docs tables figure3 work-precision benchmarks cosseratbench failures rods-in-wells folders random random-wells imperfect mutants release clean
+.PHONY: help setup packages demo animation motion gallery well string whirl recipes test docs tutorials tables figure3 work-precision benchmarks cosseratbench failures rods-in-wells folders random random-wells imperfect mutants release clean
 
 help:
 	@echo "Times are those of two cores and an empty cache of compiled forms, after \`make setup\`."
@@ -31,6 +31,7 @@ help:
 	@echo "make whirl   a collar in its hole from forward to backward whirl, and a map of whirl over speed and friction; writes out/whirl/ (three minutes)"
 	@echo "make recipes the recipes of docs/recipes_*.md, and whether they print what is shown; writes out/recipes/ (half a minute)"
 	@echo "make docs    the documentation as a site that needs no network; writes out/docs/index.html (a minute)"
+	@echo "make tutorials  run the notebooks of docs/tutorials/ and store what they print and draw (a minute)"
 	@echo "make test    all tests, the serial ones on two workers"
 	@echo "make tables  the tables of accuracy and cost in docs/, measured anew and put there"
 	@echo "make figure3 every curve of the paper's Figure 3, and what was found; writes out/ (about 4 minutes)"
@@ -77,6 +78,9 @@ recipes: setup
 # Warnings are errors. What Sphinx keeps between two builds lies beside the pages.
 docs: setup .venv/.docs
 	$(PYTHON) -m sphinx -q -W --keep-going -b html docs out/docs
+
+tutorials: setup
+	$(PYTHON) demos/tutorials.py
 
 # Two workers that know nothing of each other, then two ranks, then four for what depends on how many there are.
 # pytest's cache directory is off in parallel: the ranks would write it all at once.

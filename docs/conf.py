@@ -33,4 +33,4 @@ autodoc_typehints = "none"
 autosummary_imported_members = True
 myst_enable_extensions = ["dollarmath", "colon_fence"]
 myst_heading_anchors = 3
-nb_execution_mode = "off"  # the tests execute the notebook, and compare what it prints
+nb_execution_mode = "off"  # the tests run the tutorials, and compare what they print

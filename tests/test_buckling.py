@@ -180,8 +180,8 @@ def test_a_thin_arm_beside_a_thick_column(share, length, foot):
 
 @pytest.mark.serial
 def test_a_taut_line_has_no_critical_load(tmp_path):
-    """The scene of docs/first_steps.md: two meshes and the words, not the largest mesh and a refusal."""
-    text = pathlib.Path(__file__).parents[1].joinpath("docs", "first_steps.md").read_text()
+    """The scene of docs/command_line.md: two meshes and the words, not the largest mesh and a refusal."""
+    text = pathlib.Path(__file__).parents[1].joinpath("docs", "command_line.md").read_text()
     file = tmp_path / "line.toml"
     file.write_text(re.search(r"```toml\n(.*?)```", text, re.DOTALL)[1])
     scene = cf.read(file).scene

@@ -15,10 +15,15 @@ pytestmark = pytest.mark.serial
 ROOT = Path(__file__).parent.parent
 DOCS = ROOT / "docs"
 PAGES = [ROOT / "README.md", ROOT / "CHANGELOG.md", *sorted(DOCS.glob("**/*.md"))]
+TUTORIALS = sorted((DOCS / "tutorials").glob("*.ipynb"))
 
 
 def text_of(page):
-    return page.read_text(encoding="utf-8")
+    """The text of a page, of a notebook its Markdown."""
+    text = page.read_text(encoding="utf-8")
+    if page.suffix == ".ipynb":
+        text = "\n\n".join("".join(x["source"]) for x in json.loads(text)["cells"] if x["cell_type"] == "markdown")
+    return text
 
 
 def blocks(language):
@@ -39,7 +44,7 @@ def headings(page):
     return {re.sub(r"[^\w\- ]", "", word.lower()).replace(" ", "-") for word in words}
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+@pytest.mark.parametrize("page", [*PAGES, *TUTORIALS], ids=lambda page: page.name)
 def test_links_lead_somewhere(page):
     for link in re.findall(r"\]\(([^)\s]+)\)", re.sub(r"```.*?```", "", text_of(page), flags=re.S)):
         name, _, anchor = link.partition("#")
@@ -129,15 +134,27 @@ def test_scene_files_are_read(page, scene, tmp_path):
 
 
 @pytest.mark.slow
-def test_the_notebook_prints_what_it_shows():
-    """`jupyter execute --inplace docs/notebook.ipynb` puts in what it prints today."""
-    nbformat, nbclient = pytest.importorskip("nbformat"), pytest.importorskip("nbclient")
-    stored = nbformat.read(DOCS / "notebook.ipynb", as_version=4)
-    ran = nbformat.read(DOCS / "notebook.ipynb", as_version=4)
-    nbclient.NotebookClient(ran, timeout=120, kernel_name="python3").execute()
+@pytest.mark.parametrize("file", TUTORIALS, ids=lambda file: file.stem)
+def test_tutorials_print_what_they_show(file):
+    """`demos/tutorials.py` puts in what they print and draw today."""
+    nbformat = [pytest.importorskip(library) for library in ("nbclient", "ipykernel", "openpyxl", "nbformat")][-1]
+    import tutorials
 
-    def printed(notebook):
-        outputs = [output for cell in notebook.cells for output in cell.get("outputs", ())]
-        return "".join(output["text"] for output in outputs if output.get("name") == "stdout")
+    assert file.stem in tutorials.NAMES and len(TUTORIALS) == len(tutorials.NAMES)
+    stored, ran = nbformat.read(file, as_version=4), tutorials.ran(file.stem)
+    words, problems = tutorials.printed(ran)
+    assert (words, problems) == (tutorials.printed(stored)[0], "")
+    pictures = tutorials.pictures(stored)
+    assert len(tutorials.pictures(ran)) == len(pictures) >= 2
+    assert all(len(picture["image/png"]) < 55_000 for picture in pictures)  # 40 kB in base 64
+    assert file.stem != "column" or "2.200615447828 m" in words
 
-    assert printed(ran) == printed(stored) and "2.200615 m" in printed(stored)
+
+def test_the_survey_of_the_tutorial_is_that_of_the_demo():
+    pytest.importorskip("openpyxl")
+    here, there = (
+        cf.well.WellPath.from_xlsx(DOCS / "tutorials" / "survey.xlsx"),
+        cf.well.WellPath.from_csv(ROOT / "demos" / "wells" / "volve_f12.csv"),
+    )
+    assert here.md == pytest.approx(there.md, abs=0.01 * cf.units.foot)  # two decimals
+    assert here.inclination.tolist() == there.inclination.tolist() and here.azimuth.tolist() == there.azimuth.tolist()

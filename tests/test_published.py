@@ -25,7 +25,7 @@ def results():
 def test_it_agrees_with_its_published_numbers(name, results):
     found = results[name] = manual.solved(PROBLEMS[name])
     for row in found["rows"]:
-        off = np.abs(np.subtract(row["ours"], row["published"]))
+        off = np.atleast_1d(np.abs(np.subtract(row["ours"], row["published"])))
         assert (off <= row["allowed"]).all(), f"{row['quantity']}: {row['ours']} for {row['published']}"
         assert (np.asarray(row["estimate"]) >= 0).all() and row["agrees"], row["quantity"]
         assert abs(row["difference"]) <= np.max(row["allowed"])

@@ -87,14 +87,14 @@ LARGE = {"failures.png": (1380, 1380)}
 
 
 def kept(picture, file, most=(WIDTH, WIDTH), colours=COLOURS):
-    """Write the picture as the documentation keeps it: without white margins, at most 1100 pixels wide and high, or
+    """Write the picture (.png) as the documentation keeps it: without white margins, at most 1100 pixels wide and high, or
     `most` (width, height)."""
     image = Image.open(picture).convert("RGB")
     rows, columns = np.nonzero((np.asarray(image) < 250).any(axis=2))
     box = columns.min() - MARGIN, rows.min() - MARGIN, columns.max() + MARGIN, rows.max() + MARGIN
     image = image.crop((max(box[0], 0), max(box[1], 0), min(box[2], image.width), min(box[3], image.height)))
     image.thumbnail(most, Image.Resampling.LANCZOS)
-    image.quantize(colours, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE).save(file, optimize=True)
+    image.quantize(colours, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE).save(file, "PNG", optimize=True)
 
 
 def main(names, out="out", docs=ROOT / "docs"):
