@@ -10,7 +10,7 @@ from cosserat_fenicsx.pictures.view import view_of
 from cosserat_fenicsx.scene.signals import at, signals_of
 
 # Maximum number of arrows and other signs; of those beyond it the file says how many are left out.
-_MOST = 500
+_MOST = 200
 
 
 def signs(result, shown, shapes, span, place):
@@ -69,7 +69,7 @@ def signs(result, shown, shapes, span, place):
         one["colour"] = COLOURS[GROUPS[mark.kind]]
         if mark.unit:
             one |= {"turns": mark.turns, "unit": mark.unit, "top": top[mark.unit]}
-            one["vectors"] = _floats(vectors.reshape(len(shown), -1, 3) / top[mark.unit])
+            one["vectors"] = floats(vectors.reshape(len(shown), -1, 3) / top[mark.unit])
         found.append(one)
     drawn = np.cumsum([len(one.get("at", [0])) for one in found]) <= _MOST
     left_out, words = int((~drawn).sum()), without_sign(scene, False)
@@ -98,7 +98,7 @@ def _over_states(load, result, shown):
         every = [marks_of(at(load, t), scene, 1.0) for t in along]
         return [
             (type(load).__name__, marks[0], np.array([mark.vector for mark in marks]) if marks[0].unit else None)
-            for marks in zip(*every, strict=True)
+            for marks in zip(*every, strict=False)  # a spring may be none at some time
         ]
     factors = along if load.scaled and result.axis != "time" else np.ones(len(along))
     return [
@@ -107,5 +107,6 @@ def _over_states(load, result, shown):
     ]
 
 
-def _floats(array):
+def floats(array):
+    """An array as text, which the script of the file reads."""
     return base64.b64encode(np.ascontiguousarray(array, "<f4").tobytes()).decode()

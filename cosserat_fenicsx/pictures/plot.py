@@ -40,6 +40,8 @@ from cosserat_fenicsx.ranks import communicator, on_first
 _VISIBLE = 0.01
 # Letters per line of the title; width and height of a picture, pixels; height of a line over that of its letters.
 _TITLE_WIDTH, _WINDOW, _LINE = 60, (1400, 1000), 1.3
+# Least lower and upper end of the colour bar, with its title, as shares of the height.
+_BAR = (0.25, 0.75)
 # Least and largest height of a picture, pixels.
 _HEIGHTS = 740, 1000
 # Height that labels above a drawing have, over that of letters.
@@ -207,6 +209,10 @@ def _finish(plotter, pyvista, everywhere, symbols, lines, title, label, most=6):
     if labels.left_out:
         left_out = f"(no room for {len(labels.left_out)} labels: "
         lettered.append(f"{left_out}{textwrap.shorten(', '.join(labels.left_out), _TITLE_WIDTH - len(left_out) - 1)})")
+    for bar in plotter.scalar_bars.values():  # above the key
+        low = max(_BAR[0], _LINE * font * (len(symbols.groups) + 0.7) / view.window[1])
+        bar.SetPosition(bar.GetPosition()[0], low)
+        bar.SetHeight(_BAR[1] - low)
     for i, (words, colour) in enumerate(reversed(symbols.groups.items())):
         place = 0.79 * view.window[0], _LINE * font * (i + 0.2)
         plotter.add_text(words, position=place, color=colour, font_size=font / 2)

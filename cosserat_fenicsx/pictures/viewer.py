@@ -1,6 +1,5 @@
 """A result as one interactive file: HTML that needs no library and no network, drawn by the browser's WebGL 2."""
 
-import base64
 import html
 import json
 import math
@@ -14,7 +13,7 @@ from cosserat_fenicsx.new_files import replaced
 from cosserat_fenicsx.pictures.colours import MAPS, known, peak_of, seen
 from cosserat_fenicsx.pictures.default_colour import default_colour
 from cosserat_fenicsx.pictures.drawing import at_rest, outlines, thickening, thicker
-from cosserat_fenicsx.pictures.page_signs import signs
+from cosserat_fenicsx.pictures.page_signs import floats, signs
 from cosserat_fenicsx.pictures.signs import Deformed, span_of
 from cosserat_fenicsx.pictures.view import axes_of, view_of
 
@@ -135,9 +134,9 @@ class _Shapes:
             "nodes": states.shape[1],
             "texels": states.shape[2] // 4,
             "corners": self._outlines.shape[1],
-            "outline": _floats(factor / size * self._outlines),
-            "rest": _floats((self.rest - middle) / size),
-            "states": _floats(states),
+            "outline": floats(factor / size * self._outlines),
+            "rest": floats((self.rest - middle) / size),
+            "states": floats(states),
         }
 
 
@@ -150,10 +149,6 @@ def _choices(largest, extent, start):
             if 1 < factor and 1e-12 * extent < largest and factor * largest <= extent:
                 found.add(float(f"{factor:.0e}"))
     return sorted(found)
-
-
-def _floats(array):
-    return base64.b64encode(np.ascontiguousarray(array, "<f4").tobytes()).decode()
 
 
 def _along(result, shown):

@@ -122,6 +122,11 @@ class Signs {
       return;
     }
     if (kind == "mass") return solids.ball(place, Math.max(.3 * a, 2 * radius));
+    if (kind == "turning spring") {
+      const spiral = [...Array(61).keys()].map((k) => [radius + .2 * a * k / 15, Math.PI * k / 12]);
+      const points = spiral.map(([r, angle]) => plus(plus(place, this.data.right, r * Math.cos(angle)), this.data.up, r * Math.sin(angle)));
+      return points.slice(1).forEach((point, i) => solids.tube(points[i], point, .05 * a));
+    }
     const down = this.below(sign, tangent, inwards);
     if (kind == "pin" || kind == "hinge" || kind == "roller") {
       const top = plus(place, down, inwards && dot(down, inwards) < -1e-6 ? 0 : .7 * radius), foot = plus(top, down, .75 * a);
