@@ -96,7 +96,9 @@ def test_the_file_holds_supports_and_loads():
     line = floats(signs["line force"]["vectors"]).reshape(3, -1, 3)
     weight = 9.81 * 7850 * np.pi * 0.05**2 / 4
     np.testing.assert_allclose(line[:, :, 2].T, [[0, -1 / weight, -2 / weight]] * line.shape[1], rtol=1e-6)
-    assert data["notes"][-1].startswith("not drawn: Foundation")
+    *_, small, undrawn = data["notes"]
+    assert undrawn.startswith("not drawn: Foundation")
+    assert small.startswith(f"displacements are at most {path.largest_displacement().max():.2g} m")
     moved = 50 * 2**3 / 3 / rod.stiffness.bending[0]
     assert data["magnify"]["start"] == 1 and max(data["magnify"]["choices"]) * moved < 2 * 2
     rest = floats(data["rods"][0]["rest"]).reshape(-1, 3)

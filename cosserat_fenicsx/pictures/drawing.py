@@ -26,6 +26,8 @@ _PANEL_LETTERS = 24
 _TICKS = 6
 # Maximum digits after the point; smaller numbers are written with a power of ten.
 _MOST_DIGITS = 3
+#: Smallest visible displacement as a share of the extent of the drawing.
+VISIBLE = 0.01
 _WALL = "peru"
 # Minimum drawn radius over the extent of the drawing; the picture says which rods are enlarged.
 _SMALLEST_RADIUS = 1 / 120

@@ -14,6 +14,7 @@ from cosserat_fenicsx.pictures.charts import asked
 from cosserat_fenicsx.pictures.colours import colour_of, known, peak_of, seen
 from cosserat_fenicsx.pictures.default_colour import default_colour
 from cosserat_fenicsx.pictures.drawing import (
+    VISIBLE,
     add_bodies,
     add_lines,
     add_tubes,
@@ -36,8 +37,6 @@ from cosserat_fenicsx.pictures.view import Labels, plain, view_of
 from cosserat_fenicsx.quantities import Units
 from cosserat_fenicsx.ranks import communicator, on_first
 
-# Smallest visible displacement as a share of the extent of the drawing.
-_VISIBLE = 0.01
 # Letters per line of the title; width and height of a picture, pixels; height of a line over that of its letters.
 _TITLE_WIDTH, _WINDOW, _LINE = 60, (1400, 1000), 1.3
 # Least lower and upper end of the colour bar, with its title, as shares of the height.
@@ -222,7 +221,7 @@ def _finish(plotter, pyvista, everywhere, symbols, lines, title, label, most=6):
 def _small(path, shown, size, magnify):
     """A note where displacements are too small to be seen, with a factor that shows them; else empty."""
     largest = path.largest_displacement()[shown].max()
-    if magnify * largest > _VISIBLE * size or largest < 1e-12 * size:
+    if magnify * largest > VISIBLE * size or largest < 1e-12 * size:
         return ""
     decade = 10.0 ** math.floor(math.log10(0.1 * size / largest))
     return f"displacements are at most {largest:.2g} m, magnify={decade:g} (--magnify {decade:g}) shows them"

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from cosserat_fenicsx.new_files import replaced
 from cosserat_fenicsx.pictures.colours import MAPS, known, peak_of, seen
 from cosserat_fenicsx.pictures.default_colour import default_colour
-from cosserat_fenicsx.pictures.drawing import at_rest, outlines, thickening, thicker
+from cosserat_fenicsx.pictures.drawing import VISIBLE, at_rest, outlines, thickening, thicker
 from cosserat_fenicsx.pictures.page_signs import floats, signs
 from cosserat_fenicsx.pictures.signs import Deformed, span_of
 from cosserat_fenicsx.pictures.view import axes_of, view_of
@@ -81,7 +81,7 @@ def _data(result, magnify):
     largest = float(max(np.linalg.norm(shape.positions - shape.rest, axis=-1).max() for shape in shapes))
     return {
         "title": _title(result),
-        "notes": _notes(result, shown, factors) + undrawn,
+        "notes": _notes(result, shown, factors) + _small(largest, extent) + undrawn,
         "magnify": {"start": magnify, "choices": _choices(largest, extent, magnify)},
         "axis": _along(result, shown),
         "axes": [
@@ -138,6 +138,12 @@ class _Shapes:
             "rest": floats((self.rest - middle) / size),
             "states": floats(states),
         }
+
+
+def _small(largest, extent):
+    """A note where displacements are too small to be seen."""
+    small = 1e-12 * extent < largest < VISIBLE * extent
+    return [f"displacements are at most {largest:.2g} m, a factor of them shows them"] if small else []
 
 
 def _choices(largest, extent, start):
