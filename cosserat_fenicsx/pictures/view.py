@@ -146,21 +146,6 @@ class Labels:
         """Keep labels that come later off these lines (n, 3), m, too, where possible."""
         self._covered |= _cells_of([self._view.pixels(_dense(line)) for line in lines], self._view.window)
 
-    def evenly(self, texts, *, size, away):
-        """Labels of the ticks of an axis, every n-th of them, such that as many as possible have room.
-
-        Args:
-            texts: [(text, point (3,), m)] in the order of the ticks. away: as of `fix`.
-        """
-        boxes, best = [_box(text, self._view.pixels(point) + away, size) for text, point in texts], []
-        for n, first in ((n, first) for n in range(1, len(texts) + 1) for first in range(n)):
-            some = range(first, len(texts), n)
-            apart = not any(_overlap(boxes[i], boxes[j]) for i, j in itertools.pairwise(some))
-            kept = [i for i in some if self._free(boxes[i])] if apart else []
-            best = max(best, kept, key=len)  # the first of equal ones
-        for i in best:
-            self._keep(*texts[i], boxes[i], size, "black")
-
     def reserve(self, low, high):
         """Keep a rectangle free of labels: its lower left and upper right corners, pixels."""
         self._placed.append((*low, *high))
@@ -187,6 +172,21 @@ class Labels:
                 return True
         self.left_out.append(text)
         return False
+
+    def evenly(self, texts, *, size, away):
+        """Labels of the ticks of an axis, every n-th of them, such that as many as possible have room.
+
+        Args:
+            texts: [(text, point (3,), m)] in the order of the ticks. away: as of `fix`.
+        """
+        boxes, best = [_box(text, self._view.pixels(point) + away, size) for text, point in texts], []
+        for n, first in ((n, first) for n in range(1, len(texts) + 1) for first in range(n)):
+            some = range(first, len(texts), n)
+            apart = not any(_overlap(boxes[i], boxes[j]) for i, j in itertools.pairwise(some))
+            kept = [i for i in some if self._free(boxes[i])] if apart else []
+            best = max(best, kept, key=len)  # the first of equal ones
+        for i in best:
+            self._keep(*texts[i], boxes[i], size, "black")
 
     @property
     def boxes(self):
