@@ -159,19 +159,25 @@ class Labels:
         anchor, wish = self._view.pixels(point), np.array([towards @ self._view.right, towards @ self._view.above])
         wish = wish / np.linalg.norm(wish) if np.linalg.norm(wish) > 1e-6 else np.array([0.0, 1.0])
         half = np.array([_LETTER * len(text), _LINE]) * size / 2
-        for strict, distance, turn in itertools.product((True, False), _DISTANCES, np.deg2rad(_TURNS)):
+        best, least = None, np.inf
+        for distance, turn in itertools.product(_DISTANCES, np.deg2rad(_TURNS)):
             cos, sin = np.cos(turn), np.sin(turn)
             way = np.array([cos * wish[0] - sin * wish[1], sin * wish[0] + cos * wish[1]])
             # the label's edge is at the distance, not its middle
             reach = min(h / max(abs(w), 1e-9) for h, w in zip(half, way, strict=True))
             box = _box(text, anchor + (distance + reach) * way, size)
-            if self._free(box) and (not strict or self._clear(box)):
-                self._keep(text, point, box, size, colour)
-                if distance > _LEADER:
-                    self._leaders.append([point, point + self._view.offset(*((distance - _GAP) * way))])
-                return True
-        self.left_out.append(text)
-        return False
+            if self._free(box) and (covered := self._covers(box)) < least:
+                best, least = (box, distance, way), covered
+            if least == 0:
+                break
+        if best is None:
+            self.left_out.append(text)
+            return False
+        box, distance, way = best
+        self._keep(text, point, box, size, colour)
+        if distance > _LEADER:
+            self._leaders.append([point, point + self._view.offset(*((distance - _GAP) * way))])
+        return True
 
     def evenly(self, texts, *, size, away):
         """Labels of the ticks of an axis, every n-th of them, such that as many as possible have room.
@@ -219,11 +225,11 @@ class Labels:
             return False
         return not any(_overlap(box, other) for other in self._placed)
 
-    def _clear(self, box):
-        """Whether a rectangle lies off all rods."""
+    def _covers(self, box):
+        """How much of the lines a rectangle covers: a number of cells."""
         low = np.maximum(np.array(box[:2]) - _CLEAR, 0) // _CELL
         high = np.maximum(np.array(box[2:]) + _CLEAR, 0) // _CELL
-        return not self._covered[int(low[0]) : int(high[0]) + 1, int(low[1]) : int(high[1]) + 1].any()
+        return int(self._covered[int(low[0]) : int(high[0]) + 1, int(low[1]) : int(high[1]) + 1].sum())
 
 
 def _overlap(box, other):
