@@ -4,10 +4,10 @@ from collections import namedtuple
 from functools import partial
 
 import numpy as np
-from two_widths import draw_both
 
 from cosserat_fenicsx.pictures.charts import draw_chart, draw_energies, empty_figure, legend, room_for
 from cosserat_fenicsx.pictures.motion_charts import energies_of
+from cosserat_fenicsx.pictures.two_widths import draw_both
 
 #: The first panel: axes ("xy", "xz" or "xyz"), the station whose track is drawn, the last time (s) or None, and whether
 #: the axes have different scales.
@@ -26,7 +26,7 @@ def draw(history, file, shapes, curve):
         file: a .png.
         shapes: see `Shapes`; curve: see `Curve`.
     """
-    draw_both(partial(draw_chart, lambda: figure_of(history, shapes, curve)), file)
+    draw_both(partial(draw_chart, lambda: figure_of(history, shapes, curve)), file, history.comm)
 
 
 def figure_of(history, shapes, curve):

@@ -13,10 +13,10 @@ from pathlib import Path
 import numpy as np
 from known_numbers import Check, chosen, report, verdict
 from mpi4py import MPI
-from two_widths import draw_both
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.drilling.torsion import TorsionWaves
+from cosserat_fenicsx.pictures.two_widths import draw_both
 from cosserat_fenicsx.progress import Progress
 
 SCENES = Path(__file__).parent / "strings"
@@ -121,12 +121,12 @@ def run(demo, out="out/strings"):
     history = found.run()
     if folder is not None:
         folder.mkdir(parents=True, exist_ok=True)
-        draw_both(history.plot, folder / "drilling.png")
+        draw_both(history.plot, folder / "drilling.png", MPI.COMM_WORLD)
         if len(history.depths) > 10:
-            draw_both(history.plot_map, folder / "map.png")
-        draw_both(history.plot_energy, folder / "energy.png")
+            draw_both(history.plot_map, folder / "map.png", MPI.COMM_WORLD)
+        draw_both(history.plot_energy, folder / "energy.png", MPI.COMM_WORLD)
         if history.bit_speed.any():
-            draw_both(history.plot_phase, folder / "phase.png")
+            draw_both(history.plot_phase, folder / "phase.png", MPI.COMM_WORLD)
     return history.model, list(demo(found, history, folder))
 
 

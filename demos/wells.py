@@ -18,9 +18,9 @@ from known_numbers import Check, chosen, report, verdict
 from mpi4py import MPI
 from scipy.integrate import trapezoid
 from stiff_and_soft import stiff_and_soft
-from two_widths import draw_both
 
 import cosserat_fenicsx as cf
+from cosserat_fenicsx.pictures.two_widths import draw_both
 from cosserat_fenicsx.progress import Progress
 
 SCENES = Path(__file__).parent / "wells"
@@ -73,7 +73,7 @@ def assembly(scene, answers, sweep, folder):
     yield Check("tilt of the bit (degrees)", tilt, 0.0746971, 2e-6, source)
     yield Check("collars lie from (m above bit)", answer.depth - tangency[0], 23.07817, 2e-3, source)
     if folder is not None:
-        draw_both(partial(answer.plot_from_side, length=40.0), folder / "assembly.png")
+        draw_both(partial(answer.plot_from_side, length=40.0), folder / "assembly.png", MPI.COMM_WORLD)
 
 
 def helix(scene, answers, sweep, folder):
@@ -127,10 +127,10 @@ def run(demo, out="out/wells"):
     if folder is not None:
         for answer in answers:
             name = answer.operation.name.replace(" ", "_")
-            draw_both(answer.plot, folder / f"{name}.png")
+            draw_both(answer.plot, folder / f"{name}.png", MPI.COMM_WORLD)
             answer.plot_3d(folder / f"{name}_3d.png")
         if sweep is not None:
-            draw_both(sweep.plot, folder / "depth_sweep.png")
+            draw_both(sweep.plot, folder / "depth_sweep.png", MPI.COMM_WORLD)
     return answers[-1].model, list(demo(scene, answers, sweep, folder))
 
 

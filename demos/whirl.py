@@ -18,10 +18,10 @@ import numpy as np
 from known_numbers import Check, report, verdict
 from mpi4py import MPI
 from scipy.integrate import solve_ivp
-from two_widths import draw_both
 from whirling_collar import ARM, CLEARANCE, DRAG, EI, LENGTH, MESH, MUD_MASS, OFFSET, STEEL_MASS, spun_up
 
 import cosserat_fenicsx as cf
+from cosserat_fenicsx.pictures.two_widths import draw_both
 
 #: Drive, friction of the wall, and duration of the run-up and of the whole.
 SPEED, FRICTION, RUN_UP, DURATION = 130 * cf.units.rpm, 0.5, 6.0, 11.0
@@ -84,7 +84,9 @@ def main(out="out/whirl", film=False, duration=DURATION):
         print(late)
     if out is not None:
         for name in ("orbit", "whirl", "campbell"):
-            draw_both(partial(getattr(history, f"plot_{name}"), middle, wall), Path(out) / f"{name}.png")
+            draw_both(
+                partial(getattr(history, f"plot_{name}"), middle, wall), Path(out) / f"{name}.png", MPI.COMM_WORLD
+            )
         if film:
             turned = np.flatnonzero((history.times > 6.0) & (history.times < 8.2))
             history.at_points(turned).animate(Path(out) / "whirl.gif", enlarge=60, speed=0.2, fps=15)

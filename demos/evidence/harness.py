@@ -13,8 +13,6 @@ from pathlib import Path
 
 import numpy as np
 
-sys.path.append(str(Path(__file__).resolve().parents[1]))  # what all demos share
-
 from cosserat_fenicsx import compat
 from cosserat_fenicsx.ranks import launched
 

@@ -7,22 +7,19 @@
 
 A table replaces what stands between <!-- name --> and <!-- /name --> in a page of docs/; one that is too long for that
 has a page of its own in docs/tables/. Pictures are cut to what is drawn, reduced to few colours and put in
-docs/pictures/, those for pages of 400 pixels, which demos write beside them (demos/two_widths.py), in its folder narrow/.
+docs/pictures/, those for pages of 400 pixels, which demos write beside them (pictures/two_widths.py), in its folder narrow/.
 """
 
 import argparse
 import re
-import sys
 from pathlib import Path
 
 import numpy as np
 from PIL import Image
 
+from cosserat_fenicsx.pictures.two_widths import narrow
+
 ROOT = Path(__file__).resolve().parents[2]
-sys.path.append(str(ROOT / "demos"))
-
-from two_widths import narrow  # noqa: E402
-
 #: The tables that stand in a page, each with its page and pictures.
 PAGES = {
     "accuracy": ("evidence/accuracy.md",),

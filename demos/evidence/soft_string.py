@@ -18,10 +18,10 @@ import numpy as np
 from harness import command, in_words, table, timed, write
 from peers.environments import Missing
 from peers.process import Peer
-from two_widths import draw_both
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.pictures.charts import beside, draw_chart, legend
+from cosserat_fenicsx.pictures.two_widths import draw_both
 
 SCENES = Path(__file__).resolve().parents[1] / "wells"
 #: Hook loads out and in, N, by a differential equation at 1e-13.

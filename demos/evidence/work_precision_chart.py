@@ -1,6 +1,7 @@
 """The charts of speed against accuracy, one per problem, and one of waiting times."""
 
 import statistics
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +10,7 @@ from peers.problems import TITLES
 from work_precision_table import answered, median
 
 from cosserat_fenicsx.pictures.charts import SMALL, draw_chart, empty_figure, legend
+from cosserat_fenicsx.pictures.two_widths import draw_both
 
 #: (problem, file, subtitle, whether only the spatial model of this package is shown).
 _VIEWS = (
@@ -38,10 +40,10 @@ def draw(found, rows, out, stem):
             silent = sorted({r["peer"] for r in rows if r["problem"] == problem} - {r["peer"] for r in here})
             absent = f"; no answer from {', '.join(silent)}" if silent else ""
             title = f"{TITLES[problem]}\n{subtitle}{absent}"
-            draw_chart(lambda: _chart(here, title, problem), Path(out) / names[-1])  # noqa: B023 called at once
+            draw_both(partial(draw_chart, partial(_chart, here, title, problem)), Path(out) / names[-1])
     if any(row["wall"] for row in found.waits):
         names.append(f"{stem}_waiting.png")
-        draw_chart(lambda: _bars(found.waits), Path(out) / names[-1])
+        draw_both(partial(draw_chart, lambda: _bars(found.waits)), Path(out) / names[-1])
     return names
 
 
@@ -116,14 +118,12 @@ def _chart(rows, title, problem):
         else "of the tip's position, over its displacement"
     )
     most = ", largest over the load factors" if problem == "sweep" or problem.startswith("roll-up") else ""
-    axes.set_xlabel(f"relative error {measured}{most} (-)")
+    note = "small dots: every mesh, degree and formulation measured; lines: the best of each; dashed: peers in space"
+    axes.set_xlabel(f"relative error {measured}{most} (-)\n{note}")
     axes.set_ylabel("processor time of one warm answer, one thread")
     figure.suptitle(title)
     axes.annotate("better: faster,\nmore accurate", (0.015, 0.02), (0.09, 0.10), xycoords="axes fraction",
                   textcoords="axes fraction", arrowprops={"arrowstyle": "->"})  # fmt: skip
-    axes.text(0.99, 0.01, "small dots: every mesh, degree and formulation measured; lines: the best of each; dashed: "
-                          "peers in space", fontsize=SMALL,
-              transform=axes.transAxes, ha="right", color="0.3")  # fmt: skip
     legend(axes)
     return figure
 

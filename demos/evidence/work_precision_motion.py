@@ -9,6 +9,7 @@ Writes to out/: work_precision_motion.json (every sample), .md (the table), .png
 (peers/motions.py).
 """
 
+from functools import partial
 from pathlib import Path
 
 from harness import HEADS, command, in_words, judged, table
@@ -20,6 +21,7 @@ from work_precision_chart import in_time, plot
 from work_precision_table import answered, at_accuracies, cheapest, median, milliseconds
 
 from cosserat_fenicsx.pictures.charts import SMALL, beside, draw_chart, legend
+from cosserat_fenicsx.pictures.two_widths import draw_both
 
 PANEL = Panel(
     motions.PEERS, motions.problems, motions.error, motions.configurations, motions.kind, motions.model, 1, False
@@ -99,7 +101,7 @@ def _groups(rows):
 
 def draw(rows):
     """The chart, one panel per problem."""
-    figure, panels, _ = beside([6.3] * len(motions.TITLES), 6.2)
+    figure, panels, _ = beside([5.0] * len(motions.TITLES), 6.2)
     for axes, (problem, title) in zip(panels, motions.TITLES.items(), strict=True):
         for name, members in _groups(answered(rows, problem)).items():
             ours, kind = members[0]["peer"] == OWN, members[0]["kind"]
@@ -121,11 +123,10 @@ def draw(rows):
             axes.text(ASKED_AT, 0.985, words, va="top", ha="right", fontsize=SMALL,
                       transform=axes.get_xaxis_transform())  # fmt: skip
         in_time(axes)
-        axes.set_xlabel(f"{title}: error of the ends' positions, over a rod's length (-)")
+        note = "small dots: every mesh and step measured; lines: the best of each"
+        axes.set_xlabel(f"{title}: error of the ends' positions, over a rod's length (-)\n{note}")
     panels[0].set_ylabel("processor time of one warm answer, one thread")
     panels[0].yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
-    panels[0].text(0.01, 0.01, "small dots: every mesh and step measured; lines: the best of each", fontsize=SMALL,
-                   transform=panels[0].transAxes, color="0.3")  # fmt: skip
     legend(*panels)
     return figure
 
@@ -149,7 +150,7 @@ def main(out="out", quick=False, fresh=False, peers=motions.PEERS, wanted=None):
     rows = run(found, peers, budgets, quick=quick, wanted=wanted, limits=limits)
     told = text(found, rows)
     (out / f"{stem}.md").write_text(told + "\n", encoding="utf-8")
-    draw_chart(lambda: draw(rows), out / f"{stem}.png")
+    draw_both(partial(draw_chart, lambda: draw(rows)), out / f"{stem}.png")
     print(f"{told}\n\nwritten: {found.file}, {stem}.md, {stem}.png")
     return found
 

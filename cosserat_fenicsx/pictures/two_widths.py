@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from mpi4py import MPI
+from cosserat_fenicsx.ranks import Alone, on_first
 
 #: Width that a chart is drawn for, pixels, and how many pixels of the file are one of these.
 WIDE, NARROW = (760, 1.5), (400, 2.0)
@@ -16,15 +16,19 @@ def narrow(file):
     return file.with_name(f"{file.stem}{SUFFIX}{file.suffix}")
 
 
-def draw_both(plot, file):
-    """Write a chart for wide pages, and that for narrow ones beside it, see `narrow`; rank 0 writes.
+def draw_both(plot, file, comm=Alone):
+    """Write a chart for wide pages, and that for narrow ones beside it, see `narrow`.
 
     Args:
         plot: returns the Figure for a `width` in pixels, such as `DrillingHistory.plot`.
-        file: .png.
+        file: .png. comm: of the ranks that draw it, of which the first writes.
     """
-    for name, (width, pixels) in ((Path(file), WIDE), (narrow(file), NARROW)):
-        figure = plot(width=width)
-        if MPI.COMM_WORLD.rank == 0:
+    drawn = [(Path(file), *WIDE), (narrow(file), *NARROW)]
+    figures = [(name, plot(width=width), pixels) for name, width, pixels in drawn]
+
+    def write():
+        for name, figure, pixels in figures:
             name.parent.mkdir(parents=True, exist_ok=True)
             figure.savefig(name, dpi=pixels * figure.dpi)
+
+    on_first(comm, write)
