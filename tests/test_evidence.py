@@ -189,7 +189,13 @@ def test_tables_and_pictures_are_put_into_the_documentation(tmp_path):
     image[100:200, 150:250] = 0
     Image.fromarray(image).save(out / "figure3.png")
     Image.fromarray(image[::-1]).save(out / "figure3_narrow.png")
-    put_in_docs.main(["figure3", "failures", "orders"], out, docs)
+    (out / "benchmarks").mkdir()
+    Image.fromarray(image.repeat(8, axis=1)).save(out / "benchmarks" / "bend.png")
+    (docs / "benchmarks.md").write_text("<!-- benchmarks -->\n<!-- /benchmarks -->\n", encoding="utf-8")
+    (out / "benchmarks.md").write_text("![bend](benchmarks/bend.png)\n", encoding="utf-8")
+    put_in_docs.main(["figure3", "failures", "orders", "benchmarks"], out, docs)
+    assert "![bend](pictures/benchmarks/bend.png)" in (docs / "benchmarks.md").read_text(encoding="utf-8")
+    assert Image.open(docs / "pictures" / "benchmarks" / "bend.png").width == 600
     page = (docs / "evidence" / "figure3.md").read_text(encoding="utf-8")
     assert page == "before\n<!-- figure3 -->\n| figure3 |\n<!-- /figure3 -->\nafter\n"
     assert "# Where methods fail" in (docs / "tables" / "failures.md").read_text(encoding="utf-8")

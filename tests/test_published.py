@@ -1,5 +1,7 @@
 """Published problems (demos/benchmarks): each is solved and agrees with its printed numbers; the tables have no blank."""
 
+import importlib.util
+import json
 import re
 import sys
 from pathlib import Path
@@ -49,3 +51,33 @@ def test_every_problem_says_where_it_comes_from():
         assert min(map(len, (problem.title, problem.given, problem.source))) > 10, problem.name
     page = (manual.HERE.parents[1] / "docs" / "benchmarks.md").read_text(encoding="utf-8")
     assert "<!-- benchmarks -->" in page
+
+
+def test_a_run_that_is_broken_off_goes_on(tmp_path, monkeypatch, capsys):
+    spec = importlib.util.spec_from_file_location("published_command", manual.HERE / "__main__.py")
+    command = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(command)
+    row = {
+        "quantity": "length, m",
+        "published": 1.0,
+        "ours": 1.5,
+        "estimate": 0.0,
+        "allowed": 0.1,
+        "because": "no reason",
+    }
+    found, asked = {"seconds": 0.25, "rows": [row | {"difference": 0.5, "agrees": False}]}, []
+
+    def broken(problem, picture):
+        asked.append(problem.name)
+        if len(asked) == 3:
+            raise KeyboardInterrupt
+        return found
+
+    monkeypatch.setattr(command, "solved", broken)
+    with pytest.raises(KeyboardInterrupt):
+        command.main(out=tmp_path)
+    assert len(json.loads((tmp_path / "benchmarks.json").read_text(encoding="utf-8"))["problems"]) == 2
+    results = command.main(out=tmp_path)
+    assert "goes on from" in capsys.readouterr().err and asked == [*list(PROBLEMS)[:3], *list(PROBLEMS)[2:]]
+    assert list(results) == list(PROBLEMS)
+    assert "**disagrees**" in (tmp_path / "benchmarks.md").read_text(encoding="utf-8")

@@ -122,6 +122,8 @@ def cells(problems, results):
 
 def _shown(x, sure):
     """A number with the digits that are sure."""
-    if x == 0 or sure <= 0:
+    if abs(x) < sure / 10:
+        return "0"
+    if sure <= 0:
         return f"{x:.{_MOST}g}"
     return f"{x:.{min(max(math.ceil(math.log10(abs(x) / sure)), _FEWEST), _MOST)}g}"

@@ -3,7 +3,6 @@
 import math
 
 import numpy as np
-from curves import curve
 from gallery import SCENES, cable
 from problem import Row, problem
 from scipy.special import ellipk
@@ -139,7 +138,7 @@ def channel_strut():
         Row("largest and least stress, psi", np.array([1803.63, -2394.53]), stresses,
             path.errors.moment[0] * bent * np.array([b - centre, centre]), 2.0, "secant formula; centroid 0.6465 in"),
     ]  # fmt: skip
-    return rows, path.plot
+    return rows, lambda file: path.plot(file, magnify=50)
 
 
 @problem(
@@ -155,14 +154,14 @@ def heavy_cantilever():
     path = cf.solve(held(rod, cf.Weight((0, 0, -9.80665))), [1.0])
     sag = -path.displacement(rod.end)[0, 2]
     rows = [Row("deflection of the tip, m", 0.12258, sag, moved(path, 0), 2.5e-5, "linear theory, about 1e-4 high")]
-    return rows, path.plot
+    return rows, lambda file: path.plot(file, magnify=10)
 
 
 @problem(
     "Cable of 103 m over 100 m",
     "statics",
     "H. M. Irvine, Cable Structures (1981): elastic catenary",
-    "as in demos/cable.toml: steel rope with its bending stiffness, pinned at both ends, under its weight",
+    "as in demos/cable.toml: steel rope with its bending stiffness, pinned between two points, under its weight",
     "The catenary has no bending stiffness; that of the rope lifts the middle by about EI w/H^2.",
 )
 def hanging_cable():
@@ -239,5 +238,4 @@ def buckled_bar():
             1e-3, "loads by elliptic integrals; tol = 1e-6"),
         Row("load over Euler's, at these angles", printed, loads, 0.0, 1.4e-3, "last digit printed, low"),
     ]  # fmt: skip
-    lines = {"here": (np.abs(tip[:, 0]), loads), "printed": (y, printed)}
-    return rows, lambda file: curve(file, lines, "deflection of the tip (m)", "load over Euler's load (1)")
+    return rows, lambda file: path.plot(file, [0, 1, 3, 5, 7, 8])
