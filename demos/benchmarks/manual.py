@@ -126,4 +126,4 @@ def _shown(x, sure):
         return "0"
     if sure <= 0:
         return f"{x:.{_MOST}g}"
-    return f"{x:.{min(max(math.ceil(math.log10(abs(x) / sure)), _FEWEST), _MOST)}g}"
+    return f"{x:#.{min(max(math.ceil(math.log10(abs(x) / sure)), _FEWEST), _MOST)}g}".rstrip(".")

@@ -1,6 +1,7 @@
 """Published problems of stability: columns, frames, strips, and rods under torque."""
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 from curves import curve
@@ -10,6 +11,9 @@ from scipy.optimize import brentq
 from statics import RIGID, held
 
 import cosserat_fenicsx as cf
+from cosserat_fenicsx.parts import ForcePerLength
+from cosserat_fenicsx.scene.action import vector
+from cosserat_fenicsx.scene.rod import RodOrName
 
 UPRIGHT = cf.Line((0, 0, 0), (0, 0, 1.0), d1=(1, 0, 0))
 TIMOSHENKO = "S. P. Timoshenko & J. M. Gere, Theory of Elastic Stability (2nd ed., 1961)"
@@ -293,4 +297,61 @@ def column_in_a_bed():
     rows = [
         critical(f"P, N, {name}", exact[k], found, 1e-5, "tol = 1e-5", k) for k, name in enumerate(("first", "second"))
     ]
+    return rows, mode_of(found)
+
+
+@dataclass(frozen=True)
+class FluidPressure(cf.LineAction):
+    """The pressure of a fluid outside, of a rod that is an arc about z: a force per length that stays normal to it."""
+
+    rod: RodOrName
+    pressure: ForcePerLength
+
+    follows = True
+
+    def data(self, rod, s):
+        return (vector(self.pressure * np.cross([0, 0, 1.0], rod.curve.frame(s)[:, :, 2]), "N/m"),)
+
+    @staticmethod
+    def work(point, test, f):
+        import ufl
+
+        return ufl.dot(point.R * f, test.phi_r)
+
+
+@problem(
+    "Ring and arches under the pressure of a fluid",
+    "stability",
+    f"M. Levy 1884: p R^3/EI = 3; {TIMOSHENKO}, section 7.6: pi^2/a^2 - 1 for hinged arches of half angle a, k^2 - 1 with k "
+    "tan a cot(k a) = 1 for clamped ones",
+    "R = 1 m, EI = 1 N m^2, inextensible, in its plane; arches with a = 60 degrees",
+    "The pressure follows the rod. On the ring and between fixed ends it has a potential, but the package makes no use of "
+    "that: events of the path are located with the unsymmetric tangent.",
+)
+def fluid_pressure():
+    section, axis, rows, a = cf.Stiffness(**RIGID, bending=(1.0, 100.0), torsion=100.0), (0, 0, 1), [], math.pi / 3
+
+    def arc(start, angle, name):
+        point = (math.cos(start), math.sin(start), 0)
+        return cf.Rod(cf.Arc((0, 0, 0), point, angle, axis, d1=axis), section, name=name)
+
+    one, two = halves = arc(0.0, math.pi, "one"), arc(math.pi, math.pi, "two")
+    rod = arc(math.pi / 2 - a, 2 * a, "arch")
+    k = brentq(lambda k: math.tan(a) * math.cos(k * a) - math.sin(k * a) / k, 3.5, 5.5)
+    joints = [cf.Joint(one.end, two.start), cf.Joint(two.end, one.start)]
+    for name, rods, supports, joined, exact in (
+        ("ring", halves, [cf.Hinge(one.start, axis), cf.Roller(one.end, (0, 1, 0))], joints, 3.0),
+        ("hinged arch", [rod], [cf.Hinge(rod.start, axis), cf.Hinge(rod.end, axis)], [], (math.pi / a) ** 2 - 1),
+        ("clamped arch", [rod], [cf.Clamp(rod.start), cf.Clamp(rod.end)], [], k**2 - 1),
+    ):
+        scene = cf.Scene(rods, supports, [FluidPressure(x, 1.0) for x in rods], joined)
+        rough, ours = (
+            cf.solve(scene, (0.0, 1.1 * exact), model="spatial", elements=n).events[0].load_factor for n in (8, 12)
+        )
+        rows.append(
+            Row(f"p R^3/EI, {name}", exact, ours, abs(ours - rough) + 1e-6 * ours, 2e-6 * exact, "located to 1e-6")
+        )
+        if len(rods) == 2:
+            found = cf.buckling(scene, tol=1e-4)
+            rows.append(critical("p R^3/EI, ring, linear", exact, found, 1e-4, "tol = 1e-4"))
     return rows, mode_of(found)
