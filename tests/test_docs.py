@@ -1,5 +1,6 @@
 """The documentation: its links lead somewhere, its programs run, its scenes are read, its site builds."""
 
+import json
 import re
 from pathlib import Path
 

@@ -23,7 +23,8 @@ class Frame:
     """Straight rods between points, which `frame` and `frame_from` make.
 
     Attributes:
-        points: (n, 3) m. edges: (rods, 2) numbers of the points at the start and at the end of each rod.
+        points: (n, 3) m.
+        edges: (rods, 2) numbers of the points at the start and at the end of each rod.
         rods: the rods, "rod0", "rod1" and so on where they have no other names.
         joints: of the rods that meet at a point, each to the first one there.
         supports: a `Clamp` at each clamped point.
@@ -102,11 +103,13 @@ def frame(
     """Straight rods between points, welded where they meet.
 
     Args:
-        points: (n, 3) m. edges: (rods, 2) numbers of the points that each rod connects, from 0.
-        section, material: of all rods; or one for every edge. Without a material sections are `Stiffness`es.
+        points: (n, 3) m.
+        edges: (rods, 2) numbers of the points that each rod connects, from 0.
+        section, material: of all rods; or one for every edge. Without a material each section is a `Stiffness`.
         clamped: numbers of points that are clamped.
         hinged: numbers of points at which rods meet in ball joints.
-        d1: see `Line`, of all rods. names: of the rods.
+        d1: see `Line`, of all rods.
+        names: of the rods.
 
     Returns:
         A `Frame`; `frame.scene(loads)` is what `solve`, `buckling` and `modes` take.
