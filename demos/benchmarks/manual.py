@@ -25,7 +25,7 @@ CHAPTERS = {
     "wells": "Strings in wells",
     "drilling": "Drill-strings in motion",
 }
-HEADS = "problem | quantity | published | ours | our estimate | difference | allowed, and why | s"
+HEADS = "problem: quantity | published | ours | our estimate | difference | allowed, and why | s"
 #: Significant digits that are shown at least and at most.
 _FEWEST, _MOST = 4, 14
 
@@ -109,8 +109,7 @@ def cells(problems, results):
             )
             worst = np.argmax(np.abs(ours - published) / allowed)
             yield (
-                problems[name].title if k == 0 else '"',
-                row["quantity"].replace("|", "/"),
+                (f"**{problems[name].title}**: " if k == 0 else "") + row["quantity"].replace("|", "/"),
                 ", ".join(f"{x:.12g}" for x in published),
                 ", ".join(map(_shown, ours, np.maximum(estimate, allowed / 100))),
                 f"{estimate.max():.1g}",
