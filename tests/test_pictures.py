@@ -63,7 +63,9 @@ def test_what_matters_colours_the_rods(solved):
     for share, name in ((0.9, "bending_moment"), (1.1, "tension")):
         N = share * EI / 0.1**2 / 10.0**2
         assert default_colour(bars(thin, (N, 0, 0.02 * N)), [0, 1]) == name, "the energy of bending is larger in both"
-    assert default_colour(bars(cf.Circle(0.2), (-1e4, 0, 0)), [0, 1]) == "tension", "a strut: all energy is axial"
+    assert default_colour(bars(cf.Circle(0.2), (-1e4, 0, 0)), [1]) == "tension", "a strut: all energy is axial"
+    pressed = bars(cf.Circle(0.2), (-1e5, 0, 300.0))  # a fifth of the energy is that of bending
+    assert default_colour(pressed, [0, 1]) == "tension" and default_colour(pressed, [1]) == "bending_moment"
     rod = cf.Rod(cf.Line((0, 0, 0), (1, 0, 0)), thin, STEEL)
     twisted = cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Moment(rod.end, (1.0, 0.5, 0))])
     path = cf.solve(twisted, [0.0, 0.1], elements=4)

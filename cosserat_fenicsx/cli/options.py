@@ -84,7 +84,7 @@ def _outputs(parser):
             "motion drilling.csv, charts and stability.csv")  # fmt: skip
     parser.add_argument("--color", metavar="FIELD",
                         help="rods.png and films: field that colours the rods, such as shear_force, displacement or m.x "
-                        "[tension of cables, else the contact force or moment that stores most energy]")  # fmt: skip
+                        "[tension of cables, else what stores most energy and varies]")  # fmt: skip
     parser.add_argument("--magnify", type=float, help="pictures: factor on displacements [1]")
     parser.add_argument("--station", metavar="ROD@S",
                         help="station of the table: rod.end, rod@1.5 (m) [of the ends, loads and supports the one that "

@@ -569,7 +569,7 @@ class RodResult(Result, Extremes, Reactions, Stresses, States):
             color: what colours the rods: bending_moment, twisting_moment, tension, shear_force, n, m, displacement,
                 strain, curvature, of a motion velocity and angular_velocity too; n.x, n.y, n.z for an inertial
                 component, n.1, n.2, n.3 for one along d_1, d_2, d_3. None for what matters: the tension of cables,
-                else of the first four the one that stores most strain energy, see docs/viewing.md.
+                else of the first four the one that stores most strain energy and varies, see docs/viewing.md.
             side_by_side: whether shapes are drawn beside each other, without the reference, instead of where they are;
                 None where they would cross each other many times.
             units: "SI", "field", or a dict of units by dimensions, such as {"force": "klbf"}.
