@@ -35,7 +35,7 @@ def ran(name):
 
 
 def printed(notebook):
-    """What the cells of a notebook print, and what they write where errors and warnings go."""
+    """What the cells of a notebook print, and what they write to stderr: warnings, progress of what takes long."""
     outputs = [output for cell in notebook.cells for output in cell.get("outputs", ())]
     return tuple(
         "".join(output["text"] for output in outputs if output.get("name") == name) for name in ("stdout", "stderr")
@@ -60,6 +60,8 @@ def stored(notebook, name):
         data["image/png"] = base64.b64encode(small.getvalue()).decode()
     for cell in notebook.cells:
         cell.metadata.clear()
+        if "outputs" in cell:  # without the progress of what took long
+            cell.outputs = [output for output in cell.outputs if output.get("name") != "stderr"]
     notebook.metadata.clear()
     notebook.metadata.update(
         kernelspec={"display_name": "Python 3", "language": "python", "name": "python3"},

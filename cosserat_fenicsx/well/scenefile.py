@@ -3,10 +3,11 @@
 title = "..."
 
 [well]
-survey = "survey.csv"            # beside this file; or stations = [[0, 0, 0], [1100, 40, 30]], rows of md, inc, azi
+survey = "survey.csv"            # or .xlsx, beside this file; or stations = [[0, 0, 0], [1100, 40, 30]]: md, inc, azi
 columns = ["md", "inc", "azi"]   # optional: names of the columns of the file
 degrees = true                   # optional
 length_unit = "m"                # optional: of the measured depths of survey or stations, such as "ft"
+sheet = "as drilled"             # optional: of an .xlsx file, the first one if left out
 wall_stiffness = 1e9             # optional
 sections = [
     { to = 2500.0, diameter = 0.2224, friction = 0.20, name = "casing" },
