@@ -97,7 +97,9 @@ def test_the_metadata_agree():
 
 
 @pytest.mark.parametrize(("schema", "file"), [
-    ("github-workflows", ".github/workflows/ci.yml"), ("citation-file-format", "CITATION.cff"),
+    ("github-workflows", ".github/workflows/ci.yml"),
+    ("citation-file-format", "CITATION.cff"),
+    ("readthedocs", ".readthedocs.yaml"),
 ])  # fmt: skip
 def test_the_files_of_services_fit_their_schemas(schema, file):
     pytest.importorskip("check_jsonschema")
