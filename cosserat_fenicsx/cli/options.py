@@ -83,7 +83,7 @@ def _outputs(parser):
             "string in a well a .csv and pictures for each operation and for the depth_sweep; of a drill-string in "
             "motion drilling.csv, charts and stability.csv")  # fmt: skip
     parser.add_argument("--color", metavar="FIELD",
-                        help="rods.png and films: field that colours the rods, such as shear_force, displacement or m.x "
+                        help="rods.png and films: field that colours the rods, such as shear_force or m.x "
                         "[tension of cables, else what stores most energy and varies]")  # fmt: skip
     parser.add_argument("--magnify", type=float, help="pictures: factor on displacements [1]")
     parser.add_argument("--station", metavar="ROD@S",

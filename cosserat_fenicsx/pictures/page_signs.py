@@ -92,7 +92,7 @@ def _material(mark, vector):
 
 
 def _over_states(load, result, shown):
-    """[(name of its class, mark, vectors (states, 3), along a rod (states, n, 3), or None)] of a load in all states shown."""
+    """[(name of its class, mark, vectors (states, 3), along a rod (states, n, 3), or None)] of a load in all states."""
     along, scene = result.along_axis[shown], result.scene
     if result.axis == "time" and signals_of(load):
         every = [marks_of(at(load, t), scene, 1.0) for t in along]

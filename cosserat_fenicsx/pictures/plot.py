@@ -186,7 +186,8 @@ def _finish(plotter, pyvista, everywhere, symbols, lines, title, label, most=6):
     """Draw signs, axes, labels, key and title, and place the camera.
 
     Args:
-        lines: centrelines that labels keep off. title: lines of text. label: puts the first labels into the `Labels`. most: see `drawing.frame`.
+        lines: centrelines that labels keep off. title: lines of text. label: puts the first labels into the
+            `Labels`. most: see `drawing.frame`.
     """
     symbols.draw(plotter)
     font = letters(plotter)
