@@ -26,8 +26,8 @@ from cosserat_fenicsx.ranks import on_first
 
 # Panels of a picture, and in a row of it.
 _MOST_PANELS, _IN_A_ROW = 6, 3
-# Width of a panel, its least and largest height, height of the title, pixels.
-_WIDTH, _HEIGHTS, _TITLE = 640, (560, 680), 90
+# Width of a panel, its least and largest height, least height of the title, height of one of its lines, pixels.
+_WIDTH, _HEIGHTS, _TITLE, _LINE = 640, (560, 680), 90, 38
 # Largest rotation that is drawn, as the tangent of its angle.
 _STEEPEST = 1.0
 # Memory for frames of a film, which are drawn once, bytes.
@@ -132,13 +132,16 @@ def _panels(found, shown, amplitude):
     drawn = [Drawn(found, k, amplitude) for k in shown]
     everywhere = np.concatenate([shape.everywhere() for shape in drawn])
     panel = _height(everywhere)
-    width, height = across * _WIDTH, down * panel + _TITLE
+    width = across * _WIDTH
+    head = _head(found, width)
+    top = max(_TITLE, _LINE * (head.count("\n") + 1))
+    height = down * panel + top
     plotter = stage(  # not with supersampling, which leaves all panels but one black
         pyvista, (width, height), border=False, shape=(down + 1, across),
-        row_weights=[_TITLE, *[panel] * down], groups=[(0, slice(None))],
+        row_weights=[top, *[panel] * down], groups=[(0, slice(None))],
     )  # fmt: skip
     plotter.subplot(0, 0)
-    plotter.add_text(_head(found, width), position="upper_edge", color="black", font_size=14)
+    plotter.add_text(head, position="upper_edge", color="black", font_size=14)
     for i, (k, shape) in enumerate(zip(shown, drawn, strict=True)):
         plotter.subplot(1 + i // across, i % across)
         _add(plotter, pyvista, shape, shape.bodies(), everywhere)
@@ -159,7 +162,8 @@ def _head(found, width):
     at = f" about the equilibrium at the load factor {found.load_factor:g}" if found.load_factor else ""
     what = f"{found.scene.title}: {found.title.lower()}" if found.scene.title else found.title
     title = textwrap.fill(f"{what}{at}", width // _LETTER)
-    return f"{title}\ncoloured by the size of the motion: none is dark, the largest bright"
+    colours = textwrap.fill("coloured by the size of the motion: none is dark, the largest bright", width // _LETTER)
+    return f"{title}\n{colours}"
 
 
 def _below(shape, bodies, everywhere, width):
