@@ -55,7 +55,7 @@ def stored(notebook, name):
 
     for data in pictures(notebook):
         small = io.BytesIO()
-        kept(io.BytesIO(base64.b64decode(data["image/png"])), small, most=(760, 1200), colours=96)
+        kept(io.BytesIO(base64.b64decode(data["image/png"])), small, most=(760, 1200), colours=64)
         data.clear()  # of a JPEG, and of words
         data["image/png"] = base64.b64encode(small.getvalue()).decode()
     for cell in notebook.cells:
