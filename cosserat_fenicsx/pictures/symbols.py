@@ -29,7 +29,7 @@ _ASIDE = 0.4
 # Arrows along a rod: spacing over the size of a sign, and maximum number.
 _SPACING, _MOST = 1.3, 16
 # Maximum number of loads that have a label each.
-_MOST_TEXTS = 24
+_MOST_TEXTS = 8
 # Lengths over the size of a sign: of an arrow, of the shortest one beside others, of those along rods; of a spring.
 _ARROW, _SHORTEST, _COMB, _SPRING = 1.9, 0.9, 1.0, 1.6
 
