@@ -96,10 +96,11 @@ tables: setup
 	$(PYTHON) demos/evidence/rungs.py
 	$(PYTHON) demos/evidence/choice.py
 	$(PYTHON) demos/evidence/scaling.py
+	$(PYTHON) demos/evidence/many_rods.py
 	$(PYTHON) demos/evidence/ranks.py
 	$(PYTHON) demos/evidence/steps.py
 	$(PYTHON) demos/evidence/orders.py
-	$(PYTHON) demos/evidence/put_in_docs.py accuracy overhead first_runs rungs choice scaling ranks steps orders
+	$(PYTHON) demos/evidence/put_in_docs.py accuracy overhead first_runs rungs choice scaling many_rods ranks steps orders
 
 # What an interrupted run has finished is kept: the same command goes on from there.
 figure3: setup

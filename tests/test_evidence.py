@@ -78,6 +78,17 @@ def test_choice_quick(tmp_path):
 
 
 @pytest.mark.slow
+def test_many_rods_quick(tmp_path):
+    """Rods, times, an estimate below the tolerance, and memory; a table with its verdicts."""
+    import many_rods
+
+    ((rods, *times, error, memory),) = many_rods.main(sizes=(0,), out=tmp_path)
+    assert rods == 63 and min(times) > 0 and error <= 1e-6 and memory > 50
+    text = (tmp_path / "many_rods.md").read_text(encoding="utf-8")
+    assert "BLAS: lib" in text and "| ms a rod, of 1000 rods | - | 2.5 | - |" in text
+
+
+@pytest.mark.slow
 def test_scaling_quick(tmp_path):
     """The numbers of unknowns, and the rod in plain C: its tip moves as far as that of such a rod. Times are not
     tested."""

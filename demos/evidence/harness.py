@@ -100,7 +100,8 @@ def judged(found, most, form=None):
         found: a ratio; or a number of another unit, with the format specification `form`; or None.
     """
     verdict = "-" if found is None else "met" if found <= most else "missed"
-    return " | ".join((format(found, form), f"{most:g}", verdict) if form else (share(found), share(most), verdict))
+    number = "-" if found is None else format(found, form) if form else share(found)
+    return " | ".join((number, f"{most:g}" if form else share(most), verdict))
 
 
 # -- the machine -------------------------------------------------------------------------------------------------------

@@ -28,6 +28,7 @@ PAGES = {
     "rungs": ("evidence/cost.md",),
     "choice": ("evidence/cost.md",),
     "scaling": ("evidence/cost.md",),
+    "many_rods": ("evidence/cost.md",),
     "ranks": ("evidence/cost.md",),
     "steps": ("evidence/cost.md",),
     "overhead": ("evidence/cost.md",),
