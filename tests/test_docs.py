@@ -11,6 +11,8 @@ from recipes import alike, prints, programs, updated
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.parts import FAMILIES, members
+from cosserat_fenicsx.results.compared import CRITERIA
+from cosserat_fenicsx.results.result import Result
 
 pytestmark = pytest.mark.serial
 ROOT = Path(__file__).parent.parent
@@ -70,9 +72,10 @@ def test_recipes_and_terms_are_found():
 
 def test_pictures_are_small_and_shown():
     shown = "".join(map(text_of, PAGES))
-    for picture in (DOCS / "pictures").glob("**/*.*"):  # those for narrow pages have the names of the others
+    for picture in (DOCS / "pictures").glob("**/*.*"):
         most = 3_000_000 if picture.suffix == ".gif" else 150_000
-        assert picture.stat().st_size <= most and f"pictures/{picture.name}" in shown, picture
+        place = picture.relative_to(DOCS).as_posix().replace("/narrow/", "/")  # those have the names of the others
+        assert picture.stat().st_size <= most and place in shown, picture
 
 
 def test_every_public_name_is_in_the_reference():
@@ -98,6 +101,20 @@ def test_what_recipes_print_is_compared():
 PROGRAMS = [x for x in blocks("python") if re.search(r"import cosserat_fenicsx|from cosserat_fenicsx import", x[1])]
 
 
+@pytest.fixture
+def forgotten(monkeypatch):
+    """Quantities and criteria that a program defines are forgotten after it."""
+    criteria = dict(CRITERIA)
+    kinds = [Result]
+    for kind in kinds:  # and of those that are appended
+        kinds += kind.__subclasses__()
+        monkeypatch.setattr(kind, "_quantities", kind._quantities)
+    yield
+    CRITERIA.clear()
+    CRITERIA.update(criteria)
+
+
+@pytest.mark.usefixtures("forgotten")
 @pytest.mark.parametrize(("page", "program", "shown"), PROGRAMS, ids=[page for page, _, _ in PROGRAMS])
 def test_programs_run(page, program, shown, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
