@@ -7,9 +7,9 @@ starts. Where all ranks fail, each ends by itself.
 
 import builtins
 import contextlib
-import contextvars
 import os
 import sys
+import threading
 import time
 
 from cosserat_fenicsx.errors import SceneError
@@ -20,8 +20,7 @@ PATIENCE = 3.0
 #: Slurm's srun.
 SIZES = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "MV2_COMM_WORLD_SIZE", "SLURM_STEP_NUM_TASKS")
 
-# Of each thread: two of them may compute cases at the same time.
-_apart = contextvars.ContextVar("apart", default=False)
+_apart, _counting = 0, threading.Lock()  # how many cases this process computes now, in threads of its own
 _watched = None  # the process that `watch` was called in
 
 
@@ -53,16 +52,22 @@ def launched():
 def apart():
     """Context manager in which this rank computes without the others, as in a case of a study: the default
     communicator is this process alone."""
-    before = _apart.set(True)
+    _count(1)
     try:
         yield
     finally:
-        _apart.reset(before)
+        _count(-1)
+
+
+def _count(more):
+    global _apart
+    with _counting:
+        _apart += more
 
 
 def are_apart():
     """Whether this rank is within `apart`."""
-    return _apart.get()
+    return _apart > 0
 
 
 def communicator(comm=None):
@@ -73,17 +78,17 @@ def communicator(comm=None):
     """
     from mpi4py import MPI
 
-    if _apart.get() and comm is not None and comm.size > 1:
+    if _apart and comm is not None and comm.size > 1:
         raise SceneError(
             f"comm = a communicator of {comm.size} ranks: expected None or MPI.COMM_SELF within a study, where each "
             "case is computed by one rank"
         )
-    return comm or (MPI.COMM_SELF if _apart.get() else MPI.COMM_WORLD)
+    return comm or (MPI.COMM_SELF if _apart else MPI.COMM_WORLD)
 
 
 def world():
     """The communicator of all ranks, within `apart` of this one; MPI is loaded where there are others alone."""
-    return Alone if _apart.get() or launched()[1] == 1 else communicator()
+    return Alone if _apart or launched()[1] == 1 else communicator()
 
 
 def on_first(comm, action):

@@ -342,3 +342,6 @@ def test_factors_of_an_earlier_matrix_serve(monkeypatch):
     values[starts[7] : starts[8]] = 0.0
     assert factors.factor(values) and np.isnan(factors.solve(b)).all()
     assert not factors.factor(values)
+    *_, values, dense = sparse_system(0, 0.0)  # a singular matrix spoils none that follows
+    assert factors.factor(values)
+    np.testing.assert_allclose(factors.solve(b), np.linalg.solve(dense, b), rtol=0, atol=1e-10)

@@ -14,6 +14,7 @@ import pytest
 from conftest import column
 
 import cosserat_fenicsx as cf
+from cosserat_fenicsx.ranks import are_apart
 
 pytestmark = [pytest.mark.serial, pytest.mark.slow]
 CASES = {"eta": [0.3, 0.6, -1.0, 0.9], "elements": [4]}
@@ -95,7 +96,7 @@ def test_ranks_of_mpi4py_futures_give_the_same(here, tmp_path):
 
 
 def test_a_killed_worker_ends_the_study_and_keeps_what_is_done(tmp_path):
-    with pytest.raises(RuntimeError, match="process pool"):
+    with pytest.raises(RuntimeError, match="a worker of the executor ended at case 0 or near it"):
         cf.study(killed, {"eta": [0.3, 0.6], "elements": [4]}, workers=1, folder=tmp_path / "kept")
 
 
@@ -107,6 +108,21 @@ def test_a_killed_worker_ends_the_study_and_keeps_what_is_done(tmp_path):
 def test_refusals(given, words):
     with pytest.raises(cf.SceneError, match=words):
         cf.study(tip, CASES, **given)
+
+
+def test_arguments_that_cannot_be_sent_are_refused():
+    with pytest.raises(cf.SceneError, match=r"study.cases\[0\]: the executor cannot send it"):
+        cf.study(tip, {"eta": [lambda: 0.3], "elements": [4]}, workers=1)
+
+
+def test_threads_of_a_case_compute_alone():
+    """As the case does: under mpirun they would wait for the other ranks."""
+
+    def of_thread(k):
+        with ThreadPoolExecutor(1) as executor:
+            return float(executor.submit(are_apart).result())
+
+    assert cf.study(of_thread, {"k": [1]}).results == [1.0] and not are_apart()
 
 
 def test_a_function_of_a_function_is_refused_for_new_processes():

@@ -98,10 +98,32 @@ def test_meshes_of_other_programs_give_the_same_frame(written, tmp_path):
     ({"section": [THICK, THIN]}, "frame.section has 2 values: expected one, or 3"),
     ({"clamped": [4]}, "no rod meets this point"),
     ({"clamped": [0.5]}, "expected numbers of points"),
+    ({"clamped": [9]}, "frame.clamped has 9: expected numbers of points from 0 to 4"),
+    ({"hinged": [-1]}, "frame.hinged has -1: expected"),
+    ({"hinged": [0]}, "1 rods meet point 0: expected points where two or more do"),
 ])  # fmt: skip
 def test_refusals(changed, words):
     with pytest.raises(cf.SceneError, match=words):
         cf.frame(**{"points": PORTAL, "edges": LEGS, "section": THICK, "material": STEEL} | changed)
+
+
+LINES = [("line", np.array(LEGS))]
+
+
+@pytest.mark.parametrize(("given", "options", "words"), [
+    (meshio.Mesh(PORTAL, [*LINES, ("line3", [[0, 1, 4]])]), {}, "1 lines with more than two points"),
+    (meshio.Mesh(PORTAL, LINES, cell_sets={"a": [[0, 1, 2]], "b": [[1]]}), {"section": {"a": THICK, "b": THIN}},
+     "line 1 is in 'a' and 'b': expected groups without common lines"),
+    (meshio.Mesh(PORTAL, LINES, cell_data={"section": [[1.7, 1.2, 2.9]]}), {"section": {1: THICK}},
+     "not whole numbers"),
+    (meshio.Mesh(PORTAL, LINES, cell_data={"section": [[1, 1, 2]]}, field_data={"leg": np.array([1, 1])}),
+     {"section": {"leg": THICK}}, "no lines are in the group 'leg'"),
+    (meshio.Mesh(PORTAL, LINES, point_data={"temperature": np.arange(5.0)}), {"clamped": "temperature"},
+     "no points are named 'temperature'"),
+])  # fmt: skip
+def test_what_a_mesh_leaves_open_is_refused(given, options, words):
+    with pytest.raises(cf.SceneError, match=words):
+        cf.frame_from(given, **{"section": THICK, "material": STEEL} | options)
 
 
 def test_files_that_are_no_frames_are_refused(tmp_path):

@@ -18,6 +18,8 @@ _COARSE = 1e-9
 # Fewest unknowns of a matrix whose factors are kept for later ones; the relative residual of a solution with factors of
 # an earlier matrix, and the iterations that cost less than new factors.
 _KEPT, _REUSED, _MOST_REUSES = 2000, 1e-12, 12
+# MUMPS's errors of matrices that are singular, by their pattern or by their numbers.
+_SINGULAR = (-6, -10)
 
 
 class _Inverse:
@@ -273,6 +275,13 @@ class RepeatedFactors:
         entries = *self._pattern, np.ones(len(columns))
         self._matrix = PETSc.Mat().createAIJ((size, size), csr=entries, comm=PETSc.COMM_SELF)
         self._b, self._x = self._matrix.createVecs()
+        self._keeps, self._old, self._ksp = size >= _KEPT, None, None  # `_old`: are the factors of an earlier matrix?
+        self._begin()
+
+    def _begin(self):
+        """A solver without factors; one that failed keeps its error."""
+        if self._ksp is not None:
+            self._ksp.destroy()
         self._ksp = PETSc.KSP().create(PETSc.COMM_SELF)
         self._ksp.setType("gmres")
         self._ksp.setPCSide(PETSc.PC.Side.RIGHT)
@@ -281,7 +290,6 @@ class RepeatedFactors:
         self._pc = self._ksp.getPC()
         self._pc.setType("lu")
         self._factor = _mumps(self._pc, self._matrix)
-        self._keeps, self._old = size >= _KEPT, None  # `_old`: whether the factors are of an earlier matrix, if any
 
     def factor(self, values):
         """Take the matrix of these entries (entries,); False where it is found to be singular."""
@@ -297,9 +305,13 @@ class RepeatedFactors:
         self._pc.setOperators(self._matrix)
         self._pc.setUp()
         self._pc.setReusePreconditioner(True)
-        found = self._factor.getMumpsInfog(1) >= 0
-        self._old = False if found else None
-        return found
+        failure = self._factor.getMumpsInfog(1)
+        self._old = False if failure >= 0 else None
+        if failure < 0:
+            self._begin()
+        if failure < 0 and failure not in _SINGULAR:
+            raise MemoryError(f"MUMPS cannot factorise the equations where rods meet (its error {failure})")
+        return failure >= 0
 
     def solve(self, b):
         """The solution (rows,) for a right-hand side; not a number where the matrix is singular after all."""

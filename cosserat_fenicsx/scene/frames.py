@@ -138,7 +138,12 @@ def frame(
         Rod(Line(places[a], places[b], d1=d1), sections[i], materials[i], name=names[i])
         for i, (a, b) in enumerate(ends.tolist())
     )
-    return Frame(points, ends, rods, _numbers("clamped", clamped), _numbers("hinged", hinged))
+    held, loose = _numbers("clamped", clamped, len(points)), _numbers("hinged", hinged, len(points))
+    meet = np.bincount(ends.ravel(), minlength=len(points))
+    alone = next((k for k in loose if meet[k] < 2), None)
+    if alone is not None:
+        raise SceneError(f"frame.hinged: {meet[alone]} rods meet point {alone}: expected points where two or more do")
+    return Frame(points, ends, rods, held, loose)
 
 
 def _one_each(field, value, count):
@@ -150,11 +155,15 @@ def _one_each(field, value, count):
     return value
 
 
-def _numbers(field, value):
+def _numbers(field, value, count):
+    """The numbers of points, each once."""
     found = np.atleast_1d(np.asarray(value))
     if found.size and not np.issubdtype(found.dtype, np.integer):
         raise SceneError(f"frame.{field} = {value!r}: expected numbers of points")
-    return found.astype(int).tolist()
+    wrong = found[(found < 0) | (found >= count)]
+    if wrong.size:
+        raise SceneError(f"frame.{field} has {wrong[0]}: expected numbers of points from 0 to {count - 1}")
+    return np.unique(found).astype(int).tolist()
 
 
 def frame_from(
@@ -174,7 +183,7 @@ def frame_from(
         section, material: of all rods; or {group: section}, a group being the name or the number that the mesh gives
             to its lines: an element set (Abaqus), a physical group (gmsh), or the integers of the cell data "section".
         clamped, hinged: names of the points that are clamped, or at which rods meet in ball joints: node sets (Abaqus),
-            physical groups of points (gmsh), or point data that are not zero there (VTK).
+            physical groups of points (gmsh), or point data that are 1 there and 0 elsewhere (VTK).
         scale: m per unit of the mesh.
         d1: see `frame`.
 
@@ -199,6 +208,9 @@ def frame_from(
         kinds = ", ".join(sorted({block.type for block in mesh.cells})) or "no cells"
         raise SceneError(f"frame_from: the mesh has {kinds}: expected cells of the type line, with two points each")
     edges = np.concatenate([mesh.cells[i].data for i in blocks]).astype(int)
+    curved = sum(len(block.data) for block in mesh.cells if block.type.startswith("line") and block.type != "line")
+    if curved:
+        raise SceneError(f"frame_from: the mesh has {curved} lines with more than two points: expected straight ones")
     points = np.zeros((len(mesh.points), 3))
     points[:, : mesh.points.shape[1]] = mesh.points * scale
     groups = _groups(mesh, blocks, len(edges))
@@ -215,18 +227,23 @@ def _groups(mesh, blocks, count):
     for name, parts in mesh.cell_sets.items():
         marked, first = np.zeros(count, dtype=bool), 0
         for i in blocks:
-            marked[first + np.asarray(parts[i], dtype=int)] = True
+            if parts[i] is not None:
+                marked[first + np.asarray(parts[i], dtype=int)] = True
             first += len(mesh.cells[i].data)
         if marked.any() and ":" not in name:  # meshio's own sets have a colon
             groups[name] = marked
-    for array in (name for name in _GROUPS if name in mesh.cell_data):
-        numbers = np.concatenate([np.ravel(mesh.cell_data[array][i]) for i in blocks]).astype(int)
-        names = {int(tag): name for name, (tag, dimension) in mesh.field_data.items() if dimension == 1}
-        for number in np.unique(numbers).tolist():
-            groups.setdefault(number, numbers == number)
-            if number in names:
-                groups.setdefault(names[number], numbers == number)
-        break
+    array = next((name for name in _GROUPS if name in mesh.cell_data), None)
+    if array is None:
+        return groups
+    values = np.concatenate([np.ravel(mesh.cell_data[array][i]) for i in blocks])
+    numbers = np.round(values).astype(int)
+    if not np.array_equal(numbers, values):
+        raise SceneError(f"frame_from: the cell data {array!r} are not whole numbers: expected those of groups")
+    names = {tag: name for name, (tag, dimension) in mesh.field_data.items() if dimension == 1}
+    for number in np.unique(numbers).tolist():
+        groups.setdefault(number, numbers == number)
+        if array == "gmsh:physical" and number in names:
+            groups.setdefault(names[number], numbers == number)
     return groups
 
 
@@ -234,12 +251,15 @@ def _by_group(field, value, groups, count):
     """A section or a material for every line, from one or from {group: it}."""
     if not isinstance(value, Mapping):
         return value
-    found = [None] * count
+    found, owner = [None] * count, [None] * count
     for group, item in value.items():
         if group not in groups:
             raise SceneError(f"frame_from.{field}: no lines are in the group {group!r}: {_known(group, groups)}")
         for i in np.flatnonzero(groups[group]).tolist():
-            found[i] = item
+            if owner[i] is not None:
+                both = f"{owner[i]!r} and {group!r}"
+                raise SceneError(f"frame_from.{field}: line {i} is in {both}: expected groups without common lines")
+            found[i], owner[i] = item, group
     missing = next((i for i, item in enumerate(found) if item is None), None)
     if missing is not None:
         left = [repr(name) for name, marked in groups.items() if marked[missing]] or ["no group"]
@@ -248,7 +268,7 @@ def _by_group(field, value, groups, count):
 
 
 def _point_sets(mesh):
-    """{name: numbers of points} of a mesh."""
+    """{name: numbers of points} of a mesh; of point data those that are only 0 and 1."""
     sets = {name: np.asarray(numbers, dtype=int) for name, numbers in mesh.point_sets.items()}
     tags = mesh.cell_data.get("gmsh:physical")
     for name, (tag, dimension) in mesh.field_data.items():
@@ -257,9 +277,9 @@ def _point_sets(mesh):
                   for block, numbers in zip(mesh.cells, tags, strict=True) if block.type == "vertex"]  # fmt: skip
             sets.setdefault(name, np.concatenate([*at, np.empty(0, dtype=int)]).astype(int))
     for name, values in mesh.point_data.items():
-        if np.ndim(values) == 1 or np.shape(values)[1:] == (1,):
+        if np.size(values) == len(mesh.points) and np.isin(values, (0, 1)).all():
             sets.setdefault(name, np.flatnonzero(np.ravel(values)))
-    return sets
+    return {name: numbers for name, numbers in sets.items() if len(numbers)}
 
 
 def _points_named(field, names, sets):

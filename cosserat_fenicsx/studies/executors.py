@@ -6,7 +6,7 @@ import pickle
 import sys
 import time
 import traceback
-from concurrent.futures import FIRST_COMPLETED, Executor, wait
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, wait
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +19,7 @@ from cosserat_fenicsx.studies.outcome import to_data
 
 # Cases that an executor is given ahead of those that are done; seconds between looks for Ctrl-C.
 _AHEAD, _LOOK = 1000, 0.2
+_SENDABLE = "arguments that pickle takes: numbers, texts, arrays, scenes, functions of modules"
 
 
 def computed(task, case):
@@ -120,7 +121,19 @@ def by_executor(executor, task, cases, numbers):
             done, _ = wait(pending, timeout=_LOOK, return_when=FIRST_COMPLETED)
             obey()
             for future in done:
-                yield pending.pop(future), future.result()
+                i = pending.pop(future)
+                try:
+                    found = future.result()
+                except BrokenExecutor as problem:
+                    raise RuntimeError(
+                        f"a worker of the executor ended at case {i} or near it ({problem}): a folder keeps what was "
+                        "computed, and the same call continues from it"
+                    ) from problem
+                except (pickle.PicklingError, AttributeError, TypeError) as problem:
+                    raise SceneError(
+                        f"study.cases[{i}]: the executor cannot send it or its result ({problem}): expected {_SENDABLE}"
+                    ) from None
+                yield i, found
     finally:
         for future in pending:
             future.cancel()
