@@ -32,7 +32,7 @@ help:
 	@echo "make recipes the recipes of docs/recipes_*.md, and whether they print what is shown; writes out/recipes/ (half a minute)"
 	@echo "make docs    the documentation as a site that needs no network; writes out/docs/index.html (a minute)"
 	@echo "make tutorials  run the notebooks of docs/tutorials/ and store what they print and draw (a minute)"
-	@echo "make test    all tests, the serial ones on two workers"
+	@echo "make test    all tests, the serial ones on two workers (a quarter of an hour)"
 	@echo "make tables  the tables of accuracy and cost in docs/, measured anew and put there"
 	@echo "make figure3 every curve of the paper's Figure 3, and what was found; writes out/ (about 4 minutes)"
 	@echo "make work-precision  speed against accuracy, beside Exudyn, OpenSeesPy, PyElastica, CalculiX, welleng and torque-drag (half an hour at most)"
