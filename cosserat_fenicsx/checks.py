@@ -131,7 +131,10 @@ def stiffness(owner, field, value, unit):
 
 
 def finite_array(owner, field, value, expected):
-    """`value` as an array of floats of any shape; refused unless all are finite numbers."""
+    """`value` as an array of floats of any shape; refused unless all are finite numbers, or in a list texts with a unit
+    of the dimension of the first one in the parentheses of `expected`."""
+    if isinstance(value, list | tuple) and any(isinstance(x, str) for x in value):
+        value = [_in_si(owner, f"{field}[{i}]", x, _unit_of(expected)) for i, x in enumerate(value)]
     try:
         array = np.asarray(value)
     except ValueError:
@@ -145,8 +148,6 @@ def finite_array(owner, field, value, expected):
 
 def vector(owner, field, value, unit, size=3):
     """A tuple of `size` finite numbers; text with a unit is converted."""
-    if isinstance(value, list | tuple) and any(isinstance(x, str) for x in value):
-        value = [_in_si(owner, f"{field}[{i}]", x, unit) for i, x in enumerate(value)]
     expected = f"{size} finite numbers ({unit})"
     array = finite_array(owner, field, value, expected)
     if array.shape != (size,):

@@ -32,6 +32,7 @@ from torsion_scenes import (
 )
 
 import cosserat_fenicsx as cf
+from cosserat_fenicsx import drilling, well
 from cosserat_fenicsx.drilling.elements import AxialTorsional
 from cosserat_fenicsx.drilling.linear.impedances import axial, torsional
 from cosserat_fenicsx.drilling.linear.roots import Box, all_roots
@@ -594,3 +595,17 @@ def test_a_bit_below_a_motor_that_turns_too_far_in_a_step_is_refused(law, torque
     history = stop.value.path
     assert len(history) > 10 and np.abs(history.bit_speed).max() * history.dt <= most
     assert len(cf.drilling.simulate(scene, float(history.times[-1]), dt=0.02, progress=False)) == len(history)
+
+
+def test_times_as_text():
+    """Text with a unit is what its seconds are, for strings and for rods."""
+    string = well.DrillString([well.Collar(90.0, "NC46-65"), well.DrillPipe(900.0, "5 in 19.50 lb/ft")])
+    bit = drilling.BitOnRock(drilling.Stribeck(static="6 kN m", dynamic="4 kN m", speed=3.0), inertia=50.0)
+    scene = drilling.Drilling(string, drilling.TopDrive("60 rpm"), bit)
+    told = drilling.simulate(scene, "0.1 min", dt="2 ms", save_every="0.1 s", profile_every="1 s")
+    same = drilling.simulate(scene, 6.0, dt=2e-3, save_every=0.1, profile_every=1.0)
+    np.testing.assert_array_equal(told.bit_speed, same.bit_speed)
+    rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, 20.0)), cf.Circle(0.2), cf.Material(E=210e9, nu=0.3, density=7850.0))
+    pushed = cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Force(rod.end, (1e3, 0, 0))])
+    told, same = (cf.simulate(pushed, *times[:1], dt=times[1]) for times in (("0.1 s", "10 ms"), (0.1, 0.01)))
+    np.testing.assert_array_equal(told.position(rod.end), same.position(rod.end))

@@ -610,3 +610,14 @@ def test_a_string_in_a_plane_hole_leaves_the_plane_where_it_would_buckle(inclina
     found = cf.well.torque_and_drag(hole, string, operation, mud=cf.well.Mud(1200.0), depth=600.0, model="rod")
     assert found.solved.negative_modes == 0 and found.enough and any("begun as a helix" in line for line in found.why)
     assert np.abs(found.offset[:, 1]).max() > 0.01
+
+
+def test_depths_as_text():
+    hole = cf.well.Borehole(cf.well.WellPath.from_survey([0, 2600], [0, 0], [0, 0]), cf.well.HoleSection(2600.0, 0.2159, 0.25))
+    string = cf.well.DrillString([cf.well.DrillPipe(size="5 in 19.50 lb/ft")])
+    swept = cf.well.depth_sweep(hole, string, [cf.well.TripOut()], ["3000 ft", 1828.8], mud=cf.well.Mud(1200.0), model="soft")
+    np.testing.assert_allclose(swept.depths, [914.4, 1828.8], rtol=1e-12)
+    with pytest.raises(cf.SceneError, match=r"depths\[0\] = '3000 psi': psi is a unit of pressure"):
+        cf.well.depth_sweep(hole, string, [cf.well.TripOut()], ["3000 psi"], model="soft")
+    with pytest.raises(cf.SceneError, match="known of this diameter: 5 in 19.50 lb/ft, 5 in 25.60 lb/ft"):
+        cf.well.DrillPipe(size="5 in 20 lb/ft")

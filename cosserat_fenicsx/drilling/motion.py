@@ -73,7 +73,7 @@ def simulate(
         NotStored: the folder can no longer be written to.
     """
     instance("simulate", "scene", scene, Drilling, "a Drilling")
-    check_arguments(scene, duration, dt, elements, save_every, profile_every)
+    duration, dt, save_every, profile_every = check_arguments(scene, duration, dt, elements, save_every, profile_every)
     name, why = chosen(scene, model)
     running = model_of(scene, name, dt, elements)
     check_step(scene, running.dt, duration, save_every)
@@ -98,9 +98,9 @@ def simulate(
 def go_on(store, scene, duration, progress):
     """`resume` of a drill-string in motion; see there."""
     last, asked, apart = (store.head[name] for name in ("duration", "asked", "apart"))
-    if duration is not None and _seconds("resume", "duration", duration) < last:
+    duration = last if duration is None else _seconds("resume", "duration", duration)
+    if duration < last:
         refuse("resume", "duration", duration, f"at least {last:g} s, the last one asked for")
-    duration = float(duration or last)
     scene = _scene(store, scene, duration)
     check_arguments(scene, duration, asked["dt"], asked["elements"])
     store.hold()
@@ -173,14 +173,20 @@ def _history(store, scene, rows):
 def check_arguments(scene, duration, dt=None, elements=None, save_every=None, profile_every=None):
     """Refuse numbers out of their range, and jumps in speed.
 
+    Returns:
+        duration, dt, save_every, profile_every, s, of which any may be given as text with a unit.
+
     Raises:
         SceneError: naming the argument.
     """
     where = "simulate"
-    _seconds(where, "duration", duration)
-    for name, value in (("dt", dt), ("save_every", save_every), ("profile_every", profile_every)):
-        if value is not None and _seconds(where, name, value) > duration:
+    duration = _seconds(where, "duration", duration)
+    times = {"dt": dt, "save_every": save_every, "profile_every": profile_every}
+    for name, value in times.items():
+        times[name] = None if value is None else _seconds(where, name, value)
+        if value is not None and times[name] > duration:
             refuse(where, name, value, f"at most the duration, {duration:g} s")
+    dt = times["dt"]
     whole = isinstance(elements, numbers.Integral) and not isinstance(elements, bool)
     if elements is not None and not (whole and 1 <= elements <= 1_000_000):
         refuse(where, "elements", elements, "how many along the string, 1 to 1000000")
@@ -192,6 +198,7 @@ def check_arguments(scene, duration, dt=None, elements=None, save_every=None, pr
             if 0 < t < duration and abs(signal.jump(t)) > 1e-6 * max(1.0, abs(signal(t))):
                 refuse("TopDrive", "speed", scene.drive.speed, f"no jump, such as that of {signal.jump(t):.4g} rad/s "
                        f"at t = {t:g} s: no drive follows it; a Ramp, or a control with an inertia")  # fmt: skip
+    return duration, *times.values()
 
 
 def check_step(scene, dt, duration, save_every=None):

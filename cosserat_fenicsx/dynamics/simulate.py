@@ -102,6 +102,9 @@ def simulate(
     """
     comm = communicator(comm)
     instance("simulate", "scene", scene, Scene, "a Scene")
+    duration = positive_time("duration", duration)  # of text with a unit its seconds
+    dt, save_every = (value if value is None else positive_time(name, value)
+                      for name, value in (("dt", dt), ("save_every", save_every)))  # fmt: skip
     pace = pace_of(duration, tol=tol, dt=dt, scheme=scheme, save_every=save_every, elements=elements)
     rho_inf = _rho_inf(scheme, rho_inf)
     for rod in scene.rods:

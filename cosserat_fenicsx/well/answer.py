@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from cosserat_fenicsx.checks import File
+from cosserat_fenicsx.checks import File, positive
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.quantities import Quantity
 from cosserat_fenicsx.results.result import Result, by_name
@@ -406,6 +406,7 @@ class TorqueAndDrag(Differentiated, Result):
 
         if self.model != "rod":
             raise SceneError(f"plot_from_side: a {self.words} lies on the axis: expected an answer of model = 'rod'")
+        length = None if length is None else positive("plot_from_side", "length", length, "m")
         return charts.drawn(self, charts.side_figure, file, length, units=units, width=width)
 
     def plot_3d(

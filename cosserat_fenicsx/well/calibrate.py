@@ -149,7 +149,7 @@ class FrictionFit(Result):
         yield f"misfit {self.misfit:.3g} (1: as the standard deviations say)"
         for section, friction in zip(self.quantities["section"].of(self), self.friction, strict=True):
             if friction < 1e-6:
-                yield f"The friction of {section} is at its bound: the readings ask for less than none."
+                yield f"The friction of section {section} is at 0, its bound: the readings ask for less than none."
         if np.isfinite(self.block_interval).all():
             low, high = (self._told("block_weight", units, x) for x in self.block_interval)
             yield f"block weight {self._told('block_weight', units)}, from {low} to {high}"

@@ -13,6 +13,7 @@ the weight of the plain section.
 import csv
 import functools
 import math
+import re
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -58,8 +59,22 @@ def standard_size(kind, name):
     known = standard_sizes()[kind]
     plain = {_plain(size): size for size in known}
     if not isinstance(name, str) or _plain(name) not in plain:
-        raise SceneError(f"{kind}.size = {name!r}: {nearest(name, known)}")
+        raise SceneError(f"{kind}.size = {name!r}: {_sizes_near(name, known)}")
     return known[plain[_plain(name)]]
+
+
+def _sizes_near(name, known):
+    """What a message says of an unknown size: the known ones of its diameter, or the nearest name."""
+    diameter, _, weight = str(name).partition(" in ")
+    alike = [size for size in known if weight and size.startswith(f"{diameter} in ")]
+    if not alike:
+        return nearest(name, known)
+
+    def off(size):
+        found = [re.match(r"[\d.]+", text.partition(" in ")[2]) for text in (str(name), size)]
+        return abs(float(found[0][0]) - float(found[1][0])) if all(found) else 0.0
+
+    return f"known of this diameter: {', '.join(sorted(alike, key=off))}"
 
 
 def _plain(name):
