@@ -12,8 +12,8 @@ from reference_strings import pipe_and_collars
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.quantities import Units
+from cosserat_fenicsx.results.screen import LINES, ROWS, SHORT, WIDTH
 from cosserat_fenicsx.results.whirl import whirl_of
-from cosserat_fenicsx.results.screen import LINES, ROWS, WIDTH
 from cosserat_fenicsx.scene.describe import actions_in_words
 
 pytestmark = pytest.mark.serial
@@ -262,3 +262,16 @@ def test_what_is_zero_is_left_out():
     rod = cf.Rod(cf.Line((0, 0, 0), (10, 0, 0)), SECTION, name="rod")
     path = cf.solve(cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Force(rod.end, (2.0, 0, 0))]), [1.0])
     assert set(path.largest()) == {"tension"} and path.largest()["tension"].size == pytest.approx(2.0)
+
+
+def test_tables_break_headings_at_words_and_never_numbers(found):
+    result, kind, *_ = found
+    for units, rows, text in (("SI", SHORT, str(result)), ("field", SHORT, result.summary("field")),
+                              ("field", ROWS, result.details("field"))):  # fmt: skip
+        lines = [re.split(" *[│┃] *", line)[1:-1] for line in text.splitlines() if line[:1] in ("│", "┃")]
+        heads = {word for line in text.splitlines() if line[:1] == "┃" for word in re.findall(r"[^┃\s]+", line)}
+        columns = result._table(Units(units), rows).columns
+        assert heads and heads <= {word for column in columns for word in column.header.split()}
+        assert all(cell for line in lines[-len(columns[0]._cells) // 2 :] for cell in line), text
+    if kind == "TorqueAndDrag":
+        assert "torque" not in heads and "tension" in heads  # of a trip: zero

@@ -556,6 +556,20 @@ def test_forces_that_the_mesh_does_not_resolve_are_told():
     assert {x.start for x in rough} <= {x.start for x in found.solved.contacts if x.start == x.end}
 
 
+def test_forces_with_errors_as_large_are_left_out_and_titles_have_four_digits():
+    pytest.importorskip("matplotlib")
+    scene = cf.read(VOLVE)
+    found = scene.answer(scene.operations[2])
+    told, wide = found.details(), [x for x in found.contacts if x.bottom > 3227.69 and x.error >= x.force]
+    assert f"left out: {len(wide)} of forces at points" in told and len(wide) > 0
+    assert f"own estimated errors, {found.error:.0e}" in told and f"{wide[0].force / 1e3:.4g}" not in told
+    figure = found.plot(between=(3000, 3400), units="field")
+    hook, torque = found.hook_load / cf.units.kip, found.surface_torque / cf.units.ft_lbf
+    assert f"hook load {hook:.4g} klbf, surface torque {torque / 100:.0f}00 ft-lbf" in figure.get_suptitle()
+    ticks = [float(x.get_text().replace("\N{MINUS SIGN}", "-")) for x in figure.axes[0].get_xticklabels()]
+    assert torque > 1e4 and ticks == [-4.25, 0, 4.25]
+
+
 def test_resultants_of_any_pressure_add_up():
     """Of rough pressures with gaps and jumps, on elements of any length, in layers of any length."""
     rng, nodes = np.random.default_rng(0), np.array([0.0, 0.5 - math.sqrt(0.05), 0.5 + math.sqrt(0.05), 1.0])

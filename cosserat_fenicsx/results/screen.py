@@ -1,5 +1,6 @@
 """Tables for the screen, and pages of sentences with one table."""
 
+import copy
 import dataclasses
 import sys
 import textwrap
@@ -19,6 +20,8 @@ _FRAME, _FEWEST = 6, 4
 _DIGITS = 5
 # Numbers below this times the largest of their column are rounding.
 _ROUNDING = 1e-9
+# Longest texts that are never cut in a cell; characters between two columns, and at the edge of the table.
+_TEXT, _BETWEEN, _EDGE = 40, 3, 1
 
 
 def rows_of(count, most):
@@ -50,9 +53,9 @@ def table(given, units, rows, title=None, caption=None, which=None):
         parts = values.reshape(count, -1).T
         for part, column in zip(quantity.parts or [""], parts, strict=True):
             label = dataclasses.replace(quantity, label=f"{quantity.short or f'{quantity.label} '}{part}".strip())
-            found.add_column(label.heading(unit), justify="right" if numbers else "left", overflow="fold",
-                             no_wrap=not numbers)  # fmt: skip
-            texts.append([value_text(column[k], digits) for k in which])
+            heading, cells = label.heading(unit), [value_text(column[k], digits) for k in which]
+            found.add_column(heading, justify="right" if numbers else "left", no_wrap=True)
+            texts.append(cells)
     for i, row in enumerate(zip(*texts, strict=True)):
         if gaps and which[i] > (which[i - 1] + 1 if i else 0):
             found.add_row(*["..."] * len(row))
@@ -60,19 +63,73 @@ def table(given, units, rows, title=None, caption=None, which=None):
     return found
 
 
-def as_text(table, width=140):
-    """A rich table as plain text, as wide as it needs up to `width`, with names and titles as they are.
+def _wrapped(heading, width):
+    return textwrap.wrap(heading, width, break_long_words=False, break_on_hyphens=False)
 
+
+def _least(column):
+    """The least width of a column: of its longest cell, and of the longest word of its heading."""
+    longest = max(map(len, column.cells), default=0)
+    return max(longest if column.justify == "right" else min(longest, _TEXT), *map(len, column.header.split()), 1)
+
+
+def _widths(columns, width):
+    """Widths of columns that fit a width, with headings that break between words, in as few lines as possible; None
+    where there are none: numbers are never broken."""
+    room = width - _EDGE - _BETWEEN * len(columns)
+    for lines in range(1, max(len(column.header.split()) for column in columns) + 1):
+        found = []
+        for column in columns:
+            least = _least(column)
+            enough = range(least, max(least, len(column.header)) + 1)
+            found.append(next(w for w in enough if len(_wrapped(column.header, w)) <= lines or w == enough[-1]))
+        if sum(found) <= room:
+            for i, column in enumerate(columns):  # texts may use what is left
+                longest = max(map(len, column.cells), default=0)
+                found[i] += max(0, min(longest - found[i], room - sum(found)))
+            return found
+    return None
+
+
+def _parts(table, width):
+    """Tables of some of the columns each, which fit a width; all of them begin with the first column."""
+    first, *rest = table.columns
+    while rest:
+        count = next((k for k in range(len(rest), 1, -1) if _widths([first, *rest[:k]], width)), 1)
+        part, columns = copy.copy(table), [first, *rest[:count]]
+        widths = _widths(columns, width) or [_least(column) for column in columns]
+        part.columns = [
+            dataclasses.replace(column, header="\n".join(_wrapped(column.header, w)), width=w)
+            for column, w in zip(columns, widths, strict=True)
+        ]
+        yield part
+        table, rest = copy.copy(table), rest[count:]
+        table.title = None
+
+
+def as_text(table, width=140, most=None):
+    """A rich table from `table` as plain text, as wide as it needs up to `width`, with names and titles as they are.
+
+    Columns that do not fit follow in further tables below; or, of more than `most` tables, are left out, which is said.
     Its lines are ASCII where standard output does not know others.
     """
     try:
         "━┏┃".encode(sys.stdout.encoding or "utf-8")
     except UnicodeEncodeError:
         table.box = box.ASCII2
+    parts = list(_parts(table, width)) or [table]
+    shown = parts[:most]
+    for part in shown[:-1]:
+        part.caption = None
+    if len(parts) > len(shown):
+        count = 1 + sum(len(part.columns) - 1 for part in shown)
+        told = f"{count} of {len(table.columns)} columns: details() has more"
+        shown[-1].caption = f"{table.caption}\n{told}" if table.caption else told
     # a fixed width, since the size of the terminal is unknown under mpirun
     console = Console(width=width, color_system=None, markup=False, emoji=False)
     with console.capture() as capture:
-        console.print(table)
+        for part in shown:
+            console.print(part)
     return capture.get().rstrip()
 
 
@@ -88,7 +145,7 @@ def page(answer, table_of):
         lines = [*lines[: LINES - _FRAME - _FEWEST - 1], "... more by `details()`"]
     rows = SHORT
     while rows >= 1 and (shown := table_of(rows)) is not None:
-        text = as_text(shown, WIDTH).splitlines()
+        text = as_text(shown, WIDTH, 1).splitlines()
         beyond = len(lines) + len(text) - LINES
         if beyond <= 0:
             return "\n".join([*lines, *text])

@@ -244,10 +244,16 @@ def answer_figure(answer, between=None):
     (force_unit, force), (moment_unit, moment) = unit_of(_HOOK), unit_of(_SURFACE)
     figure.suptitle(
         f"{title_of(answer, top, bottom)}\n"
-        f"hook load {answer.hook_load / force:.1f} {force_unit}, "
-        f"surface torque {round(answer.surface_torque / moment, 2) + 0.0:.2f} {moment_unit}"
+        f"hook load {_rounded(answer.hook_load / force)} {force_unit}, "
+        f"surface torque {_rounded(answer.surface_torque / moment)} {moment_unit}"
     )
     return figure
+
+
+def _rounded(number):
+    """Text: four significant digits; 0 where these begin behind the third decimal."""
+    number = float(f"{number:.4g}") if abs(number) >= 1e-3 else 0.0
+    return f"{number:.0f}" if abs(number) >= 1e4 else f"{number:.4g}"
 
 
 def title_of(answer, top, bottom):
@@ -306,8 +312,7 @@ def _string(panel, answer, rows, depth):
     for y, middle, name in zip(_apart(middles, panel), middles, names, strict=True):
         panel.plot([0.8 * most, 1.35 * most], [middle, y], color=GREY, linewidth=0.5)
         panel.text(1.4 * most, y, name, fontsize=SMALL, va="center", clip_on=True)
-    end = float(f"{most:.2g}")
-    panel.set_xticks([-end, 0, end], [f"{x:g}" for x in (-end, 0, end)], fontsize=SMALL)
+    panel.set_xticks([-most, 0, most], [f"{x:.5g}" for x in (-most, 0, most)], fontsize=SMALL)
     panel.set_xlabel(f"south ← → north ({unit})" if vertical else f"low side ← → high side ({unit})")
     panel.grid(visible=False)
 

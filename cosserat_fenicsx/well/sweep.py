@@ -19,7 +19,6 @@ from cosserat_fenicsx.parts import from_data, members, to_data, use
 from cosserat_fenicsx.progress import Progress
 from cosserat_fenicsx.quantities import Quantity, Units
 from cosserat_fenicsx.ranks import world
-from cosserat_fenicsx.results import screen
 from cosserat_fenicsx.results.result import Result, by_name
 from cosserat_fenicsx.storage.mark import NotMarked, mark_of
 from cosserat_fenicsx.storage.store import Kind, Nowhere, Store
@@ -41,8 +40,6 @@ KIND = Kind(
 #: Arguments that are parts; the others are plain, but for the operations.
 _PARTS = {"hole": Borehole, "string": DrillString, "mud": Mud}
 _CASES = ("operation", "friction", "depth")
-# Columns of the table that `print` shows, beside the depth.
-_COLUMNS = 6
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -70,8 +67,8 @@ class DepthSweep(Result):
         Quantity("operation", axes=("operation",), getter=lambda x: np.array([one.name for one in x.operations])),
         Quantity("friction", axes=("friction",), getter=lambda x: np.array([_as_text(one) for one in x.friction])),
         Quantity("depth", unit="m", axes=("depth",), getter="depths"),
-        Quantity("hook_load", unit="N", axes=_CASES),
-        Quantity("surface_torque", unit="N m", axes=_CASES),
+        Quantity("hook_load", unit="N", axes=_CASES, digits=5),
+        Quantity("surface_torque", unit="N m", axes=_CASES, digits=5),
         *(Quantity(name, label, unit, axes=_CASES, getter=lambda x, name=name: x.values[name])
           for name, label, unit in (("error", "estimated relative error of the solution", "1"),
                                     ("model_error", "estimated relative error of the model", "1"),
@@ -129,7 +126,7 @@ class DepthSweep(Result):
         return tables.sweep_in_words(self)
 
     def _table(self, units, rows):
-        return tables.over_depths(self, units, rows, 100 if rows == screen.ROWS else _COLUMNS)
+        return tables.over_depths(self, units, rows)
 
     def plot(self, file: File | None = None, *, units: Any = "SI", width: int | None = None):
         """Draw hook load and surface torque over the depth of the bit, the depth downwards ("broomstick").

@@ -19,8 +19,10 @@ def along(answer, units, rows):
     """The table of the state along the string: the ends of components, and about every tenth of the depth between."""
     known, which = answer.quantities, np.array(_shown(answer))
     which = which[screen.rows_of(len(which), rows)]
+    still = np.abs(answer.torque).max() <= known["torque"].noise
+    names = [name for name in answer._on_screen if not (name == "torque" and still)]
     return screen.table(
-        [(known[name], np.asarray(known[name].of(answer))[which]) for name in answer._on_screen],
+        [(known[name], np.asarray(known[name].of(answer))[which]) for name in names],
         units,
         rows,
         f"{answer.operation.name}, bit at {answer._told('md', units, answer.depth)}, {answer.words}",
@@ -36,11 +38,17 @@ def _at_the_lower_end(answer, units):
     contacts = [contact for contact in answer.contacts if contact.bottom > top]
     if top == answer.depth or not any(contact.at_point for contact in contacts):
         return
-    which = [i for i, contact in enumerate(answer.contacts) if contact in contacts]
+    which = [i for i, x in enumerate(answer.contacts) if x in contacts and not x.error >= x.force]
+    if not which:
+        return
+    unknown = len(contacts) - len(which)
+    caption = (
+        f"left out: {unknown} of forces at points, with estimated errors as large as the forces" if unknown else None
+    )
     names = ("contact_top", "contact_bottom", "contact_force", "contact_error", "contact_where", "contact_component")
     given = [(answer.quantities[name], answer.quantities[name].of(answer)[which]) for name in names]
     title = f"where the string touches the wall below md = {answer._told('md', units, top)}"
-    yield screen.as_text(screen.table(given, units, len(which), title))
+    yield screen.as_text(screen.table(given, units, len(which), title, caption))
 
 
 def parts_at(answer, contact):
@@ -109,15 +117,17 @@ def more_in_words(answer, units):
         rough = getattr(answer.solved, "rough", ())
         if rough:
             most = 8
-            places = ", ".join(f"{np.interp(x.start, answer.solved.s, answer.md):.5g}" for x in rough[:most])
+            unit, size = units.on_screen(answer.quantities["md"], [answer.depth])
+            places = ", ".join(f"{np.interp(x.start, answer.solved.s, answer.md) / size:.5g}" for x in rough[:most])
             more = f" and {len(rough) - most} more" if len(rough) > most else ""
-            which = f"of these forces, those at md = {places}{more} m"
+            which = f"of these forces, those at md = {places}{more} {unit}"
             if len(rough) == len(at_points):
                 which = "all of these forces"
             yield (
                 f"{which} are ROUGH, with estimated errors above {100 * ROUGH:g} % of them, up to "
-                f"{answer._told('hook_load', units, max(x.error for x in rough), '.2g')} (contacts[i].error): a "
-                "smaller tol helps, but not where the end of a contact or component, or a survey station, is near"
+                f"{answer._told('hook_load', units, max(x.error for x in rough), '.2g')} (contacts[i].error); "
+                f"hook load and surface torque have their own estimated errors, {answer.error:.0e}. A smaller tol helps, "
+                "but not where the end of a contact or component, or a survey station, is near"
             )
     yield f"{answer.model}: {'; '.join(answer.why)}."
 
@@ -163,17 +173,17 @@ def sweep_in_words(sweep):
         yield f"model: {used[0]}"
 
 
-def over_depths(sweep, units, rows, most):
-    """The table of hook loads, torques and models over the depth of the bit; at most so many columns."""
+def over_depths(sweep, units, rows):
+    """The table of hook loads, torques and models over the depth of the bit."""
     known, used = sweep.quantities, {*sweep.models.ravel()} - {""}
     given = []
     for i, operation in enumerate(sweep.operations):
         for j in range(len(sweep.friction)):
-            given.append((replace(known["hook_load"], short=sweep.label(i, j)), sweep.hook_load[i, j]))
+            label = sweep.label(i, j)
+            given.append((replace(known["hook_load"], short=label), sweep.hook_load[i, j]))
             if operation.direction(1.0)[1]:
-                given.append((replace(known["surface_torque"], short="torque"), sweep.surface_torque[i, j]))
+                given.append((replace(known["surface_torque"], short=f"{label}, torque"), sweep.surface_torque[i, j]))
             if len(used) > 1:
-                given.append((replace(known["models"], label="model"), sweep.models[i, j]))
-    left_out = "" if len(given) <= most else f"\n{most} of {len(given)} columns: details() has more"
-    title = f"hook load, and surface torque where the string rotates, over the depth of the bit{left_out}"
-    return screen.table([(known["depth"], sweep.depths), *given[:most]], units, rows, title)
+                given.append((replace(known["models"], label=f"{label}, model"), sweep.models[i, j]))
+    title = "hook load, and surface torque where the string rotates, over the depth of the bit"
+    return screen.table([(known["depth"], sweep.depths), *given], units, rows, title)

@@ -220,7 +220,7 @@ class Stability(Result):
         own, cases, table = own_rule(self.scene), self.growth[:, :, 0].size, Table()
         headings = [f"{name} (own)" if name == own else name for name in growing[0][3]]
         for heading in ("mode", "grows in", "fastest", "at rpm", "kN", "frequency (Hz)", "growth", *headings):
-            table.add_column(heading, justify="right", overflow="fold")
+            table.add_column(heading, justify="right", no_wrap=True)
         for k, i, j, drives in growing[:rows]:
             growth = self.growth[:, :, k]
             table.add_row(
