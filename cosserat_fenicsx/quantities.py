@@ -141,6 +141,11 @@ class Units:
                 return self._chosen[name], known[self._chosen[name]] / known[quantity.unit]
         return quantity.unit, 1.0
 
+    def told(self, value: float, unit: str, dimension: str = "", form: str = "g") -> str:
+        """A number with its unit: one in an SI unit, of a dimension where several have that unit, as text."""
+        shown, size = self.of(Quantity("number", unit=unit, dimension=dimension))
+        return f"{value / size:{form}} {shown}"
+
     def on_screen(self, quantity: Quantity, values: Any = ()) -> tuple[str, float]:
         """The unit of a quantity in tables and charts, and its size in the result's unit: SI units have the prefix that
         suits the values."""

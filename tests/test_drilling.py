@@ -663,6 +663,8 @@ def test_explain_tells_what_may_be_mistaken(tmp_path, capsys):
         "Hook: 5e+06 N/m, the block moves upwards at 0 to 0.0027778 m/s.",
     ):
         assert words in told, words
+    assert main(["explain", str(tmp_path / "scene.toml"), "--units", "field"]) == 0
+    assert "to 8202.1 ft, 12.25 in wide, friction 0.2." in capsys.readouterr().out
     assert main(["explain", str(ROOT / "demos" / "strings" / "stopped_block.toml")]) == 0
     told = capsys.readouterr().out
     assert "N/m in air." in told and "Hole: none, no walls" in told and "friction at the wall" not in told.lower()

@@ -210,6 +210,7 @@ def test_contacts_add_up_to_the_friction():
 
 DEMOS = Path(__file__).parent.parent / "demos"
 VOLVE = DEMOS / "wells" / "volve_f12.toml"
+RODS = DEMOS / "eccentric_cantilever.toml"
 
 
 def test_the_demos_give_their_numbers(capsys):
@@ -324,6 +325,39 @@ def test_the_command_line(tmp_path, capsys):
     text = VOLVE.read_text(encoding="utf-8")
     (tmp_path / "no_well.toml").write_text(text[text.index("[string]") :], encoding="utf-8")
     assert main(["run", str(tmp_path / "no_well.toml")]) == 2 and "[well] is missing" in capsys.readouterr().err
+
+
+def test_the_command_line_in_field_units(tmp_path, capsys):
+    assert main(["explain", str(VOLVE), "--units", "field"]) == 0
+    told = capsys.readouterr().out
+    assert "Hole, open hole: to 11279.5 ft, 8.5 in wide, friction 0.3." in told
+    assert "String, bit: md 11278.5 to 11279.5 ft, 79.89 lbf/ft in mud, touches the wall at a radius of 4.25 in" in told
+    assert "rotary drilling, on bit 17.9847 klbf and 3500 ft-lbf." in told
+    soft = ["run", str(VOLVE), "-o", str(tmp_path), "--no-picture", "--model", "soft"]
+    assert main([*soft, "--units", "field"]) == 0
+    told, found = capsys.readouterr().out, cf.read(VOLVE)
+    hook = found.answer(found.operations[0]).hook_load / cf.units.kip
+    assert f"hook load {hook:.6g} klbf" in told and "trip out, bit at 11279.5 ft" in told and "kN" not in told
+    rows = (tmp_path / "trip_out.csv").read_text(encoding="utf-8").splitlines()
+    assert rows[0].startswith("md (ft),north (ft)") and float(rows[-1].split(",")[0]) == pytest.approx(3438 / 0.3048)
+    assert "hook load (klbf)" in (tmp_path / "depth_sweep.csv").read_text(encoding="utf-8").splitlines()[0]
+    for file, word, words in ((VOLVE, "metric", "expected SI or field"), (RODS, "field", "this scene is of rods")):
+        for command in ("run", "explain"):
+            assert main([command, str(file), "--units", word]) == 2 and words in capsys.readouterr().err
+
+
+def test_holes_and_strings_are_printed_with_units():
+    """By the sentences of `cosserat explain`."""
+    found = cf.read(VOLVE)
+    hole, string = str(found.hole).splitlines(), str(found.string).splitlines()
+    assert hole[0].startswith("Well: 74 stations to md = 3438 m, which is north -346.44 m") and len(hole) == 3
+    assert hole[2] == "Hole, open hole: to 3438 m, 0.2159 m wide, friction 0.3."
+    assert string[1].startswith(
+        "String, collar: length 90 m, 136.59 kg/m in air, touches the wall at a radius of 0.082"
+    )
+    given = cf.well.DrillString([cf.well.Component(None, None, 241.13, 0.0635, name="pipe")])
+    assert str(given) == ("String, pipe: up to the surface, 241.13 N/m in mud, touches the wall at a radius of 0.0635 m, "
+                          "stiffness not known.")  # fmt: skip
 
 
 def test_doubts_are_said_once_and_without_code(tmp_path, capsys):

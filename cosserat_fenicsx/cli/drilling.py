@@ -7,9 +7,8 @@ from dataclasses import replace
 from functools import partial
 
 from cosserat_fenicsx import units
-from cosserat_fenicsx.cli.output import deliver, given, refuse_of_rods
+from cosserat_fenicsx.cli.output import deliver, given, refuse_of_rods, units_of
 from cosserat_fenicsx.cli.say import DONE, say
-from cosserat_fenicsx.cli.well import hole_in_words
 from cosserat_fenicsx.dimensions import in_si
 from cosserat_fenicsx.drilling.bit_laws import Stribeck
 from cosserat_fenicsx.drilling.choose import chosen, model_of
@@ -18,6 +17,7 @@ from cosserat_fenicsx.drilling.scenefile import SimulateDrilling
 from cosserat_fenicsx.drilling.segments import Discs
 from cosserat_fenicsx.drilling.stick_slip import turns
 from cosserat_fenicsx.errors import SceneError
+from cosserat_fenicsx.quantities import Units
 from cosserat_fenicsx.storage.store import Store, holds
 
 _TAKEN = ("duration", "dt", "elements", "model", "save_every")
@@ -27,6 +27,7 @@ _NAMES = ("drilling.csv", "drilling.png", "energy.png", "phase.png", "map.png", 
 
 def _scene(options, found):
     refuse_of_rods(options, "a drill-string in motion")
+    units_of(options)  # refused before the computation
     if options.static:
         raise SceneError("--static is for rods, and this scene is a drill-string in motion: strings in equilibrium are "
                          "scenes with [well] and [[operations]]")  # fmt: skip
@@ -46,9 +47,10 @@ def run(options, found, tables):
         return code
 
     def files_of(answer):
-        return {"stability.csv": answer.write, "stability.png": not options.no_picture and answer.plot}
+        chart = not options.no_picture and partial(answer.plot, units=options.units or "SI")
+        return {"stability.csv": partial(answer.write, units=options.units or "SI"), "stability.png": chart}
 
-    of_output = Namespace(output=options.output, scene=options.scene)
+    of_output = Namespace(output=options.output, scene=options.scene, units=options.units)
     return deliver(found.map, of_output, ("stability.csv", "stability.png"), files_of, tables)
 
 
@@ -63,16 +65,16 @@ def _check_folder(folder, scene):
 
 def deliver_motion(computed, options, tables=None):
     """Deliver a `DrillingHistory`, see `deliver`."""
-    picture, film = not options.no_picture, options.animate
+    picture, film, asked = not options.no_picture, options.animate, {"units": units_of(options)}
 
     def files(history):
         picture_in_time, in_depth = picture and len(history) > 1, len(history.profile_times) > 1
         return {
-            "drilling.csv": history.write,
-            "drilling.png": picture_in_time and history.plot,
-            "energy.png": picture_in_time and history.plot_energy,
-            "phase.png": picture_in_time and turns(history) and history.plot_phase,
-            "map.png": picture_in_time and in_depth and history.plot_map,
+            "drilling.csv": partial(history.write, **asked),
+            "drilling.png": picture_in_time and partial(history.plot, **asked),
+            "energy.png": picture_in_time and partial(history.plot_energy, **asked),
+            "phase.png": picture_in_time and turns(history) and partial(history.plot_phase, **asked),
+            "map.png": picture_in_time and in_depth and partial(history.plot_map, **asked),
             film: film and in_depth and partial(history.animate, speed=options.speed),
         }
 
@@ -82,7 +84,8 @@ def deliver_motion(computed, options, tables=None):
 def explain(options, found):
     """The text of `cosserat explain` of a `DrillingScene`."""
     found = _scene(options, found)
-    scene, settings = found.scene, found.settings
+    scene, settings, shown = found.scene, found.settings, Units(units_of(options))
+    told = shown.told
     lines = [found.title] if found.title else []
     if isinstance(scene.string, Discs):
         inertias = ", ".join(f"{x:g}" for x in scene.string.inertias)
@@ -90,13 +93,15 @@ def explain(options, found):
     else:
         for part in scene.segments:
             lines.append(
-                f"String, {part.name}: {part.length:g} m, impedance {part.torsional_impedance:.5g} N m s/rad in "
+                f"String, {part.name}: {told(part.length, 'm')}, impedance {part.torsional_impedance:.5g} N m s/rad in "
                 f"torsion and {part.axial_impedance:.5g} N s/m along the axis, waves at {part.torsional_speed:.5g} and "
-                f"{part.axial_speed:.5g} m/s, {part.weight:.5g} N/m{_fluid(scene)}."
+                f"{part.axial_speed:.5g} m/s, {told(part.weight, 'N/m', 'force per length', '.5g')}{_fluid(scene)}."
             )
-        lines += _in_hole(scene)
+        lines += _in_hole(scene, shown)
     lines.append(f"Drive: {_drive(scene.drive, settings.get('duration'))}.")
-    lines.append(f"Bit: {scene.bit.law}{_at_bit(scene.bit)}." if scene.bit else "Bit: none, the lower end is free.")
+    lines.append(
+        f"Bit: {scene.bit.law}{_at_bit(scene.bit, shown)}." if scene.bit else "Bit: none, the lower end is free."
+    )
     if scene.hook is not None:
         stiff = f"{scene.hook.stiffness:g} N/m" if math.isfinite(scene.hook.stiffness) else "rigid"
         upwards = _over_time(scene.hook.signal(), 1.0, settings.get("duration"))
@@ -128,17 +133,17 @@ def _fluid(scene):
     return " in air" if scene.mud is not None or scene.hole is None else ""
 
 
-def _in_hole(scene):
-    """Lines on mud and hole."""
+def _in_hole(scene, shown):
+    """Lines on mud and hole, in some units."""
     mud = scene.mud
     if mud is not None:
         yield f"Mud: {mud.density:g} kg/m^3, {mud.density / in_si('mud', '1 ppg', 'density'):.4g} ppg."
     if scene.hole is None:
-        yield f"Hole: none, no walls; bit at md = {scene.bit_depth:g} m, the string hangs vertically."
+        yield f"Hole: none, no walls; bit at md = {shown.told(scene.bit_depth, 'm')}, the string hangs vertically."
         return
-    yield from hole_in_words(scene.hole)
+    yield from scene.hole.sections_in_words(shown)
     inclination = math.degrees(scene.hole.path.inclination.max())
-    yield f"Bit at md = {scene.bit_depth:g} m; largest inclination of the hole {inclination:.4g} degrees."
+    yield f"Bit at md = {shown.told(scene.bit_depth, 'm')}; largest inclination of the hole {inclination:.4g} degrees."
 
 
 def _over_time(signal, unit, duration):
@@ -159,8 +164,10 @@ def _drive(drive, duration):
     return f"{asked}, {drive.control}{inertia}"
 
 
-def _at_bit(bit):
-    told = [f"{bit.weight / 1e3:g} kN on bit"] if bit.weight else []
+def _at_bit(bit, shown):
+    told = []
+    if bit.weight:
+        told.append(f"{bit.weight / 1e3:g} kN on bit" if shown.si else f"{shown.told(bit.weight, 'N')} on bit")
     told += [f"inertia {bit.inertia:g} kg m^2"] if bit.inertia else []
     if bit.weight and isinstance(bit.law, Stribeck) and bit.law.radius is None:
         told.append("its torque does not follow the weight: that takes coefficients and a radius")

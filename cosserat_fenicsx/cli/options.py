@@ -37,6 +37,7 @@ def parser():
     resume = commands.add_parser("resume", help="continue a motion that was run with --folder, to the same digits")
     resume.add_argument("folder", help="the DIR of --folder")
     resume.add_argument("--duration", type=float, help="s; longer than before")
+    _units(resume)
     _outputs(resume)
 
     buckling = commands.add_parser("buckling", help="critical load factors by linear buckling")
@@ -97,6 +98,12 @@ def _outputs(parser):
                         help="films: seconds of the motion per second [1 for motions of 2 to 10 s]")  # fmt: skip
 
 
+def _units(parser):
+    parser.add_argument("--units", metavar="SI | field",
+                        help="of strings in wells and drill-strings in motion: units of tables, charts and .csv files; "
+                        "field: ft, in, klbf, ft-lbf, ppg, rpm, psi [SI]")  # fmt: skip
+
+
 def _film(name):
     """The name of a film; --animate without a name would take the argument after it, such as the scene file."""
     if Path(name).suffix == ".toml":
@@ -121,6 +128,7 @@ def _common(parser):
     parser.add_argument("--control", help="auto, load (stop at a limit point) or arc (arc length along the path, never "
                         "back) [auto]")  # fmt: skip
     parser.add_argument("--branch", type=int, help="1 or -1: leave the path at its first bifurcation")
+    _units(parser)
     parser.add_argument("--static", action="store_true", help="the equilibrium path, whatever [simulate] says")
     motion = parser.add_argument_group("motions (--tol, --elements [8], --degree [3] and --model are theirs too)")
     motion.add_argument("--duration", type=float, help="s; makes a motion of any scene")

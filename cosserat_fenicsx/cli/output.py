@@ -28,6 +28,14 @@ def given(options, names):
     return {name: value for name, value in found.items() if value is not None}
 
 
+def units_of(options):
+    """What --units asks for: "SI", also without it, or "field"."""
+    asked = getattr(options, "units", None)
+    if asked not in (None, "SI", "field"):
+        raise SceneError(f"--units {asked}: expected SI or field (ft, in, klbf, ft-lbf, ppg, rpm, psi)")
+    return asked or "SI"
+
+
 def refuse_of_rods(options, kind):
     """Refuse options of rods for another kind of scene, such as "a well"."""
     for name in given(options, [name for name in _OPTIONS if name not in _TAKEN[kind]]):
@@ -50,7 +58,7 @@ def deliver(computed, options, names, files_of, tables=None, *, moving=False, ob
     out = output_of(options, [*names, *filter(None, [film])], tables)
     result, trouble, code = _ended(lambda: together(computed), patience() if obeys else nullcontext())
     if result is not None and (code == DONE or len(result)):
-        say(result.details(**given(options, ["station"])), file=sys.stdout)
+        say(result.details(units_of(options), **given(options, ["station"])), file=sys.stdout)
         if out is not None:
             if code == INTERRUPTED:
                 say("cosserat: interrupted; writing the partial result, Ctrl-C again skips what is not written yet")

@@ -15,6 +15,12 @@ _MOTION, _PATH = (
 _BOTH = ("tol", "elements", "degree", "model")
 
 
+def _refuse_units(options):
+    if options.units is not None:
+        raise SceneError("--units is for strings in wells and drill-strings in motion, and this scene is of rods: "
+                         "their tables are in SI; in Python print(path.summary('field')) shows others")  # fmt: skip
+
+
 def _asked(options, found):
     """Whether a motion is requested, and the arguments of `simulate`, or of `solve` for an equilibrium path.
 
@@ -24,6 +30,7 @@ def _asked(options, found):
     Raises:
         SceneError: an option of a path for a motion or vice versa.
     """
+    _refuse_units(options)
     asked, motion = given(options, (*_MOTION, *_PATH, *_BOTH)), found.motion
     moves = not options.static and bool(motion or "duration" in asked)
     for name in (name for name in (_PATH if moves else _MOTION) if name in asked):
@@ -103,6 +110,7 @@ def deliver_rods(computed, options, moving, tables=None):
     from cosserat_fenicsx.checks import positive
     from cosserat_fenicsx.pictures.colours import colour_of
 
+    _refuse_units(options)
     at, color, picture = _numbers(options.at), options.color, not options.no_picture
     magnify = 1.0 if options.magnify is None else positive("plot", "magnify", options.magnify, "-")
     if color is not None:

@@ -1,18 +1,14 @@
 """Strings in wells on the command line: `cosserat run` and `cosserat explain` of a scene with a [well] table."""
 
-import math
 import sys
 from dataclasses import replace
 from functools import partial
 
-import numpy as np
-
-from cosserat_fenicsx import units
-from cosserat_fenicsx.cli.output import deliver, given, output_of, refuse_of_rods
+from cosserat_fenicsx.cli.output import deliver, given, output_of, refuse_of_rods, units_of
 from cosserat_fenicsx.cli.say import DONE, say
+from cosserat_fenicsx.quantities import Units
 from cosserat_fenicsx.ranks import on_first, world
 from cosserat_fenicsx.storage.store import discard
-from cosserat_fenicsx.well.components import weight_in_mud
 from cosserat_fenicsx.well.scenefile import TorqueAndDragSettings
 
 # Ends of the names of files of an operation, and names of those of a sweep.
@@ -33,6 +29,7 @@ _MODELS = {
 
 def _scene(options, scene):
     refuse_of_rods(options, "a well")
+    units_of(options)  # refused before the computation
     asked = given(options, ("tol", "model"))
     return replace(scene, torque_and_drag=replace(scene.torque_and_drag or TorqueAndDragSettings(), **asked))
 
@@ -40,6 +37,7 @@ def _scene(options, scene):
 def run(options, scene, tables):
     """`cosserat run` of a `WellScene` and the tables of its file; returns the exit code."""
     scene, stems, picture = _scene(options, scene), _stems(scene.operations), not options.no_picture
+    units = units_of(options)
     names = [f"{stem}{ending}" for stem in stems for ending in _ENDINGS] + list(_OF_SWEEPS)
     out = output_of(options, names, tables)
     if scene.title:
@@ -47,7 +45,12 @@ def run(options, scene, tables):
 
     def files_of(stem, answer):
         csv, contacts, chart, in_space = (f"{stem}{ending}" for ending in _ENDINGS)
-        return {csv: answer.write, contacts: True, chart: picture and answer.plot, in_space: picture and answer.plot_3d}
+        return {
+            csv: partial(answer.write, units=units),
+            contacts: True,
+            chart: picture and partial(answer.plot, units=units),
+            in_space: picture and partial(answer.plot_3d, units=units),
+        }
 
     for operation, stem in zip(scene.operations, stems, strict=True):
         solved = partial(scene.answer, operation)
@@ -65,7 +68,8 @@ def run(options, scene, tables):
         return sweep
 
     def files_of_sweep(sweep):
-        return {"depth_sweep.csv": sweep.write, "depth_sweep.png": picture and len(sweep) and sweep.plot}
+        chart = picture and len(sweep) and partial(sweep.plot, units=units)
+        return {"depth_sweep.csv": partial(sweep.write, units=units), "depth_sweep.png": chart}
 
     return deliver(swept, options, names, files_of_sweep, tables, obeys=False)
 
@@ -76,35 +80,16 @@ def _stems(operations):
     return [name + (f"_{names[:i].count(name) + 1}" if name in names[:i] else "") for i, name in enumerate(names)]
 
 
-def hole_in_words(hole):
-    """Sentences on the sections of a `Borehole`."""
-    for i, section in enumerate(hole.sections, start=1):
-        name = section.name or f"section {i}"
-        yield f"Hole, {name}: to {section.to:g} m, {section.diameter:g} m wide, friction {section.friction:g}."
-
-
 def explain(options, scene):
     """The text of `cosserat explain` of a `WellScene`."""
     scene = _scene(options, scene)
-    hole, path = scene.hole, scene.hole.path
-    end, worst = path.position(path.length), int(np.argmax(path.dogleg_severity))
+    shown = Units(units_of(options))
     lines = [scene.title] if scene.title else []
-    lines.append(
-        f"Well: {len(path.md)} stations to md = {path.length:g} m, which is north {end[0]:.2f}, east {end[1]:.2f} and "
-        f"down {end[2]:.2f} m; largest inclination {math.degrees(path.inclination.max()):.2f} degrees, largest dogleg "
-        f"{path.dogleg_severity[worst] / units.deg_per_30m:.2f} degrees per 30 m below {path.md[worst]:g} m."
-    )
-    lines += hole_in_words(hole)
-    depth = scene.settings.get("depth", hole.length)
-    for place in scene.string.laid(depth):
-        part, S = place.component, place.component.stiffness
-        stiff = "stiffness not known" if S is None or S.matrix is not None else f"EI = {min(S.bending):.4g} N m^2"
-        lines.append(
-            f"String, {part.name}: md {place.top:g} to {place.bottom:g} m, {weight_in_mud(part, scene.mud):.2f} N/m in "
-            f"mud, touches the wall at a radius of {part.contact_radius:g} m, {stiff}."
-        )
+    lines += [scene.hole.path_in_words(shown), *scene.hole.sections_in_words(shown)]
+    lines += scene.string.in_words(scene.settings.get("depth", scene.hole.length), scene.mud, shown)
     for operation in scene.operations:
-        lines.append(f"Operation: {operation.name}, on bit {operation.weight:g} N and {operation.torque:g} N m.")
+        on_bit = f"{shown.told(operation.weight, 'N')} and {shown.told(operation.torque, 'N m')}"
+        lines.append(f"Operation: {operation.name}, on bit {on_bit}.")
     if scene.sweep:
         lines.append(f"Sweep over {len(scene.sweep['depths'])} depths of the bit.")
     model, tol = scene.settings.get("model", "auto"), scene.settings.get("tol", 1e-4)

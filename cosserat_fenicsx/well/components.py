@@ -23,6 +23,7 @@ from cosserat_fenicsx import units
 from cosserat_fenicsx.checks import positive, refuse, store
 from cosserat_fenicsx.errors import SceneError, nearest
 from cosserat_fenicsx.parts import Diameter, ForcePerLength, Length, MassPerLength, Part, between
+from cosserat_fenicsx.quantities import Units
 from cosserat_fenicsx.scene.sections import Circle, Material, Stiffness, Tube
 
 _TABLE = Path(__file__).with_name("standard_sizes.csv")
@@ -320,6 +321,15 @@ def weight_in_mud(component, mud):
     return (component.mass - lifted) * mud.gravity
 
 
+def in_words(part, where, weight, units):
+    """A sentence on a component: where it is, its weight, its contact radius and its stiffness, in some units."""
+    stiff, S = "stiffness not known", part.stiffness
+    if S is not None and S.matrix is None:
+        stiff = f"EI = {units.told(min(S.bending), 'N m^2', form='.4g')}"
+    radius = units.told(part.contact_radius, "m", "diameter")
+    return f"String, {part.name}: {where}, {weight}, touches the wall at a radius of {radius}, {stiff}."
+
+
 @dataclass(frozen=True)
 class Laid:
     """A component in its place: measured depths (m) of its upper and lower end."""
@@ -366,6 +376,24 @@ class DrillString(Part):
                 if part is given[0]:
                     expected += f"; where the list runs the other way, say order='{other}'"
                 refuse(part, "length", None, expected)
+
+    def __str__(self):
+        units, lines = Units(), []
+        for part in self.components:
+            where = "up to the surface" if part.length is None else f"length {units.told(part.length, 'm')}"
+            if part.weight is not None:
+                weight = f"{units.told(part.weight, 'N/m', 'force per length', '.2f')} in mud"
+            else:
+                weight = f"{units.told(part.mass, 'kg/m', form='.2f')} in air"
+            lines.append(in_words(part, where, weight, units))
+        return "\n".join(lines)
+
+    def in_words(self, depth, mud, units):
+        """Sentences on the components in their places, with the bit at a measured depth (m) in a mud, in some units."""
+        for place in self.laid(depth):
+            where = f"md {units.told(place.top, 'm').split()[0]} to {units.told(place.bottom, 'm')}"
+            weight = units.told(weight_in_mud(place.component, mud), "N/m", "force per length", ".2f")
+            yield in_words(place.component, where, f"{weight} in mud", units)
 
     def laid(self, depth):
         """The components in their places with the lower end at a measured depth (m), from the bit up.

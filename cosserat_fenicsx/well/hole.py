@@ -8,12 +8,13 @@ from typing import Annotated, ClassVar
 
 import numpy as np
 
-from cosserat_fenicsx import units
+from cosserat_fenicsx import units as constants
 from cosserat_fenicsx.actions.fluids import AddedMass, LinearDrag
 from cosserat_fenicsx.checks import File, Numbers, number, positive, refuse, store, warn
 from cosserat_fenicsx.dimensions import in_si, size_of
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.parts import Density, Depth, Diameter, FileName, Friction, Number, Part, WallStiffness, at_least
+from cosserat_fenicsx.quantities import Units
 from cosserat_fenicsx.scene.rod import Rod
 from cosserat_fenicsx.scene.sections import Circle, Tube
 from cosserat_fenicsx.well.path import WellPath
@@ -140,10 +141,34 @@ class Borehole(Part):
                 raise SceneError(f"HoleSection.to = {section.to:g}: expected more than {above:g} m, the section above")
             above = section.to
         if abs(self.path.length - above) > 1e-3 * self.length:
-            ratio = max(self.path.length, above) * units.foot / self.length
+            ratio = max(self.path.length, above) * constants.foot / self.length
             feet = ": 3.28 times as deep, as feet are that are taken for metres" if abs(ratio - 1) < 0.05 else ""
             warn(f"Borehole: the survey ends at {self.path.length:.6g} m and the sections at {above:.6g} m; "
                           f"the hole ends at the shallower one{feet}")  # fmt: skip
+
+    def __str__(self):
+        units = Units()
+        return "\n".join([self.path_in_words(units), *self.sections_in_words(units)])
+
+    def path_in_words(self, units: Units) -> str:
+        """A sentence on the path, in some units."""
+        path = self.path
+        north, east, down = (units.told(x, "m", form=".2f") for x in path.position(path.length))
+        worst = int(np.argmax(path.dogleg_severity))
+        unit, size = ("30 m", constants.deg_per_30m) if units.si else ("100 ft", constants.deg_per_100ft)
+        return (
+            f"Well: {len(path.md)} stations to md = {units.told(path.length, 'm')}, which is north {north}, east {east} "
+            f"and down {down}; largest inclination {math.degrees(path.inclination.max()):.2f} degrees, largest dogleg "
+            f"{path.dogleg_severity[worst] / size:.2f} degrees per {unit} below {units.told(path.md[worst], 'm')}."
+        )
+
+    def sections_in_words(self, units: Units) -> list[str]:
+        """A sentence on each section, in some units."""
+        return [
+            f"Hole, {section.name or f'section {i}'}: to {units.told(section.to, 'm')}, "
+            f"{units.told(section.diameter, 'm', 'diameter')} wide, friction {section.friction:g}."
+            for i, section in enumerate(self.sections, start=1)
+        ]
 
     @property
     def length(self):

@@ -123,7 +123,7 @@ class DepthSweep(Result):
         return found if notes is None else found | {"notes": notes}
 
     def _answer(self, units):
-        return tables.sweep_in_words(self)
+        return tables.sweep_in_words(self, units)
 
     def _table(self, units, rows):
         return tables.over_depths(self, units, rows)

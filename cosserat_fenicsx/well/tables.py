@@ -153,7 +153,7 @@ def _on_bit(answer, units):
         )
 
 
-def sweep_in_words(sweep):
+def sweep_in_words(sweep, units):
     """Sentences: what was found, notes, and the largest error of a model."""
     yield f"{len(sweep)} of {sweep.done.size} answers over {len(sweep.depths)} depths of the bit."
     notes, most = sweep.noted(), 12
@@ -166,7 +166,7 @@ def sweep_in_words(sweep):
         worst = "without a bound: it may lock up" if np.isinf(told[i, j, k]) else f"{told[i, j, k]:.0e}"
         yield (
             "largest relative error of hook load and surface torque by what the model leaves out, estimated: "
-            f"{worst} ({sweep.label(i, j)}, bit at {sweep.depths[k]:.6g} m)"
+            f"{worst} ({sweep.label(i, j)}, bit at {sweep._told('depth', units, sweep.depths[k])})"
         )
     used = sorted({*sweep.models.ravel()} - {""})
     if len(used) == 1:
