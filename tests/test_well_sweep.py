@@ -613,9 +613,13 @@ def test_a_string_in_a_plane_hole_leaves_the_plane_where_it_would_buckle(inclina
 
 
 def test_depths_as_text():
-    hole = cf.well.Borehole(cf.well.WellPath.from_survey([0, 2600], [0, 0], [0, 0]), cf.well.HoleSection(2600.0, 0.2159, 0.25))
+    hole = cf.well.Borehole(
+        cf.well.WellPath.from_survey([0, 2600], [0, 0], [0, 0]), cf.well.HoleSection(2600.0, 0.2159, 0.25)
+    )
     string = cf.well.DrillString([cf.well.DrillPipe(size="5 in 19.50 lb/ft")])
-    swept = cf.well.depth_sweep(hole, string, [cf.well.TripOut()], ["3000 ft", 1828.8], mud=cf.well.Mud(1200.0), model="soft")
+    swept = cf.well.depth_sweep(
+        hole, string, [cf.well.TripOut()], ["3000 ft", 1828.8], mud=cf.well.Mud(1200.0), model="soft"
+    )
     np.testing.assert_allclose(swept.depths, [914.4, 1828.8], rtol=1e-12)
     with pytest.raises(cf.SceneError, match=r"depths\[0\] = '3000 psi': psi is a unit of pressure"):
         cf.well.depth_sweep(hole, string, [cf.well.TripOut()], ["3000 psi"], model="soft")
