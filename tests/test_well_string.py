@@ -65,7 +65,7 @@ def test_standard_sizes():
         assert plain * (1 - 1e-12) <= part.mass < 1.35 * plain and part.inner_diameter < part.outer_diameter
         if kind == "DrillPipe":  # upsets and joints add a tenth or so
             assert part.mass < 1.23 * plain
-    with pytest.raises(cf.SceneError, match="did you mean '5 in 19.50 lb/ft'"):
+    with pytest.raises(cf.SceneError, match="known of this diameter: 5 in 19.50 lb/ft, 5 in 25.60 lb/ft"):
         cf.well.DrillPipe(size="5 in 19.60 lb/ft")
     other = cf.well.DrillPipe(size="5 in 19.50 lb/ft", outer_diameter=0.13)
     assert other.mass == pytest.approx(7850 * math.pi / 4 * (0.13**2 - other.inner_diameter**2))

@@ -29,7 +29,8 @@ from cosserat_fenicsx.storage.stored_history import KIND, StoredHistory
 def go_on(store, scene, duration, progress):
     """`resume` of a motion of rods."""
     if duration is not None:
-        duration = positive_time("duration", duration, "resume")
+        seconds = positive_time("duration", duration, "resume")
+        duration = seconds if isinstance(duration, str) else duration  # messages show a number as it was given
     scene, head = _opened(store, scene, duration), store.head
     until = duration or head["durations"][-1]
     check_counts("resume", until, head["asked"]["dt"], head["asked"]["save_every"])
