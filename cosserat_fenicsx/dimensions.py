@@ -53,7 +53,8 @@ DIMENSIONS = {
                    for name in ("ft-lbf", "ft lbf", "ft-lb", "ft lb", "ft-lbs", "lbf-ft", "lbf ft", "lb-ft", "lb ft")}},
         "ft-lbf", 1e10),
     "density": Dimension(
-        "kg/m^3", {"kg/m^3": 1.0, "kg/m3": 1.0, **_same(units.g_per_cm3, "g/cm^3", "g/cm3", "sg", "SG"),
+        "kg/m^3", {"kg/m^3": 1.0, "kg/m3": 1.0,
+                   **_same(units.g_per_cm3, "g/cm^3", "g/cm3", "sg", "SG", "t/m^3", "t/m3"),
                    **_same(units.ppg, "ppg", "lb/gal", "lbm/gal")}, "ppg", 1e5),
     "mass per length": Dimension(
         "kg/m", {"kg/m": 1.0, **_same(units.lb_per_ft, "lb/ft", "lbm/ft", "ppf")}, "lb/ft", 1e6),
@@ -67,7 +68,9 @@ DIMENSIONS = {
     "angular velocity": Dimension("rad/s", {"rad/s": 1.0, **_same(units.rpm, "rpm", "RPM", "1/min")}, "rpm", 1e5),
     "pressure": Dimension(
         "Pa", {**_same(1.0, "Pa", "N/m^2"), "kPa": units.kPa, "MPa": units.MPa, "GPa": units.GPa, "psi": units.psi,
-               "ksi": units.ksi}, "psi", 1e15),
+               "ksi": units.ksi, **_same(units.kPa, "kN/m^2", "kN/m2"), **_same(1e4 * units.kPa, "kN/cm^2", "kN/cm2"),
+               **_same(units.MPa, "N/mm^2", "N/mm2", "N/mm²", "MN/m^2", "MN/m2"), "N/cm^2": 1e4,
+               **_same(units.GPa, "kN/mm^2", "kN/mm2", "kN/mm²"), **_same(1.0, "N/m2", "N/m²")}, "psi", 1e15),
     "angle": Dimension("rad", {"rad": 1.0, **_same(units.deg, "deg", "°")}, "deg"),
     "angle per length": Dimension(
         "rad/m", {"rad/m": 1.0, "deg/30m": units.deg_per_30m, "deg/100ft": units.deg_per_100ft}, "deg/100ft"),

@@ -77,6 +77,13 @@ def test_tabulated(name):
     assert getattr(units, name) == pytest.approx(TABULATED[name], rel=5e-7)
 
 
+@pytest.mark.parametrize("modulus", ["210 GPa", "210000 N/mm2", "210 kN/mm^2", "21000 kN/cm^2", "210e6 kN/m^2"])
+def test_units_of_stresses(modulus):
+    """Those of structural engineers, in which a wrong guess is off by a million."""
+    steel = cf.Material(E=modulus, nu=0.3, density="7.85 t/m^3")
+    assert steel.E == pytest.approx(210e9, rel=1e-15) and steel.density == pytest.approx(7850.0, rel=1e-15)
+
+
 def test_definitions():
     assert units.foot == 0.3048 and units.lbf == 0.45359237 * 9.80665 and units.psi * units.inch**2 == units.lbf
     assert units.lb_per_ft == pytest.approx(1.48816394, abs=5e-9) and units.ppg == pytest.approx(119.826427, abs=5e-7)
