@@ -81,8 +81,8 @@ class Follower:
             if not Continuation(track, steps).to(1.0):
                 raise NotConverged(
                     f"no equilibrium under the permanent loads was found beyond {track.here.load_factor:.3g} of them: "
-                    f"{track.failure}. Are the units those of SI (N, m, Pa), and do supports hold every rod? Otherwise try "
-                    "more elements, or loads that are not permanent"
+                    f"{track.failure}. Are the units those of SI (N, m, Pa), and do supports hold every rod? Otherwise "
+                    "try more elements, or loads that are not permanent"
                 )
             problem.end_beginning()
             track.begin_here()
