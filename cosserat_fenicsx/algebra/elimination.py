@@ -6,6 +6,7 @@ segments of rods, and all ranks solve the whole interface, with the same numbers
 """
 
 import contextlib
+import functools
 import math
 
 import numpy as np
@@ -132,8 +133,7 @@ class Elimination(Pointers):
     def _find_places(self, at, ends, rows, slots):
         numbering, first, kept = self.numbering, self._shape[at, :2].sum(axis=1), self._shape[at, 2:].sum(axis=1)
         starts, here = np.cumsum((slots[at] + kept) ** 2), np.empty((2, len(self.condensed)), dtype=np.int64)
-        for shape in set(zip(first.tolist(), kept.tolist(), slots[at].tolist(), strict=True)):  # most have the same
-            a, b, c = shape
+        for a, b, c in set(zip(first.tolist(), kept.tolist(), slots[at].tolist(), strict=True)):  # most are alike
             alike = np.flatnonzero((first == a) & (kept == b) & (slots[at] == c))
             where = np.hstack([ends[at[alike], None] + np.arange(c), rows[at[alike], a : a + b] - numbering.size])
             block = (starts[alike] - (b + c) ** 2)[:, None] + np.arange((b + c) ** 2)
@@ -300,8 +300,12 @@ class _Sparse:
         keys, entry = np.unique(np.append(rows, each) * self._size + np.append(columns, each), return_inverse=True)
         self._columns, self.room = keys % self._size, len(keys)
         self._starts = np.searchsorted(keys // self._size, np.arange(self._size + 1))
-        self._factors = eigen.RepeatedFactors(self._starts, self._columns)
         return entry[: len(rows)]
+
+    @functools.cached_property
+    def _factors(self):
+        """Made when they are first asked for: many systems only count signs."""
+        return eigen.RepeatedFactors(self._starts, self._columns)
 
     def factor(self, values, zero):
         return bool(np.isfinite(values).all()) and self._factors.factor(values)

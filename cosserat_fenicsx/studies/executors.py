@@ -1,4 +1,4 @@
-"""Cases of a study, computed here or by an executor: processes of this machine, a dask cluster, ranks of mpi4py.futures."""
+"""Cases of a study, computed here or by an executor: new processes, a dask cluster, ranks of mpi4py.futures."""
 
 import contextlib
 import itertools

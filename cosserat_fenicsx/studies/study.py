@@ -95,8 +95,8 @@ def study(
     store = Nowhere() if folder is None else Store(folder, KIND, comm).begin(told)
     try:
         rows = _latest(store.lines(lambda row: _outcome_in(row, len(cases))))
-        with executor_of(task, workers, executor) as found:
-            run = _Run(task, cases, rows, retry, store, comm, found)
+        with executor_of(task, workers, executor) as chosen:
+            run = _Run(task, cases, rows, retry, store, comm, chosen)
             rows, troubles = run.over(progress)
     finally:
         store.release()

@@ -157,9 +157,9 @@ class Borehole(Part):
         worst = int(np.argmax(path.dogleg_severity))
         unit, size = ("30 m", constants.deg_per_30m) if units.si else ("100 ft", constants.deg_per_100ft)
         return (
-            f"Well: {len(path.md)} stations to md = {units.told(path.length, 'm')}, which is north {north}, east {east} "
-            f"and down {down}; largest inclination {math.degrees(path.inclination.max()):.2f} degrees, largest dogleg "
-            f"{path.dogleg_severity[worst] / size:.2f} degrees per {unit} below {units.told(path.md[worst], 'm')}."
+            f"Well: {len(path.md)} stations to md = {units.told(path.length, 'm')}, which is north {north}, east "
+            f"{east} and down {down}; largest inclination {math.degrees(path.inclination.max()):.2f} degrees, largest "
+            f"dogleg {path.dogleg_severity[worst] / size:.2f} degrees per {unit} below {units.told(path.md[worst], 'm')}."
         )
 
     def sections_in_words(self, units: Units) -> list[str]:

@@ -126,8 +126,8 @@ def more_in_words(answer, units):
             yield (
                 f"{which} are ROUGH, with estimated errors above {100 * ROUGH:g} % of them, up to "
                 f"{answer._told('hook_load', units, max(x.error for x in rough), '.2g')} (contacts[i].error); "
-                f"hook load and surface torque have their own estimated errors, {answer.error:.0e}. A smaller tol helps, "
-                "but not where the end of a contact or component, or a survey station, is near"
+                f"hook load and surface torque have their own estimated errors, {answer.error:.0e}. A smaller tol "
+                "helps, but not where the end of a contact or component, or a survey station, is near"
             )
     yield f"{answer.model}: {'; '.join(answer.why)}."
 

@@ -1,23 +1,30 @@
 """A chart of curves: what a problem draws where its result has no picture of its own."""
 
-from cosserat_fenicsx.pictures.charts import draw_chart, legend, stacked
+from cosserat_fenicsx.pictures.charts import draw_chart, empty_figure, legend
+
+
+def charted(xlabel, ylabel, lines, equal=False):
+    """A function that draws lines into a file.
+
+    Args:
+        xlabel, ylabel: of the axes, with units.
+        lines: [(label, or None for a line without legend, x, y, style)].
+        equal: whether both axes have one scale.
+    """
+
+    def figure():
+        made = empty_figure(7.5, 4.5)
+        axes = made.add_subplot()
+        for label, x, y, style in lines:
+            axes.plot(x, y, style, label=label)
+        axes.set(xlabel=xlabel, ylabel=ylabel, aspect="equal" if equal else "auto")
+        if any(label for label, *_ in lines):
+            legend(axes)
+        return made
+
+    return lambda file: draw_chart(figure, file)
 
 
 def curve(file, lines, across, up):
-    """Draw lines into a file.
-
-    Args:
-        lines: {name: (x, y)}; a name "" stays without legend; up to ten points are drawn as points.
-        across, up: labels of the axes, with units.
-    """
-
-    def make():
-        figure, (axes,) = stacked(6.0, [3.0])
-        for name, (x, y) in lines.items():
-            axes.plot(x, y, "o" if len(x) <= 10 else "-", label=name or None)
-        axes.set(xlabel=across, ylabel=up)
-        if any(lines):
-            legend(axes)
-        return figure
-
-    return draw_chart(make, file)
+    """Draw {name: (x, y)} into a file: up to ten points as points, a name "" without legend; `across`, `up`: labels."""
+    charted(across, up, [(name or None, x, y, "o" if len(x) <= 10 else "-") for name, (x, y) in lines.items()])(file)

@@ -4,7 +4,8 @@ import math
 from itertools import pairwise
 
 import numpy as np
-from modes import charted, compared, pictured, swinging
+from curves import charted
+from modes import compared, pictured, swinging
 from problem import Row, problem
 
 import cosserat_fenicsx as cf

@@ -6,12 +6,12 @@ The mesh is refined until two meshes agree (`cf.modes`); the estimate is that of
 import math
 
 import numpy as np
+from curves import charted
 from problem import Row, problem
 from scipy.optimize import brentq
 from scipy.special import jn_zeros
 
 import cosserat_fenicsx as cf
-from cosserat_fenicsx.pictures.charts import draw_chart, empty_figure, legend
 
 X_AXIS = cf.Line((0, 0, 0), (1, 0, 0))  # 1 m, d1 along y and d2 along z
 
@@ -37,21 +37,6 @@ def compared(quantity, published, found, which, allowed, because, factor=1.0):
 def pictured(found):
     """Draws the first modes of a result."""
     return lambda file: found.plot(file)
-
-
-def charted(xlabel, ylabel, lines, equal=False):
-    """Draws lines (label, x, y, style) in one panel; equal: whether both axes have one scale."""
-
-    def figure():
-        made = empty_figure(7.5, 4.5)
-        axes = made.add_subplot()
-        for label, x, y, style in lines:
-            axes.plot(x, y, style, label=label)
-        axes.set(xlabel=xlabel, ylabel=ylabel, aspect="equal" if equal else "auto")
-        legend(axes)
-        return made
-
-    return lambda file: draw_chart(figure, file)
 
 
 def roots(function, upto, count, start=1e-3, pieces=2000):

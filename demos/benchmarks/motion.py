@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from modes import charted
+from curves import charted
 from problem import Row, problem
 from scipy.special import ellipk
 
