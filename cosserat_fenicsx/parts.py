@@ -107,7 +107,11 @@ class Part(metaclass=_Readable):
         return next((make for make in others if (arguments_of(make).keys() - own) & set(names)), cls)
 
 
-class FunctionOfTime(Part, family="function of time", homes=("cosserat_fenicsx.scene.signals",)):
+class FunctionOfTime(
+    Part,
+    family="function of time",
+    homes=("cosserat_fenicsx.scene.signals", "cosserat_fenicsx.scene.body_motion"),
+):
     """Base of functions of time (s), with the attribute `jumps`, times where they are not smooth.
 
     Their numbers, in the fields `value` or `values`, may be text with a unit, which what they are given to converts.

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from conftest import refuses
 from moving_scenes import SPAGHETTI, drift, flying_in_a_plane, flying_in_space, right_angle, spaghetti
+from scipy.spatial.transform import Rotation
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.dynamics.pace import Adaptive, Resolution
@@ -591,3 +592,32 @@ def test_a_motion_may_start_under_permanent_loads_alone():
     weight = cf.Scene([ROD], [cf.Clamp(ROD.start)], [cf.LineForce(ROD, (0, 0, -1.0), permanent=True)])
     history = cf.simulate(weight, 0.2, dt=0.05, start=0.0, elements=2)
     assert np.ptp(history.displacement(ROD.end), axis=0).max() < 1e-12 < np.abs(history.displacement(ROD.end)).max()
+
+
+def test_a_support_on_a_body_of_six_degrees_of_freedom(tmp_path):
+    """Splines of the table's columns; off its reference point a point of the body moves by the arm that turns."""
+    t = np.linspace(0, 8, 161)
+    roll, heave = 5 * np.sin(t), 0.3 * np.cos(t)
+    rows = np.column_stack([t, 0 * t, 0 * t, heave, roll, 0 * t, 90 + 0 * t])
+    np.savetxt(tmp_path / "vessel.csv", rows, delimiter=",", header="t, x, y, z, roll, pitch, yaw")
+    about, point = np.array([0, 0, 1.0]), np.array([0, 3.0, 1.0])
+    moved = cf.signals.BodyDisplacement(tmp_path / "vessel.csv", True, point, about, fade_in=2.0)
+    angle = np.radians(5 * np.sin(5.02))  # the arm along y is raised by the roll, then turned to -x by the yaw
+    arm = [-3 * np.cos(angle), -3.0, 3 * np.sin(angle) + 0.3 * np.cos(5.02)]
+    np.testing.assert_allclose(moved(5.02), arm, atol=1e-7)
+    turned = cf.signals.BodyRotation(np.column_stack([rows[:, :4], np.radians(rows[:, 4:])]), False, fade_in=2.0)
+    now = Rotation.from_rotvec(turned(5.02)).apply((0, 3, 0))
+    np.testing.assert_allclose(now, np.subtract(arm, (0, -3, 0.3 * np.cos(5.02))), atol=1e-7)
+    assert moved(0.0) == (0, 0, 0) and moved(-1.0) == (0, 0, 0) and moved(9.0) == moved(8.0)
+    rod = cf.Rod(cf.Line(tuple(point), (2, 3, 1)), BLADE, name="arm")
+    scene = cf.Scene([rod], [cf.Prescribed("arm.start", displacement=moved, rotation=turned)])
+    cf.write(scene, tmp_path / "scene.toml")
+    assert (
+        cf.read(tmp_path / "scene.toml").scene.supports[0].displacement.function
+        == scene.supports[0].displacement.function
+    )
+    history = cf.simulate(scene, 1.0, dt=0.05, elements=2)
+    np.testing.assert_allclose(history.position(rod.start)[-1] - point, moved(1.0), atol=1e-12)
+    for bad, words in ((rows[::-1], "ascending times"), (rows[:, :6], "seven columns"), (rows * 4, "half a turn")):
+        with pytest.raises(cf.SceneError, match=words):
+            cf.signals.BodyRotation(bad, True)

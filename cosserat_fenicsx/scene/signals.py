@@ -37,7 +37,6 @@ from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.kinds import Either
 from cosserat_fenicsx.parts import FileName, FunctionAlong, FunctionOfTime, Limits, Number
 
-
 _Time = Annotated[float, Number("time", Limits(what="a time"))]
 
 
@@ -425,7 +424,7 @@ class AlongTable(FunctionAlong):
 
     def __post_init__(self):
         if self.values is None:
-            table = _read(self.s)
+            table = read_table(self, "s", self.s, 4, "four columns, s (m) and three components")
             store(self, s=table[:, 0], values=table[:, 1:])
         s = _ascending(self, "s", "ascending arc lengths (m)")
         expected = f"three finite numbers for each of the {len(s)} arc lengths"
@@ -499,17 +498,20 @@ def values_of(value, s):
     return value(s) if isinstance(value, FunctionAlong) else value
 
 
-def _read(file):
-    text = text_of(file, "arc lengths and vectors as .csv")
+def read_table(owner, field, file, columns, expected):
+    """The numbers (n, columns) of a .csv file without a heading.
+
+    Args:
+        owner, field: what has the file, for messages. expected: the columns in words, their number first.
+    """
+    where = f"{name_of(owner)}.{field} = {str(file)!r}"
     try:
-        table = np.loadtxt(text.splitlines(), delimiter=",", comments="#", ndmin=2)
+        table = np.loadtxt(text_of(file, f"{expected}, as .csv").splitlines(), delimiter=",", comments="#", ndmin=2)
     except ValueError as problem:
         raise SceneError(
-            f"AlongTable.s = {str(file)!r}: cannot be read ({problem}): expected arc lengths (m), or a .csv file of "
-            "four columns, s (m) and three components, no heading but lines that begin with #"
+            f"{where}: cannot be read ({problem}): expected a .csv file of {expected}; no heading but lines that begin "
+            "with #"
         ) from None
-    if table.shape[1] != 4:
-        raise SceneError(
-            f"AlongTable.s = {str(file)!r}: {table.shape[1]} columns: expected four, s (m) and three components"
-        )
+    if table.shape[1] != columns:
+        raise SceneError(f"{where}: {table.shape[1]} columns: expected {expected}")
     return table
