@@ -38,9 +38,23 @@ def test_mutants_quick():
     """A wrong sign in the direction of a line is found by the tests of curves, and they pass without it."""
     import mutants
 
-    assert mutants.quick() == ["killed", "survived"]
+    assert mutants.quickly() == ["killed", "survived"]
     chosen = mutants.chosen(mutants.ROOT, 30, seed=0)
     assert chosen == mutants.chosen(mutants.ROOT, 30, seed=0) and {x.part for x in chosen} == {*mutants.PARTS}
+    lines = {
+        "a/b.py": {"2": ["t::slow", "t::quick"], "9": ["t::other"]},
+        "a/c.py": {"1": ["u::c"]},
+        "d.py": {"1": ["v"]},
+    }
+    seconds = {"t::slow": 5.0, "t::quick": 1.0, "t::other": 0.1, "u::c": 0.2, "v": 0.0}
+    for file, tests in {
+        "a/b.py": ["t::quick", "t::slow", "t::other"],
+        "a/x.c": ["t::other", "u::c", "t::quick", "t::slow"],
+    }.items():
+        met = mutants.tests_for(mutants.Mutant("C", file, 3, "sign", 0, "", ""), lines, seconds)
+        assert met == tests
+    said = "0.25s setup    t::a\n1.00s call     t::a\n2.00s call     t::b[x]\nFAILED t::b[x] - assert 1 - 2\n"
+    assert mutants.read_durations(said) == ({"t::a": 1.25, "t::b[x]": 2.0}, {"t::a"})
 
 
 @pytest.mark.slow

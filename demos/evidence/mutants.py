@@ -1,20 +1,20 @@
 """How sharp the tests are: the share of small errors, put into the code at random, that the serial tests find.
 
-    python demos/evidence/mutants.py                 120 errors, 20 in each part of the code (hours)
+    python demos/evidence/mutants.py                 120 errors, 20 in each part of the code (one to two hours)
     python demos/evidence/mutants.py --count 12 --seed 3
     python demos/evidence/mutants.py --quick         one error in a copy of a small file, against its own tests
 
 An error (a "mutant") swaps an arithmetic operator or a comparison, changes a sign or a constant, or leaves out a
 statement. It is killed when a test fails that passes without it, or when the tests take five times as long as they
-should. Each mutant lives in a copy of the checkout; the tests that run its line are started first, then those that run
-another line of its file, and for forms and C all: which these are is measured once, with coverage (`pip install
-pytest-cov`). A run that was broken off goes on where it was: outcomes are kept in out/mutants.jsonl, by seed and state
-of the code.
+should. Which tests run which lines, and how long each takes, is measured once, file by file of the tests, with coverage
+(`pip install pytest-cov`). A mutant then meets the tests that run its line, the quickest first, then those that run
+another line of its file (in C: of the folder's Python), up to the first that fails or to two minutes of tests: the
+share of the whole suite is this or more. All in one process at a time. A run that was broken off goes on where it was.
+
+Writes to out/: mutants_coverage.json, mutants.jsonl (each outcome, by seed and state of the code), mutants.md.
 """
 
-import argparse
 import ast
-import concurrent.futures
 import hashlib
 import json
 import os
@@ -24,9 +24,12 @@ import shutil
 import subprocess
 import sys
 import tempfile
+import time
+from collections import Counter
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
+from harness import command, table, write
 from rich.progress import track
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -52,8 +55,14 @@ IN_C = {
     "constant": [(r"(?<![\w.])([2-9]|\d+\.\d+)(?![\w.])", r"(\1 * 1.5)")],
     "statement": [(r"^\s+[\w\->\[\].*]+ [-+*/]?= [^;{]*;$", "    ;")],
 }  # fmt: skip
+#: Tests of what lies around the code, or of all of it at once: they run no line of their own, or take long.
+LEFT_OUT = (
+    "site", "published", "docs", "release", "ci", "services", "typing", "evidence", "gallery", "rank_fails", "animation",
+    "demos", "house", "chart_layout",
+)  # fmt: skip
 #: The tests of a mutant may take this many times what they take without it, and as many seconds more.
 TIMES, SECONDS = 5, 60
+BUDGET = 120.0  # s, of the tests that a mutant meets
 
 
 @dataclass(frozen=True)
@@ -168,88 +177,104 @@ def state_of(root):
     return digest.hexdigest()[:16]
 
 
-def surroundings(root):
-    """The environment of a run of tests."""
-    return {**os.environ, "PYTHONPATH": str(root), "PYTHONDONTWRITEBYTECODE": "1"}
+def pytest_in(root, *words, limit=None, **variables):
+    """(exit code, what is printed) of pytest in a checkout.
+
+    Raises:
+        subprocess.TimeoutExpired: after `limit`, s.
+    """
+    environment = {**os.environ, "PYTHONPATH": str(root), **variables}
+    words = [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", *words]
+    done = subprocess.run(words, cwd=root, env=environment, timeout=limit, capture_output=True, text=True)
+    return done.returncode, done.stdout
 
 
 def tests_of_lines(root, out):
-    """({file: {line: tests}}, {test: s}): what each line is run by, and how long each test takes."""
-    kept = out / "mutants_coverage.json"
-    if kept.exists():
-        found = json.loads(kept.read_text(encoding="utf-8"))
-        if found["state"] == state_of(root):
-            return found["lines"], found["seconds"]
-    with tempfile.TemporaryDirectory() as place:
-        copy = copied(root, Path(place))
-        words = ["-m", "pytest", "-n", "2", "--dist", "worksteal", "-p", "no:cacheprovider", "--cov=cosserat_fenicsx"]
-        words += ["--cov=forms", "--cov-context=test", "--cov-report=", "--durations=0", "--durations-min=0.001"]
-        print("measuring which tests run which lines (the whole serial suite, once) ...", flush=True)
-        piped = {"capture_output": True, "text": True}
-        done = subprocess.run([sys.executable, *words], cwd=copy, env=surroundings(copy), **piped)
-        print("\n".join(done.stdout.splitlines()[-1:]), flush=True)
-        seconds = {}
-        for line in done.stdout.splitlines():
-            match = re.match(r"([\d.]+)s (?:call|setup) +(\S.*)", line)
-            if match:
-                seconds[match[2]] = seconds.get(match[2], 0.0) + float(match[1])
-        from coverage import CoverageData
+    """({file: {line: tests}}, {test: s}): what each line is run by, and how long each test takes that passes."""
+    from coverage import CoverageData
 
-        data = CoverageData(str(copy / ".coverage"))
-        data.read()
-        lines = {}
-        for file in data.measured_files():
-            name = str(Path(file).resolve().relative_to(copy.resolve()))
-            by_line = data.contexts_by_lineno(file)
-            lines[name] = {number: sorted({context.partition("|")[0] for context in contexts} - {""})
-                           for number, contexts in by_line.items()}  # fmt: skip
+    kept, state = out / "mutants_coverage.json", state_of(root)
+    if kept.exists() and (found := json.loads(kept.read_text(encoding="utf-8")))["state"] == state:
+        return found["lines"], found["seconds"]
+    lines, seconds = {}, {}
+    words = ["--cov=cosserat_fenicsx", "--cov=forms", "--cov-context=test", "--cov-report=", "-rfE"]
+    with tempfile.TemporaryDirectory() as place:
+        copy = copied(root, Path(place).resolve())
+        left_out = {f"test_{name}" for name in LEFT_OUT}
+        files = [file for file in sorted((copy / "tests").glob("test_*.py")) if file.stem not in left_out]
+        for file in track(files, "coverage"):
+            # a process for each file: what a process keeps is run by its first test only
+            name = str(file.relative_to(copy))
+            said = pytest_in(copy, name, *words, "--durations=0", "--durations-min=0", COVERAGE_FILE=f"{file}.coverage")[1]
+            taken, passed = read_durations(said)
+            seconds |= {test: taken[test] for test in passed}
+            data = CoverageData(f"{file}.coverage")
+            data.read()
+            for measured in data.measured_files():
+                of_file = lines.setdefault(str(Path(measured).relative_to(copy)), {})
+                for number, contexts in data.contexts_by_lineno(measured).items():
+                    tests = {context.partition("|")[0] for context in contexts} & passed
+                    of_file.setdefault(str(number), []).extend(sorted(tests))
     out.mkdir(parents=True, exist_ok=True)
-    found = {"state": state_of(root), "lines": lines, "seconds": seconds}
-    kept.write_text(json.dumps(found), encoding="utf-8")
-    return json.loads(json.dumps(lines)), seconds
+    kept.write_text(json.dumps({"state": state, "lines": lines, "seconds": seconds}), encoding="utf-8")
+    return lines, seconds
+
+
+def read_durations(said):
+    """({test: s}, the tests that passed) of what pytest prints with --durations=0 -rfE."""
+    taken, failed = Counter(), set(re.findall(r"^(?:FAILED|ERROR) (\S+::.*?)(?: - .*)?$", said, re.MULTILINE))
+    for seconds, test in re.findall(r"^([\d.]+)s (?:call|setup|teardown) +(\S.*)$", said, re.MULTILINE):
+        taken[test] += float(seconds)
+    return taken, set(taken) - failed
 
 
 def tests_for(mutant, lines, seconds):
-    """The tests that run the line of a mutant, the quickest first, then the others that may notice it.
+    """The tests that a mutant meets, in order, at most BUDGET seconds of them.
 
-    A function that keeps what it has made runs its lines in one test only: the others are the tests that run any line
-    of the file, and for forms and C, which are compiled and kept, all tests.
+    A function that keeps what it has made runs its lines in one test only: after the tests that run the line come those
+    that run any line of the file. C is run by what runs the Python around it.
     """
+    folder = str(Path(mutant.file).parent) + "/"
+    around = [name for name in lines if name.startswith(folder)] if mutant.file.endswith(".c") else [mutant.file]
     by_line = lines.get(mutant.file, {})
     # A statement of several lines may be charged to its first ones.
     line = max((int(x) for x in by_line if int(x) <= mutant.line), default=0)
     of_line = set(by_line.get(str(line), ()))
-    of_file = {test for tests in by_line.values() for test in tests} - of_line
-    others = set(seconds) - of_line - of_file if mutant.part in ("forms", "C") else set()
+    of_file = {test for name in around for tests in lines.get(name, {}).values() for test in tests} - of_line
+    found, spent = [], 0.0
+    for tests in (of_line, of_file):
+        taken, cost = Counter(), {}
+        for test in sorted(tests, key=lambda test: (seconds[test], test)):
+            # the quickest first, but one file of tests after the other: tests of a file are alike
+            taken[test.partition("::")[0]] += 1
+            cost[test] = (seconds[test] + 0.01) * taken[test.partition("::")[0]]
+        for test in sorted(cost, key=cost.get):
+            if spent + seconds[test] <= BUDGET or not found:
+                found.append(test)
+                spent += seconds[test]
+    return found
 
-    def ordered(tests):
-        return sorted(tests, key=lambda test: seconds.get(test, 0.0))
 
-    return [*ordered(of_line), *ordered(of_file), *ordered(others)]
-
-
-def verdict(mutant, root, tests, seconds=0.0):
-    """ "killed", "survived" or "not run" of a mutant against tests that take `seconds`, in a copy of the checkout."""
+def verdict(mutant, copy, tests, seconds=0.0):
+    """What becomes of a mutant in a copy of the checkout against tests that take `seconds`: ("killed", by which test),
+    ("survived", "") or ("not run", "")."""
     if not tests:
-        return "not run"
-    with tempfile.TemporaryDirectory() as place:
-        copy = copied(root, Path(place))
-        file = copy / mutant.file
-        text = file.read_text(encoding="utf-8")
-        assert text[mutant.offset : mutant.offset + len(mutant.old)] == mutant.old, mutant
-        changed = text[: mutant.offset] + mutant.new + text[mutant.offset + len(mutant.old) :]
-        file.write_text(changed, encoding="utf-8")
-        (copy / "asked.json").write_text(json.dumps(tests), encoding="utf-8")
-        options = ["-q", "-x", "-p", "no:cacheprovider"]
-        code = f"import json, sys, pytest; sys.exit(pytest.main([*{options}, *json.load(open('asked.json'))]))"
-        try:
-            done = subprocess.run(
-                [sys.executable, "-c", code], cwd=copy, env=surroundings(copy), timeout=TIMES * seconds + SECONDS,
-                stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
-            )  # fmt: skip
-        except subprocess.TimeoutExpired:
-            return "killed"
-        return "survived" if done.returncode == 0 else "killed"
+        return "not run", ""
+    file = copy / mutant.file
+    text, stamp = file.read_text(encoding="utf-8"), file.stat().st_mtime_ns
+    assert text[mutant.offset : mutant.offset + len(mutant.old)] == mutant.old, mutant
+    file.write_text(text[: mutant.offset] + mutant.new + text[mutant.offset + len(mutant.old) :], encoding="utf-8")
+    os.utime(file, (time.time(), time.time() + random.randrange(10**8)))  # Python compares times in whole seconds
+    (copy / "asked.txt").write_text("\n".join(tests), encoding="utf-8")
+    try:
+        code, said = pytest_in(copy, "-x", "-rfE", "@asked.txt", limit=TIMES * seconds + SECONDS)
+    except subprocess.TimeoutExpired:
+        return "killed", "the limit of time"
+    finally:
+        file.write_text(text, encoding="utf-8")
+        os.utime(file, ns=(stamp, stamp))
+    killer = re.search(r"^(?:FAILED|ERROR) (\S+)", said, re.MULTILINE)
+    return ("survived", "") if code == 0 else ("killed", killer[1] if killer else "a process that ends")
 
 
 def chosen(root, count, seed):
@@ -266,55 +291,55 @@ def chosen(root, count, seed):
     return found
 
 
-def main(count=120, seed=0, root=ROOT, out=Path("out"), workers=2):
-    """Print the share of mutants that are killed, by part; returns {mutant: verdict}."""
+def main(count=120, seed=0, out="out", root=ROOT, quick=False):
+    """Print the share of mutants that are killed, by part, and write it to out/mutants.md; returns {mutant: verdict}."""
+    if quick:
+        return print(quickly())
+    out = Path(out)
     lines, seconds = tests_of_lines(root, out)
     file, key, known = out / "mutants.jsonl", f"{seed} {count} {state_of(root)}", {}
     for line in file.read_text(encoding="utf-8").splitlines() if file.exists() else ():
         row = json.loads(line)
         if row.pop("run") == key:
-            told = row.pop("verdict")
-            known[Mutant(**row)] = told
+            told, by = row.pop("verdict"), row.pop("by")
+            known[Mutant(**row)] = told, by
     mutants = chosen(root, count, seed)
-    left = [x for x in mutants if x not in known]
-    with concurrent.futures.ThreadPoolExecutor(workers) as pool, file.open("a", encoding="utf-8") as stream:
-        running = {}
-        for x in left:
+    with file.open("a", encoding="utf-8") as stream, tempfile.TemporaryDirectory() as place:
+        copy = copied(root, Path(place))
+        for x in track([x for x in mutants if x not in known], "mutants"):
             tests = tests_for(x, lines, seconds)
-            running[pool.submit(verdict, x, root, tests, sum(seconds.get(test, 0.0) for test in tests))] = x
-        try:
-            for done in track(concurrent.futures.as_completed(running), "mutants", total=len(left)):
-                x = running[done]
-                known[x] = done.result()
-                stream.write(json.dumps({"run": key, **asdict(x), "verdict": known[x]}) + "\n")
-                stream.flush()
-        except KeyboardInterrupt:
-            pool.shutdown(wait=False, cancel_futures=True)
-            raise
-    found = {x: known[x] for x in mutants}
-    for x, told in found.items():
-        if told != "killed":
-            print(f"{told}: {x.file}:{x.line} ({x.kind}): {x.old!r} -> {x.new!r}")
-    for part in PARTS:
-        told = [found[x] for x in found if x.part == part]
-        print(f"{part}: {told.count('killed')} of {len(told)} killed, {told.count('not run')} on lines no test runs")
-    print(f"all: {list(found.values()).count('killed')} of {len(found)} killed")
+            known[x] = told, by = verdict(x, copy, tests, sum(map(seconds.get, tests)))
+            stream.write(json.dumps({"run": key, **asdict(x), "verdict": told, "by": by}) + "\n")
+            stream.flush()
+    return reported(mutants, known, f"`mutants.py --count {count} --seed {seed}`, state of the code {state_of(root)}.", out)
+
+
+def reported(mutants, known, about, out):
+    """Write what became of the mutants; returns {mutant: verdict}."""
+    found = {x: known[x][0] for x in mutants}
+    rows = []
+    for part in (*PARTS, "all"):
+        of_part = Counter(found[x] for x in found if part in (x.part, "all"))
+        number, killed = of_part.total(), of_part["killed"]
+        rows.append((part, number, killed, of_part["not run"], f"{100 * killed / max(number, 1):.0f}"))
+    left = [f"- {x.file}:{x.line} ({x.kind}): {x.old!r} became {x.new!r}: {found[x]}" for x in found
+            if found[x] != "killed"]  # fmt: skip
+    heads = "part | mutants | killed | on lines that no test runs | killed (%)"
+    print(write("mutants", [about, "", *table(heads, rows), *(["", *left] if left else [])], out))
     return found
 
 
-def quick(root=ROOT):
+def quickly(root=ROOT):
     """The verdicts of a mutant of scene/curves.py that its tests must find, and of the file as it is."""
     name = "cosserat_fenicsx/scene/curves.py"
     mutants = mutants_in("scene", name, (root / name).read_text(encoding="utf-8"))
     wrong = next(x for x in mutants if x.new.startswith("-(np.eye"))  # a rotation
     same = Mutant("scene", name, wrong.line, "none", wrong.offset, wrong.old, wrong.old)
-    return [verdict(x, root, ["tests/test_curves.py"]) for x in (wrong, same)]
+    with tempfile.TemporaryDirectory() as place:
+        copy = copied(root, Path(place))
+        return [verdict(x, copy, ["tests/test_curves.py"])[0] for x in (wrong, same)]
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--quick", action="store_true", help="one mutant of a small file")
-    parser.add_argument("--count", type=int, default=120)
-    parser.add_argument("--seed", type=int, default=0)
-    given = parser.parse_args()
-    print(quick()) if given.quick else main(given.count, given.seed)
+    numbers = {"count": {"type": int, "default": 120}, "seed": {"type": int, "default": 0}}
+    command(__doc__, main, {"quick": True}, **numbers)
