@@ -5,13 +5,10 @@ python demos/frames.py gridshell           some
 python demos/frames.py --quick             without pictures
 """
 
-import argparse
-import sys
 from pathlib import Path
 
 import numpy as np
-from known_numbers import Check, chosen, report, verdict
-from mpi4py import MPI
+from known_numbers import Check, command, run_all
 
 import cosserat_fenicsx as cf
 
@@ -88,20 +85,15 @@ FRAMES = (gridshell, lattice, net)
 def main(names=(), out="out/frames"):
     """Run demos, and print their numbers and whether all are right; `names`: of demos, none for all; `out`: folder for
     pictures, or None. Returns a list of `Check`s."""
-    found = []
-    for demo in chosen("demos/frames.py", "frame", FRAMES, names):
+
+    def solved(demo):
         path, check = demo()
         if out is not None:
             path.plot(Path(out) / f"{demo.__name__}.png")
-        found.append((demo.__name__, path.model, check))
-    if MPI.COMM_WORLD.rank == 0:
-        print(report("Frames: what must come out", found))
-    return [check for *_, check in found]
+        return path.model, [check]
+
+    return run_all("demos/frames.py", "frame", "Frames: what must come out", FRAMES, names, solved)
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("names", nargs="*", help="; ".join(demo.__name__ for demo in FRAMES))
-    parser.add_argument("--quick", action="store_true", help="without pictures")
-    options = parser.parse_args()
-    sys.exit(verdict(main(options.names, None if options.quick else "out/frames")))
+    command(__doc__, FRAMES, main, "out/frames")

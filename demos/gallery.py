@@ -5,14 +5,11 @@ python demos/gallery.py cable soft_arm     some
 python demos/gallery.py --quick            without pictures
 """
 
-import argparse
 import math
-import sys
 from pathlib import Path
 
 import numpy as np
-from known_numbers import Check, chosen, report, verdict
-from mpi4py import MPI
+from known_numbers import Check, command, run_all
 from scipy.optimize import brentq
 
 import cosserat_fenicsx as cf
@@ -129,29 +126,15 @@ def run(demo, out="out"):
 
 
 def main(names=(), out="out"):
-    """Run demos, and print their numbers and whether all are right.
+    """Run demos, and print their numbers and whether all are right; `names`: of demos, none for all; `out`: folder for
+    pictures, or None. Returns a list of `Check`s."""
 
-    Args:
-        names: of demos; none for all.
-        out: folder for pictures, or None.
+    def solved(demo):
+        path, check = run(demo, out)
+        return path.model, [check]
 
-    Returns:
-        list of `Check`s.
-    """
-    found = {demo.__name__: run(demo, out) for demo in chosen("demos/gallery.py", "scene", GALLERY, names)}
-    if MPI.COMM_WORLD.rank == 0:
-        print(
-            report(
-                "The gallery: what must come out", [(name, path.model, check) for name, (path, check) in found.items()]
-            )
-        )
-    return [check for _, check in found.values()]
+    return run_all("demos/gallery.py", "scene", "The gallery: what must come out", GALLERY, names, solved)
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("names", nargs="*", help="; ".join(demo.__name__ for demo in GALLERY))
-    parser.add_argument("--quick", action="store_true", help="without pictures")
-    options = parser.parse_args()
-    checks = main(options.names, None if options.quick else "out")
-    sys.exit(verdict(checks))
+    command(__doc__, GALLERY, main, "out")

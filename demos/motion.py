@@ -8,16 +8,13 @@
 Writes to out/: NAME.png (shapes over time and the track of a station, the curve with the number, energies).
 """
 
-import argparse
 import math
-import sys
 from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
-from known_numbers import Check, chosen, deviation, report, verdict
+from known_numbers import Check, command, run_all
 from motion_chart import Curve, Shapes, draw
-from mpi4py import MPI
 from scipy.integrate import solve_ivp
 
 import cosserat_fenicsx as cf
@@ -199,32 +196,16 @@ def run(demo, out=None, *, quick=False, film=False):
 
 
 def main(names=(), out="out", *, quick=False, film=False):
-    """Run demos, and print their numbers and whether all are right.
+    """Run demos, and print their numbers and whether all are right; `names`: of demos, none for all; `out`: folder for
+    pictures, or None; `quick`, `film`: see `run`. Returns a list of `Check`s."""
 
-    Args:
-        names: of demos; none for all.
-        out: folder for pictures, or None.
-        quick, film: see `run`.
-
-    Returns:
-        list of (Check, largest deviation).
-    """
-    rows = []
-    for demo in chosen("demos/motion.py", "demo", DEMOS, names):
+    def solved(demo):
         history, check = run(demo, out, quick=quick, film=film)
-        rows.append((demo.__name__, history.model, check, history.steps[-1]))
-    if MPI.COMM_WORLD.rank == 0:
-        print(report("Motions: what must come out", rows, ["steps"]))
-        if out is not None and not quick:
-            print(f"Pictures: {out}/")
-    return [(check, deviation(check)) for _, _, check, _ in rows]
+        return history.model, [check], history.steps[-1]
+
+    return run_all("demos/motion.py", "demo", "Motions: what must come out", DEMOS, names, solved, ["steps"])
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description="Motions, with a picture and a number each.")
-    parser.add_argument("names", nargs="*", help="; ".join(demo.__name__ for demo in DEMOS))
-    parser.add_argument("--quick", action="store_true", help="shorter, without pictures")
-    parser.add_argument("--film", action="store_true", help="also NAME.gif")
-    options = parser.parse_args()
-    checks = main(options.names, None if options.quick else "out", quick=options.quick, film=options.film)
-    sys.exit(verdict([check for check, _ in checks]))
+    command(__doc__, DEMOS, lambda names, out, film: main(names, out, quick=out is None, film=film), "out",
+            film="also NAME.gif")  # fmt: skip

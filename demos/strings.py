@@ -6,18 +6,16 @@ python demos/strings.py stick_slip         some
 python demos/strings.py --quick            without pictures
 """
 
-import argparse
-import sys
+from functools import partial
 from pathlib import Path
 
 import numpy as np
-from known_numbers import Check, chosen, report, verdict
+from known_numbers import Check, command, run_all
 from mpi4py import MPI
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.drilling.torsion import TorsionWaves
 from cosserat_fenicsx.pictures.two_widths import draw_both
-from cosserat_fenicsx.progress import Progress
 
 SCENES = Path(__file__).parent / "strings"
 _WAVES = "characteristics, extrapolated"
@@ -131,30 +129,17 @@ def run(demo, out="out/strings"):
 
 
 def main(names=(), out="out/strings"):
-    """Run demos, and print their numbers and whether all are right.
-
-    Args:
-        names: of demos; none for all.
-        out: folder for pictures, or None.
-
-    Returns:
-        list of `Check`s.
-    """
-    rows, demos = [], chosen("demos/strings.py", "string", STRINGS, names)
-    with Progress([len(demos)], None, MPI.COMM_WORLD, "demo") as bar:
-        bar.start("strings in motion")
-        for i, demo in enumerate(demos):
-            bar.reached(i)
-            model, checks = run(demo, out)
-            rows += [(demo.__name__, model, check) for check in checks]
-    print(report("Drill-strings in motion: what must come out", rows))
-    return [check for *_, check in rows]
+    """Run demos, and print their numbers and whether all are right; `names`: of demos, none for all; `out`: folder for
+    pictures, or None. Returns a list of `Check`s."""
+    return run_all(
+        "demos/strings.py",
+        "string",
+        "Drill-strings in motion: what must come out",
+        STRINGS,
+        names,
+        partial(run, out=out),
+    )
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("names", nargs="*", help="; ".join(demo.__name__ for demo in STRINGS))
-    parser.add_argument("--quick", action="store_true", help="without pictures")
-    options = parser.parse_args()
-    checks = main(options.names, None if options.quick else "out/strings")
-    sys.exit(verdict(checks))
+    command(__doc__, STRINGS, main, "out/strings")

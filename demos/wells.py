@@ -6,22 +6,19 @@ python demos/wells.py volve_f12          some
 python demos/wells.py --quick            without pictures
 """
 
-import argparse
 import math
-import sys
 from functools import partial
 from pathlib import Path
 
 import numpy as np
 from conduit import FRICTION, pulled_cable
-from known_numbers import Check, chosen, report, verdict
+from known_numbers import Check, command, run_all
 from mpi4py import MPI
 from scipy.integrate import trapezoid
 from stiff_and_soft import stiff_and_soft
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.pictures.two_widths import draw_both
-from cosserat_fenicsx.progress import Progress
 
 SCENES = Path(__file__).parent / "wells"
 
@@ -135,30 +132,12 @@ def run(demo, out="out/wells"):
 
 
 def main(names=(), out="out/wells"):
-    """Run demos, and print their numbers and whether all are right.
-
-    Args:
-        names: of demos; none for all.
-        out: folder for pictures, or None.
-
-    Returns:
-        list of `Check`s.
-    """
-    rows, demos = [], chosen("demos/wells.py", "well", (*WELLS, *TUBES), names)
-    with Progress([len(demos)], None, MPI.COMM_WORLD, "demo") as bar:
-        bar.start("strings in wells")
-        for i, demo in enumerate(demos):
-            bar.reached(i)
-            model, checks = run(demo, out)
-            rows += [(demo.__name__, model, check) for check in checks]
-    print(report("Strings in wells: what must come out", rows))
-    return [check for *_, check in rows]
+    """Run demos, and print their numbers and whether all are right; `names`: of demos, none for all; `out`: folder for
+    pictures, or None. Returns a list of `Check`s."""
+    return run_all(
+        "demos/wells.py", "well", "Strings in wells: what must come out", (*WELLS, *TUBES), names, partial(run, out=out)
+    )
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("names", nargs="*", help="; ".join(demo.__name__ for demo in (*WELLS, *TUBES)))
-    parser.add_argument("--quick", action="store_true", help="without pictures")
-    options = parser.parse_args()
-    checks = main(options.names, None if options.quick else "out/wells")
-    sys.exit(verdict(checks))
+    command(__doc__, (*WELLS, *TUBES), main, "out/wells")
