@@ -155,6 +155,21 @@ def test_labels_keep_off_each_other_and_off_the_edge():
         assert a[2] <= b[0] or b[2] <= a[0] or a[3] <= b[1] or b[3] <= a[1]
 
 
+@pytest.mark.parametrize("seed", [9, 11])
+def test_lines_to_labels_do_not_cross(seed):
+    """Fourteen labels along a string, on both sides."""
+    way, random = np.array([0.7, 0, -0.7]), np.random.default_rng(seed)
+    string = np.linspace(0, 10, 50)[:, None] * way
+    labels = Labels(View.of(string, np.ptp(string, axis=0), (1100, 1000)), [string])
+    for x in random.uniform(2, 10, 14):
+        assert labels.near(f"2.5 kN at {x:.1f} m", x * way, np.array([1.0, 0, 1]) * random.choice([-1, 1]), size=30)
+    for (a, b), (c, d) in itertools.combinations(np.array(labels._leaders), 2):
+        ways = np.column_stack([b - a, c - d])
+        if abs(np.linalg.det(ways)) > 1e-6:  # not parallel
+            shares = np.linalg.solve(ways, c - a)
+            assert not ((shares > 0) & (shares < 1)).all()
+
+
 def test_numbers_of_an_axis_are_even():
     """Every n-th one, from that on which leaves most room where another label stands at an end."""
     view = View.of(np.array([[0.0, 0, 0], [10, 0, 5]]), np.array([10.0, 0, 5]), (700, 500))
@@ -163,7 +178,7 @@ def test_numbers_of_an_axis_are_even():
     for size, taken in ((10, None), (32, None), (32, ticks[0])):
         labels = Labels(view)
         if taken:
-            labels.fix("x", taken[1], size=size)
+            labels.fix("x", [(taken[1], (0.0, 0.0))], size=size)
         before = len(labels.boxes)
         labels.evenly(ticks, size=size, away=(0, 0))
         kept[size, taken is None] = [text for text, *_ in labels._texts[before:]]

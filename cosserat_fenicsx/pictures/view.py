@@ -113,13 +113,17 @@ class View:
         plotter.reset_camera_clipping_range()
 
 
-# Mean width of a letter and height of a line over the font's size; pixels between labels, and to the picture's edge.
-_LETTER, _LINE, _GAP, _EDGE = 0.56, 1.15, 5, 4
+# Widths of letters, at least those of Arial, and height of a line over the font's size; pixels between labels, and to the
+# picture's edge.
+_LETTERS = {**dict.fromkeys(" .,:;'|!()[]-/Iijltfr", 0.34), **dict.fromkeys("mwMW@%", 0.95)}
+_LETTER, _CAPITAL, _LINE, _GAP, _EDGE = 0.56, 0.73, 1.15, 5, 4
 # Distances (pixels) of a label from its point, and turns (deg) of its direction, in the order of preference; distance
 # from which on a thin line leads back.
-_DISTANCES, _TURNS, _LEADER = (16, 26, 42, 64, 92, 128, 180, 250), (0, 40, -40, 80, -80, 120, -120, 180), 40
-# Pixels between a label and the middle of a rod; size of the cells in which lines are looked up, pixels.
-_CLEAR, _CELL = 10, 4
+_DISTANCES, _LEADER = (16, 26, 42, 64, 92, 128, 180, 250), 40
+_TURNS = (0, *(sign * turn for turn in range(20, 180, 20) for sign in (1, -1)), 180)
+# Pixels between a label and the middle of a rod; size of the cells in which lines are looked up, pixels; how much more a
+# label should keep off rods than off other lines.
+_CLEAR, _CELL, _RODS = 10, 4, 4
 
 
 class Labels:
@@ -127,56 +131,69 @@ class Labels:
 
     Args:
         view: the `View`.
-        lines: lines (n, 3), m, such as rods and arrows, that labels keep off where possible.
+        lines: lines (n, 3), m, such as rods and arrows, that labels keep off where possible, more than off others.
     """
 
     def __init__(self, view, lines=()):
-        self._view, self._placed, self._texts, self._leaders = view, [], [], []
-        self._covered = _cells_of([view.pixels(_dense(line)) for line in lines], view.window)
+        self._view, self._placed, self._texts, self._leaders, self._ends = view, [], [], [], []
+        self._covered = _RODS * self._cells(lines)
         #: texts for which there was no room
         self.left_out = []
 
-    def fix(self, text, point, *, size, away=(0.0, 0.0), colour="black"):
-        """A label whose middle is `away` pixels (2,) from a point (3,), m, unless another label is there."""
-        box = _box(text, self._view.pixels(point) + away, size)
-        if self._free(box):
-            self._keep(text, point, box, size, colour)
+    def fix(self, text, places, *, size, colour="black"):
+        """A label at the first of some places where no other label is.
+
+        Args:
+            places: [(point (3,), m, and how many pixels (2,) from there the middle of the label is)].
+        """
+        for point, away in places:
+            box = _box(text, self._view.pixels(point) + away, size)
+            if self._free(box):
+                self._keep(text, point, box, size, colour)
+                return
+
+    def _cells(self, lines):
+        return _cells_of([self._view.pixels(_dense(line)) for line in lines], self._view.window)
 
     def keep_off(self, lines):
         """Keep labels that come later off these lines (n, 3), m, too, where possible."""
-        self._covered |= _cells_of([self._view.pixels(_dense(line)) for line in lines], self._view.window)
+        self._covered = np.maximum(self._covered, self._cells(lines))
 
     def reserve(self, low, high):
         """Keep a rectangle free of labels: its lower left and upper right corners, pixels."""
         self._placed.append((*low, *high))
 
     def near(self, text, point, towards, *, size, colour="black"):
-        """A label near a point (3,), m, in the direction `towards` (3,) if there is room, else in another one.
+        """A label near a point (3,), m, in the direction `towards` (3,) if there is room, else in another one; where its
+        line crosses those of other labels and these labels least, and then where it covers least.
 
         Returns:
             whether there was room for it.
         """
         anchor, wish = self._view.pixels(point), np.array([towards @ self._view.right, towards @ self._view.above])
         wish = wish / np.linalg.norm(wish) if np.linalg.norm(wish) > 1e-6 else np.array([0.0, 1.0])
-        half = np.array([_LETTER * len(text), _LINE]) * size / 2
-        best, least = None, np.inf
+        half = np.array([_width(text), _LINE]) * size / 2
+        best, least = None, (np.inf, 0)
         for distance, turn in itertools.product(_DISTANCES, np.deg2rad(_TURNS)):
             cos, sin = np.cos(turn), np.sin(turn)
             way = np.array([cos * wish[0] - sin * wish[1], sin * wish[0] + cos * wish[1]])
-            # the label's edge is at the distance, not its middle
-            reach = min(h / max(abs(w), 1e-9) for h, w in zip(half, way, strict=True))
-            box = _box(text, anchor + (distance + reach) * way, size)
-            if self._free(box) and (covered := self._covers(box)) < least:
-                best, least = (box, distance, way), covered
-            if least == 0:
-                break
+            # the label's edge is at the distance, its corner in directions between
+            box = _box(text, anchor + distance * way + half * np.clip(1.5 * way, -1, 1), size)
+            if self._free(box) and (0, covered := self._covers(box)) < least:
+                line = anchor, anchor + (distance - _GAP) * way
+                costs = self._crosses(line, box), covered
+                if costs < least:
+                    best, least = (box, distance, line), costs
+                if costs == (0, 0):
+                    break
         if best is None:
             self.left_out.append(text)
             return False
-        box, distance, way = best
+        box, distance, (start, end) = best
         self._keep(text, point, box, size, colour)
+        self._leaders.append((start, end))
         if distance > _LEADER:
-            self._leaders.append([point, point + self._view.offset(*((distance - _GAP) * way))])
+            self._ends += [point, point + self._view.offset(*(end - start))]
         return True
 
     def evenly(self, texts, *, size, away):
@@ -201,8 +218,8 @@ class Labels:
 
     def draw(self, plotter, pyvista):
         """Put all labels into the drawing."""
-        if self._leaders:
-            ends = np.concatenate(self._leaders) + self._view.half * self._view.to_camera  # in front of the rods
+        if self._ends:
+            ends = np.array(self._ends) + self._view.half * self._view.to_camera  # in front of the rods
             plotter.add_mesh(pyvista.line_segments_from_points(ends), color="grey", line_width=2)
             plotter.reset_camera_clipping_range()
         # one by one: of labels that are added together VTK leaves out those near others, by rules of its own
@@ -225,8 +242,15 @@ class Labels:
             return False
         return not any(_overlap(box, other) for other in self._placed)
 
+    def _crosses(self, line, box):
+        """How many labels and lines from labels to their points a label in a rectangle, with its line, would cross."""
+        wide = box[0] - _GAP, box[1] - _GAP, box[2] + _GAP, box[3] + _GAP
+        lines, boxes = np.reshape(self._leaders, (-1, 2, 2)), np.reshape(self._placed, (-1, 4))
+        found = _crosses_boxes(lines, np.array(wide)) | _cross(np.array(line), lines)
+        return int(found.sum() + _crosses_boxes(np.array(line), boxes).sum())
+
     def _covers(self, box):
-        """How much of the lines a rectangle covers: a number of cells."""
+        """How much of the lines a rectangle covers: a number of cells, of rods `_RODS` times as many."""
         low = np.maximum(np.array(box[:2]) - _CLEAR, 0) // _CELL
         high = np.maximum(np.array(box[2:]) + _CLEAR, 0) // _CELL
         return int(self._covered[int(low[0]) : int(high[0]) + 1, int(low[1]) : int(high[1]) + 1].sum())
@@ -238,8 +262,30 @@ def _overlap(box, other):
     return a < x1 + _GAP and x0 < c + _GAP and b < y1 + _GAP and y0 < d + _GAP
 
 
+def _cross(line, others):
+    """Which of other line segments (n, 2, 2) a segment (2, 2) crosses, pixels."""
+    c, d = others[:, 0], others[:, 1]
+
+    def side(p, q, r):
+        return np.sign((q - p)[..., 0] * (r - p)[..., 1] - (q - p)[..., 1] * (r - p)[..., 0])
+
+    return (side(*line, c) * side(*line, d) < 0) & (side(c, d, line[0]) * side(c, d, line[1]) < 0)
+
+
+def _crosses_boxes(lines, boxes):
+    """Which line segments (..., 2, 2) touch which rectangles (..., 4), pixels; one of the two may be single."""
+    start, along = lines[..., 0, :], lines[..., 1, :] - lines[..., 0, :] + 1e-9  # never along an axis
+    ends = np.sort([(boxes[..., :2] - start) / along, (boxes[..., 2:] - start) / along], axis=0)
+    return np.maximum(ends[0].max(axis=-1), 0.0) <= np.minimum(ends[1].min(axis=-1), 1.0)
+
+
+def _width(text):
+    """Of a text, over the font's size."""
+    return sum(_LETTERS.get(x, _CAPITAL if x.isupper() else _LETTER) for x in text)
+
+
 def _box(text, at, size):
-    width, height = _LETTER * size * len(text), _LINE * size
+    width, height = _width(text) * size, _LINE * size
     return at[0] - width / 2, at[1] - height / 2, at[0] + width / 2, at[1] + height / 2
 
 
@@ -249,12 +295,12 @@ def plain(text):
 
 
 def _cells_of(lines, window):
-    """Which cells of a picture points (n, 2) of lines, pixels, lie in: a boolean array over columns and rows."""
-    covered = np.zeros([int(side // _CELL) + 1 for side in window], dtype=bool)
+    """Which cells of a picture points (n, 2) of lines, pixels, lie in: 1 of an array over columns and rows, else 0."""
+    covered = np.zeros([int(side // _CELL) + 1 for side in window], dtype=int)
     for line in lines:
         cells = (line // _CELL).astype(int)
         cells = cells[((cells >= 0) & (cells < covered.shape)).all(axis=1)]
-        covered[cells[:, 0], cells[:, 1]] = True
+        covered[cells[:, 0], cells[:, 1]] = 1
     return covered
 
 
@@ -339,10 +385,12 @@ def draw_axes(plotter, pyvista, axes, view, labels, font=None):
         lines += [np.array([point, point + view.offset(*(-_TICK * out))]) for point in points]
         numbers = [(text, point) for (_, text), point in zip(axis.ticks, points, strict=True)]
         labels.evenly(numbers, size=font, away=(font / 2 + room) * out)
-        away = (font / 2 + 2 * room + font * (0.35 * len(axis.name) * abs(out[0]) + abs(out[1]))) * out
-        names.append((axis.name, edge.mean(axis=0), away))
-    for name, point, away in names:
-        labels.fix(name, point, size=font, away=away)
+        beside = font / 2 + 2 * room + font * (0.35 * len(axis.name) * abs(out[0]) + abs(out[1]))
+        end = edge[int(np.argmax(view.pixels(edge)[:, 1] * (1 if i == 2 else -1)))]
+        beyond = font * np.array([0.0, 1.3 if i == 2 else -2.4])  # over the vertical axis, under the others
+        names.append((axis.name, [(edge.mean(axis=0), beside * out), (end, beyond)]))
+    for name, places in names:
+        labels.fix(name, places, size=font)
     if np.abs(view.to_camera).max() < 1:  # seen obliquely
         (x0, x1), (y0, y1), z = *((axis.low, axis.high) for axis in axes[:2]), axes[2].low
         floor = np.array([[x0, y0, z], [x1, y0, z], [x1, y1, z], [x0, y1, z], [x0, y0, z]])

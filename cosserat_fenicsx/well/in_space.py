@@ -55,18 +55,19 @@ def _draw(answer, enlarge, top, bottom):
     if tubes:
         _add_hole(plotter, pyvista, answer, md, axis, enlarge * radius)
     beside = enlarge * radius[:, None]
-    beside = [axis + sign * beside * way for sign in (-1, 1) for way in (view.above, view.right)]
+    beside = [axis + share * beside * way for share in (-1, -0.5, 0.5, 1) for way in (view.above, view.right)]
     surface = top == 0 and axes[2].high == axis[:, 2].max()
     outlines = _add_surroundings(plotter, pyvista, axes, axis, surface)
-    labels = Labels(view, [axis, *beside, *outlines])
+    labels = Labels(view, [axis, *beside])
+    labels.keep_off(outlines)
     labels.reserve(
         (view.window[0] - 0.85 * _MARGINS[1], 0.15 * view.window[1]), (view.window[0], 0.85 * view.window[1])
     )
+    _add_title(plotter, answer, enlarge, title_of(answer, top, bottom), labels)
     draw_axes(plotter, pyvista, axes, view, labels, _font(view.window))
     _add_directions(axes, view, labels)
     _add_names(plotter, pyvista, answer, labels, view, (md, axis, line, enlarge * radius), (top, bottom))
     labels.draw(plotter, pyvista)
-    _add_title(plotter, answer, enlarge, title_of(answer, top, bottom), view.window)
     view.place(plotter)
     return plotter
 
@@ -221,16 +222,18 @@ def _add_names(plotter, pyvista, answer, labels, view, lines, ends):
         return np.array([np.interp(depth, md, curve[:, i]) for i in range(3)])
 
     (unit, length), (force_unit, force_size) = unit_of(DEPTH), unit_of(AT_POINTS)
-    points = sorted(points_between(answer, *ends), key=lambda point: -point[1])
-    for k, (depth, force, side) in enumerate(points):
+    points = points_between(answer, *ends)
+    most = 3 if ends == (0.0, answer.depth) else 8
+    told = sorted(points, key=lambda point: -point[1])[:most]
+    for depth, force, side in points:  # labels down the string: their lines cross less
         centre, on = at(depth, axis), at(depth, line)
         size = max(0.35 * float(np.interp(depth, md, radius)), 4 * view.pixel)
         away = on - centre
         centre = on + away / (np.linalg.norm(away) or 1.0) * size
         plotter.add_mesh(pyvista.Sphere(radius=size, center=centre), color=SIDES[side].removeprefix("tab:"))
-        if k < (3 if ends == (0.0, answer.depth) else 8):
-            told = f"{force / force_size:.3g} {force_unit} at {depth / length:.5g} {unit}"
-            labels.near(told, centre, away, size=font)
+        if (depth, force, side) in told:
+            text = f"{force / force_size:.3g} {force_unit} at {depth / length:.5g} {unit}"
+            labels.near(text, centre, away, size=font)
     for depth, name in shoes_between(answer, *ends):
         labels.near(name, at(depth, axis), view.right, size=font, colour="saddlebrown")
     if ends != (0.0, answer.depth):
@@ -240,9 +243,12 @@ def _add_names(plotter, pyvista, answer, labels, view, lines, ends):
                 labels.near(place.component.name, at((a + b) / 2, axis), view.above, size=font, colour="dimgrey")
 
 
-def _add_title(plotter, answer, enlarge, title, window):
+def _add_title(plotter, answer, enlarge, title, labels):
+    """Two lines at the upper edge, which labels keep off."""
     how = f"radii and clearance {enlarge:g} times as large" if enlarge != 1 else "radii and clearance as they are"
     straight = "; its helix is drawn straight" if answer.model != "rod" and answer.helical.any() else ""
-    lines = [title, how + straight]
-    size = round(min(0.6 * _font(window), window[0] / (0.62 * max(map(len, lines))) / 1.5))
+    lines, (width, height) = [title, how + straight], plotter.window_size
+    wide = 0.62 * 1.5 * max(map(len, lines))  # pixels, of letters of the size 1
+    size = round(min(0.6 * _font((width, height)), width / wide))
     plotter.add_text("\n".join(lines), font_size=size, color="black", position="upper_left")
+    labels.reserve((0, height - 2 * 2.2 * size), (size * wide, height))
