@@ -6,12 +6,15 @@ python demos/recipes.py --update       puts what they print today into the pages
 """
 
 import argparse
+import ast
 import contextlib
 import io
 import re
 import shutil
 import sys
 from pathlib import Path
+
+from cosserat_fenicsx.pictures.two_widths import draw_both
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGES = {page.stem.removeprefix("recipes_"): page for page in sorted((ROOT / "docs").glob("recipes_*.md"))}
@@ -46,8 +49,22 @@ def alike(printed, shown):
     return True
 
 
+def draw_again(program, names):
+    """Draw the charts that a program wrote with a width, once more for wide and for narrow pages.
+
+    Args:
+        names: the global names that the program left.
+    """
+    for call in ast.walk(ast.parse(program)):
+        if isinstance(call, ast.Call) and "width" in (given := {x.arg: x for x in call.keywords}):
+            given["width"].value = ast.Name("width")
+            file = next(x for x in ast.walk(call) if str(getattr(x, "value", "")).endswith(".png"))
+            name, file.value = file.value, None
+            draw_both(eval(f"lambda width: {ast.unparse(call)}", names), name)
+
+
 def run(page, folder):
-    """Run the recipes of a page in a folder, which is emptied first.
+    """Run the recipes of a page in a folder, which is emptied first; their charts are drawn for narrow pages, too.
 
     Returns:
         list of (match, printed): see `programs`, and what each printed.
@@ -55,8 +72,12 @@ def run(page, folder):
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
     with contextlib.chdir(folder):
-        found = programs(page.read_text(encoding="utf-8"))
-        return [(match, prints(match[1], page.name, {"__name__": "program"})) for match in found]
+        found = []
+        for match in programs(page.read_text(encoding="utf-8")):
+            names = {"__name__": "program"}
+            found.append((match, prints(match[1], page.name, names)))
+            draw_again(match[1], names)
+        return found
 
 
 def updated(text, ran):

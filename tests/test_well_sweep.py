@@ -226,7 +226,12 @@ def test_charts(tmp_path):
     found = sweep()
     figure = found.plot()
     assert [axes.get_xlabel() for axes in figure.axes] == ["hook load (kN)", "surface torque (kN m)"]
-    assert len(figure.axes[0].lines) == 6 and figure.axes[0].get_ylim() == pytest.approx((2585, 715))
+    lines = [line for line in figure.axes[0].lines if len(line.get_xdata())]
+    assert len(lines) == 6 and figure.axes[0].get_ylim() == pytest.approx((2585, 715))
+    told = [text.get_text() for text in figure.axes[0].get_legend().get_texts()]
+    assert told == ["trip out", "trip in", "rotate off bottom", "friction 0.1", "friction 0.2, 0.4"]
+    styles = {(line.get_color(), line.get_linestyle()) for line in lines}
+    assert len(styles) == 6 and len({colour for colour, _ in styles}) == 3
     answer = cf.well.torque_and_drag(HOLE, STRING, cf.well.Sliding(1e5), mud=MUD, model="buckled")
     with pytest.raises(cf.SceneError, match="ends in .csv"):
         answer.write(tmp_path / "answer.xlsx")

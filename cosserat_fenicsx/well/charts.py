@@ -98,10 +98,14 @@ def sweep_figure(sweep):
     depths, (low, high) = sweep.depths / length, _usual_range(sweep.hook_load / force)
     by_rod = sweep.models == "rod"
     both = (by_rod.any(), (np.isfinite(sweep.hook_load) & ~by_rod).any()) == (True, True)
+    marker = "." if len(depths) < 30 else None
+    apart = min(len(sweep.operations), len(sweep.friction)) > 1
+    styles = [{"linestyle": STYLES[j % len(STYLES)], "linewidth": 1.2 * (1 + j // len(STYLES))}
+              for j in range(len(sweep.friction))]  # fmt: skip
     for i, operation in enumerate(sweep.operations):
-        for j in range(len(sweep.friction)):
-            style = {"color": COLOURS[i % len(COLOURS)], "linestyle": STYLES[j % len(STYLES)]}
-            drawn = {**style, "label": sweep.label(i, j), "marker": "." if len(depths) < 30 else None}
+        for j, style in enumerate(styles):
+            style = {**style, "color": COLOURS[i % len(COLOURS)]}
+            drawn = {**style, "label": None if apart else sweep.label(i, j), "marker": marker}
             hook = sweep.hook_load[i, j] / force
             shown = [(panels[0], np.where((hook < low) | (hook > high), np.nan, hook))]
             if turns and operation.direction(1.0)[1]:
@@ -112,6 +116,11 @@ def sweep_figure(sweep):
                     here = by_rod[i, j]
                     panel.plot(loads[here], depths[here], "s", color=style["color"], markersize=7, fillstyle="none")
             _without_answer(panels[0], sweep, i, j, (low, high), style["color"])
+    if apart:  # colours are operations, styles of lines coefficients of friction
+        for i, operation in enumerate(sweep.operations):
+            panels[0].plot([], [], marker=marker, color=COLOURS[i % len(COLOURS)], label=operation.name)
+        for j, style in enumerate(styles):
+            panels[0].plot([], [], **style, color=GREY, label=sweep.friction_in_words(j))
     panels[0].set_xlabel(hook_label)
     if turns:
         panels[1].set_xlabel(torque_label)

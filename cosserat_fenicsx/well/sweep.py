@@ -99,10 +99,12 @@ class DepthSweep(Result):
 
     def label(self, i: int, j: int) -> str:
         """The name of the line of operation i and friction j."""
-        friction = self.friction[j]
-        if friction is None:
-            return self.operations[i].name
-        return f"{self.operations[i].name}, friction {_as_text(friction)}"
+        friction = "" if self.friction[j] is None else f", {self.friction_in_words(j)}"
+        return f"{self.operations[i].name}{friction}"
+
+    def friction_in_words(self, j: int) -> str:
+        """The name of the coefficients of friction j."""
+        return f"friction {_as_text(self.friction[j]) or 'of the hole'}"
 
     def noted(self, k: int | None = None) -> list[str]:
         """The notes in words, with operation, friction and depth; those of depth k alone where it is given."""
