@@ -38,6 +38,8 @@ MOST_TEXT = 2**27
 _WORKBOOKS = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0")
 _SMALLEST = min(MOST.values())
 _OF_STRINGS = ("cosserat_fenicsx.well.", "cosserat_fenicsx.drilling.")
+# Diameters (m) above this are wider than those of wells.
+_WIDEST = 1.5
 # Longer texts of values, such as a rod's, are abbreviated in messages.
 _LONGEST = 100
 
@@ -68,22 +70,33 @@ def _unit_of(expected):
     return unit[1] if unit else ""
 
 
-def _in_si(owner, field, value, unit):
-    """A number from text with a unit of the dimension of `unit`; anything else as it is."""
-    if not isinstance(value, str) or unit not in BY_UNIT:
+def _in_si(owner, field, value, unit, dimension=None):
+    """A number from text with a unit of a dimension, None for that of `unit`; anything else as it is."""
+    dimension = dimension or BY_UNIT.get(unit)
+    if not isinstance(value, str) or dimension is None:
         return value
-    return in_si(f"{name_of(owner)}.{field}", value, BY_UNIT[unit])
+    return in_si(f"{name_of(owner)}.{field}", value, dimension)
 
 
-def number(owner, field, value, expected, accept, above_zero=False):
+class _Typed(str):
+    """A text that messages show as it is."""
+
+    __repr__ = str.__str__
+
+
+def number(owner, field, value, expected, accept, above_zero=False, dimension=None):
     """`value` as a float where it is a number that `accept` accepts, or text with a unit; refused otherwise.
 
     Args:
         expected: for messages, with the SI unit in its first parentheses.
         above_zero: whether numbers so small that their powers are zero are refused too.
+        dimension: of text with a unit, see `dimensions`; None for that of the SI unit.
     """
+    unit, told = _unit_of(expected), value
     if isinstance(value, str):
-        value = _in_si(owner, field, value, _unit_of(expected))
+        value = _in_si(owner, field, value, unit, dimension)
+        if not isinstance(value, str):
+            told = _Typed(f"{told!r} ({value:.10g} {unit})")
     if isinstance(value, bool) or not isinstance(value, numbers.Real):
         refuse(owner, field, value, expected)
     try:
@@ -91,14 +104,13 @@ def number(owner, field, value, expected, accept, above_zero=False):
     except OverflowError:  # an integer of more than 308 digits
         refuse(owner, field, f"{str(value)[:10]}...", expected)
     if math.isnan(given) or not accept(given):
-        refuse(owner, field, value, expected)
+        refuse(owner, field, told, expected)
     if above_zero and given < 1 / LARGEST:
-        refuse(owner, field, value, f"{expected} from {1 / LARGEST:g} to {LARGEST:g}")
+        refuse(owner, field, told, f"{expected} from {1 / LARGEST:g} to {LARGEST:g}")
     if abs(given) > _SMALLEST and abs(given) != math.inf:
-        unit = _unit_of(expected)
         most = _most(owner, unit)
         if abs(given) > most:
-            refuse(owner, field, value, f"{expected}, of at most {most:g}{f' {unit}' if unit else ''}")
+            refuse(owner, field, told, f"{expected}, of at most {most:g}{f' {unit}' if unit else ''}")
     return given
 
 
@@ -131,8 +143,10 @@ def stiffness(owner, field, value, unit):
 
 
 def finite_array(owner, field, value, expected):
-    """`value` as an array of floats of any shape; refused unless all are finite numbers, or in a list texts with a unit
-    of the dimension of the first one in the parentheses of `expected`."""
+    """`value` as an array of floats of any shape; refused unless all are finite numbers, or texts with a unit, alone or
+    in a list, of the dimension of the first one in the parentheses of `expected`."""
+    if isinstance(value, str):
+        value = _in_si(owner, field, value, _unit_of(expected))
     if isinstance(value, list | tuple) and any(isinstance(x, str) for x in value):
         value = [_in_si(owner, f"{field}[{i}]", x, _unit_of(expected)) for i, x in enumerate(value)]
     try:
@@ -201,6 +215,16 @@ def call(function, x, name, where):
         return function(x)
     except Exception as problem:  # a user's function may raise any exception
         raise SceneError(f"{name} raised {type(problem).__name__} ({problem}){where}") from problem
+
+
+def doubt_width(owner, field):
+    """Warn of a diameter (m) of a hole, or of what is in it, that is probably in inches."""
+    diameter = getattr(owner, field)
+    if diameter is not None and diameter > _WIDEST:
+        warn(
+            f"{name_of(owner)}.{field} = {diameter:g} m is wider than holes are: is it in inches? 8.5 in are '8.5 in', "
+            "8.5 * units.inch or 0.2159"
+        )
 
 
 def direction(owner, field, value):

@@ -286,11 +286,9 @@ class Number(Kind):
     def check(self, owner, field, value):
         if type(value) is float and 1 / LARGEST < abs(value) < 1e5 and not self.whole and self.limits.admit(value):
             return value  # as most are; the whole check takes longer
-        if self.dimension and isinstance(value, str):
-            value = in_si(f"{checks.name_of(owner)}.{field}", value, self.dimension)
-        whole = (lambda x: x == int(x)) if self.whole else (lambda x: True)
         above_zero = self.limits.above and self.limits.low == 0
-        found = checks.number(owner, field, value, self.words, lambda x: self.limits.admit(x) and whole(x), above_zero)
+        admitted = (lambda x: self.limits.admit(x) and x == int(x)) if self.whole else self.limits.admit
+        found = checks.number(owner, field, value, self.words, admitted, above_zero, self.dimension)
         return int(found) if self.whole else found
 
     def schema(self, definitions):

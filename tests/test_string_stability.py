@@ -290,6 +290,9 @@ def test_other_drives():
 
 def test_speeds_in_revolutions_a_minute_are_doubted():
     """120 typed for 120 * units.rpm would be 1146 rev/min."""
+    for law in (cf.drilling.Stribeck, cf.drilling.WallFriction):
+        with pytest.warns(cf.SceneWarning, match=r"speed = 30 .*30 rev/min are '30 rpm', 3.14 rad/s"):
+            law(0.5, 0.3, speed=30)
     with pytest.warns(cf.SceneWarning, match=r"TopDrive.speed = 120 rad/s are 1146 rev/min.*120 \* units.rpm"):
         fast = cf.drilling.TopDrive(120)
     assert fast.speed == 120
@@ -298,6 +301,8 @@ def test_speeds_in_revolutions_a_minute_are_doubted():
             cf.drilling.TopDrive(function)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
+        cf.drilling.Stribeck(0.5, 0.3, speed=10)
+        cf.drilling.WallFriction(0.5, 0.3, speed="300 ft/min")
         drive = cf.drilling.TopDrive(250 * cf.units.rpm)
         scene = cf.drilling.Drilling(
             cf.drilling.Discs((930.0, 2782.0), (700.0,)),

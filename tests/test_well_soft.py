@@ -429,6 +429,10 @@ def test_uncertainty_of_a_hook_load_with_a_fit():
     assert found.standard_deviation == pytest.approx(math.sqrt(slopes @ covariance @ slopes), rel=1e-12)
     assert sum(found.shares.values()) == pytest.approx(1.0)
     assert "% from hole.sections[1].friction" in str(found)
+    by_text = here.uncertainty({"operation.weight": "2 klbf", names[0]: 0.02})
+    assert by_text.given == {"operation.weight": 2 * cf.units.kip, names[0]: 0.02}
+    with pytest.raises(cf.SceneError, match="psi is a unit of pressure"):
+        here.uncertainty({"operation.weight": "2 psi"})
 
 
 def test_refusals_in_words():

@@ -159,6 +159,18 @@ def test_the_soft_string_says_what_it_leaves_out():
     (lambda: cf.well.DrillString(["pipe"]), r"components\[0\] = .*: expected Component\(...\), DrillPipe\(...\)"),
     (lambda: cf.well.Stabiliser(1.5, 0.2, 0.25, 0.07),
      "Stabiliser.diameter = 0.2: expected across the blades, at least"),
+    (lambda: cf.well.DrillPipe("5 in 19.50 lb/ft"),
+     r"length, then the name of a size, as in DrillPipe\('300 ft', '5 in 19.50 lb/ft'\), or up to the surface"),
+    (lambda: cf.well.Collar("NC46-65", "300 ft"), r"as in Collar\('300 ft', 'NC46-65'\)$"),
+    (lambda: cf.well.DrillPipe('5" 20'), r"known of this diameter: 5 in 19.50 lb/ft, 5 in 25.60 lb/ft$"),
+    (lambda: cf.well.DrillPipe(size='5-1/2" 24#'), "known of this diameter: 5 1/2 in 24.70 lb/ft, 5 1/2 in 21.90"),
+    (lambda: cf.well.HeavyWeight("5 in", "600 ft"), r"as in HeavyWeight\('600 ft', '5 in'\)$"),
+    (lambda: cf.well.Collar("-300 ft", "NC46-65"), r"length = '-300 ft' \(-91.44 m\): expected a positive number"),
+    (lambda: cf.well.Mud("-10 ppg"), r"Mud.density = '-10 ppg' \(-1198.264\d* kg/m\^3\): expected"),
+    (lambda: drag(cf.well.TripOut(), depth="9000 psi"), "psi is a unit of pressure"),
+    (lambda: drag(cf.well.TripOut(), depth="-9000 ft"), r"depth = '-9000 ft' \(-2743.2 m\): expected"),
+    (lambda: HOLE.with_friction([0.2] * (len(HOLE.sections) - 1) + [7]),
+     "friction from 0 to 5, in the section that ends at 2500 m"),
     (lambda: cf.well.Ream(0.1, 0), "Ream.rpm = 0"),
     (lambda: cf.well.RotaryDrilling(math.nan, 0), "RotaryDrilling.weight"),
     (lambda: drag(cf.well.TripOut(), mud=None), "mud = None: expected Mud"),
@@ -192,9 +204,26 @@ def test_a_rotation_in_radians_per_second_is_doubted():
         cf.well.Ream(0.15, 20)
 
 
+def test_weight_on_bit_without_torque_or_bit_is_told():
+    without = cf.well.DrillString([cf.well.Collar(90, "NC46-65"), cf.well.DrillPipe(size="5 in 19.50 lb/ft")])
+    for string, torque, told in (
+        (STRING, 4e3, (False, False)),
+        (STRING, 0.0, (True, False)),
+        (without, 0.0, (True, True)),
+    ):
+        words = str(drag(cf.well.RotaryDrilling(8e4, torque), string=string, model="soft"))
+        assert ("No bit torque given" in words, "No Bit in the string" in words) == told
+    assert "bit torque" not in str(drag(cf.well.TripOut(), model="soft"))
+
+
 def test_dimensions_in_other_units_are_warned_of():
-    with pytest.warns(cf.SceneWarning, match="wider than holes are"):
-        cf.well.HoleSection(100.0, 8.5, 0.2)
+    for field, make in {
+        "HoleSection.diameter": lambda: cf.well.HoleSection(100.0, 8.5, 0.2),
+        "Bit.diameter": lambda: cf.well.Bit(8.5),
+        "Collar.outer_diameter": lambda: cf.well.Collar(90.0, outer_diameter=6.5, inner_diameter=0.07),
+    }.items():
+        with pytest.warns(cf.SceneWarning, match=rf"{field} = [68].5 m is wider than holes are: is it in inches"):
+            make()
     for density in (1.2, 10.2, 9000.0):
         with pytest.warns(cf.SceneWarning, match="hardly that of a mud"):
             cf.well.Mud(density)

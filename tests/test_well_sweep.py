@@ -626,6 +626,8 @@ def test_depths_as_text():
         hole, string, [cf.well.TripOut()], ["3000 ft", 1828.8], mud=cf.well.Mud(1200.0), model="soft"
     )
     np.testing.assert_allclose(swept.depths, [914.4, 1828.8], rtol=1e-12)
+    alone = cf.well.depth_sweep(hole, string, cf.well.TripOut(), "3000 ft", mud=cf.well.Mud(1200.0), model="soft")
+    assert alone.hook_load[0, 0, 0] == swept.hook_load[0, 0, 0]
     with pytest.raises(cf.SceneError, match=r"depths\[0\] = '3000 psi': psi is a unit of pressure"):
         cf.well.depth_sweep(hole, string, [cf.well.TripOut()], ["3000 psi"], model="soft")
     with pytest.raises(cf.SceneError, match="known of this diameter: 5 in 19.50 lb/ft, 5 in 25.60 lb/ft"):

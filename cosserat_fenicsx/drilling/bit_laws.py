@@ -33,6 +33,7 @@ import numpy as np
 
 from cosserat_fenicsx.checks import refuse, warn
 from cosserat_fenicsx.drilling.laws import Resistance, by_method, checked
+from cosserat_fenicsx.drilling.signals import doubt_decay
 from cosserat_fenicsx.parts import (
     AngularVelocity,
     ForceSize,
@@ -127,6 +128,7 @@ class Stribeck(BitLaw):
     def validate(self):
         if self.static < self.dynamic:
             refuse(self, "static", self.static, f"at least the dynamic one, {self.dynamic:g}")
+        doubt_decay(self, self.speed)
 
     @property
     def needs_weight(self) -> bool:

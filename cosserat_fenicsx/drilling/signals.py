@@ -24,6 +24,18 @@ def doubt_speed(owner: object, field: str, speed: float) -> None:
         )
 
 
+def doubt_decay(owner: object, speed: float | None, most: float = 15.0, unit: str = "rad/s") -> None:
+    """Warn of a speed of a law of friction, at which its static part decays, that looks like revolutions a minute; or,
+    of a slip in m/s, that no string has."""
+    if speed is not None and speed > most:
+        rate = f"'{speed:g} rpm', {speed * units.rpm:.3g} rad/s"
+        rate += "" if unit == "rad/s" else ", with of_rotation=True"
+        warn(
+            f"{type(owner).__name__}.speed = {speed:g} {unit} is faster than friction at rest fades, at 0.1 to 10 rad/s of "
+            f"a bit and below 2 m/s of slip: {speed:g} rev/min are {rate}"
+        )
+
+
 class ScalarSignal:
     """A number at every time (s), from a number or from a function of time.
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from cosserat_fenicsx.checks import refuse, store
 from cosserat_fenicsx.drilling.laws import Resistance, by_method
+from cosserat_fenicsx.drilling.signals import doubt_decay
 from cosserat_fenicsx.numerics import gauss
 from cosserat_fenicsx.parts import Friction, Kind, Number, Part, Rate, positive
 from cosserat_fenicsx.well.hole import Mud
@@ -80,6 +81,7 @@ class WallFriction(FrictionLaw):
         if self.speed is not None:
             kind = Number("angular velocity" if self.of_rotation else "speed", positive())
             store(self, speed=kind.check(self, "speed", self.speed))
+            doubt_decay(self, self.speed, *(() if self.of_rotation else (5.0, "m/s")))
 
     def coefficient(self, slip: float) -> float:
         return float(self.resistance(slip)) if slip > 0 else self.static

@@ -62,7 +62,8 @@ class Sensitivity(Mapping):
         """First-order (linear) propagation: variance = sum_ij q_i s_i rho_ij s_j q_j, with the derivatives q_i.
 
         Args:
-            standard_deviations: {name of a parameter, or the `Parameter`: s_i}, in its unit; one of each derivative.
+            standard_deviations: {name of a parameter, or the `Parameter`: s_i}, in its unit, or text such as "2 klbf";
+                one of each derivative.
             correlation: (m, m) rho of the parameters in the order of `standard_deviations`; None: independent.
 
         Raises:
@@ -70,9 +71,14 @@ class Sensitivity(Mapping):
         """
         standard_deviations = {getattr(x, "name", x): deviation for x, deviation in standard_deviations.items()}
         names = list(standard_deviations)
-        for name in names:
-            number("uncertainty", f"standard_deviations['{name}']", standard_deviations[name],
-                   "a standard deviation, 0 or more", lambda x: 0 <= x < np.inf)  # fmt: skip
+        for name, given in standard_deviations.items():
+            unit = self.units.get(name, "1")
+            words = (
+                "a standard deviation, 0 or more" if unit in ("", "1") else f"a standard deviation ({unit}), 0 or more"
+            )
+            standard_deviations[name] = number(
+                "uncertainty", f"standard_deviations['{name}']", given, words, lambda x: 0 <= x < np.inf
+            )
         rho = np.eye(len(names)) if correlation is None else _correlation(correlation, len(names))
         parts = np.array([self[name] * standard_deviations[name] for name in names])
         products = parts * np.tensordot(rho, parts, 1)

@@ -20,12 +20,14 @@ from pathlib import Path
 from typing import Annotated, ClassVar, Literal
 
 from cosserat_fenicsx import units
-from cosserat_fenicsx.checks import positive, refuse, store
+from cosserat_fenicsx.checks import doubt_width, positive, refuse, store
 from cosserat_fenicsx.errors import SceneError, nearest
 from cosserat_fenicsx.parts import Diameter, ForcePerLength, Length, MassPerLength, Part, between
 from cosserat_fenicsx.quantities import Units
 from cosserat_fenicsx.scene.sections import Circle, Material, Stiffness, Tube
 
+# A number with a unit of lengths, and nothing after it.
+_LENGTH = re.compile(r"""\s*[-+]?[\d.]+(?:[eE][-+]?\d+)?(?:[ -]+\d+/\d+|/\d+)?\s*[a-zA-Z"]*\s*$""")
 _TABLE = Path(__file__).with_name("standard_sizes.csv")
 
 
@@ -66,21 +68,28 @@ def standard_size(kind, name):
 
 def _sizes_near(name, known):
     """What a message says of an unknown size: the known ones of its diameter, or the nearest name."""
-    diameter, _, weight = str(name).partition(" in ")
-    alike = [size for size in known if weight and size.startswith(f"{diameter} in ")]
-    if not alike:
-        return nearest(name, known)
+    alike = _of_its_diameter(name, known)
+    return f"known of this diameter: {', '.join(alike)}" if alike else nearest(name, known)
+
+
+def _of_its_diameter(name, known):
+    """The known sizes that have the diameter of a name, that of the nearest weight first."""
+    found, sizes = _plain(str(name)).split(), {size: _plain(size).split() for size in known}
 
     def off(size):
-        found = [re.match(r"[\d.]+", text.partition(" in ")[2]) for text in (str(name), size)]
-        return abs(float(found[0][0]) - float(found[1][0])) if all(found) else 0.0
+        try:
+            return abs(float(sizes[size][1]) - float(found[1]))
+        except (IndexError, ValueError):  # without a weight
+            return 0.0
 
-    return f"known of this diameter: {', '.join(sorted(alike, key=off))}"
+    return sorted((size for size, words in sizes.items() if words[:1] == found[:1]), key=off)
 
 
 def _plain(name):
-    """A name without units and blanks, with weights to the last digit that is not zero."""
-    words = name.lower().replace('"', " ").replace("lb/ft", " ").replace("in", " ").split()
+    """A name without units and blanks; numbers in decimals, to the last digit that is not zero."""
+    name = re.sub(r"[\"#]|lb/ft|ppf|in(?![a-z])", " ", name.lower())
+    name = re.sub(r"(?:(\d+)[ -]+)?(\d+)/([1-9]\d*)", lambda x: f"{int(x[1] or 0) + int(x[2]) / int(x[3]):g}", name)
+    words = name.split()
     return " ".join(f"{float(word):g}" if word.replace(".", "", 1).isdigit() else word for word in words)
 
 
@@ -171,6 +180,26 @@ class _Tubular(StringPart):
 
     weight = None
 
+    def __post_init__(self):
+        if isinstance(self.length, str):
+            self._refuse_size_as_length()
+        super().__post_init__()
+
+    def _refuse_size_as_length(self):
+        """Refuse the name of a size, or what looks like one, where a length belongs; say how both are written."""
+        kind, given = type(self).__name__, self.length
+        known = standard_sizes()[kind]
+        names = {_plain(size): size for size in known}
+        swapped = _LENGTH.match(str(self.size))
+        alone = self.size is None and self.outer_diameter is None
+        if _LENGTH.match(given) and not (_plain(given) in names and (swapped or alone)):
+            return
+        size = names.get(_plain(given))
+        near = "" if size else f"; {_sizes_near(given, known)}"
+        length, size = self.size if swapped else "300 ft", size or [*_of_its_diameter(given, known), *known][0]
+        how = f"{kind}({length!r}, {size!r})" + ("" if swapped else f", or up to the surface {kind}(size={size!r})")
+        refuse(self, "length", given, f"a length, then the name of a size, as in {how}{near}")
+
     def validate(self):
         """Fill in missing fields from the standard size or from the body."""
         store(self, name=self.name or type(self)._called)
@@ -184,6 +213,7 @@ class _Tubular(StringPart):
         for field in ("outer_diameter", "inner_diameter"):
             if getattr(self, field) is None:
                 refuse(self, field, None, "a diameter (m), or the name of a standard size, size='...'")
+        doubt_width(self, "outer_diameter")
         Tube(self.outer_diameter, self.inner_diameter)  # refuses diameters of no tube
         if self.mass is None:
             store(self, mass=self.material.density * math.pi / 4 * (self.outer_diameter**2 - self.inner_diameter**2))
@@ -268,7 +298,8 @@ class Bit(StringPart):
         material, name: as of `DrillPipe`.
 
     Raises:
-        SceneError: a number that is not positive, or a body wider than the bit.
+        SceneError: a number that is not positive, or a body wider than the bit. A diameter of metres gives a
+            `SceneWarning`.
     """
 
     diameter: Diameter
@@ -282,6 +313,7 @@ class Bit(StringPart):
 
     def validate(self):
         """Fill in missing fields from the diameter."""
+        doubt_width(self, "diameter")
         if self.body_diameter is None:
             store(self, body_diameter=0.7 * self.diameter)
         if self.body_diameter > self.diameter:

@@ -10,7 +10,7 @@ import numpy as np
 
 from cosserat_fenicsx import units as constants
 from cosserat_fenicsx.actions.fluids import AddedMass, LinearDrag
-from cosserat_fenicsx.checks import File, Numbers, number, positive, refuse, store, warn
+from cosserat_fenicsx.checks import File, Numbers, doubt_width, number, positive, refuse, store, warn
 from cosserat_fenicsx.dimensions import in_si, size_of
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.parts import Density, Depth, Diameter, FileName, Friction, Number, Part, WallStiffness, at_least
@@ -39,11 +39,16 @@ class HoleSection(Part):
     friction: Friction
     name: str = ""
 
+    def __post_init__(self):
+        try:
+            super().__post_init__()
+        except SceneError as problem:  # of several sections: which one
+            told = "" if ".to =" in str(problem) else f", in the section that ends at {self.to:g} m"
+            raise SceneError(f"{problem}{told}") from None
+
     def validate(self):
         """Warn of a diameter that is probably in another unit."""
-        if self.diameter > 1.5:
-            warn(f"HoleSection.diameter = {self.diameter:g} m is wider than holes are: 8.5 in are "
-                          "8.5 * units.inch = 0.2159")  # fmt: skip
+        doubt_width(self, "diameter")
 
 
 def _depth(i, depth, unit):

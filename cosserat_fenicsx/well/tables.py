@@ -8,7 +8,7 @@ import numpy as np
 
 from cosserat_fenicsx.results import screen
 from cosserat_fenicsx.well import criteria
-from cosserat_fenicsx.well.components import DrillPipe
+from cosserat_fenicsx.well.components import Bit, DrillPipe
 from cosserat_fenicsx.well.contacts import ROUGH, stretches
 
 # A sentence with a word in capitals is a warning.
@@ -81,6 +81,7 @@ def answer_in_words(answer, units):
         f"{'Enough' if answer.enough else 'NOT ENOUGH'} for tol = {answer.tol:g}: estimated relative errors of these "
         f"are {answer.error:.0e} of the solution; of the model: {_estimate(answer)}."
     )
+    yield from _without_bit(answer)
     if answer.hook_load < 0:
         yield "The string does not go down by its own weight: a negative hook load is a push at the surface."
     for state in (criteria.SNAKE, criteria.HELIX):
@@ -130,6 +131,19 @@ def more_in_words(answer, units):
                 "helps, but not where the end of a contact or component, or a survey station, is near"
             )
     yield f"{answer.model}: {'; '.join(answer.why)}."
+
+
+def _without_bit(answer):
+    """Sentences on a weight on bit of a string that rotates, where there is no torque on bit, or no bit."""
+    operation, lowest = answer.operation, answer.string.components[0]
+    if operation.weight > 0 and operation.direction(1.0)[1]:
+        if operation.torque == 0:
+            yield (
+                "No bit torque given: the surface torque is that of friction along the string alone; expected a "
+                "torque on bit beside its weight."
+            )
+        if not any(isinstance(part, Bit) for part in answer.string.components):
+            yield f"No Bit in the string: the weight on bit acts at the lower end of the {lowest.name}."
 
 
 def _estimate(answer):
