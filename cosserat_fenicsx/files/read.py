@@ -20,21 +20,25 @@ from cosserat_fenicsx.parts import Part, Reading, made, misplaced, schema, to_da
 from cosserat_fenicsx.scene.sections import Material
 from cosserat_fenicsx.storage.store import read as stored
 
+#: The kinds of scene files.
+KINDS = ("rods", "well", "drilling")
 # Tables that a drill-string in motion has, and a string in a well has not.
 _OF_DRILLING = {"drive", "bit", "hook", "wall_friction", "drag", "simulate", "stability", "discs"}
 
 
-def kinds() -> dict:
-    """{kind: class} of scene files."""
-    from cosserat_fenicsx.drilling.scenefile import DrillingScene
-    from cosserat_fenicsx.files.rods import RodScene
-    from cosserat_fenicsx.well.scenefile import WellScene
-
-    return {"rods": RodScene, "well": WellScene, "drilling": DrillingScene}
+def class_of(kind: str) -> type:
+    """The class of the scene files of a kind, `KINDS`; those of the others are not imported, which takes a while."""
+    if kind == "drilling":
+        from cosserat_fenicsx.drilling.scenefile import DrillingScene as found
+    elif kind == "well":
+        from cosserat_fenicsx.well.scenefile import WellScene as found
+    else:
+        from cosserat_fenicsx.files.rods import RodScene as found
+    return found
 
 
 def kind_of(tables) -> str:
-    """The kind of a file by its tables, also where one of them is missing or misspelt: a key of `kinds`."""
+    """The kind of a file by its tables, also where one of them is missing or misspelt: one of `KINDS`."""
     if "drive" in tables or ({"string", "well", "discs"} & tables.keys() and _OF_DRILLING & tables.keys()):
         return "drilling"
     return "well" if "rods" not in tables and {"well", "string", "operations"} & tables.keys() else "rods"
@@ -83,7 +87,7 @@ def from_tables(tables, folder):
     if not isinstance(materials, dict):
         raise misplaced(("materials",), f"materials = {materials!r}: expected tables, [materials.name]")
     named = {name: made(Material, entry, ("materials", name)) for name, entry in materials.items()}
-    found = made(kinds()[kind_of(tables)], tables, (), Reading(folder, {"Material": named}))
+    found = made(class_of(kind_of(tables)), tables, (), Reading(folder, {"Material": named}))
     if named and hasattr(found, "scene"):
         store(found.scene, materials=named)
     return found
@@ -106,8 +110,8 @@ def schema_of_files() -> dict:
     """The JSON Schema of scene files, which editors complete and check them with."""
     definitions, found = {}, []
     material = {"type": "object", "additionalProperties": {"$ref": "#/$defs/Material"}}
-    for cls in kinds().values():
-        one = schema(cls)
+    for kind in KINDS:
+        one = schema(class_of(kind))
         definitions |= one.pop("$defs")
         one.pop("$schema")
         one["properties"] |= {"use": {"type": "array", "items": {"type": "string"}}, "materials": material}

@@ -19,7 +19,6 @@ from cosserat_fenicsx.results.accuracy import on_mesh
 from cosserat_fenicsx.results.export import saved
 from cosserat_fenicsx.results.path import Path
 from cosserat_fenicsx.results.records import Event, Record, Records
-from cosserat_fenicsx.statics.circulatory import conservative_along
 from cosserat_fenicsx.statics.critical import derivatives_of
 from cosserat_fenicsx.statics.path.chord import Chord
 from cosserat_fenicsx.statics.path.events import Lost
@@ -39,6 +38,12 @@ _CORRECTIONS, _NEAR = 6, 0.1
 _ASIDE = 0.3
 
 
+def _conservative_along(path):
+    from cosserat_fenicsx.statics.circulatory import conservative_along  # late: scipy is slow to import, few ask for it
+
+    return conservative_along(path)
+
+
 class _Enough(Exception):
     """Raised where the user's `until` returns True."""
 
@@ -54,7 +59,7 @@ class Tracing:
         self.problem, _, self.stability = solvers
         self.model, self._options, self._choice, self._bar = self.problem.model, follow, choice, bar
         why = [*choice.why, self.model.signature.formulation.words]
-        self.path = Path.of(self.model, why, conservative_along, derivatives_of)
+        self.path = Path.of(self.model, why, _conservative_along, derivatives_of)
         if choice.model == "spatial":
             self._follower = Follower(*solvers, on_event=self._meet, **follow)
         else:  # planar models: load control without events; the spatial model takes over where more is needed
@@ -340,7 +345,7 @@ def read_path(file: File, *, comm: MPI.Comm | None = None) -> Path:
         SceneError: it cannot be read, is damaged, holds something else, or is of a newer release.
     """
     path = saved.read(file, Path, assembled, communicator(comm))
-    path._potential, path._differentiated = conservative_along, derivatives_of
+    path._potential, path._differentiated = _conservative_along, derivatives_of
     return path
 
 
