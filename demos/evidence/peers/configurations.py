@@ -63,8 +63,10 @@ def _exudyn(problem):
     found = []
     for substeps in _substeps(problem):
         if problem == "sweep":
-            found += _grid("planar 3-node", (4, 6, 8, 10, 12, 16, 24, 32, 40, 64), (1e-3, 3e-4, 1e-4, 1e-5), substeps)
-            found += _grid("planar ANCF cable", (8, 12, 16, 20, 24, 32, 48, 64), (1e-3, 1e-4, 1e-5), substeps)
+            meshes = (3, 4, 6, 7, 8, 10, 12, 16, 24, 32, 40, 64)
+            found += _grid("planar 3-node", meshes, (1e-3, 3e-4, 1e-4, 1e-5), substeps)
+            meshes = (8, 10, 12, 16, 20, 24, 32, 48, 64)
+            found += _grid("planar ANCF cable", meshes, (1e-3, 1e-4, 3e-5, 1e-5), substeps)
         elif problem != "bend":
             found += _grid("planar 3-node", (4, 8, 16, 32, 64), (1e-3, 1e-5), substeps)
             found += _grid("planar ANCF cable", (8, 16, 32, 64), (1e-5,), substeps)
