@@ -3,10 +3,11 @@
 import contextlib
 import itertools
 import pickle
+import queue
 import sys
 import time
 import traceback
-from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, wait
+from concurrent.futures import BrokenExecutor, Executor
 from pathlib import Path
 
 import numpy as np
@@ -17,8 +18,9 @@ from cosserat_fenicsx.interrupts import obey
 from cosserat_fenicsx.ranks import apart
 from cosserat_fenicsx.studies.outcome import to_data
 
-# Cases that an executor is given ahead of those that are done; seconds between looks for Ctrl-C.
-_AHEAD, _LOOK = 1000, 0.2
+# Cases that an executor is given ahead of those that are done, several for each of a thousand workers; seconds between
+# looks for Ctrl-C.
+_AHEAD, _LOOK = 4000, 0.2
 _SENDABLE = "arguments that pickle takes: numbers, texts, arrays, scenes, functions of modules"
 
 
@@ -111,29 +113,33 @@ def by_executor(executor, task, cases, numbers):
     Args:
         numbers: of the cases to compute, an iterator.
     """
-    pending = {}
+    pending, done = {}, queue.SimpleQueue()  # `wait` would look at all that are pending, for each that is done
     try:
         while True:
             for i in itertools.islice(numbers, _AHEAD - len(pending)):
-                pending[executor.submit(_in_worker, task, cases[i])] = i
+                future = executor.submit(_in_worker, task, cases[i])
+                pending[future] = i
+                future.add_done_callback(done.put)
             if not pending:
                 return
-            done, _ = wait(pending, timeout=_LOOK, return_when=FIRST_COMPLETED)
             obey()
-            for future in done:
-                i = pending.pop(future)
-                try:
-                    found = future.result()
-                except BrokenExecutor as problem:
-                    raise RuntimeError(
-                        f"a worker of the executor ended at case {i} or near it ({problem}): a folder keeps what was "
-                        "computed, and the same call continues from it"
-                    ) from problem
-                except (pickle.PicklingError, AttributeError, TypeError) as problem:
-                    raise SceneError(
-                        f"study.cases[{i}]: the executor cannot send it or its result ({problem}): expected {_SENDABLE}"
-                    ) from None
-                yield i, found
+            try:
+                future = done.get(timeout=_LOOK)
+            except queue.Empty:
+                continue
+            i = pending.pop(future)
+            try:
+                found = future.result()
+            except (pickle.PicklingError, AttributeError, TypeError) as problem:
+                raise SceneError(
+                    f"study.cases[{i}]: the executor cannot send it or its result ({problem}): expected {_SENDABLE}"
+                ) from None
+            yield i, found
+    except BrokenExecutor as problem:
+        raise RuntimeError(
+            f"a worker of the executor ended at case {min([i, *pending.values()])} or near it ({problem}): a folder "
+            "keeps what was computed, and the same call continues from it"
+        ) from problem
     finally:
         for future in pending:
             future.cancel()
