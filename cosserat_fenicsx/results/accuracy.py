@@ -346,15 +346,24 @@ def winding_lengths(path):
 def turns_of(path, most):
     """For every rod (elements,): the largest angle, rad, by which the moments at the Gauss points turn sections along
     an element, relative to the rest state, at any point of a path; None where none is larger than `most`."""
-    m = path._stacked("gauss_fields")[..., 3:6]
-    per_moment = [
-        np.diff(breaks) * (path.scales.moment * rod.length / rod.profile.range[0].J.min())
-        for rod, breaks in zip(path.scene.rods, path.layout.breaks, strict=True)
-    ]
-    if np.sqrt(3) * np.abs(m).max(initial=0.0) * max(turns.max() for turns in per_moment) <= most:
+    m = path._stacked("gauss_fields")[..., 3:6] * path.scales.moment
+    sizes = [np.diff(breaks) * rod.length for rod, breaks in zip(path.scene.rods, path.layout.breaks, strict=True)]
+    softest = [rod.profile.range[0].J.min() for rod in path.scene.rods]
+    steepest = max(lengths.max() / J for lengths, J in zip(sizes, softest, strict=True))
+    if np.sqrt(3) * np.abs(m).max(initial=0.0) * steepest <= most:
         return None
-    m = (np.linalg.norm(m, axis=3) @ path.rule.weights).max(axis=0)
-    found = [m[cells] * turns for cells, turns in zip(cells_of(path.layout), per_moment, strict=True)]
+    found = []
+    for rod, x, cells, lengths in zip(
+        path.scene.rods, path.layout.inside(path.rule.gauss), cells_of(path.layout), sizes, strict=True
+    ):
+        J, of_rod = rod.profile.range[0].J, m[:, cells]
+        if rod.profile.coupled:  # J is about principal axes
+            J = J.min()
+        else:  # in the directors: a section may be far stiffer in bending than in torsion
+            q = path.motion(rod, x.ravel())[..., 3:].reshape(-1, 4)
+            frames = directors(q).reshape(len(of_rod), *x.shape, 3, 3) @ rod.curve.frame(x * rod.length)
+            of_rod = np.einsum("...ij,...i", frames, of_rod)
+        found.append((np.linalg.norm(of_rod / J, axis=3) @ path.rule.weights).max(axis=0) * lengths)
     return found if max(turns.max() for turns in found) > most else None
 
 
