@@ -99,6 +99,7 @@ tables: setup
 	$(PYTHON) demos/evidence/many_rods.py
 	$(PYTHON) demos/evidence/ranks.py
 	$(PYTHON) demos/evidence/steps.py
+	$(PYTHON) demos/evidence/wall_in_motion.py
 	$(PYTHON) demos/evidence/orders.py
 	$(PYTHON) demos/evidence/put_in_docs.py accuracy overhead first_runs rungs choice scaling many_rods ranks steps orders
 

@@ -140,6 +140,17 @@ def test_steps_quick(tmp_path):
     assert all(iterations < 6 for _, iterations, _ in found)
 
 
+def test_wall_in_motion_quick(tmp_path):
+    """What lies on the wall stays there and loses energy, what falls is above it; times are not tested."""
+    import wall_in_motion
+
+    found = wall_in_motion.main(runs=1, duration=0.02, length=250.0, elements=40, out=tmp_path)
+    lies, falls = (history for _, history in found.values())
+    wall = [history.scene.loads[0] for history in (lies, falls)]
+    assert (lies.wall_forces(wall[0]).normal[1:] > 0).all() and (falls.wall_forces(wall[1]).normal[1:] == 0).all()
+    assert lies.dissipated[-1] > 0 and np.abs(lies.balance).max() < 1e-6 * np.abs(lies.work).max()
+
+
 @pytest.mark.slow
 def test_orders_quick(tmp_path):
     """Schemes have their orders with joints, damping and driven supports too; meshes 2p."""
