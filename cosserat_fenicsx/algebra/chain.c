@@ -218,6 +218,18 @@ static inline double dot(const double *restrict a, const double *restrict b, int
 
 /* ---- along the rods ---------------------------------------------------------------------------------------------- */
 
+enum { BESIDE = 4 }; /* numbers of a front that are taken together */
+
+static inline int round_down(int i)
+{
+    return i & -BESIDE;
+}
+
+static inline int round_up(int i)
+{
+    return round_down(i + BESIDE - 1);
+}
+
 /* Where the i-th of the numbers carried from the element before is in the front; `ahead`: how many are in front of the
    element's own. */
 static inline int carried_to(int i, int ahead, const int *shape)
@@ -263,6 +275,34 @@ static void condense(chain *s, int t, const double *F, int n, int k, int d)
     for (int i = d; i < slots; i++) block[(size_t)i * all + i] = 1;
 }
 
+/* The factors of a front F (n, n) with k pivots by columns, for `subtract_column`: those of L from the first on, those of
+   U above the pivots from the last on. Each begins and ends where four numbers of the front do, filled up with zeros. */
+static void keep_factors(chain *s, int t, const double *F, int n, int k)
+{
+    double *to = s->factor + (size_t)t * s->room * (s->wide + BESIDE), *inverse = s->inverse + (size_t)t * s->room;
+    for (int j = 0; j < k; j++) {
+        const int first = round_down(j + 1), end = round_up(n);
+        for (int i = first; i <= j; i++) *to++ = 0;
+        for (int i = j + 1; i < n; i++) *to++ = F[(size_t)i * n + j];
+        for (int i = n; i < end; i++) *to++ = 0;
+        inverse[j] = 1 / F[(size_t)j * n + j];
+    }
+    for (int j = n - 1; j >= 0; j--) {
+        const int above = j < k ? j : k;
+        for (int i = 0; i < above; i++) *to++ = F[(size_t)i * n + j];
+        for (int i = above; i < round_up(above); i++) *to++ = 0;
+    }
+}
+
+/* z -= column * by from `first` to `end`, both multiples of BESIDE; returns the column that follows. */
+static inline const double *subtract_column(double *restrict z, const double *restrict column, double by, int first,
+                                            int end)
+{
+    for (int i = first; i < end; i += BESIDE, column += BESIDE)
+        for (int j = 0; j < BESIDE; j++) z[i + j] -= column[j] * by;
+    return column;
+}
+
 /* Factors of the sum of the elements: of the kernel, or matrices that are given. Returns 0, or 1 if it is singular. */
 int eliminate(chain *s, kernel *k, const double *matrices)
 {
@@ -273,7 +313,7 @@ int eliminate(chain *s, kernel *k, const double *matrices)
         const int *shape = s->shape + 4 * t, m = d + shape[0] + shape[1], n = m + shape[2] + shape[3];
         int *row = s->row + (size_t)t * s->room, *column = s->column + (size_t)t * s->room;
         const int last = s->ends[t] != -1;
-        double *F = s->front + (size_t)t * s->room * s->room;
+        double *F = s->front + (size_t)(t % 2) * s->room * s->room; /* of earlier ones the factors are kept */
         int eliminated = -1;
         /* A pivot that seems to be zero is judged again with rows scaled: in the column of a rotation the forces against
            shear of a slender rod exceed all moments, and the more the shorter the element. */
@@ -288,6 +328,7 @@ int eliminate(chain *s, kernel *k, const double *matrices)
         k_before = eliminated;
         s->done[2 * t] = n, s->done[2 * t + 1] = k_before;
         if (k_before < 0) return 1;
+        keep_factors(s, t, F, n, k_before);
         d = m - k_before, before = F, n_before = n;
         if (last) condense(s, t, F, n, k_before, d), before = 0, d = 0;
     }
@@ -304,7 +345,7 @@ void count(chain *s, kernel *k)
     take_constants(k);
     for (int t = 0; t < s->elements; t++) {
         const int *shape = s->shape + 4 * t, m = shape[0] + shape[1], n = m + shape[2] + shape[3];
-        double *F = s->front + (size_t)(t % 2) * s->room * s->room; /* of the others nothing is needed any more */
+        double *F = s->front + (size_t)(t % 2) * s->room * s->room; /* of earlier ones nothing is needed */
         assemble(s, k, 0, F, t, 0, before, n_before, k_before, s->diagonal);
         s->logarithm += signs(F, n, m, s->work, &s->negative, &s->zero);
         before = F, n_before = n, k_before = m;
@@ -321,12 +362,12 @@ void forward(chain *s, const double *b, double *interface)
         const size_t at = (size_t)t * s->room;
         const int *shape = s->shape + 4 * t, *rows = s->rows + at, *row = s->row + at, *column = s->column + at;
         const int n = s->done[2 * t], k = s->done[2 * t + 1], m = d + shape[0] + shape[1];
-        const double *F = s->front + at * s->room;
-        double *z = s->forward + at;
+        const double *l = s->factor + at * (s->wide + BESIDE);
+        double *z = s->forward + (size_t)t * s->wide;
         for (int i = 0; i < n; i++) y[i] = i >= d && i < m ? b[rows[i - d]] : 0;
         for (int i = 0; i < carried; i++) y[carried_to(i, d + shape[0], shape)] += carry[i];
         for (int i = 0; i < n; i++) z[i] = y[row[i]];
-        for (int i = 1; i < n; i++) z[i] -= dot(F + (size_t)i * n, z, i < k ? i : k);
+        for (int j = 0; j < k; j++) l = subtract_column(z, l, z[j], round_down(j + 1), round_up(n));
         d = m - k, carried = n - k;
         if (s->ends[t] == -1) {
             memcpy(carry, z + k, carried * sizeof *carry);
@@ -344,16 +385,16 @@ void backward(chain *s, const double *interface, double *x)
         const size_t at = (size_t)t * s->room;
         const int *shape = s->shape + 4 * t, *column = s->column + at;
         const int n = s->done[2 * t], k = s->done[2 * t + 1], m = n - shape[2] - shape[3];
-        const double *F = s->front + at * s->room;
-        double *z = s->forward + at;
+        const double *u = s->factor + at * (s->wide + BESIDE), *inverse = s->inverse + at;
+        double *z = s->forward + (size_t)t * s->wide;
+        for (int j = 0; j < k; j++) u += round_up(n) - round_down(j + 1);
         for (int i = k; i < n; i++) {
             if (i < m && s->ends[t] >= 0) x[column[i]] = interface[s->ends[t] + i - k];
             z[i] = column[i] < s->size ? x[column[i]] : interface[column[i] - s->size];
         }
-        for (int i = k - 1; i >= 0; i--) {
-            const double *row = F + (size_t)i * n;
-            z[i] = (z[i] - dot(row + i + 1, z + i + 1, n - i - 1)) / row[i];
-            x[column[i]] = z[i];
+        for (int j = n - 1; j >= 0; j--) {
+            if (j < k) x[column[j]] = z[j] *= inverse[j];
+            u = subtract_column(z, u, z[j], 0, round_up(j < k ? j : k));
         }
     }
 }

@@ -42,10 +42,12 @@ typedef struct {
     const int *ends;               /* (elements,) -1; at the end of a segment the first of its `delays` numbers in the
                                       interface for delayed unknowns, or -2 where it has none */
     const int *block;              /* (elements,) at the end of a segment where its matrix is in condensed; else -1 */
-    double *front;                 /* (elements, room, room) factors; (2, room, room) where pivots are only counted */
+    double *front;                 /* (2, room, room) of the element in turn and of the one before */
+    int wide;                      /* room, rounded up to a multiple of 4 */
+    double *factor, *inverse;      /* (elements, room, wide + 4) factors by columns; (elements, room) of the pivots */
     int *row, *column, *done;      /* (elements, room) order of rows, unknowns of columns; (elements, 2) size of the front,
                                       eliminated */
-    double *forward, *condensed;   /* (elements, room); matrices of the segments on the interface */
+    double *forward, *condensed;   /* (elements, wide); matrices of the segments on the interface */
     double *diagonal;              /* (interface,) sum of the elements' diagonals there */
     double *carry, *work;          /* (room,) each */
     int negative, zero;            /* pivots, after `count` */

@@ -18,6 +18,8 @@ from cosserat_fenicsx.algebra.building import Pointers
 ZERO_PIVOT = 2e-15
 #: Unknowns that an element may leave to the next one, where contact forces are unknowns: see `chain.c`.
 _DELAYS = 3
+# Numbers of a front that C takes together.
+_BESIDE = 4
 
 
 class Elimination(Pointers):
@@ -123,9 +125,12 @@ class Elimination(Pointers):
             ("block", block), *self._factors.items(),
         ):  # fmt: skip
             setattr(chain, name, self.integers(array))
-        self._factors["front"] = np.zeros((fronts, room, room))
+        chain.wide = wide = -(-room // _BESIDE) * _BESIDE
+        self._factors["factor"] = np.zeros((fronts, room, wide + _BESIDE))
+        self._factors["inverse"] = np.zeros((fronts, room))
         for name, array in (
-            ("front", self._factors["front"]), ("forward", np.zeros((fronts, room))), ("condensed", self.condensed),
+            ("front", np.zeros((2, room, room))), ("factor", self._factors["factor"]),
+            ("inverse", self._factors["inverse"]), ("forward", np.zeros((fronts, wide))), ("condensed", self.condensed),
             ("diagonal", self.diagonal), ("carry", np.zeros(room)), ("work", np.zeros(room)),
         ):  # fmt: skip
             setattr(chain, name, self.doubles(array))
