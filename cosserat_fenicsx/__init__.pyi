@@ -5,6 +5,10 @@ from cosserat_fenicsx import drilling as drilling
 from cosserat_fenicsx import signals as signals
 from cosserat_fenicsx import units as units
 from cosserat_fenicsx import well as well
+from cosserat_fenicsx.actions.actuation import Actuation as Actuation
+from cosserat_fenicsx.actions.actuation import Growth as Growth
+from cosserat_fenicsx.actions.actuation import Pretension as Pretension
+from cosserat_fenicsx.actions.actuation import Thermal as Thermal
 from cosserat_fenicsx.actions.centrifugal import Centrifugal as Centrifugal
 from cosserat_fenicsx.actions.fluids import AddedMass as AddedMass
 from cosserat_fenicsx.actions.fluids import Drag as Drag

@@ -24,7 +24,7 @@ def rotation_vector(q0, q1):
 
 
 def strains(motion, section):
-    """The six material strains v - v_R and u - u_R."""
+    """The six material strains v - v_0 and u - u_0."""
     e, k = equilibrium.strains(motion, section)
     return ufl.as_vector([*e, *k])
 

@@ -22,9 +22,10 @@ Variation = namedtuple("Variation", "r q r_s q_s")
 
 
 def strains(line, section):
-    """(v - v_R, u - u_R) with directors and q not normalised, material."""
-    e = section.R_R.T * (directors(line.q).T * line.r_s) - section.v_R
-    return e, section.R_R.T * (2 * conjugate_product(line.q, line.q_s))
+    """(v - v_0, u - u_0) with directors and q not normalised, material."""
+    e = section.R_R.T * (directors(line.q).T * line.r_s) - section.v_0
+    k = section.R_R.T * (2 * conjugate_product(line.q, line.q_s))
+    return e, k if section.k_0 is None else k - section.k_0
 
 
 def turned(q, dq):

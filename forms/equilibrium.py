@@ -1,7 +1,8 @@
 """Eq. (1) of the paper, static part, for any parametrisation of the rotation: each model supplies its own `Motion`.
 
 Strong form: n' + f = 0, m' + r' x n + mu = 0, with a law of forms/law.py for the material components, T^T n and T^T m
-with T = R R_R, of the strains v - v_R and u - u_R. The contact force n may be independent of the motion: a field of
+with T = R R_R, of the strains v - v_0 and u - u_0. v_0 and u_0 are those without stress: v_R and u_R of the reference,
+and what actuation, heat or growth add to them. The contact force n may be independent of the motion: a field of
 unknowns, values at the quadrature points updated from one Newton step to the next, or known from statics; m then
 follows from n and u - u_R. `ds(a)` is the integral of a over the rod with p Gauss points per element.
 """
@@ -17,9 +18,9 @@ Motion = namedtuple("Motion", "r_s R curvature")
 #: Virtual displacement phi_r and virtual rotation phi, both inertial, and their derivatives along the rod; phi_qa is
 #: the test function of |q| = 1 where the unknown is q. Derivatives that a term does not need may be None.
 VirtualMotion = namedtuple("VirtualMotion", "phi_r phi phi_r_s phi_s phi_qa", defaults=(None, None, 0))
-#: The law of forms/law.py, the reference frame R_R = [d_1R d_2R d_3R] and the reference strain v_R = R_R^T r_R', which
-#: is (0, 0, 1) on the exact curve; UFL matrix and vector.
-Section = namedtuple("Section", "law R_R v_R")
+#: The law of forms/law.py, the reference frame R_R = [d_1R d_2R d_3R], and the strains without stress: v_0, which is
+#: v_R = R_R^T r_R' where nothing acts in the law, (0, 0, 1) on the exact curve; and k_0 = u_0 - u_R, None there. UFL.
+Section = namedtuple("Section", "law R_R v_0 k_0", defaults=(None,))
 
 
 def frame(motion, section):
@@ -28,17 +29,18 @@ def frame(motion, section):
 
 
 def stretch_and_shear(motion, section):
-    """Material strain v - v_R = T^T r' - v_R, eq. (4)."""
-    return frame(motion, section).T * motion.r_s - section.v_R
+    """Material strain v - v_0 = T^T r' - v_0, eq. (4)."""
+    return frame(motion, section).T * motion.r_s - section.v_0
 
 
 def bending_and_torsion(motion, section):
-    """Material strain u - u_R; the reference curvature drops out because R is relative to the reference."""
-    return section.R_R.T * motion.curvature
+    """Material strain u - u_0; the reference curvature drops out because R is relative to the reference."""
+    k = section.R_R.T * motion.curvature
+    return k if section.k_0 is None else k - section.k_0
 
 
 def strains(motion, section):
-    """(v - v_R, u - u_R), material."""
+    """(v - v_0, u - u_0), material."""
     return stretch_and_shear(motion, section), bending_and_torsion(motion, section)
 
 
@@ -55,9 +57,9 @@ def contact_moment(n, motion, section):
 
 
 def tangent_of_force(n, motion, section):
-    """r' = T (v_R + e) with the strain e = v - v_R from the contact force n by the inverse law, inertial."""
+    """r' = T (v_0 + e) with the strain e = v - v_0 from the contact force n by the inverse law, inertial."""
     T = frame(motion, section)
-    return T * (section.v_R + section.law.strain(T.T * n, bending_and_torsion(motion, section)))
+    return T * (section.v_0 + section.law.strain(T.T * n, bending_and_torsion(motion, section)))
 
 
 def compatibility(n, motion, section):

@@ -1,7 +1,8 @@
 """The constitutive law of a section: its contact force and moment from its six strains, and back.
 
-All components are material: the strains e = v - v_R and k = u - u_R, the contact force n and the contact moment m. A
-law is three linear functions, which apply to values of strain and stress and to their changes alike:
+All components are material: the strains e = v - v_0 and k = u - u_0 from those without stress (forms/equilibrium.py),
+the contact force n and the contact moment m. A law is three linear functions, which apply to values of strain and
+stress and to their changes alike:
 
     force(e, k)    n from the strains
     moment(n, k)   m from n and k

@@ -18,7 +18,7 @@ from cosserat_fenicsx.scene.rolled import Profile
 from cosserat_fenicsx.scene.scene import check_magnitudes
 from cosserat_fenicsx.scene.sections import Rectangle, Stiffness
 from cosserat_fenicsx.scene.signals import signals_of
-from cosserat_fenicsx.statics.meshes import first_layout, meshes_for, resolving_turns
+from cosserat_fenicsx.statics.meshes import first_layout, meshes_for, resolving_turns, turning_in_law
 from cosserat_fenicsx.statics.solve import check_arguments
 
 #: The unknowns of a model, in a plane (True) or in space.
@@ -45,7 +45,8 @@ def explain(scene, load_factors, settings):
         layout = Layout.of(scene, elements) if elements else first_layout(scene, degree)
     else:
         layout, _ = meshes_for(scene, degree, tol, many)
-        layout = resolving_turns(scene, layout, float(np.abs(load_factors).max())) or layout
+        largest = float(np.abs(load_factors).max())
+        layout = turning_in_law(scene, resolving_turns(scene, layout, largest) or layout, largest)
     first = elements or max(layout.counts)
 
     def signature_of(model):

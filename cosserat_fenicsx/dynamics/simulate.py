@@ -27,6 +27,7 @@ from cosserat_fenicsx.results.history import History
 from cosserat_fenicsx.results.path import Path
 from cosserat_fenicsx.scene.action import path_dependent
 from cosserat_fenicsx.scene.scene import Scene, check_magnitudes
+from cosserat_fenicsx.statics.meshes import turning_in_law
 from cosserat_fenicsx.storage.store import Nowhere, Store
 from cosserat_fenicsx.storage.stored_history import KIND, StoredHistory
 
@@ -132,7 +133,7 @@ def simulate(
         if not start.stable[-1]:
             cautions = ["the equilibrium that it starts from is unstable: rounding errors decide where it goes"]
     model, why = chosen_model(scene_over, model, scheme, start)
-    layout = Layout.of(scene, elements)
+    layout = turning_in_law(scene_over, Layout.of(scene, elements), abs(load_factor), elements)
     with solvers_of(scene_over, layout, degree, scheme, load_factor, comm, model) as (problem, stepper):
         stepper.rho_inf = rho_inf
         cautions += pace.watch(scene, duration, load_factor, stepper.impulse_error)

@@ -203,7 +203,7 @@ class Term:
 
     def _function(self, size):
         mesh, place = self._rods.mesh, self.kind.place
-        if place == "line":
+        if self.kind.at_gauss:
             return gauss_function(mesh, self._signature.points, size)
         return element_function(mesh, 1 if place == "point" else self._signature.degree, size)
 
@@ -239,7 +239,7 @@ class Term:
     @property
     def _dof_places(self):
         """Reference coordinates of the degrees of freedom of an element, in dolfinx's order."""
-        if self.kind.place == "line":
+        if self.kind.at_gauss:
             return np.polynomial.legendre.leggauss(self._signature.points)[0] / 2 + 0.5
         return compat.element_nodes(self.weight.function_space)
 
@@ -320,7 +320,7 @@ class Term:
                 self.acting.append((now, rod))
             if not len(rows):
                 continue
-            rough = self.kind.place == "line" and len(now.kinks(rod))
+            rough = self.kind.at_gauss and len(now.kinks(rod))
             self._take(nearest_polynomials(now, rod, s, *elements) if rough else now.data(rod, s), rod, rows)
         return True
 

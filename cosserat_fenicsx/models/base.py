@@ -127,7 +127,7 @@ class RodModel:
         return data
 
     def cross_section(self):
-        """The `equilibrium.Section` of the model's data, UFL."""
+        """The `equilibrium.Section` of the model's data without actions in the law, UFL; see `compiled.section_of`."""
         return Section(self.data.law, as_matrix(self.data.R_R), self.data.v_R)
 
     def motion_of(self, w, nodal):

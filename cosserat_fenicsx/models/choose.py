@@ -120,6 +120,8 @@ def _live(scene):
         traits = traits_of(load, scene.rods)
         if not traits.turns:
             return _names_components(i, load)
+        if load.in_law:
+            return f"load {i + 1}, {describe(load)}, changes the strains without stress, which the model does not know"
         known = traits.dead or (traits.known_force and load.station is not None)
         if not known or load.refreshed is not None:
             how = "turns with the rod" if load.follows else "depends on the motion"

@@ -88,7 +88,7 @@ def compile_static(model, spaces, displacements=None):
     def ds(a):
         return a * dx.gauss
 
-    section, motion = model.cross_section(), model.motion_of(U, U_node)
+    section, motion = section_of(model), model.motion_of(U, U_node)
     phi, trial = ufl.TestFunction(model.space), ufl.TrialFunction(model.space)
     test, derivative = model.tests_of(phi, motion), derivative_in(trial, U, U_node)
     n, phi_n = (None if a is None else model.vector(a) for a in force.symbols(model, U, phi))
@@ -234,11 +234,28 @@ def _rule(mesh, points, weights):
     )
 
 
-def acting_at(model, point_at):
-    """(number, `Term`, its factor, UFL, and its `Point`) of all actions of a model; point_at: see `action_work`."""
+def section_of(model):
+    """The `equilibrium.Section` of a model, with the actions in its law (`Action.in_law`)."""
+    section = model.cross_section()
+    for _, term, factor in _terms(model, in_law=True):
+        k, e = (section.R_R.T * (factor * term.weight[0] * a) for a in term.data)
+        section = section._replace(v_0=section.v_0 + e, k_0=k if section.k_0 is None else section.k_0 + k)
+    return section
+
+
+def _terms(model, *, in_law):
+    """(number, `Term`, its factor, UFL) of the actions in a model's law, or of all others."""
     factors = {"load": model.load_factor, "permanent": model.permanent_factor, "full": 1}
     for number, term in enumerate(model.actions.terms):
-        yield number, term, factors[term.kind.scaled], point_at(term.kind.place, term.rest, term.frame)
+        if (term.kind.place == "law") == in_law:
+            yield number, term, factors[term.kind.scaled]
+
+
+def acting_at(model, point_at):
+    """(number, `Term`, its factor, UFL, and its `Point`) of all actions of a model with a virtual work; point_at: see
+    `action_work`."""
+    for number, term, factor in _terms(model, in_law=False):
+        yield number, term, factor, point_at(term.kind.place, term.rest, term.frame)
 
 
 def action_work(model, dx, test, point_at, unknowns, accepted_at=None, test_at=None):

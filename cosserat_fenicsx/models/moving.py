@@ -25,6 +25,7 @@ from cosserat_fenicsx.models.compiled import (
     live_parts,
     measures,
     nonzero,
+    section_of,
 )
 from cosserat_fenicsx.models.connections import ties_of
 from cosserat_fenicsx.models.rod_data import (
@@ -84,7 +85,7 @@ class StepForms:
         self.state, self.start, self.velocity = U, U0, V = model.state, model.start, model.velocity
         self.nodal, self.nodal0, self.rates = nodal, nodal0, _ = named(U), named(U0), named(V)
         self.halfway, self.passed = (nodal + nodal0) / 2, (nodal - nodal0) / model.h
-        self.section, self.viscosity = model.cross_section(), law_of(*model.viscosity)
+        self.section, self.viscosity = section_of(model), law_of(*model.viscosity)
         self.before, self.after, self.middle = (model.motion_of(w, w) for w in (U0, U, (U + U0) / 2))
         self.phi, trial = ufl.TestFunction(model.space), ufl.TrialFunction(model.space)
         self.test = model.tests_of(self.phi, self.after)

@@ -121,10 +121,18 @@ def _rounding(scene, layout, degree):
     )  # fmt: skip
 
 
-#: A kind of action: its virtual work, where it is integrated ("point", "line" at Gauss points, or "node"), the sizes of
-#: its data and of its memory, its factor ("load" factor, "permanent" factor, or 1: "full"), its `Action.evolve`,
-#: whether its data depend on the position, and whether it is independent of the state (`traits.Traits`).
-TermKind = namedtuple("TermKind", "work place sizes memory scaled evolve refreshed dead")
+class TermKind(namedtuple("TermKind", "work place sizes memory scaled evolve refreshed dead")):
+    """A kind of action: its virtual work, where it is integrated ("point", "line" at Gauss points, "node", or "law" for
+    a part of the law, without work), the sizes of its data and of its memory, its factor ("load" factor, "permanent"
+    factor, or 1: "full"), its `Action.evolve`, whether its data depend on the position, and whether it is independent
+    of the state (`traits.Traits`)."""
+
+    __slots__ = ()
+
+    @property
+    def at_gauss(self):
+        """Whether its data are those at the Gauss points."""
+        return self.place in ("line", "law")
 
 
 def place_actions(scene, layout):
@@ -133,13 +141,13 @@ def place_actions(scene, layout):
     terms, taken = [], []
     for action in scene.actions:
         work = work_of(action)
-        if work is None:
+        if work is None and not action.in_law:
             continue
         if action.station is not None:
             places, place = [layout.vertex(scene, action.station)], "point"
         else:
             places = [(scene.number(rod), None) for rod in scene.rods_of(action)]
-            place = "node" if action.at_nodes else "line"
+            place = "law" if action.in_law else "node" if action.at_nodes else "line"
         data = at(action, 0.0).data(scene.rods[places[0][0]], np.zeros(1))
         scaled = "load" if action.scaled else "permanent" if action.permanent else "full"
         sizes, memory = (tuple(datum.size for datum in data) for data in (data, action.memory))
@@ -154,4 +162,4 @@ def place_actions(scene, layout):
             taken.append(there)
         members.extend((action, *where) for where in places)
         there.update(places)
-    return sorted(terms, key=lambda term: (term[0].work.__qualname__, term[0].place, term[0].scaled))
+    return sorted(terms, key=lambda term: (getattr(term[0].work, "__qualname__", ""), term[0].place, term[0].scaled))

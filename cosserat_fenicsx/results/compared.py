@@ -10,6 +10,7 @@ import numpy as np
 
 from cosserat_fenicsx.errors import SceneError, nearest
 from cosserat_fenicsx.remember import per_scene
+from cosserat_fenicsx.scene.action import acts_in_law, without_stress
 
 
 def in_turn(sizes):
@@ -238,7 +239,8 @@ def sizes_of(path):
     rotations: the largest rotation, in rad (2 sin of half of it), at least the displacement over the longest length.
     Both at least 1e-6 of the largest of the whole path.
     n: the largest |n|, at least the largest |m| over the longest length. m: the largest |m|, at least 1e-9 of |n| times
-    that length; |n| times that length where m is rounding alone on the whole path.
+    that length; |n| times that length where m is rounding alone on the whole path. Where actions change the strains
+    without stress, m is at least the moment, and n 1e-9 of the force, that would hold the rods as in the reference.
     """
     gyrations, length = _of_scene(path.scene, path.scales)
     squares = np.add.reduceat(np.square(path._motion), (0, 3, 4), axis=2)
@@ -248,6 +250,9 @@ def sizes_of(path):
     rotation = np.maximum(2 * half.max(axis=1), moved / length)
     squares = np.add.reduceat(np.square(path._stacked("gauss_fields")[..., :6]), (0, 3), axis=3)
     force, moment = np.sqrt(squares.max(axis=(1, 2))).T
+    if acts_in_law(path.scene):
+        held = _held(path)
+        force, moment = np.maximum(force, _LEAST_MOMENT * held[0]), np.maximum(moment, held[1])
     force = np.maximum(np.maximum(force, moment / length), _NOTHING)
     noise = np.array([0.0, 0.0, *_noise(path)])[:, None]
     least = 1.0 if (moment <= _VANISHING * noise[3]).all() else _LEAST_MOMENT
@@ -258,6 +263,19 @@ def sizes_of(path):
         own = np.maximum(criterion.sizes(path), 1e-300)
         sizes, noise = np.vstack([sizes, own]), np.vstack([noise, np.zeros((1, noise.shape[1]))])
     return Sizes(sizes, turned > moved, np.broadcast_to(noise, sizes.shape))
+
+
+def _held(path):
+    """(2, points) the largest force and moment, dimensionless, that would hold sections to their strains in the
+    reference, against `action.without_stress`; without infinite stiffnesses."""
+    sizes, load_factors = np.zeros((2, len(path))), np.array([record.load_factor for record in path._records])
+    for rod, x in zip(path.scene.rods, path.layout.node_s(path.rule.nodes), strict=True):
+        along, (full, scaled) = rod.stiffness_at(x * rod.length), without_stress(path.scene, rod, x * rod.length)
+        for k, load_factor in enumerate(load_factors):
+            strains = full + load_factor * scaled
+            held = [np.linalg.norm(a, axis=1).max() for a in along.contact(strains[1], strains[0])]
+            sizes[:, k] = np.maximum(sizes[:, k], np.array(held) / (path.scales.force, path.scales.moment))
+    return sizes
 
 
 @lru_cache(maxsize=32)

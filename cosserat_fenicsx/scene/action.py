@@ -11,6 +11,7 @@ from collections import namedtuple
 import numpy as np
 
 from cosserat_fenicsx.parts import Part
+from cosserat_fenicsx.scene.signals import at
 
 #: A scalar (size 1) or a vector (size 3, inertial) in a virtual work: value (size,), or (n, size) along a rod.
 Datum = namedtuple("Datum", "value unit size")
@@ -21,6 +22,7 @@ _UNITS = {
     "1": (0, 0, 0, False),
     "m": (0, 1, 0, False),
     "1/m": (0, -1, 0, False),
+    "rad/m": (0, -1, 0, True),
     "m from origin": (0, 1, 0, False),
     "m/s": (0, 1, -1, False),
     "rad/s": (0, 0, -1, True),
@@ -103,11 +105,13 @@ class Action(Part, family="load or action", homes=("cosserat_fenicsx.scene.loads
             `actions.walls.Around` of the points.
         presses: whether it is a wall with a force on the parts of rods that touch it alone, which has a kink where
             contact begins.
+        in_law: whether it is no load but a part of the law along a rod. Its `data` are then what sections have without
+            stress beyond the reference, inertial in the reference: curvature and twist, rad/m, and strain, 1.
         traits: None; or a dict of the fields of `models.traits.Traits`, where it takes long to find them from `work`.
     """
 
     at_nodes, scaled, permanent, follows, memory, evolve, traits = False, True, False, False, (), None, None
-    delayed, resists, touches, presses = None, None, False, False
+    delayed, resists, touches, presses, in_law = None, None, False, False, False
 
     def acts_on(self, rod):
         """Whether it acts along a rod."""
@@ -183,6 +187,25 @@ class LineAction(Action):
 def has_permanent(scene):
     """Whether a scene has permanent loads, so that its state at the load factor 0 is not the reference."""
     return any(action.permanent for action in scene.actions)
+
+
+def acts_in_law(scene):
+    """Whether an action of a scene is part of the law."""
+    return any(action.in_law for action in scene.actions)
+
+
+def without_stress(scene, rod, s, t=0.0):
+    """What the actions in the law give sections of a rod without stress at arc lengths s (n,), m, and the time t (s).
+
+    Returns:
+        (2, 2, n, 3), material: in full, and per unit of the load factor; curvature and twist, rad/m, and strain.
+    """
+    found, frames = np.zeros((2, 2, len(s), 3)), rod.curve.frame(s)
+    for action in scene.actions:
+        if action.in_law and action.acts_on(rod):
+            data = at(action, t).data(rod, s)
+            found[int(action.scaled)] += [np.einsum("kji,kj->ki", frames, datum.value) for datum in data]
+    return found
 
 
 def path_dependent(scene):

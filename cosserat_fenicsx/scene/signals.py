@@ -279,6 +279,7 @@ class Signal:
         """
         when = f"at the time t = {t:g} s" + (f", of the {self.owner} at {self.place}" if self.place else "")
         given = call(self.function, t, f"{self.owner}.{self.field}: its function", f", {when}")
+        given = (given,) if self.size == 1 and isinstance(given, numbers.Real) else given
         floats = type(given) is tuple and all(type(x) is float and abs(x) <= LARGEST for x in given)
         if floats and len(given) == self.size:
             return given  # the usual case; the full check takes ten times as long
@@ -290,8 +291,8 @@ class Signal:
 
 @dataclass(frozen=True)
 class VectorInTime(Either):
-    """Three numbers of a dimension; or, with `functions`, a function of time, with the `jumps` of its owner; or, with
-    `FunctionAlong` among the classes, one of the arc length of the `rod` of its owner."""
+    """Numbers of a dimension, three or one; or, with `functions`, a function of time, with the `jumps` of its owner;
+    or, with `FunctionAlong` among the classes, one of the arc length of the `rod` of its owner."""
 
     functions: bool = True
 
@@ -320,7 +321,8 @@ class VectorInTime(Either):
         jumps = tuple(sorted({float(t) for t in (*getattr(function, "jumps", ()), *given)}))
         place = getattr(owner, "station", None) or getattr(owner, "rod", None)
         place = str(getattr(place, "name", place) or "")
-        signal = Signal(type(owner).__name__, field, unit, function, jumps, place=place)
+        size = getattr(self.inner, "size", 1)
+        signal = Signal(type(owner).__name__, field, unit, function, jumps, size, place)
         signal(0.0)
         return signal
 
@@ -465,6 +467,7 @@ class AlongPieces(FunctionAlong):
     """
 
     pieces: Sequence[tuple[float, Numbers]]
+    kinks = ()
 
     def __post_init__(self):
         if not isinstance(self.pieces, list | tuple) or not self.pieces:

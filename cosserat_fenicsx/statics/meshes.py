@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cosserat_fenicsx.errors import NotConverged
+from cosserat_fenicsx.errors import NotConverged, SceneError
 from cosserat_fenicsx.interrupts import obey
 from cosserat_fenicsx.models.rodmesh import Layout
 from cosserat_fenicsx.models.traits import traits_of
@@ -23,7 +23,9 @@ from cosserat_fenicsx.results.accuracy import (
     turns_of,
     unresolved,
 )
+from cosserat_fenicsx.scene.action import acts_in_law, without_stress
 from cosserat_fenicsx.scene.curves import Line
+from cosserat_fenicsx.scene.signals import sample_times
 
 #: Elements per rod of the first mesh, where the mesh is not given.
 FIRST_ELEMENTS = 4
@@ -41,6 +43,8 @@ class FirstMesh:
     turns: float = 2.5  # angle (rad) by which an element may turn, where rods turn by many radians
     many_turns: float = 6.3  # smallest angle (rad) of a rod that turns by many radians
     most_for_turns: int = 512  # elements of such a rod
+    in_law: float = 1.0  # angle (rad) by which an element may turn without stress
+    inside: tuple = (0.01, 0.25, 0.5, 0.75, 0.99)  # places in an element where that is sampled
     large: float = 0.1  # share of the largest quadrature error above which an element is halved
     # Smallest mean ratio of chord to arc over a part of an element (see `resolving`), as of an arc of one radian.
     straight: float = 0.958
@@ -94,6 +98,33 @@ def resolving_turns(scene, layout, largest):
             np.maximum(1.0, np.minimum(turn / _FIRST.turns * np.diff(breaks), _FIRST.most_for_turns / len(breaks)))
         )
     return layout.resized(scene, wanted) if max(map(np.max, wanted)) > 1 else None
+
+
+def turning_in_law(scene, layout, largest, elements=None):
+    """The mesh, with elements that turn by at most a radian without stress (`Action.in_law`), up to a load factor.
+
+    Args:
+        largest: the load factor, in size; elements: those of a given mesh, which stays.
+
+    Raises:
+        SceneError: more than a radian on a given mesh.
+    """
+    if not acts_in_law(scene):
+        return layout
+    times = {t for action in scene.loads if action.in_law for t in sample_times(action, scene.horizon)}
+    wanted = []
+    for rod, breaks in zip(scene.rods, layout.breaks, strict=True):
+        s = rod.length * (breaks[:-1, None] + np.diff(breaks)[:, None] * _FIRST.inside)
+        parts = np.array([without_stress(scene, rod, s.ravel(), t)[:, 0] for t in times])
+        sizes = np.linalg.norm(parts, axis=3).max(axis=0).reshape(2, *s.shape).max(axis=2)
+        turns = (sizes[0] + largest * sizes[1]) * np.diff(breaks) * rod.length
+        if elements and turns.max() > _FIRST.in_law:
+            raise SceneError(
+                f"elements = {elements}: without stress one of rod '{rod.name}' would turn by {turns.max():.3g} rad: "
+                f"expected at most {_FIRST.in_law:g} rad, elements = {math.ceil(elements * turns.max())} or more"
+            )
+        wanted.append(np.maximum(1.0, np.ceil(turns / _FIRST.in_law - 1e-9)))
+    return layout.resized(scene, wanted) if max(map(np.max, wanted)) > 1 else layout
 
 
 def _size(vector):
@@ -343,7 +374,8 @@ def until_two_meshes_agree(owner, scene, on_mesh, tol, *, most, elements, degree
     Raises:
         NotConverged: the accuracy is not reached, or two meshes in a row cannot be solved.
     """
-    layout, coarse, best, worse = Layout.of(scene, elements or FIRST_ELEMENTS), None, math.inf, 0
+    layout = turning_in_law(scene, Layout.of(scene, elements or FIRST_ELEMENTS), 1.0, elements)
+    coarse, best, worse = None, math.inf, 0
     failed = False  # whether the last mesh could not be solved
     before = coarse_layout = None  # relative differences of the halving before; the mesh of `coarse`
     with MeshProgress(owner, tol, progress, comm) as bar:

@@ -142,12 +142,18 @@ class Problem(Equations):
         self.set_state(self.x)
 
     def rates(self, slope):
-        """The first-order changes of all arrays of `numbers` along a change of the unknowns (owned entries); that of
-        the carried contact force by the linearised strains, without loss of digits on slender rods."""
+        """The first-order changes of all arrays of `numbers` along a change of the unknowns per unit of load factor
+        (owned entries); that of the carried contact force by the linearised strains, without loss of digits on slender
+        rods, and by the actions in the law."""
         if not self.c.advance:
             return [slope]
         behind, ahead = (self._advanced(step) for step in (0.0, slope))
-        return [slope, ahead - behind]
+        change, here = ahead - behind, self.load_factor
+        if any(kind.place == "law" and kind.scaled == "load" for kind in self.model.signature.terms):
+            self.set_load_factor(here + 1.0)  # the law is linear in the load factor
+            change += self._advanced(0.0) - behind
+            self.set_load_factor(here)
+        return [slope, change]
 
     def mismatch(self):
         """The contact force by the strains minus the carried one: rounding of the strains times the stiffness; None

@@ -27,7 +27,7 @@ from cosserat_fenicsx.scene.action import path_dependent
 from cosserat_fenicsx.scene.scene import Scene, check_magnitudes
 from cosserat_fenicsx.scene.statical import check_no_mechanism
 from cosserat_fenicsx.scene.supports import Prescribed
-from cosserat_fenicsx.statics.meshes import first_layout, meshes_for, resolving_turns
+from cosserat_fenicsx.statics.meshes import first_layout, meshes_for, resolving_turns, turning_in_law
 from cosserat_fenicsx.statics.path.follower import CONTROLS
 from cosserat_fenicsx.statics.path.load_control import StepControl
 from cosserat_fenicsx.statics.path.recorder import Tracing
@@ -106,7 +106,8 @@ def solve(
     formulation = formulation_of(formulation)
     degree = formulation.default_degree if degree is None else degree
     check_arguments(scene, tol, elements, bound)
-    check_magnitudes(scene, max(map(abs, load_factors)))
+    largest = max(map(abs, load_factors))
+    check_magnitudes(scene, largest)
     if comm.rank == 0:
         scene.warn()
     discretised = {"formulation": formulation, "degree": degree, "points": gauss_points}
@@ -157,11 +158,12 @@ def solve(
                 return tracer.corrected(coarse)
 
         if elements is not None:
-            return trace(Layout.of(scene, elements))
+            return trace(turning_in_law(scene, Layout.of(scene, elements), largest, elements))
         many = free or len(load_factors) > FEW
         layout, usual = meshes_for(scene, degree, tol, many) if simple else (first_layout(scene, degree), None)
-        turning = resolving_turns(scene, layout, max(map(abs, load_factors)))
+        turning = resolving_turns(scene, layout, largest)
         layout, usual = (layout, usual) if turning is None else (turning, None)
+        layout, usual = (x and turning_in_law(scene, x, largest) for x in (layout, usual))
         return refine(trace, correct, scene, layout, tol, bounded[1], degree, usual)
 
     with Progress(load_factors, progress, comm) as bar:
