@@ -24,7 +24,7 @@ from cosserat_fenicsx.drilling.wall_friction import ViscousDrag
 from cosserat_fenicsx.parts import ForceSize
 from cosserat_fenicsx.scene.action import PointAction, scalar, vector
 from cosserat_fenicsx.scene.rod import Station, StationOrName, is_known
-from cosserat_fenicsx.well.components import Laid
+from cosserat_fenicsx.well.components import Laid, StringPart
 
 # Drag acts at nodes, so many in the pipe at least: errors of 3e-4 at a rate of 0.3 per s in 3000 m.
 _BEADS = 64
@@ -73,7 +73,7 @@ class PipeAbove(PointAction):
         if not given:
             refuse(self, "pipe", self.pipe, "at least one part")
         for part in given:
-            if not isinstance(part, Segment) and not all(hasattr(part, x) for x in ("length", "stiffness", "mass")):
+            if not isinstance(part, Segment | StringPart):
                 refuse(self, "pipe", part, "parts of the pipe: DrillPipe, HeavyWeight, ..., or Segment")
             positive(part, "length", part.length, "m, of the pipe")
         store(self, pipe=tuple(given))

@@ -13,8 +13,9 @@ class Segment:
     """A uniform part of a string.
 
     Attributes:
-        length: m. GJ: N m^2. rhoJ: polar inertia per length, kg m. EA: N. rhoA: kg/m. radius: of contact, m.
-        weight: in mud, N/m. name: of the component.
+        length: m. GJ, rhoJ: torsional stiffness, N m^2, and polar inertia per length, kg m, with tool joints, see
+            `StringPart.torsion`. EA: N. rhoA: kg/m, with tool joints. radius: of contact, m. weight: in mud, N/m.
+        name: of the component.
     """
 
     length: float
@@ -28,12 +29,12 @@ class Segment:
 
     @property
     def torsional_speed(self) -> float:
-        """Of waves, sqrt(G/rho), m/s."""
+        """Of waves, sqrt(G/rho) without tool joints, m/s."""
         return math.sqrt(self.GJ / self.rhoJ)
 
     @property
     def torsional_impedance(self) -> float:
-        """J sqrt(G rho), N m s/rad."""
+        """J sqrt(G rho) without tool joints, N m s/rad."""
         return math.sqrt(self.GJ * self.rhoJ)
 
     @property
@@ -64,9 +65,8 @@ def segment_of(place, weight):
         refuse(part, "stiffness.axial", stiffness.axial, "a finite axial stiffness (N), for a motion")
     mass = stiffness.mass if part.mass is None else part.mass
     return Segment(
-        place.bottom - place.top, stiffness.torsion, stiffness.inertia[2], stiffness.axial, mass, part.contact_radius,
-        weight, part.name,
-    )  # fmt: skip
+        place.bottom - place.top, *part.torsion, stiffness.axial, mass, part.contact_radius, weight, part.name
+    )
 
 
 @dataclass(frozen=True)

@@ -119,6 +119,11 @@ class StringPart(Part, family="component of a string"):
         """Contact radius along its whole length, m; of the body, where the `diameter` stands out from it."""
         return self.contact_radius if self.touches is None else self.outer_diameter / 2
 
+    @property
+    def torsion(self):
+        """Torsional stiffness (N m^2) and polar inertia per length (kg m) for waves of torsion along the string."""
+        return self.stiffness.torsion, self.stiffness.inertia[2]
+
 
 @dataclass(frozen=True)
 class Component(StringPart):
@@ -229,6 +234,21 @@ class _Tubular(StringPart):
     def stiffness(self):
         """Of the body."""
         return Tube(self.outer_diameter, self.inner_diameter).stiffness(self.material)
+
+    @cached_property
+    def torsion(self):
+        """Torsional stiffness (N m^2) and polar inertia per length (kg m), means of body and tool joints.
+
+        A joint every 10 m is far shorter than the waves, which see the mean inertia and the mean compliance. The share
+        of the length that joints have follows from the mass: they have the bore of the body, which lengthens them by
+        what upsets and a narrower bore weigh.
+        """
+        body, share = self.stiffness, 0.0
+        joint = Tube(self.tool_joint or self.outer_diameter, self.inner_diameter).stiffness(self.material)
+        if joint.mass > body.mass:
+            share = min(max((self.mass - body.mass) / (joint.mass - body.mass), 0.0), 1.0)
+        compliance = (1 - share) / body.torsion + share / joint.torsion
+        return 1 / compliance, (1 - share) * body.inertia[2] + share * joint.inertia[2]
 
 
 class DrillPipe(_Tubular):
