@@ -43,7 +43,7 @@ help:
 	@echo "make random  200 random scenes against the strong form, at three tolerances (about 5 minutes)"
 	@echo "make random-wells  100 random wells, strings and operations against finer meshes in a stiffer wall (about half an hour)"
 	@echo "make imperfect  60 symmetric structures with small imperfections against paths in small steps (about 20 minutes)"
-	@echo "make mutants  120 small errors put into the code: how many do the tests find? (hours)"
+	@echo "make mutants  120 small errors put into the code: how many do the tests find? (two hours)"
 	@echo "make release  the sdist, the wheel and the conda recipe, checked; writes dist/"
 	@echo "make setup   only what all of these need first: the Debian packages and the environment .venv"
 	@echo "make clean   remove .venv, out and whatever else was built here"
@@ -174,6 +174,7 @@ packages:
 mutants: setup
 	$(PYTHON) -m pip install --disable-pip-version-check --constraint .venv/constraints.txt pytest-cov
 	$(PYTHON) demos/evidence/mutants.py
+	$(PYTHON) demos/evidence/put_in_docs.py mutants
 
 release: setup
 	$(PYTHON) -m pip install --disable-pip-version-check --constraint .venv/constraints.txt --editable '.[release]'

@@ -39,6 +39,7 @@ PAGES = {
     "soft_string": ("evidence/wells.md", "soft_string.png"),
     "rods_in_wells": ("evidence/wells.md",),
     "benchmarks": ("benchmarks.md",),
+    "mutants": ("evidence/tests.md",),
 }
 #: The tables with a page of their own: its title and pictures.
 ALONE = {
