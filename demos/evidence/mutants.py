@@ -8,7 +8,7 @@ An error (a "mutant") swaps an arithmetic operator or a comparison, changes a si
 statement. It is killed when a test fails that passes without it, or when the tests take five times as long as they
 should. Which tests run which lines, and how long each takes, is measured once, file by file of the tests, with coverage
 (`pip install pytest-cov`). A mutant then meets the tests that run its line, the quickest first, then those that run
-another line of its file (in C: of the folder's Python), up to the first that fails or to one minute of tests: the
+another line of its file (in C: of the folder's Python), up to the first that fails or to half a minute of tests: the
 share of the whole suite is this or more. All in one process at a time. A run that was broken off goes on where it was.
 
 Writes to out/: mutants_coverage.json, mutants.jsonl (each outcome, by seed and state of the code), mutants.md.
@@ -62,7 +62,7 @@ LEFT_OUT = (
 )  # fmt: skip
 #: The tests of a mutant may take this many times what they take without it, and as many seconds more.
 TIMES, SECONDS = 5, 60
-BUDGET = 60.0  # s, of the tests that a mutant meets
+BUDGET = 30.0  # s, of the tests that a mutant meets
 
 
 @dataclass(frozen=True)
