@@ -55,6 +55,30 @@ typedef struct {
     double zero_pivot;             /* of `eliminate`, relative to the largest number in the column; smaller ones are zero */
 } chain;
 
+/* Contact of nodes with the wall of a tube in a time step, whose nodes move linearly with the forces: see contact.c. All
+   vectors are inertial. */
+typedef struct {
+    int nodes, reach, at_end, most; /* nodes that may touch; how many on each side of one its force moves; whether forces
+                                       are those of the end of the step, not of its mean; sweeps */
+    const double *clearance, *stiffness, *friction, *damping, *arm; /* (nodes,); arm: radius of the rod's surface */
+    double h, share, smallest;      /* the step; changes that end the sweeps, of the first one and of all */
+    const double *tangent, *start;  /* (nodes, 3) of the tube; from its axis to the rod at the start, across it */
+    const double *compliance;       /* (nodes, 6, 2 reach + 1, 6) by each component of the force and moment of a node the
+                                       motion of its neighbours, and of itself in the middle */
+    double *moved;                  /* (nodes, 6) displacement and rotation in the step with the forces */
+    double *force, *law;            /* (nodes, 6) force and moment; (nodes, 3) normal force, friction round and along */
+    const int *rows;                /* (nodes, 7) unknowns of this rank, or -1; nodes at one point follow each other */
+    const double *fixed;            /* (nodes, 7) values where clamped, else 0 */
+    double *before, *now;           /* (nodes, 7) unknowns at the start and with the last motion */
+    double *free, *last;            /* (nodes, 6) motion and forces before the last ones were found */
+    double *load, *response;        /* (unknowns,) of this rank */
+    int stale, exact;               /* whether the compliance must be found again; whether all responses are exact */
+    double usual, worse, least, rounding; /* error of the motion by the compliance, relative: the smallest one, at least
+                                       `least`; this many times it, and the compliance is stale; smallest motions that
+                                       are compared */
+    double missing, omitted;        /* the last of these errors; by it, norm of what the last response leaves out */
+} contact;
+
 /* The equations of a problem. */
 typedef struct {
     kernel *residual, *tangent, *advance; /* the last one, of the carried contact force, or 0 */
@@ -69,6 +93,7 @@ typedef struct {
     double *interface;              /* (interfaces,) */
     const int *of_interface;        /* (interfaces,) this rank's unknowns there, or -1 */
     int interfaces, singular;
+    contact *contact;               /* nodes that may touch a wall, or 0 */
     void *self;                     /* for the hooks */
 } problem;
 
@@ -100,19 +125,6 @@ typedef struct {
     double spent, enough;
 } stepping;
 
-/* Contact of nodes with the wall of a tube in a time step, whose nodes move linearly with the forces: see contact.c. All
-   vectors are inertial. */
-typedef struct {
-    int nodes, reach, at_end, most; /* nodes that may touch; how many on each side of one its force moves; whether forces
-                                       are those of the end of the step, not of its mean; sweeps */
-    const double *clearance, *stiffness, *friction, *damping, *arm; /* (nodes,); arm: radius of the rod's surface */
-    double h, share, smallest;      /* the step; changes that end the sweeps, of the first one and of all */
-    const double *tangent, *start;  /* (nodes, 3) of the tube; from its axis to the rod at the start, across it */
-    const double *compliance;       /* (nodes, 2 reach + 1, 6, 6) motion of the neighbours, and of the node itself in the
-                                       middle, by its force and moment */
-    double *moved;                  /* (nodes, 6) displacement and rotation in the step with the forces */
-    double *force, *law;            /* (nodes, 6) force and moment; (nodes, 3) normal force, friction round and along */
-} contact;
 
 /* PETSc's functions of these names, found by Python. */
 typedef struct {
@@ -200,6 +212,7 @@ void begin(newton *n);
 int iterate(stepping *s);
 int attach(petsc *functions, newton *n, void *snes, void *vector, void *matrix, void *pc);
 
+void find_motion(contact *c, const double *now);
 int settle(contact *c);
 int broken(const contact *c);
 void slips(const contact *c, double *size);

@@ -114,10 +114,45 @@ static double dot6(const double *a, const double *b)
     return sum;
 }
 
-/* Wv = W v: the motion (displacement, rotation) by a force and a moment v. */
-static void respond(const double *W, const double *v, double *Wv)
+/* The motion (displacement, rotation) of node i itself by a force and a moment v. */
+static void respond(const contact *c, int i, const double *v, double *Wv)
 {
-    for (int k = 0; k < 6; k++) Wv[k] = dot6(W + 6 * k, v);
+    const size_t width = 6 * (2 * (size_t)c->reach + 1);
+    const double *W = c->compliance + i * 6 * width + 6 * c->reach;
+    for (int k = 0; k < 6; k++) Wv[k] = 0;
+    for (int m = 0; m < 6; m++, W += width)
+        for (int k = 0; k < 6; k++) Wv[k] += W[k] * v[m];
+}
+
+/* Add the motion of all neighbours of node i, and of itself, by a force and a moment v. */
+static void move_by(const contact *c, int i, const double *v)
+{
+    const size_t width = 6 * (2 * (size_t)c->reach + 1);
+    const int first = i < c->reach ? 0 : i - c->reach, end = i + c->reach < c->nodes ? i + c->reach + 1 : c->nodes;
+    const double *W = c->compliance + i * 6 * width + 6 * (first + c->reach - i);
+    double *restrict to = c->moved + 6 * first;
+    for (int j = 0; j < 6 * (end - first); j++)
+        to[j] += W[j] * v[0] + W[j + width] * v[1] + W[j + 2 * width] * v[2] + W[j + 3 * width] * v[3]
+               + W[j + 4 * width] * v[4] + W[j + 5 * width] * v[5];
+}
+
+/* The motion of all nodes in the step from `before` to unknowns `now`: displacements and rotations, by the mean rotation;
+   with them the work of a force and a moment in a step is exact. */
+void find_motion(contact *c, const double *now)
+{
+    const double *before = c->before;
+    double *moved = c->moved;
+    for (int i = 0; i < c->nodes; i++, before += 7, now += 7, moved += 6) {
+        double q[4], d[4], size = 0;
+        for (int k = 0; k < 3; k++) moved[k] = now[k] - before[k];
+        for (int k = 0; k < 4; k++) {
+            q[k] = (before[3 + k] + now[3 + k]) / 2, d[k] = now[3 + k] - before[3 + k];
+            size += q[k] * q[k];
+        }
+        moved[3] = 2 / size * (q[0] * d[1] - q[1] * d[0] - q[3] * d[2] + q[2] * d[3]);
+        moved[4] = 2 / size * (q[0] * d[2] - q[2] * d[0] + q[3] * d[1] - q[1] * d[3]);
+        moved[5] = 2 / size * (q[0] * d[3] - q[3] * d[0] - q[2] * d[1] + q[1] * d[2]);
+    }
 }
 
 /* Forces and moments of unit friction round and along the axis; their work by a motion is the slip. */
@@ -144,18 +179,17 @@ void slips(const contact *c, double *size)
 /* Solve a node with the forces of all others; returns the size of the change of its motion by its own. */
 static double settle_node(contact *c, int i)
 {
-    const double *W = c->compliance + ((size_t)i * (2 * c->reach + 1) + c->reach) * 36;
     double *force = c->force + 6 * i, *moved = c->moved + 6 * i, *law = c->law + 3 * i;
     const place p = place_of(c, i);
     if (p.R0 <= c->clearance[i] && p.R <= c->clearance[i] && law[0] == 0 && law[1] == 0 && law[2] == 0) return 0;
     double inward[6] = {0}, across[6], along[6], out[6] = {0}, by[3][6], slip[6], change[6];
     for (int k = 0; k < 3; k++) inward[k] = -p.share * p.e[k], out[k] = p.R > 0 ? p.x[k] / p.R : 0;
     slip_directions(c, i, &p, across, along);
-    respond(W, inward, by[0]);
+    respond(c, i, inward, by[0]);
     const double N = settle_normal(c, i, p.R0, p.R, law[0], -dot6(out, by[0]));
     double T[2] = {0, 0};
     if (c->friction[i] > 0 && N > 0) {
-        respond(W, across, by[1]), respond(W, along, by[2]);
+        respond(c, i, across, by[1]), respond(c, i, along, by[2]);
         for (int k = 0; k < 6; k++) slip[k] = moved[k] + by[0][k] * (N - law[0]);
         const double A[3] = {dot6(across, by[1]), (dot6(across, by[2]) + dot6(along, by[1])) / 2, dot6(along, by[2])};
         const double b[2] = {dot6(across, slip) - A[0] * law[1] - A[1] * law[2],
@@ -167,16 +201,10 @@ static double settle_node(contact *c, int i)
         const double now = N * inward[k] + T[0] * across[k] + T[1] * along[k];
         change[k] = now - force[k], force[k] = now;
     }
-    double size = 0;
-    for (int j = -c->reach; j <= c->reach; j++) {
-        double moving[6], *to = c->moved + 6 * (i + j);
-        if (i + j < 0 || i + j >= c->nodes) continue;
-        respond(W + 36 * j, change, moving);
-        for (int k = 0; k < 6; k++) {
-            to[k] += moving[k];
-            if (j == 0) size = fmax(size, fabs(moving[k]) * (k < 3 ? 1 : c->arm[i]));
-        }
-    }
+    double moving[6], size = 0;
+    respond(c, i, change, moving);
+    for (int k = 0; k < 6; k++) size = fmax(size, fabs(moving[k]) * (k < 3 ? 1 : c->arm[i]));
+    move_by(c, i, change);
     return size;
 }
 

@@ -10,7 +10,9 @@ from cosserat_fenicsx.algebra.building import Pointers, module
 from cosserat_fenicsx.algebra.elimination import condensed
 
 #: Hooks: requests of C to Python, see newton.c.
-STATE, RESIDUAL, TANGENT, INTERFACE, ADD_UP, SUM, MATRICES, COUNT, CONTACT = (1 << k for k in range(9))
+STATE, RESIDUAL, TANGENT, INTERFACE, ADD_UP, SUM, MATRICES, COUNT, CONTACT, COMPLIANCE, NODES = (
+    1 << k for k in range(11)
+)
 
 
 @cache
@@ -204,6 +206,10 @@ class Equations(Called):
             self._array(a, 1)[0] = numbering.comm.allreduce(float(a[0]))
         elif what == CONTACT:
             self._touch(self._array(a, numbering.size), self._array(b, numbering.size))
+        elif what == COMPLIANCE:
+            self.contact.find_compliance()
+        elif what == NODES:
+            numbering.comm.Allreduce(MPI.IN_PLACE, self._array(a, 7 * self.contact.count))
         else:
             self._change_matrices()
 
@@ -219,7 +225,7 @@ class Equations(Called):
             self.ties.add_residual(b, self.tie_load_factor)
 
     def _touch(self, x, change):
-        """Where nodes may touch: change Newton's step, which is subtracted from x; arrays of this rank's unknowns."""
+        """Where laws act at nodes: change Newton's step, which is subtracted from x; arrays of this rank's unknowns."""
 
     def _change_matrices(self):
         """Change `matrices`, of the elements."""

@@ -5,7 +5,8 @@
 #include <math.h>
 #include <string.h>
 
-enum { STATE = 1, RESIDUAL = 2, TANGENT = 4, INTERFACE = 8, ADD_UP = 16, SUM = 32, MATRICES = 64, CONTACT = 256 };
+enum { STATE = 1, RESIDUAL = 2, TANGENT = 4, INTERFACE = 8, ADD_UP = 16, SUM = 32, MATRICES = 64, CONTACT = 256, COMPLIANCE = 512,
+       NODES = 1024 };
 enum { FAILED = 1 };
 
 static int python_hook(void *self, int what, double *a, double *b);
@@ -16,6 +17,16 @@ static int hook(problem *p, int what, double *a, double *b)
 }
 
 /* ---- equations --------------------------------------------------------------------------------------------------- */
+
+/* Add forces (nodes, 6), or what they are more than others, times a factor to this rank's unknowns. */
+static void add_forces(const contact *c, const double *forces, const double *others, double factor, double *b)
+{
+    for (int i = 0; i < c->nodes; i++)
+        for (int k = 0; k < 6; k++) {
+            const int row = c->rows[7 * i + (k < 3 ? k : k + 1)], j = 6 * i + k;
+            if (row >= 0) b[row] += factor * (others ? forces[j] - others[j] : forces[j]);
+        }
+}
 
 static int put_state(problem *p, const double *x, int evaluated)
 {
@@ -42,6 +53,7 @@ int residual(problem *p, const double *x, double *b)
     else if (hook(p, ADD_UP, p->local, b))
         return FAILED;
     if (hook(p, RESIDUAL, (double *)x, b)) return FAILED;
+    if (p->contact) add_forces(p->contact, p->contact->force, 0, -1, b);
     for (int k = 0; k < 3 && p->load[k]; k++)
         for (int i = 0; i < p->size; i++) b[i] -= *p->factor[k] * p->load[k][i];
     return 0;
@@ -93,6 +105,90 @@ static int error_is_small(double step, double before, int quadratic, double allo
     return c < 0.9 && step * c * (quadratic ? fmin(1, 100 * c) : 1) <= allowed * (1 - c);
 }
 
+/* ---- contact ----------------------------------------------------------------------------------------------------- */
+
+/* Unknowns of the nodes that may touch (nodes, 7), of all ranks: in x, or x - change; zero where clamped. */
+static int at_nodes(problem *p, const double *x, const double *change, double *now)
+{
+    const contact *c = p->contact;
+    for (int i = 0; i < 7 * c->nodes; i++) {
+        const int row = c->rows[i];
+        now[i] = row < 0 ? 0 : change ? x[row] - change[row] : x[row];
+    }
+    return hook(p, NODES, now, 0);
+}
+
+/* The motion of these nodes in the step to x, or x - change. */
+static int move_nodes(problem *p, const double *x, const double *change)
+{
+    contact *c = p->contact;
+    if (at_nodes(p, x, change, c->now)) return FAILED;
+    for (int i = 0; i < 7 * c->nodes; i++) c->now[i] += c->fixed[i];
+    find_motion(c, c->now);
+    return 0;
+}
+
+/* Add the exact response to the last change of the forces to Newton's step, and judge the compliance by it. */
+static int respond_exactly(problem *p, double *change)
+{
+    contact *c = p->contact;
+    double size = 0, missed = 0;
+    memset(c->load, 0, p->size * sizeof *c->load);
+    add_forces(c, c->force, c->last, -1, c->load);
+    if (solve(p, c->load, c->response)) return FAILED;
+    for (int i = 0; i < p->size; i++) change[i] += c->response[i];
+    if (at_nodes(p, c->response, 0, c->now)) return FAILED;
+    for (int i = 0; i < c->nodes; i++)
+        for (int k = 0; k < 3; k++) {
+            const double foretold = c->moved[6 * i + k] - c->free[6 * i + k];
+            size = fmax(size, fabs(foretold)), missed = fmax(missed, fabs(foretold + c->now[7 * i + k]));
+        }
+    if (!(size > c->rounding)) return 0;
+    c->missing = fmax(missed / size, c->least);
+    c->usual = fmin(c->usual, c->missing);
+    c->stale = c->missing > c->worse * c->usual;
+    return 0;
+}
+
+/* Add the response to the last change of the forces, by the compliance, to Newton's step. What that leaves out is in the
+   next residual. */
+static void respond_nearby(contact *c, double *change)
+{
+    double sum = 0;
+    for (int i = 0; i < c->nodes; i++) {
+        const int *rows = c->rows + 7 * i;
+        const double *q = c->now + 7 * i + 3, *free = c->free + 6 * i, *moved = c->moved + 6 * i;
+        if (i > 0 && memcmp(rows, rows - 7, 7 * sizeof *rows) == 0) continue; /* the same point once more */
+        double by[7], phi[3];
+        for (int k = 0; k < 3; k++) by[k] = moved[k] - free[k], phi[k] = (moved[3 + k] - free[3 + k]) / 2;
+        by[3] = -phi[0] * q[1] - phi[1] * q[2] - phi[2] * q[3];
+        by[4] = phi[0] * q[0] + phi[1] * q[3] - phi[2] * q[2];
+        by[5] = -phi[0] * q[3] + phi[1] * q[0] + phi[2] * q[1];
+        by[6] = phi[0] * q[2] - phi[1] * q[1] + phi[2] * q[0];
+        for (int k = 0; k < 7; k++) {
+            sum += by[k] * by[k];
+            if (rows[k] >= 0) change[rows[k]] -= by[k];
+        }
+    }
+    c->omitted = c->missing * sqrt(sum);
+}
+
+/* Find the forces with which the laws of contact hold after Newton's step, which is subtracted from x, and add the
+   response to their change. `first`: whether it is the first of a step. */
+static int meet(problem *p, const double *x, double *change, int first)
+{
+    contact *c = p->contact;
+    const size_t size = 6 * c->nodes * sizeof *c->force;
+    if (c->stale && hook(p, COMPLIANCE, 0, 0)) return FAILED;
+    if (move_nodes(p, x, change)) return FAILED;
+    memcpy(c->free, c->moved, size), memcpy(c->last, c->force, size), c->omitted = 0;
+    settle(c);
+    if (memcmp(c->last, c->force, size) == 0) return 0;
+    if (first || c->exact) return respond_exactly(p, change);
+    respond_nearby(c, change);
+    return 0;
+}
+
 /* ---- time steps -------------------------------------------------------------------------------------------------- */
 
 /* The root mean square of the nodal unknowns in a - b, or in a where b is 0. */
@@ -113,9 +209,11 @@ static int motion_in(const stepping *s, const double *a, const double *b, double
 static void judge_increment(stepping *s, double step, double before)
 {
     const double rate = s->iterations > 1 ? step / before : 1;
+    const contact *c = s->problem->contact;
+    const int complete = !c || c->omitted <= s->enough * s->root;
     if (!isfinite(step)) s->verdict = NOT_A_NUMBER;
     else if (step > s->diverged) s->verdict = GROWN;
-    else if (step <= s->enough || (s->iterations > 1 && error_is_small(step, before, 0, s->enough))
+    else if ((complete && (step <= s->enough || (s->iterations > 1 && error_is_small(step, before, 0, s->enough))))
              || (step <= s->rounding && rate > 0.5 && s->iterations > 1))
         s->verdict = CONVERGED;
     else if (s->iterations >= s->most) s->verdict = RAN_OUT;
@@ -140,6 +238,7 @@ int iterate(stepping *s)
             s->fresh = 0, s->spent = s->price, s->served = 0;
         }
         if (solve(p, s->b, s->change)) return FAILED;
+        if (!p->singular && p->contact && meet(p, s->x, s->change, s->iterations == 0)) return FAILED;
         if (!p->singular && hook(p, CONTACT, s->x, s->change)) return FAILED;
         if (p->singular) {
             s->verdict = SINGULAR;
@@ -150,6 +249,7 @@ int iterate(stepping *s)
         if (motion_in(s, s->change, 0, &step)) return FAILED;
         judge_increment(s, step, before);
     }
+    if (p->contact && move_nodes(p, s->x, 0)) return FAILED;
     return take_state(p, s->x);
 }
 

@@ -45,7 +45,10 @@ class TouchingNodes:
         self._clamped = rows < 0
         self._shared = len(np.unique(self._rows)) < len(self._rows)
         self._problem, self._load, self._response = problem, numbering.vector(), numbering.vector()
-        self._fixed = np.where(self._clamped, self.of_local(problem.state), 0.0)
+        #: (n, 7) values where clamped, else zero; numbers in this rank's part of the solver's vector, or -1
+        self.fixed = np.where(self._clamped, self.of_local(problem.state), 0.0)
+        self.rows = np.full((self.count, 7), -1)
+        self.rows[self._mine] = self._rows
 
     def _sum(self, values):
         return self._comm.allreduce(values) if self._comm.size > 1 else values
@@ -66,7 +69,7 @@ class TouchingNodes:
 
     def unknowns(self, *vectors):
         """(n, 7) unknowns at the nodes, see `of_vector`."""
-        return self.of_vector(*vectors) + self._fixed
+        return self.of_vector(*vectors) + self.fixed
 
     def subtract(self, forces, b):
         """Subtract forces and moments (n, 6) from this rank's part of a residual."""
@@ -129,9 +132,9 @@ class NodalContact(Pointers):
         units = {"stiffness": scales.force / scales.length, "damping": model.time / scales.length}
         for name in ("stiffness", "damping"):
             self._numbers[name][:] = np.concatenate([getattr(p, name) for p in touched])[order] / units[name]
-        sizes = {"tangent": 3, "start": 3, "moved": 6, "force": 6, "law": 3}
+        sizes = {"tangent": 3, "start": 3, "moved": 6, "force": 6, "law": 3, "before": 7, "now": 7, "free": 6, "last": 6}
         self._vectors = {name: np.zeros((n, size)) for name, size in sizes.items()}
-        self._compliance = np.zeros((n, 2 * reach + 1, 6, 6))
+        self._compliance = np.zeros((n, 6, 2 * reach + 1, 6))
         self._weaker = np.concatenate([np.full((len(p.slots), 2), p.weaker) for p in touched])[order]
         self._weaker[:, 1] *= model.time / scales.length
         self._slip, self._slip_begun = np.full(n, np.nan), np.zeros(n)  # speeds of slip in the last step
@@ -140,16 +143,20 @@ class NodalContact(Pointers):
         self.c = contact = self._ffi.new("contact *")
         contact.nodes, contact.reach, contact.at_end = n, reach, at_end
         contact.most, contact.share, contact.smallest = _MOST, _SHARE, _SMALLEST
-        for name, array in {**self._numbers, **self._vectors, "compliance": self._compliance}.items():
+        contact.worse, contact.least, contact.rounding = _WORSE, _MISSED, _ROUNDING
+        contact.exact, contact.rows = n <= _FEW, self.integers(nodes.rows)
+        of_unknowns = {name: np.zeros(problem.numbering.size) for name in ("load", "response")}
+        arrays = {"fixed": nodes.fixed, "compliance": self._compliance, **of_unknowns}
+        for name, array in {**self._numbers, **self._vectors, **arrays}.items():
             setattr(contact, name, self.doubles(array))
-        self._usual = np.inf
         self._known_for = np.nan  # the step length for which the compliance was computed, s
+        contact.stale, contact.usual = True, np.inf
 
     # -- a step ------------------------------------------------------------------------------------------------------
 
     def begin(self, h):
         """Begin a step of length h (dimensionless) at the problem's state."""
-        self._before = now = self._nodes.of_local(self._problem.state)
+        self._vectors["before"][:] = now = self._nodes.of_local(self._problem.state)
         scales = self._problem.model.scales
         points = now[:, :3] * scales.length + self._origin
         vectors, numbers = self._vectors, self._numbers
@@ -171,8 +178,8 @@ class NodalContact(Pointers):
         self._slip_begun[:] = self._slip
         kinetic, speed = self._weaker.T
         numbers["friction"] *= kinetic + (1 - kinetic) * np.exp(-self._slip / speed)
-        if abs(h - self._known_for) > 1e-9 * h:
-            self._known_for = np.nan
+        if not abs(h - self._known_for) <= 1e-9 * h:
+            self.c.stale = True
         self._begun[:], self._law_begun[:] = vectors["force"], vectors["law"]
 
     @property
@@ -184,40 +191,14 @@ class NodalContact(Pointers):
         self._vectors["force"][:], self._vectors["law"][:] = self._begun, self._law_begun
         self._slip[:] = self._slip_begun
 
-    def add_forces(self, b):
-        """Subtract the forces from this rank's part of a residual."""
-        self._nodes.subtract(self._vectors["force"], b)
-
-    def meet(self, x, change):
-        """Add the change of the forces to Newton's step `change` of this rank's unknowns, which is subtracted from
-        x."""
-        vectors = self._vectors
-        if np.isnan(self._known_for):
-            self._find_compliance()
-        vectors["moved"][:] = free = motion_between(self._before, self._nodes.unknowns(x, change))
-        before = vectors["force"].copy()
-        self._lib.settle(self.c)
-        if (before == vectors["force"]).all():
-            return
-        response = self._nodes.response(before - vectors["force"])
-        change += response
-        foretold = vectors["moved"][:, :3] - free[:, :3]
-        size, missed = np.abs(foretold), np.abs(foretold + self._nodes.of_vector(response)[:, :3])
-        if size.max() > _ROUNDING:
-            share = missed.max() / size.max()
-            self._usual = min(self._usual, max(share, _MISSED))
-            if share > _WORSE * self._usual:
-                self._known_for = np.nan
-
     @property
     def broken(self):
-        """Whether the forces violate the laws of contact at the problem's state."""
-        self._vectors["moved"][:] = motion_between(self._before, self._nodes.of_local(self._problem.state))
+        """Whether the forces violate the laws of contact after the last iteration."""
         return bool(self._lib.broken(self.c))
 
-    def _find_compliance(self):
+    def find_compliance(self):
         """Find the compliance by the current tangent."""
-        self._known_for, self._usual = self.c.h, np.inf
+        self._known_for, self.c.usual, self.c.stale = self.c.h, np.inf, False
         nodes, n, reach = self._nodes, self.c.nodes, self.c.reach
         turning = small_rotations(nodes.of_local(self._problem.state)[:, 3:])
         apart = min(2 * reach + 1, n)
@@ -232,7 +213,7 @@ class NodalContact(Pointers):
                 found = nodes.of_vector(nodes.response(force))
                 turned = (turning @ found[:, 3:, None])[..., 0]
                 moved = np.concatenate([found[:, :3], turned], axis=1)
-                self._compliance[sources, :, :, component] = np.where(inside[..., None], moved[j], 0.0)
+                self._compliance[sources, component] = np.where(inside[..., None], moved[j], 0.0)
 
     # -- books -------------------------------------------------------------------------------------------------------
 
@@ -244,7 +225,6 @@ class NodalContact(Pointers):
     def books(self):
         """Stored and dissipated energy of the step, dimensionless."""
         vectors = self._vectors
-        vectors["moved"][:] = motion_between(self._before, self._nodes.of_local(self._problem.state))
         gained = self._lib.stored(self.c, 0) - self._lib.stored(self.c, 1)
         if self.c.at_end:
             return gained, self._lib.lost(self.c, self._at_start)
@@ -263,13 +243,14 @@ class NodalContact(Pointers):
         kept = {name: self._vectors[name].copy() for name in ("force", "law")}
         md = np.concatenate([place.md for place in self._walls])
         kept |= {"md": md, "slip": self._slip.copy(), "compliance": self._compliance.copy()}
-        return {**kept, "known_for": self._known_for, "usual": self._usual}
+        return {**kept, "known_for": self._known_for, "usual": self.c.usual, "stale": bool(self.c.stale)}
 
     def recall(self, memory):
         for name in ("force", "law"):
             self._vectors[name][:] = memory[name]
         self._compliance[:], self._slip[:] = memory["compliance"], memory["slip"]
-        self._known_for, self._usual = float(memory["known_for"]), float(memory["usual"])
+        self._known_for, self.c.usual = float(memory["known_for"]), float(memory["usual"])
+        self.c.stale = bool(memory["stale"])
         for place, md in zip(self._walls, np.split(memory["md"], self._ends), strict=True):
             place.md = md
 

@@ -4,7 +4,7 @@ joints hold at its end, and their reactions act at mid-step."""
 import numpy as np
 from dolfinx import fem
 
-from cosserat_fenicsx.algebra.equations import CONTACT, RESIDUAL, STATE, Equations
+from cosserat_fenicsx.algebra.equations import COMPLIANCE, CONTACT, NODES, RESIDUAL, STATE, Equations
 from cosserat_fenicsx.algebra.packed import Packed
 from cosserat_fenicsx.algebra.tie_rows import TieRows
 from cosserat_fenicsx.dynamics.contact import NodalContact, SpinLaw
@@ -81,7 +81,7 @@ class StepProblem(Equations):
         self._known, self._loads, self._vector = (self.numbering.vector() for _ in range(3))
         self.take_loads((self._known.array, np.ones(1)))
         self._start = model.start.x.array
-        self.load_factor, self.fresh, self.contact, self.touching = 1.0, True, None, []
+        self.load_factor, self.fresh, self.contact, self.touching, self._laws = 1.0, True, None, [], []
         self._hooks = self.c.hooks
         self._pack()
 
@@ -95,9 +95,11 @@ class StepProblem(Equations):
         self._assemble_loads()
         walls = [action for action in scene.actions if action.touches]
         self.contact = NodalContact(self, walls, at_end=self.acting_share == 1) if walls else None
-        laws = [SpinLaw(self, action) for action in scene.actions if action.resists]
-        self.touching = [self.contact, *laws] if walls else laws
-        self.c.hooks = self._hooks | (CONTACT | RESIDUAL) * bool(self.touching)
+        self._laws = [SpinLaw(self, action) for action in scene.actions if action.resists]
+        self.touching = [self.contact, *self._laws] if walls else self._laws
+        self.c.contact = self.contact.c if walls else self._ffi.NULL
+        of_contact = (COMPLIANCE | NODES * (model.comm.size > 1)) * bool(walls)
+        self.c.hooks = self._hooks | (CONTACT | RESIDUAL) * bool(self._laws) | of_contact
         self._begun = False  # the reactions of another scene are no initial guess
         self.begin()
 
@@ -166,12 +168,12 @@ class StepProblem(Equations):
 
     def _change_residual(self, x, b):
         super()._change_residual(x, b)
-        for part in self.touching:
-            part.add_forces(b)
+        for law in self._laws:
+            law.add_forces(b)
 
     def _touch(self, x, change):
-        for part in self.touching:
-            part.meet(x, change)
+        for law in self._laws:
+            law.meet(x, change)
 
     def _take_loads(self, t):
         """Evaluate the loads at the time t (s)."""
