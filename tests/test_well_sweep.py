@@ -174,6 +174,8 @@ def test_friction_from_measurements():
     assert block.block_weight == pytest.approx(250e3, rel=1e-6) and block.friction == pytest.approx(
         [0.2, 0.3], abs=1e-6
     )
+    given = cf.well.calibrate_friction(HOLE, STRING, measured(0.0, 250e3), mud=MUD, block_weight="250 kN")
+    assert given.block_weight == 250e3 and given.friction == pytest.approx([0.2, 0.3], abs=1e-6)
 
 
 @pytest.mark.parametrize(("wrong", "words"), [
@@ -211,6 +213,8 @@ def test_the_interval_covers_as_often_as_it_says():
 
 def test_measurements_that_are_refused():
     one = cf.well.RigMeasurement(1400.0, cf.well.TripOut(), 1e6)
+    with pytest.raises(cf.SceneError, match="psi is a unit of pressure"):
+        cf.well.calibrate_friction(HOLE, STRING, [one] * 3, mud=MUD, block_weight="60 psi")
     with pytest.raises(cf.SceneError, match="2 readings for 2 unknowns"):
         cf.well.calibrate_friction(HOLE, STRING, [one, one], mud=MUD)
     with pytest.raises(cf.SceneError, match=r"no reading depends on friction of section 2 \(to 2500 m\)"):

@@ -191,6 +191,14 @@ def calibrate_friction(
         refuse("calibrate_friction", "model", model, f"'{SOFT}' or '{BUCKLED}'")
     confidence = number("calibrate_friction", "confidence", confidence, "a number between 0 and 1", lambda x: 0 < x < 1)
     settings = {"mud": mud, "model": model, "tol": _SET.tol, "torque_convention": torque_convention}
+    if block_weight is not None:
+        block_weight = number(
+            "calibrate_friction",
+            "block_weight",
+            block_weight,
+            "a weight (N), or None where it is not known",
+            np.isfinite,
+        )
     unknown_block, sections = block_weight is None, len(hole.sections)
     readings, wanted = _readings_of(measurements), sections + unknown_block
     excess = len(readings) - wanted
