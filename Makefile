@@ -92,6 +92,7 @@ test: setup
 tables: setup
 	$(PYTHON) demos/evidence/accuracy.py
 	$(PYTHON) demos/evidence/overhead.py
+	$(PYTHON) demos/evidence/cases.py
 	$(PYTHON) demos/evidence/first_runs.py
 	$(PYTHON) demos/evidence/rungs.py
 	$(PYTHON) demos/evidence/choice.py
@@ -101,7 +102,7 @@ tables: setup
 	$(PYTHON) demos/evidence/steps.py
 	$(PYTHON) demos/evidence/wall_in_motion.py
 	$(PYTHON) demos/evidence/orders.py
-	$(PYTHON) demos/evidence/put_in_docs.py accuracy overhead first_runs rungs choice scaling many_rods ranks steps orders
+	$(PYTHON) demos/evidence/put_in_docs.py accuracy overhead cases first_runs rungs choice scaling many_rods ranks steps orders
 
 # What an interrupted run has finished is kept: the same command goes on from there.
 figure3: setup

@@ -77,6 +77,9 @@ from cosserat_fenicsx.scene.supports import Joint as Joint
 from cosserat_fenicsx.scene.supports import Pin as Pin
 from cosserat_fenicsx.scene.supports import Prescribed as Prescribed
 from cosserat_fenicsx.scene.supports import Roller as Roller
+from cosserat_fenicsx.statics.cases import Cases as Cases
+from cosserat_fenicsx.statics.cases import CompiledScene as CompiledScene
+from cosserat_fenicsx.statics.cases import compile as compile
 from cosserat_fenicsx.statics.linear_buckling import buckling as buckling
 from cosserat_fenicsx.statics.path.load_control import StepControl as StepControl
 from cosserat_fenicsx.statics.path.recorder import read_path as read_path

@@ -26,6 +26,14 @@ def test_overhead_quick(tmp_path):
     assert np.max(difference) < 1e-10
 
 
+def test_cases_quick(tmp_path):
+    """Compiled cases and `solve` give the same digits; times are not tested."""
+    import cases
+
+    for difference, left in cases.main(cases=8, calls=2, runs=1, out=tmp_path):
+        assert difference < 1e-12 and not left
+
+
 def test_first_runs_quick(tmp_path):
     """Elements (in older releases of dolfinx), forms and two kinds of loads of a column, and the package's own C."""
     import first_runs

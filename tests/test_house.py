@@ -87,6 +87,8 @@ FITTERS = {
         "sensitivity",
         "solve",
         "problem",
+        "cases",
+        "loaded",
         "path/recorder",
     },
     "dynamics": {

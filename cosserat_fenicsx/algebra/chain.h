@@ -191,6 +191,25 @@ typedef struct {
     double *work;                   /* (6, numbers) */
 } sweep;
 
+/* Numbers that differ from case to case: to[place[j]] = values[k * width + which[j]] in the case k. */
+typedef struct {
+    double *to;
+    const double *values;
+    const int *place, *which;
+    int count, width;
+} written;
+
+/* Many cases of one problem, see cases.c. */
+typedef struct {
+    sweep *sweep;                   /* with one load factor, for all of them */
+    written *written;
+    int parts, count, next, corrects; /* corrects: Newton's method from `starts`, else a sweep from rest */
+    const double *starts;           /* (cases, numbers of a point), or those at rest alone */
+    double first, near, patience;   /* first step; largest motion of a correction; seconds after which to return */
+    double *found, *found_fields;   /* (cases, unknowns), (cases, elements, size) */
+    int *undecided;                 /* (cases,) */
+} cases;
+
 void pack(kernel *k);
 void add_vector(kernel *k, const int *dofs, double *values);
 void put_values(kernel *k, const int *dofs, double *values);
@@ -227,6 +246,7 @@ int reject_step(step_control *c, double taken);
 
 int negative_modes(second_variation *v, int *sideways);
 int run(sweep *s);
+int run_cases(cases *c);
 
 #if 0
 extern "Python" int python_hook(void *self, int what, double *a, double *b);

@@ -319,7 +319,7 @@ class RodModel:
         lengths = bending_lengths(data, [rod.length / scales.length for rod in scene.rods], layout.counts)
         self.bounded_K = bounded(self.section, self.signature.formulation.force.stiff, sizes, lengths)
         fill_fields(self.data, rods, self.section, self.bounded_K)
-        self.round_off = self._round_off(sizes)
+        self.round_off = float(self.round_off_of(self.section, sizes))
         self._rest = self._at_rest()
         self.rest()
         self._rest_state = self.state.x.array.copy()
@@ -341,9 +341,13 @@ class RodModel:
         for function in self.carried:
             function.x.array[:] = 0
 
-    def _round_off(self, sizes):
-        """Bound on the rounding error of |F|: strains are differences of r over the spacing of the nodes."""
-        stiffest = self.section.K[np.isfinite(self.section.K)].max(initial=0.0)
+    def round_off_of(self, section, sizes):
+        """Bound on the rounding error of |F|: strains are differences of r over the spacing of the nodes.
+
+        Args:
+            section: the `RodData`, or those of many scenes, K and J (n, elements, points, 3); sizes: of the elements.
+        """
+        stiffest = np.where(np.isfinite(section.K), section.K, 0.0).max(axis=(-3, -2, -1))
         return 4 * np.finfo(float).eps * stiffest * self.signature.degree / sizes.min() * np.sqrt(self.unknowns)
 
     def _tie(self):

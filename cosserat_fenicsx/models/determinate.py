@@ -134,16 +134,16 @@ class _KnownForce(RodModel):
     def fields_of(self, n, m, r_s):
         return None
 
-    def _round_off(self, sizes):
-        """Bound on the rounding error of |F|, which contains only moments here."""
+    def round_off_of(self, section, sizes):
+        """See `RodModel`: the residual contains only moments here."""
         eps, p = np.finfo(float).eps, self.signature.degree
-        J = self.section.J if self.signature.coupled else self.section.J[..., :2]
-        return 4 * eps * J.max() * p / sizes.min() * np.sqrt(self.unknowns)
+        J = section.J if self.signature.coupled else section.J[..., :2]
+        return 4 * eps * J.max(axis=(-3, -2, -1)) * p / sizes.min() * np.sqrt(self.unknowns)
 
     def load(self, scene, layout):
         """See `RodModel`; statics gives the contact force."""
         super().load(scene, layout)
-        self.load_norm = 0.0
+        self.load_norm, self.nodal_forces = 0.0, []
         self._known = self._take(self.forms.force, self._force)
         self._lasting = 0.0 if self._permanent is None else self._take(self.forms.permanent_force, self._permanent)
 
@@ -151,6 +151,7 @@ class _KnownForce(RodModel):
         """The contact force at the Gauss points that balances dead forces; also stored in a Function."""
         nodal = self._nodal_forces(forms)
         self.load_norm += float(np.linalg.norm(nodal))
+        self.nodal_forces.append(nodal)
         known = self._tree.forces(nodal, self.rule)
         self.rods.fill(function, known)
         return known
@@ -208,7 +209,7 @@ class DeterminateInPlane(_KnownForce, PlaneModel):
             t1, t2 = section.R_R[..., 0], section.R_R[..., 1]
             t = np.stack([c * t1 - s * t2, s * t1 + c * t2], axis=-1)
             a = np.stack([-t[..., 1], t[..., 0]], axis=-1)
-            n = np.multiply.outer(load_factors, known) + lasting
+            n = load_factors[:, None, None, None] * known + lasting
             none = np.zeros_like(curvature)
             material = np.stack([np.einsum("...i,...i", a, n), none, np.einsum("...i,...i", t, n)], axis=-1)
             bent = np.stack([none, curvature, none], axis=-1)
@@ -252,7 +253,7 @@ class DeterminateInSpace(_KnownForce):
         section, known, lasting = self.section, self._known, self._lasting
         rule, tree, sizes = self.rule, self._tree, self._sizes()
         rest, basis = self.reference, rule.at_gauss
-        R_R = section.R_R.reshape(*section.K.shape, 3)
+        R_R = section.R_R.reshape(*section.v_R.shape, 3)
 
         def expand(load_factors, nodal, gauss):
             inside = nodal[:, tree.cell_nodes].swapaxes(2, 3)  # (k, elements, 4, p + 1)
@@ -261,7 +262,7 @@ class DeterminateInSpace(_KnownForce):
             squared = np.einsum("...i,...i", q, q)[..., None]
             R = directors((q / np.sqrt(squared)).reshape(-1, 4)).reshape(*q.shape[:-1], 3, 3)
             T = R @ R_R
-            n = np.multiply.outer(load_factors, known) + lasting
+            n = load_factors[:, None, None, None] * known + lasting
             curvature = np.einsum("...ij,...i", R_R, 2 * conjugate_product(q, q_s) / squared)
             material = np.einsum("...ij,...i", T, n)
             r_s = np.einsum("...ij,...j", T, section.v_R + strain(section, material, curvature))

@@ -283,8 +283,8 @@ def on_mesh(path, layout):
     return rq, forces.reshape(len(n), -1, len(rule.gauss), 3)
 
 
-# Largest length of an element next to a support, load or kink, over the length of the boundary layer there.
-_COARSE = 4.0
+#: Largest length of an element next to a support, load or kink, over the length of the boundary layer there.
+LONGEST_IN_LAYER = 4.0
 # Largest number of nodes in contact that pressure is extrapolated from.
 _EXTRAPOLATED = 4
 
@@ -301,7 +301,7 @@ def layer_lengths(scene, scales, layout, rule, n):
     """
     force = np.sqrt(3) * np.abs(n).max(initial=0.0) * scales.force
     if all(
-        force * (np.diff(breaks).max() * rod.length / _COARSE) ** 2 <= rod.profile.range[0].J[:2].min()
+        force * (np.diff(breaks).max() * rod.length / LONGEST_IN_LAYER) ** 2 <= rod.profile.range[0].J[:2].min()
         for rod, breaks in zip(scene.rods, layout.breaks, strict=True)
     ):
         return None
@@ -405,7 +405,7 @@ def unresolved(scene, layout, lengths):
     for breaks, pieces, layers in zip(layout.breaks, layout.pieces(scene), lengths, strict=True):
         sizes = np.diff(breaks)
         at_ends = np.unique([k for piece in pieces for k in (piece.start, piece.stop - 1)])
-        if (sizes[at_ends] > _COARSE * layers[at_ends]).any():
+        if (sizes[at_ends] > LONGEST_IN_LAYER * layers[at_ends]).any():
             return True
     return False
 
@@ -413,7 +413,8 @@ def unresolved(scene, layout, lengths):
 def resolves(layout, lengths):
     """Whether all elements are short enough for the boundary layers in them; `lengths` as `layer_lengths` returns."""
     return lengths is None or all(
-        (np.diff(breaks) <= _COARSE * layers).all() for breaks, layers in zip(layout.breaks, lengths, strict=True)
+        (np.diff(breaks) <= LONGEST_IN_LAYER * layers).all()
+        for breaks, layers in zip(layout.breaks, lengths, strict=True)
     )
 
 

@@ -242,7 +242,7 @@ def sizes_of(path):
     that length; |n| times that length where m is rounding alone on the whole path. Where actions change the strains
     without stress, m is at least the moment, and n 1e-9 of the force, that would hold the rods as in the reference.
     """
-    gyrations, length = _of_scene(path.scene, path.scales)
+    gyrations, length, noise = path._of_sections
     squares = np.add.reduceat(np.square(path._motion), (0, 3, 4), axis=2)
     moved = np.maximum(np.sqrt(squares[..., 0].max(axis=1)), _NOTHING)
     half = np.sqrt(np.maximum.reduceat(squares[..., 2], _first_nodes(path.layout, path.degree), axis=1))
@@ -254,11 +254,13 @@ def sizes_of(path):
         held = _held(path)
         force, moment = np.maximum(force, _LEAST_MOMENT * held[0]), np.maximum(moment, held[1])
     force = np.maximum(np.maximum(force, moment / length), _NOTHING)
-    noise = np.array([0.0, 0.0, *_noise(path)])[:, None]
-    least = 1.0 if (moment <= _VANISHING * noise[3]).all() else _LEAST_MOMENT
+    noise = np.pad(noise, ((2, 0), (0, 0)))
+    vanishing = moment <= _VANISHING * noise[3]
+    least = np.where(vanishing if path.apart else vanishing.all(), 1.0, _LEAST_MOMENT)
     moment = np.maximum(np.maximum(moment, least * length * force), _NOTHING)
     sizes = np.array([np.maximum(moved, turned), rotation, force, moment])
-    sizes[:2] = np.maximum(sizes[:2], _AT_REST * sizes[:2].max(axis=1, initial=0.0)[:, None])
+    if not path.apart:
+        sizes[:2] = np.maximum(sizes[:2], _AT_REST * sizes[:2].max(axis=1, initial=0.0)[:, None])
     for criterion in path.criteria:
         own = np.maximum(criterion.sizes(path), 1e-300)
         sizes, noise = np.vstack([sizes, own]), np.vstack([noise, np.zeros((1, noise.shape[1]))])
@@ -285,38 +287,34 @@ def _first_nodes(layout, degree):
 
 
 @per_scene
-def _of_scene(scene, scales):
-    """(radii of gyration of the rods, the longest length), dimensionless."""
-    return np.array([gyration(rod) for rod in scene.rods]) / scales.length, max(
-        rod.length for rod in scene.rods
-    ) / scales.length
-
-
-def _noise(path):
-    """Errors of n and of m by rounding, dimensionless.
+def of_sections(scene, scales, layout, p, by_statics, given=None):
+    """The radii of gyration of the rods, the longest length, and errors of n and of m by rounding, (2, 1),
+    dimensionless.
 
     n is a stiffness times differences of positions over the spacing of the nodes, unless it follows from statics;
     m likewise of rotations, with a share of the moment of n over the spacing of the nodes.
+
+    Args:
+        given: for every rod (least, largest) `Stiffnesses` of many points instead of the scene's, K and J (points, 3);
+            the radii are (points, rods) then, and the errors (2, points).
     """
-    return _rounding(path.scene, path.scales, path.layout, path.degree, path.model == "determinate")
-
-
-@per_scene
-def _rounding(scene, scales, layout, p, by_statics):
-    force = moment = 0.0
-    for rod, breaks in zip(scene.rods, layout.breaks, strict=True):
-        highest = rod.profile.range[1].K
-        stiffness = 1.0 if by_statics else highest[np.isfinite(highest)].max(initial=0.0) / scales.force
+    radii, force, moment = [], np.zeros(1), np.zeros(1)
+    for i, (rod, breaks) in enumerate(zip(scene.rods, layout.breaks, strict=True)):
+        low, high = rod.profile.range if given is None else given[i]
+        radii.append(gyration(low, high) / scales.length)
+        highest = np.where(np.isfinite(high.K), high.K, 0.0).max(axis=-1)
+        stiffness = 1.0 if by_statics else highest / scales.force
         shortest = np.diff(breaks).min() * rod.length / scales.length
-        force = max(force, _OF_FORCE * stiffness * p * p / shortest)
-        moment = max(moment, p / shortest + stiffness * p / 2)
-    return _EPS * force, _EPS * moment
+        force = np.maximum(force, _OF_FORCE * stiffness * p * p / shortest)
+        moment = np.maximum(moment, p / shortest + stiffness * p / 2)
+    length = max(rod.length for rod in scene.rods) / scales.length
+    return np.stack(radii, axis=-1), length, _EPS * np.stack([force, moment])
 
 
-def gyration(rod):
-    """Largest radius of gyration sqrt(EI/EA) of a rod, m; 0 where EA is infinite."""
-    low, high = rod.profile.range
-    return float(np.sqrt(high.J[:2].max() / low.K[2]))
+def gyration(low, high):
+    """Largest radius of gyration sqrt(EI/EA) of a rod, m, from its least and largest `Stiffnesses`; 0 where EA is
+    infinite."""
+    return np.sqrt(high.J[..., :2].max(axis=-1) / low.K[..., 2])
 
 
 def differences(fine, coarse):
@@ -339,8 +337,8 @@ def differences(fine, coarse):
     apart = np.sqrt(np.maximum(squares, 0.0))
     apart[..., 1] *= 2
     if sizes.turning.any():
-        gyrations, _ = _of_scene(fine.scene, fine.scales)
-        for radius, part in zip(gyrations, places.rods, strict=True):
+        gyrations, *_ = fine._of_sections
+        for radius, part in zip(np.atleast_2d(gyrations).T[:, :, None], places.rods, strict=True):
             turned = np.where(sizes.turning[:, None], radius * apart[:, part, 1], 0.0)
             apart[:, part, 0] = np.maximum(apart[:, part, 0], turned)
     everywhere, at_ends = apart.max(axis=1).T, apart[:, places.ends].max(axis=1).T

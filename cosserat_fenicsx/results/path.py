@@ -10,7 +10,7 @@ import numpy as np
 from cosserat_fenicsx.quantities import Quantity
 from cosserat_fenicsx.results import screen
 from cosserat_fenicsx.results.accuracy import leading_of
-from cosserat_fenicsx.results.compared import NAMES, Errors, all_cell_nodes, sizes_of, words_of
+from cosserat_fenicsx.results.compared import NAMES, Errors, all_cell_nodes, of_sections, sizes_of, words_of
 from cosserat_fenicsx.results.records import Event, Records
 from cosserat_fenicsx.results.recovery import element_contact
 from cosserat_fenicsx.results.result import by_name
@@ -79,6 +79,8 @@ class Path(RodResult):
     _quantities = _QUANTITIES
     #: whether the formulation's virtual rotations are changes of q instead of independent small rotations
     galerkin = False
+    #: whether every point is a path of its own, as of many cases
+    apart = False
     _computed = (*RodResult._computed, "_contact", "conservative", "_reference", "_roughness", "_in_elements")
     # functions of a path that compute its `conservative` and its `sensitivity`
     _potential = _differentiated = None
@@ -113,6 +115,10 @@ class Path(RodResult):
         """(points, elements, nodes per element, 13) `_motion`, n and m."""
         nodal = self._motion[:, all_cell_nodes(self.layout, self.degree)]
         return np.concatenate([nodal, self._contact], axis=3)
+
+    @property
+    def _of_sections(self):
+        return of_sections(self.scene, self.scales, self.layout, self.degree, self.model == "determinate")
 
     @cached_property
     def _reference(self):
@@ -325,7 +331,7 @@ class Path(RodResult):
         """(4, n) errors of n and m by rounding, over their largest sizes on the path; 0 for the others, see
         `rounding`."""
         sizes = self._reference.sizes
-        return self._reference.rounding / sizes.max(axis=1, initial=1e-300)[:, None]
+        return self._reference.rounding / (sizes if self.apart else sizes.max(axis=1, initial=1e-300)[:, None])
 
     def mode(self, event: Event, rod: RodOrName | None = None) -> np.ndarray:
         """(nodes, 3) the mode of an event at the nodes of a rod (default the first), see `Event`."""

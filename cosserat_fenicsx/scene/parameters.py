@@ -74,9 +74,10 @@ class Parameter:
 
 @dataclass(frozen=True)
 class _OfScene(Parameter):
-    """A parameter by its name; `place` identifies the number, whatever its name."""
+    """A parameter by its name; `place` identifies the number, whatever its name, with its `owner`."""
 
     place: tuple = ()
+    owner: object = None
 
 
 def check_once(scene, given):
@@ -134,7 +135,53 @@ def parameter_of(scene, given):
         new = _put(getattr(owner, field), keys, value)
         return _Rebuilding({id(owner): _made(owner, {field: new})}).of(scene)
 
-    return _OfScene(given, float(leaf), scene_of, unit, size or None, (id(owner), field, *keys))
+    return _OfScene(given, float(leaf), scene_of, unit, size or None, (id(owner), field, *keys), owner)
+
+
+def scene_with(scene, names, values):
+    """The scene with other numbers, by their names (see `parameter_of`), all of them changed."""
+    for name, value in zip(names, values, strict=True):
+        scene = parameter_of(scene, name).scene_of(float(value))
+    return scene
+
+
+def laws_with(scene, parameters, values):
+    """The stiffnesses of uniform rods without couplings in a scene with other numbers of sections and materials.
+
+    Args:
+        parameters: by their names, see `parameter_of`; values: (cases, parameters).
+
+    Returns:
+        K and J, (cases, rods, 3), N and N m^2; NaN in cases that a constructor refuses.
+    """
+    found = np.empty((len(values), len(scene.rods), 6))
+    for i, rod in enumerate(scene.rods):
+        found[:, i, :3], found[:, i, 3:] = rod.profile.range[0].K, rod.profile.range[0].J
+    of_rods = [i for i, rod in enumerate(scene.rods) if _holds(rod, parameters)]
+    for row, numbers_of_case in zip(found, values.tolist(), strict=True):
+        try:
+            known = {}
+            for parameter, value in zip(parameters, numbers_of_case, strict=True):
+                _, field, *keys = parameter.place
+                owner = known.get(id(parameter.owner), parameter.owner)
+                known[id(parameter.owner)] = _made(owner, {field: _put(getattr(owner, field), keys, value)})
+            rebuilding = _Rebuilding(known)
+            for i in of_rods:
+                rod = scene.rods[i]
+                k = rebuilding.of(rod.section).stiffness(rebuilding.of(rod.material))
+                row[i] = *k.shear, k.axial, *k.bending, k.torsion
+        except SceneError:
+            row[:] = np.nan
+    return found[..., :3], found[..., 3:]
+
+
+def _holds(rod, parameters):
+    """Whether the section or the material of a rod depends on one of the parameters."""
+    known = _Rebuilding({id(parameter.owner): None for parameter in parameters})
+    try:
+        return known.of(rod.section) is not rod.section or known.of(rod.material) is not rod.material
+    except SceneError:  # an owner inside the section cannot be None
+        return True
 
 
 def _extent(curve):

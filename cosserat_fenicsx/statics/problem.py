@@ -240,7 +240,8 @@ class Promoted(Exception):
 _OUTCOMES = (NotConverged, Promoted)
 
 
-def _make(comm, signature):
+def make_solvers(comm, signature):
+    """A new `Problem`, not loaded, its Newton solver and its `NegativeModes`."""
     model = _MODELS[signature.model, signature.flat](comm, signature)
     problem = Problem(model)
     return problem, Newton(problem), NegativeModes(problem)
@@ -254,7 +255,7 @@ def solvers_of(scene, layout, *, formulation="mixed", degree=4, points=None, com
     """
     comm = communicator(comm)
     signature = Signature.of(scene, layout, formulation=formulation, degree=degree, points=points, model=model)
-    with PROBLEMS.lend(("equilibrium", signature), comm, lambda: _make(comm, signature), _OUTCOMES) as solvers:
+    with PROBLEMS.lend(("equilibrium", signature), comm, lambda: make_solvers(comm, signature), _OUTCOMES) as solvers:
         problem, _, stability = solvers
         if problem.load(scene, layout):
             stability.load()

@@ -49,6 +49,9 @@ class Refinement:
 
 _REFINEMENT = Refinement()
 
+#: see `Refinement.resolved`
+RESOLVED = _REFINEMENT.resolved
+
 
 class _TooCoarse(Exception):
     """The path on a coarse first mesh is not plain, see `_plain`."""

@@ -32,6 +32,7 @@ PAGES = {
     "ranks": ("evidence/cost.md",),
     "steps": ("evidence/cost.md",),
     "overhead": ("evidence/cost.md",),
+    "cases": ("studies.md",),
     "first_runs": ("evidence/cost.md",),
     "work_precision": ("evidence/other_programs.md", "work_precision_sweep.png"),
     "work_precision_motion": ("evidence/other_programs.md", "work_precision_motion.png"),

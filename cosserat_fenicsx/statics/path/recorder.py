@@ -32,8 +32,8 @@ _ENORMOUS = 1.0
 _SHORTER = 1e-3
 # Largest |n| h^2/EI at which an element of length h resolves boundary layers, of length sqrt(EI/|n|).
 _RESOLVED = 100.0
-# Bounds for a point corrected from a coarser mesh: Newton iterations, and motion (lengths, rad).
-_CORRECTIONS, _NEAR = 6, 0.1
+#: Bounds for a point corrected from a coarser mesh: Newton iterations, and motion (lengths, rad).
+CORRECTIONS, NEAR = 6, 0.1
 # Largest distance of a point from the same one on a coarser mesh, over the distance of the latter's neighbours.
 _ASIDE = 0.3
 
@@ -226,14 +226,14 @@ class Tracing:
         problem, track, path = self.problem, self.track, self.path
         if problem.begins:
             problem.end_beginning()
-        track.max_iterations = _CORRECTIONS
+        track.max_iterations = CORRECTIONS
         try:
             for point, values, n in self._starts(coarse):
                 obey()
                 problem.begin_at(values, n, point.reactions)
                 start = problem.numbers()
                 solved = track.at_load(start, point.load_factor)
-                if not solved.converged or track.distance(problem.numbers(), start) > _NEAR:
+                if not solved.converged or track.distance(problem.numbers(), start) > NEAR:
                     return None
                 found = track.point(solved)
                 if found.negative_modes != point.negative_modes:

@@ -1,0 +1,413 @@
+"""`compile`: a scene whose numbers change from case to case, prepared once for many equilibria.
+
+The equilibrium at one load factor is found as `solve` finds it where two meshes suffice: a sweep of the load factor on
+the first mesh, Newton's method on the one of elements half as long, and an error estimate from both. The problems of
+both meshes stay loaded. In fixed units the numbers that C reads are linear functions of the loads, found once from
+several scenes; those of the law follow from the sections and materials of the cases. Where neither describes a scene
+exactly, each case is loaded by itself. What cannot be decided this way goes to `solve`.
+"""
+
+import threading
+import weakref
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from cosserat_fenicsx.algebra.pool import release
+from cosserat_fenicsx.checks import number
+from cosserat_fenicsx.errors import NotConverged, SceneError, nearest
+from cosserat_fenicsx.models.base import Scales
+from cosserat_fenicsx.models.choose import choose
+from cosserat_fenicsx.models.formulation import formulation_of
+from cosserat_fenicsx.models.signature import Signature
+from cosserat_fenicsx.ranks import communicator
+from cosserat_fenicsx.results.accuracy import estimate_error, on_mesh
+from cosserat_fenicsx.results.compared import NAMES, POSITION
+from cosserat_fenicsx.scene.action import path_dependent
+from cosserat_fenicsx.scene.parameters import check_once, laws_with, parameter_of, scene_with
+from cosserat_fenicsx.scene.profiles import Stiffnesses
+from cosserat_fenicsx.scene.scene import Scene
+from cosserat_fenicsx.statics.loaded import Loaded
+from cosserat_fenicsx.statics.meshes import meshes_for, plainly_resolved, resolving_turns
+from cosserat_fenicsx.statics.path.recorder import CORRECTIONS, NEAR
+from cosserat_fenicsx.statics.problem import make_solvers
+from cosserat_fenicsx.statics.refinement import RESOLVED
+from cosserat_fenicsx.statics.solve import check_arguments, solve
+
+#: What a case may be asked for: {name of a method of `Path`: the estimated error that bounds its own}.
+QUERIES = {"position": "position", "displacement": "position", "rotation_angle": "rotation", "force": "force",
+           "moment": "moment"}  # fmt: skip
+_DEGREE, _FORMULATION = 4, "mixed"  # the defaults of `solve`
+# Changes of the parameters, over their sizes, of the scenes by which the dependence of the data is found and checked.
+_BESIDE, _APART, _CHECK = 0.043, 0.25, -0.117
+# Largest difference of data that count as the same, over the largest number of an array.
+_SAME = 2e-14
+_BLOCK = 256  # cases that are solved at once
+
+
+@dataclass(frozen=True, eq=False)
+class Cases:
+    """The answers of `CompiledScene.batch`, or of one case, without the first axis then.
+
+    Attributes:
+        values: (cases, queries) SI units, the components of vectors inertial; NaN where there is no equilibrium.
+        errors: (cases, queries) estimated errors of the values, in the same units.
+        by_solve: (cases,) of bool: which went to `solve`.
+        failures: {index of a case: why it has no equilibrium}.
+    """
+
+    values: np.ndarray
+    errors: np.ndarray
+    by_solve: np.ndarray
+    failures: dict = field(default_factory=dict)
+
+
+def compile(  # noqa: A001  public as cf.compile
+    scene: Scene,
+    over: Sequence[str],
+    query: Sequence[tuple],
+    *,
+    load_factor: float = 1.0,
+    tol: float = 1e-6,
+) -> "CompiledScene":
+    """Prepare a scene for many equilibria that differ in some of its numbers.
+
+    Args:
+        scene: a `Scene`.
+        over: names of the numbers that change, "rods.column.section.diameter", "loads[0].force[2]"; see `Parameter`.
+            Numbers of loads, and of the sections and materials of uniform rods, are the fastest.
+        query: what is asked of every equilibrium: tuples (name, station) or (name, station, component), with the names
+            "position", "displacement" (m), "rotation_angle" (rad), "force" (N) and "moment" (N m) of the methods of
+            `Path`, and the component 0, 1 or 2 of vectors, inertial.
+        load_factor: of the equilibrium, not 0.
+        tol: largest estimated error, as of `solve`.
+
+    Returns:
+        CompiledScene, a function of the values.
+
+    Raises:
+        SceneError: an unknown name (the message names the nearest), or an argument outside its range.
+    """
+    check_arguments(scene, tol, None)
+    number("compile", "load_factor", load_factor, "a finite number other than 0", lambda x: 0 < abs(x) < np.inf)
+    names = [over] if isinstance(over, str) else list(over)
+    for name in names:
+        if not isinstance(name, str):
+            raise SceneError(f"compile: over holds {name!r}: expected names such as 'rods.column.section.diameter'")
+    if not names:
+        raise SceneError("compile: over is empty: expected at least one name of a number")
+    check_once(scene, names)
+    return CompiledScene(scene, names, [_Query.of(scene, x) for x in query], float(load_factor), tol)
+
+
+@dataclass(frozen=True)
+class _Query:
+    name: str
+    rod: int
+    share: float  # of the rod's length
+    component: int | None
+
+    @classmethod
+    def of(cls, scene, given):
+        if not isinstance(given, tuple) or len(given) not in (2, 3):
+            raise SceneError(f"compile: query holds {given!r}: expected tuples such as ('displacement', 'rod.end', 0)")
+        name, station, component = given[0], given[1], given[2] if len(given) == 3 else None
+        if name not in QUERIES:
+            raise SceneError(f"compile: query {name!r}: {nearest(name, QUERIES)}")
+        scalar = name == "rotation_angle"
+        if (component is not None) if scalar else (component not in (0, 1, 2)):
+            raise SceneError(
+                f"compile: query {given!r}: expected {'no component' if scalar else 'a component, 0 to 2'}"
+            )
+        station = scene.station(station) if isinstance(station, str) else station
+        if getattr(station, "rod", None) not in scene.rods:
+            raise SceneError(f"compile: query {given!r}: expected a station of the scene, or its name")
+        return cls(name, scene.number(station.rod), station.s / station.rod.length, component)
+
+    def on(self, path):
+        """(points,) values and (points,) estimated errors."""
+        rod = path.scene.rods[self.rod]
+        station = rod.end if self.share == 1 else rod.at(self.share * rod.length)
+        values = getattr(path, self.name)(station)
+        k = NAMES.index(QUERIES[self.name])
+        unit = (path.scales.length, 1.0, path.scales.force, path.scales.moment)[k]
+        return values if self.component is None else values[:, self.component], path._errors[k] * (
+            path._reference.sizes[k] * unit
+        )
+
+
+class CompiledScene:
+    """The function that `compile` returns: of the values of the parameters, in the order of their names.
+
+    Attributes:
+        names: of the parameters.
+        model: "determinate", "planar" or "spatial" of the fast way; "" where there is none.
+        why: sentences on how cases are solved.
+    """
+
+    def __init__(self, scene, names, queries, load_factor, tol):
+        self.names, self.why, self.model = tuple(names), [], ""
+        self._scene, self._queries, self._load_factor, self._tol = scene, queries, load_factor, tol
+        self._meshes, self._linear = None, None
+        self._comm, self._lock = communicator(), threading.Lock()
+        obstacle = "there are several ranks" if self._comm.size > 1 else self._prepare()
+        if obstacle:
+            self._meshes, self.model = None, ""
+            self.why.append(f"every case goes to solve: {obstacle}")
+
+    def __repr__(self):
+        return f"<CompiledScene over {', '.join(self.names)}: {'; '.join(self.why)}>"
+
+    def __call__(self, values: Sequence[float]) -> Cases:
+        """The `Cases` of one case.
+
+        Args:
+            values: of the parameters, (parameters,).
+
+        Raises:
+            SceneError: another number of values, or values that the scene refuses.
+            NotConverged: as of `solve`.
+        """
+        found = self._solved(self._checked(np.asarray(values, dtype=float)[None]), raises=True)
+        return Cases(found.values[0], found.errors[0], found.by_solve[0])
+
+    def batch(self, array: np.ndarray) -> Cases:
+        """The `Cases` of many cases, solved in C one after another.
+
+        Args:
+            array: (cases, parameters) values.
+
+        Raises:
+            SceneError: another shape, or values that are not finite.
+        """
+        return self._solved(self._checked(np.asarray(array, dtype=float)), raises=False)
+
+    def _checked(self, array):
+        if array.ndim != 2 or array.shape[1] != len(self.names) or not np.isfinite(array).all():
+            raise SceneError(f"values of shape {array.shape[-1:]}: expected finite numbers for {', '.join(self.names)}")
+        return array
+
+    # -- preparation -------------------------------------------------------------------------------------------------
+
+    def _prepare(self):
+        """Load both meshes, and find how their data depend on the parameters; the obstacle where there is one."""
+        scene, self._formulation = self._scene, formulation_of(None)
+        parameters = [parameter_of(scene, name) for name in self.names]
+        base, sizes = (np.array([getattr(x, name) for x in parameters]) for name in ("value", "size"))
+        signs = np.resize([1.0, -0.7, 0.6, -0.9, 0.8], len(base))  # no two parameters change alike
+        self._at, checked = base + _BESIDE * sizes * signs, base + _CHECK * sizes * signs[::-1]
+        try:
+            reference, other = (scene_with(scene, self.names, values) for values in (self._at, checked))
+            steps = [scene_with(scene, self.names, self._at + _APART * sizes * unit) for unit in np.eye(len(base))]
+        except SceneError as problem:
+            return f"numbers close to those of the scene are refused: {problem}"
+        obstacle = _obstacle(reference)
+        if obstacle:
+            return obstacle
+        self._kind = self._kind_of(reference)
+        layout, usual, turning, choice, signatures = self._kind
+        if turning is not None:
+            return "prescribed rotations or moments turn a rod by many radians"
+        self.model, EI = choice.model, Scales.of(scene).moment * Scales.of(scene).length
+        self._usual = usual is not None
+        self._layouts = layout, layout.finer(reference, 2)
+        iterations = [10 if signatures[0].formulation.force.of_motion is False else 30, CORRECTIONS]
+        self._meshes = [
+            Loaded(make_solvers(self._comm, signature), reference, mesh, EI, self._load_factor, iterations=most, near=NEAR)
+            for signature, mesh, most in zip(signatures, self._layouts, iterations, strict=True)
+        ]
+        for mesh in self._meshes:
+            weakref.finalize(self, release, mesh.solvers).atexit = False
+        model = self._meshes[0].model
+        if self._meshes[0].problem.begins or any(kind.scaled == "full" for kind in model.signature.terms):
+            return "loads act that the load factor does not scale"
+        self._reference = reference
+        laws = self._find_laws(parameters, steps) if all(x.profile.constant for x in scene.rods) else None
+        if laws is not None and not signatures[0].coupled:
+            self._law = [x for x, of_law in zip(parameters, laws, strict=True) if of_law]
+            self._of_law = np.array(laws)
+            self._linear = [self._find_linear(mesh, steps) for mesh in self._meshes]
+            if not self._describes(other, checked):
+                self._linear = None
+        how = "a linear map and the laws of the sections" if self._linear else "loading every case"
+        self.why += [f"the {self.model} model, on {' and '.join(str(sum(x.counts)) for x in self._layouts)} elements",
+                     f"data by {how}"]  # fmt: skip
+        return ""
+
+    def _kind_of(self, scene):
+        """What decides on meshes and compiled code: (first mesh, usual one, mesh for turns, choice, signatures)."""
+        layout, usual = meshes_for(scene, _DEGREE, self._tol, False)
+        choice = choose(scene, formulation=self._formulation, degree=_DEGREE)
+        turning = resolving_turns(scene, layout, abs(self._load_factor))
+        signatures = [
+            Signature.of(scene, mesh, formulation=self._formulation, degree=_DEGREE, model=choice.model)
+            for mesh in (layout, layout.finer(scene, 2))
+        ]
+        return layout, usual, turning, choice, signatures
+
+    def _fits(self, scene):
+        """Whether `solve` would use the same code and meshes for a scene."""
+        layout, usual, turning, choice, signatures = self._kind_of(scene)
+        known = self._kind
+        return (
+            turning is None and choice.model == known[3].model and signatures == known[4]
+            and (usual is None) == (known[1] is None)
+            and all(map(np.array_equal, layout.breaks, known[0].breaks))
+        )  # fmt: skip
+
+    def _find_laws(self, parameters, steps):
+        """Which parameters change the stiffnesses of rods."""
+        before = [rod.profile.range[0] for rod in self._reference.rods]
+        return [
+            any(not np.array_equal(a.K, b.profile.range[0].K) or not np.array_equal(a.J, b.profile.range[0].J)
+                for a, b in zip(before, scene.rods, strict=True))
+            for scene in steps
+        ]  # fmt: skip
+
+    def _find_linear(self, mesh, steps):
+        """[(numbers at the reference, places of those that change, their derivatives (parameters, n))] of all arrays."""
+        before = [array.copy() for array in _all(mesh)]
+        columns = [np.zeros((len(steps), len(array))) for array in before]
+        sizes = np.array([parameter_of(self._scene, name).size for name in self.names])
+        for j in np.flatnonzero(~self._of_law):
+            mesh.load(steps[j])
+            for column, array, known in zip(columns, _all(mesh), before, strict=True):
+                change = array - known
+                change[np.abs(change) <= _SAME * np.abs(known).max(initial=0.0)] = 0.0
+                column[j] = change / (_APART * sizes[j])
+        mesh.load(self._reference)
+        return [(known, np.flatnonzero(column.any(axis=0)), column[:, column.any(axis=0)])
+                for known, column in zip(before, columns, strict=True)]  # fmt: skip
+
+    def _describes(self, scene, values):
+        """Whether linear map and laws give the data of another scene."""
+        K, J = laws_with(self._scene, self._law, values[None, self._of_law])
+        if not self._fits(scene) or not np.isfinite(K).all():
+            return False
+        for mesh, linear in zip(self._meshes, self._linear, strict=True):
+            read, more = mesh.arrays()
+            guessed = [known.copy() for known, *_ in linear]
+            for array, (known, places, derivatives) in zip(guessed, linear, strict=True):
+                array[places] = known[places] + (values - self._at) @ derivatives
+            if self._law:
+                functions, *_ = mesh.stretched(K, J)
+                for to, places, name, which in mesh.law_places():
+                    k = next(k for k, array in enumerate(read) if array.ctypes.data == to.ctypes.data)
+                    guessed[k][places] = functions[name][0, which]
+            mesh.load(scene)
+            found = [array.copy() for array in _all(mesh)]
+            mesh.load(self._reference)
+            for a, b in zip(guessed, found, strict=True):
+                if a.shape != b.shape or np.abs(a - b).max(initial=0.0) > 10 * _SAME * np.abs(b).max(initial=0.0):
+                    return False
+        return True
+
+    # -- cases -------------------------------------------------------------------------------------------------------
+
+    def _solved(self, array, *, raises):
+        shape = len(array), len(self._queries)
+        found = Cases(np.full(shape, np.nan), np.full(shape, np.nan), np.ones(len(array), dtype=bool))
+        if self._meshes:
+            step = _BLOCK if self._linear else 1
+            for first in range(0, len(array), step):
+                part = slice(first, first + step)
+                with self._lock:
+                    decided, values, errors = self._fast(array[part])
+                found.values[part][decided], found.errors[part][decided] = values[decided], errors[decided]
+                found.by_solve[part] = ~decided
+        for k in np.flatnonzero(found.by_solve).tolist():
+            try:
+                scene = scene_with(self._scene, self.names, array[k])
+                path = solve(scene, [self._load_factor], tol=self._tol, progress=False, comm=self._comm)
+            except (SceneError, NotConverged) as failure:
+                if raises:
+                    raise
+                found.failures[k] = str(failure)
+                continue
+            found.values[k], found.errors[k] = self._asked(path, 0)
+        return found
+
+    def _asked(self, path, which):
+        """Values and errors (.., queries) of points of a path."""
+        told = [query.on(path) for query in self._queries]
+        return (np.stack(each, axis=-1)[which] for each in zip(*told, strict=True))
+
+    def _fast(self, array):
+        """(which cases are decided (n,), values and errors (n, queries))."""
+        nothing = np.zeros(len(array), dtype=bool), *np.full((2, len(array), len(self._queries)), np.nan)
+        K = J = None
+        if self._linear is None:
+            try:
+                scene = scene_with(self._scene, self.names, array[0])
+            except SceneError:
+                return nothing
+            if not self._fits(scene):
+                return nothing
+            for mesh in self._meshes:
+                mesh.load(scene)
+            K, J = (np.array([[getattr(rod.profile.range[0], name) for rod in scene.rods]]) for name in "KJ")
+        elif self._law:
+            K, J = laws_with(self._scene, self._law, array[:, self._of_law])
+            sound = np.isfinite(J).all(axis=(1, 2))
+            if not sound.any():
+                return nothing
+            K, J = (np.where(sound[:, None, None], x, x[sound][0]) for x in (K, J))
+        coarse, fine = self._meshes
+        of_cases = [self._written(k, array, K, J) for k in range(2)]
+        lost, x, fields = coarse.run(len(array), of_cases[0][0])
+        here = coarse.path(x, fields, self.why, **of_cases[0][1])
+        rq, n = on_mesh(here, self._layouts[1])
+        lost_too, x, fields = fine.run(len(array), of_cases[1][0], fine.starts(rq, n))
+        there = fine.path(x, fields, self.why, **of_cases[1][1])
+        apart, _ = estimate_error(there, here)
+        softest = J if J is not None else np.array([[rod.profile.range[0].J for rod in there.scene.rods]])
+        decided = ~(lost | lost_too) & (apart[POSITION] <= RESOLVED) & (there.worst <= self._tol)
+        if self._linear and self._law:
+            decided &= sound
+        for path in (here, there):
+            decided &= plainly_resolved(path, softest)
+            decided &= path.rounding <= self._tol
+        return decided, *self._asked(there, slice(None))
+
+    def _written(self, k, array, K, J):
+        """(what C writes, arguments of `Loaded.path`) of the cases on the k-th mesh."""
+        if self._linear is None:
+            return [], {}
+        mesh, linear, change = self._meshes[k], self._linear[k], array - self._at
+        read, more = mesh.arrays()
+        written, named, rounding = [], {}, None
+        for to, (known, places, derivatives) in zip(read, linear, strict=False):
+            if len(places):
+                written.append((to, places, known[places] + change @ derivatives, np.arange(len(places))))
+        for name, (known, places, derivatives) in zip(more, linear[len(read) :], strict=True):
+            if len(places):
+                named[name] = np.tile(known, (len(change), 1))
+                named[name][:, places] += change @ derivatives
+        if self._law:
+            functions, section, rounding = mesh.stretched(K, J)
+            written += [(to, places, functions[name], which) for to, places, name, which in mesh.law_places()]
+            named["section"], named["rounding"] = section, rounding
+            named["stiffnesses"] = [2 * (Stiffnesses(K[:, i], J[:, i], None, None),) for i in range(K.shape[1])]
+        return written + mesh.limits(rounding, named.pop("dead", None), named.pop("nodal", None)), named
+
+
+def _all(mesh):
+    read, more = mesh.arrays()
+    return [*read, *more.values()]
+
+
+def _obstacle(scene):
+    """Why a scene has no fast way; "" where it may have one."""
+    if path_dependent(scene):
+        return "a load has memory"
+    for action in scene.actions:
+        if action.refreshed is not None or action.presses or action.touches:
+            return f"the {type(action).__name__} depends on the position"
+        if any(map(callable, vars(action).values())):
+            return f"the {type(action).__name__} is a function"
+    if not all(rod.uniform for rod in scene.rods):
+        return "a curve or a section is a function of the arc length"
+    if any(not x.clamps for x in scene.supports) or any(not x.rigid for x in scene.joints):
+        return "supports or joints have constraint equations"
+    return ""

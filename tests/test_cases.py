@@ -1,0 +1,145 @@
+"""Many cases of a scene, `compile`: each equals `solve` of the same scene, or went there."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+import cosserat_fenicsx as cf
+from cosserat_fenicsx.errors import Interrupted
+from cosserat_fenicsx.ranks import apart
+from cosserat_fenicsx.scene.parameters import parameter_of, scene_with
+from cosserat_fenicsx.statics import loaded
+
+STEEL = cf.Material(E=2e11, nu=0.3, density=7800.0)
+
+
+def column(*loads, force=(3.0, 0.0, -20.0), length=1.0):
+    rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, length)), cf.Circle(0.01), STEEL, name="column")
+    loads = [make(rod) for make in loads] or [cf.Force(rod.end, force)]
+    return cf.Scene([rod], supports=[cf.Clamp(rod.start)], loads=loads)
+
+
+def elbow():
+    post = cf.Rod(cf.Line((0, 0, 0), (0, 0, 1)), cf.Rectangle(0.012, 0.008), STEEL, name="post")
+    arm = cf.Rod(cf.Line((0, 0, 1), (1, 0, 1)), cf.Tube(0.02, 0.016), STEEL, name="column")
+    return cf.Scene([post, arm], [cf.Clamp(post.start)], [cf.Force(arm.end, (0.0, 2.0, -4.0))],
+                    joints=[cf.Joint(post.end, arm.start)])  # fmt: skip
+
+
+ASKED = [("displacement", "column.end", 0), ("position", "column.end", 2), ("rotation_angle", "column.end"),
+         ("force", "column.start", 2), ("moment", "column.start", 1)]  # fmt: skip
+SCENES = {
+    "planar": (
+        column(),
+        ["rods.column.section.diameter", "rods.column.material.E", "loads[0].force[0]", "loads[0].force[2]"],
+    ),  # fmt: skip
+    "spatial": (column(force=(2.0, 3.0, -9.0)), ["materials[0].nu", "loads[0].force[1]"]),
+    "follower": (
+        column(lambda rod: cf.FollowerForce(rod.end, (2.0, 0.0, -5.0))),
+        ["loads[0].force[0]", "rods.column.section.diameter"],
+    ),  # fmt: skip
+    "along": (
+        column(lambda rod: cf.LineForce(rod, (4.0, 1.0, 0.0)), lambda rod: cf.Moment(rod.end, (0, 2.0, 0))),
+        ["loads[0].force[0]", "loads[1].moment[1]"],
+    ),  # fmt: skip
+    "weight": (
+        column(lambda rod: cf.Weight((0, 0, -9.81)), lambda rod: cf.Force(rod.end, (1.0, 0, 0))),
+        ["materials[0].density", "loads[1].force[0]"],
+    ),  # fmt: skip
+    "length": (column(), ["rods.column.curve.end[2]", "loads[0].force[0]"]),
+    "frame": (elbow(), ["rods.post.section.width", "rods.column.section.inner_diameter", "loads[0].force[2]"]),
+}
+
+
+def spread(scene, over, count, share=0.05, seed=1):
+    parameters = [parameter_of(scene, name) for name in over]
+    sizes = share * np.array([x.size for x in parameters])
+    return np.array([x.value for x in parameters]) + sizes * np.random.default_rng(seed).uniform(
+        -1, 1, (count, len(over))
+    )
+
+
+@pytest.mark.serial
+@pytest.mark.parametrize("name", SCENES)
+def test_cases_equal_solve(name):
+    scene, over = SCENES[name]
+    compiled, values = cf.compile(scene, over, ASKED), spread(scene, over, 3)
+    assert compiled.model, compiled.why
+    found, one = compiled.batch(values), compiled(values[2])
+    assert not found.by_solve.any() and not found.failures
+    np.testing.assert_allclose(one.values, found.values[2], rtol=1e-12, atol=1e-13)
+    for k in (0, 2):
+        path = cf.solve(scene_with(scene, over, values[k]), [1.0])
+        wanted, errors = compiled._asked(path, 0)
+        sizes = np.maximum(np.abs(wanted), np.repeat([path.largest_displacement()[0], 1, 1, 1], [2, 1, 1, 1]) * 1e-1)
+        assert np.abs((found.values[k] - wanted) / sizes).max() < 1e-12, (found.values[k], wanted)
+        assert path.error[0] > 1e-12 and (found.errors[k][:2] > 0).all()
+        np.testing.assert_allclose(found.errors[k], errors, rtol=1e-2, atol=1e-9 * np.abs(wanted).max())
+
+
+@pytest.mark.serial
+def test_what_is_not_decided_goes_to_solve_and_says_so():
+    scene = column(force=(1.0, 0.0, -20.0))
+    compiled = cf.compile(scene, ["loads[0].force[2]", "rods[0].section.diameter"], ASKED[:1], tol=1e-8)
+    critical = cf.euler_load(scene.rods[0])
+    found = compiled.batch([[-20.0, 0.01], [-3.0 * critical, 0.01], [-20.0, -0.01]])
+    assert found.by_solve.tolist() == [False, True, True]
+    assert "diameter" in found.failures[2] and np.isnan(found.values[2]).all()
+    alone = cf.solve(scene_with(scene, compiled.names, [-3.0 * critical, 0.01]), [1.0], tol=1e-8)
+    assert found.values[1, 0] == pytest.approx(alone.displacement("column.end")[0, 0], rel=1e-12)
+    with pytest.raises(cf.SceneError, match="diameter"):
+        compiled([-20.0, -0.01])
+
+
+@pytest.mark.serial
+def test_a_case_without_a_fast_way():
+    hinged = column(lambda rod: cf.Force(rod.at(0.5), (1.0, 0, 0)))
+    hinged = dataclasses.replace(hinged, supports=[*hinged.supports, cf.Pin(hinged.rods[0].end)])
+    compiled = cf.compile(hinged, "loads[0].force[0]", [("displacement", "column@0.5", 0)])
+    assert not compiled.model and "constraint equations" in compiled.why[0]
+    found = compiled([2.0])
+    assert found.by_solve
+    assert (
+        found.values[0] == cf.solve(scene_with(hinged, compiled.names, [2.0]), [1.0]).displacement("column@0.5")[0, 0]
+    )
+
+
+@pytest.mark.serial
+def test_it_says_what_it_expects():
+    scene = column()
+    for over, query, words in (
+        (["rods[0].section.diametre"], ASKED, "diameter"),
+        ([], ASKED, "over is empty"),
+        (["loads[0].force[0]"], [("displacment", "column.end", 0)], "displacement"),
+        (["loads[0].force[0]"], [("force", "column.end")], "component"),
+        (["materials[0].E", "rods[0].material.E"], ASKED, "same number"),
+    ):
+        with pytest.raises(cf.SceneError, match=words):
+            cf.compile(scene, over, query)
+    with pytest.raises(cf.SceneError, match="finite"):
+        cf.compile(scene, ["loads[0].force[0]"], ASKED).batch([[np.nan]])
+
+
+@pytest.mark.serial
+def test_ctrl_c_leaves_it_usable(monkeypatch):
+    compiled = cf.compile(column(), ["loads[0].force[0]"], ASKED[:1])
+    before = compiled([2.0]).values
+
+    def stop():
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patched:
+        patched.setattr(loaded, "obey", stop)
+        with pytest.raises((KeyboardInterrupt, Interrupted)):
+            compiled.batch([[1.0], [2.5]])
+    np.testing.assert_array_equal(compiled([2.0]).values, before)
+
+
+@pytest.mark.ranks
+def test_each_rank_alone():
+    scene = column()
+    with apart():
+        found = cf.compile(scene, ["loads[0].force[0]"], ASKED[:1]).batch([[2.0], [3.0]])
+    assert not found.by_solve.any()
+    assert found.values[1, 0] == pytest.approx(cf.solve(scene, [1.0]).displacement("column.end")[0, 0], rel=1e-12)
