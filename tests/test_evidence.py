@@ -111,6 +111,18 @@ def test_many_rods_quick(tmp_path):
 
 
 @pytest.mark.slow
+def test_million_cases_quick(tmp_path):
+    """Every part is measured; on paper, each core of a job array computes, and the sum is that of the cases."""
+    import million_cases
+
+    found = million_cases.main(count=200, samples=1, out=tmp_path)
+    assert min(found[what] for what in ("case", "start", "wall", "seconds", "reading")) > 0
+    assert found["files"] == 2 and found["stored"] > 200
+    text = (tmp_path / "million_cases.md").read_text(encoding="utf-8")
+    assert f"| {1e6 * found['case'] / 3600:.0f} h |" in text and "| 1000, 2000 |" in text
+
+
+@pytest.mark.slow
 def test_scaling_quick(tmp_path):
     """The numbers of unknowns, and the rod in plain C: its tip moves as far as that of such a rod. Times are not
     tested."""

@@ -29,6 +29,7 @@ PAGES = {
     "choice": ("evidence/cost.md",),
     "scaling": ("evidence/cost.md",),
     "many_rods": ("evidence/cost.md",),
+    "million_cases": ("clusters.md",),
     "ranks": ("evidence/cost.md",),
     "steps": ("evidence/cost.md",),
     "overhead": ("evidence/cost.md",),
