@@ -6,10 +6,12 @@ import numpy as np
 from cosserat_fenicsx.numerics import conjugate_product, directors
 from cosserat_fenicsx.results.compared import (
     FORCE,
+    MOMENT,
     NAMES,
     POSITION,
     ROTATION,
     ROUNDING,
+    all_cell_nodes,
     cell_nodes,
     cells_of,
     differences,
@@ -61,6 +63,9 @@ def estimate_error(fine, coarse, before=None, *, smooth=True):
       these at most 2^(p - 3). A quarter at most where that does not hold for every quantity, and on elements of
       unequal length, as in boundary layers.
 
+    Where a rod has more than twice as many elements, what halved ones would leave of its differences is meant, see
+    `compared.differences`.
+
     Each quantity is judged by itself, relative to its own size, see `compared.sizes_of`: the four of the package, then
     further criteria (see `compared.Criterion`), which add rows to all (4, n) arrays.
 
@@ -73,7 +78,8 @@ def estimate_error(fine, coarse, before=None, *, smooth=True):
         (4, n) the relative differences, which are `before` in the next halving; and (4, n) the assumed gains.
     """
     p = fine.degree
-    relative, difference, at_ends = _differences(fine, coarse)
+    _, difference, at_ends, shared = _differences(fine, coarse)
+    relative = shared / fine._reference.sizes
     part = np.where(relative < _ASYMPTOTIC, 1 / _SAFETY_BELOW, 1 / _SAFETY)
     if before is None:
         ahead, far = difference > _AHEAD * at_ends, difference > _FAR_AHEAD * at_ends
@@ -145,9 +151,9 @@ def compare(fine, coarse):
 
 
 def _differences(fine, coarse):
-    """(4, n) relative differences, then the two results of `compared.differences`."""
-    difference, at_ends = differences(fine, coarse)
-    return difference / fine._reference.sizes, difference, at_ends
+    """(4, n) relative differences, then the results of `compared.differences`."""
+    found = differences(fine, coarse)
+    return found[0] / fine._reference.sizes, *found
 
 
 def hardest(path):
@@ -253,18 +259,32 @@ def _spread(indicator, sizes, errors, between, which, *, of_mesh):
 def leading_of(path):
     """(2, rods, points) the largest leading coefficient of an element's displacement, and of its rotation (twice that
     of q), dimensionless."""
-    return np.array([
-        [found.max(axis=1) for found in leading_coefficients(path, path._motion[..., :3])],
-        [2 * found.max(axis=1) for found in leading_coefficients(path, path._motion[..., 3:])],
-    ])  # fmt: skip
+    first = [cells.start for cells in cells_of(path.layout)]
+    moved, turned = (leading_coefficients(path, values) for values in np.split(path._motion, [3], axis=2))
+    return np.array([np.maximum.reduceat(found, first, axis=1).T for found in (moved, 2 * turned)])
 
 
 def leading_coefficients(path, values):
-    """For every rod (points, elements): sizes of the leading coefficients of nodal values (points, nodes, k)."""
-    return [
-        np.linalg.norm(np.einsum("j,kcji->kci", path.rule.leading, values[:, nodes]), axis=2)
-        for nodes, _ in cell_nodes(path.layout, path.degree)
-    ]
+    """(points, elements) sizes of the leading coefficients of nodal values (points, nodes, k) in the elements of all
+    rods."""
+    of_elements = values[:, all_cell_nodes(path.layout, path.degree)]
+    return np.linalg.norm(np.einsum("j,kcji->kci", path.rule.leading, of_elements), axis=2)
+
+
+def expected_differences(path):
+    """(elements,) how far the positions and the moments of a path will differ from those on a finer mesh, relative, the
+    largest of all points; about, by the leading coefficients of rotations and without loads along rods.
+
+    A rotation that turns by the leading coefficient a moves the points of an element of length h by a h times a number
+    of the polynomials, between the nodes; the contact force n times that is what moments are off by.
+    """
+    x, nodes = np.linspace(-1, 1, 101)[:, None], 2 * path.rule.nodes - 1
+    between = np.abs(np.prod(x - nodes, axis=1)).max() / (2 * len(nodes))
+    turned = 2 * leading_coefficients(path, path._motion[..., 3:])
+    off = between * turned * path.layout.sizes(path.scene) / path.scales.length
+    force = np.linalg.norm(path._stacked("gauss_fields")[..., :3], axis=3).max(axis=2)
+    sizes = path._reference.sizes[..., None]
+    return np.maximum(off / sizes[POSITION], force * off / sizes[MOMENT]).max(axis=0)
 
 
 def on_mesh(path, layout):

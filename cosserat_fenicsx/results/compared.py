@@ -171,7 +171,7 @@ class Moment(Criterion):
 #: Errors that are always estimated.
 Errors = namedtuple("Errors", "position rotation force moment")
 NAMES = Errors._fields
-POSITION, ROTATION, FORCE = 0, 1, 2
+POSITION, ROTATION, FORCE, MOMENT = 0, 1, 2, 3
 
 
 def criteria_of(bound):
@@ -324,8 +324,10 @@ def differences(fine, coarse):
     sides of a jump.
 
     Returns:
-        Over all places, and over the ends of elements of the coarse mesh alone: (4, points), dimensionless, rotations
-        in rad; then further criteria, in both. Differences within rounding are 0.
+        Over all places; over the ends of elements of the coarse mesh alone; and over all places, but those inside the
+        elements of rods with r > 2 times as many elements on the fine mesh multiplied by (2/r)^p, the share of their
+        errors there that halved elements would have: (4, points), dimensionless, rotations in rad; then further
+        criteria, in all. Differences within rounding are 0.
     """
     sizes = fine._reference
     places = compared(coarse.layout, fine.layout, coarse.rule)
@@ -343,8 +345,13 @@ def differences(fine, coarse):
             apart[:, part, 0] = np.maximum(apart[:, part, 0], turned)
     everywhere, at_ends = apart.max(axis=1).T, apart[:, places.ends].max(axis=1).T
     everywhere[everywhere <= np.maximum(ROUNDING, _NOISE * sizes.rounding[: len(NAMES)])] = 0.0
+    shared, ratios = everywhere, np.divide(fine.layout.counts, coarse.layout.counts)
+    if ratios.max() > 2:
+        shares = np.minimum((2 / ratios) ** fine.degree, 1.0)
+        apart *= np.repeat(shares, [part.stop - part.start for part in places.rods])[:, None]
+        shared = np.where(everywhere > 0, np.maximum(apart.max(axis=1).T, at_ends), 0.0)
     for k, criterion in enumerate(fine.criteria, start=len(NAMES)):
         apart = _norms(criterion.values(fine) - criterion.values(coarse))
         apart[apart <= ROUNDING * sizes.sizes[k].max(initial=0.0)] = 0.0
-        everywhere, at_ends = np.vstack([everywhere, apart]), np.vstack([at_ends, apart])
-    return everywhere, at_ends
+        everywhere, at_ends, shared = (np.vstack([known, apart]) for known in (everywhere, at_ends, shared))
+    return everywhere, at_ends, shared

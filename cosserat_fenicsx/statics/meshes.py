@@ -19,11 +19,13 @@ from cosserat_fenicsx.results.accuracy import (
     LONGEST_IN_LAYER,
     contact_edges,
     element_differences,
+    expected_differences,
     layer_lengths,
     leading_coefficients,
     turns_of,
     unresolved,
 )
+from cosserat_fenicsx.results.compared import cells_of
 from cosserat_fenicsx.scene.action import acts_in_law, without_stress
 from cosserat_fenicsx.scene.curves import Line
 from cosserat_fenicsx.scene.signals import sample_times
@@ -351,7 +353,7 @@ def balanced(fine, coarse, above):
     layout, order = coarse.layout, coarse.degree + 1
     if sum(fine.elements) * above ** (1 / order) < _GRADING.many:
         return None
-    rough = np.concatenate([found.max(axis=0) for found in leading_coefficients(fine, fine._motion[..., :3])])
+    rough = leading_coefficients(fine, fine._motion[..., :3]).max(axis=0)
     if _even(rough ** (1 / coarse.degree)):
         return None
     differences = element_differences(fine, coarse)
@@ -367,6 +369,24 @@ def balanced(fine, coarse, above):
             total = number[piece].sum()
             number[piece] *= _round_up(total) / total
     return layout.resized(coarse.scene, wanted)
+
+
+def halved(path, target):
+    """The layout with all elements halved; in a frame of many rods, those of rods that bend most are cut into more, so
+    that the error estimated from the two meshes may be expected to be below the target.
+
+    Args:
+        path: a `Path` on the mesh, whose errors are unknown.
+    """
+    layout, scene, p = path.layout, path.scene, path.degree
+    if len(scene.rods) < _FIRST.many_rods:
+        return layout.finer(scene, 2.0)
+    above = 2 * (expected_differences(path) / (2.0**p * target)) ** (1 / p)  # 2^p: the gain that is assumed at most
+    of_rods = np.maximum.reduceat(above, [cells.start for cells in cells_of(layout)])
+    of_rods = np.clip(np.ceil(of_rods), 2.0, _GRADING.most).tolist()
+    if max(of_rods) == 2:
+        return layout.finer(scene, 2.0)
+    return layout.resized(scene, [np.full(count, x) for count, x in zip(layout.counts, of_rods, strict=True)])
 
 
 def _even(numbers):

@@ -26,7 +26,7 @@ from cosserat_fenicsx.results.accuracy import (
 )
 from cosserat_fenicsx.results.compared import NAMES, POSITION
 from cosserat_fenicsx.results.records import find_again, keep_confirmed
-from cosserat_fenicsx.statics.meshes import balanced, loose_edges, resolving, with_edges, with_layers, with_turns
+from cosserat_fenicsx.statics.meshes import balanced, halved, loose_edges, resolving, with_edges, with_layers, with_turns
 from cosserat_fenicsx.statics.problem import Promoted
 
 
@@ -195,6 +195,8 @@ class _Search:
                     self._balancings += 1
                     return self._restarted(resolving(self._scene, even, self._degree))
             self._factor = 2.0 if self._presses else self._factor_for(self._few)
+        elif self._few is not None and not self._presses:
+            return halved(self._few, _REFINEMENT.aim * self._tol)
         return layout.finer(self._scene, self._factor)
 
     def _restarted(self, layout):
@@ -265,7 +267,8 @@ class _Search:
         smooth = not (self._presses and loose_edges(fine, contact_edges(fine)))
         apart, gain = estimate_error(fine, coarse, before, smooth=smooth)
         self._halved, self._order = (fine, coarse), order_of(gain, fine.degree)
-        self._error_before = error_before(apart, gain)
+        if np.divide(fine.layout.counts, coarse.layout.counts).max() <= 2:  # else the coarse mesh is not fine enough
+            self._error_before = error_before(apart, gain)
         return apart
 
     def _keep(self, whole, apart):
