@@ -39,3 +39,13 @@ def test_the_lumped_bit_at_slow_rotation():
     axial, torsional = roots**2, roots**2 + 0.2 * roots + 1
     terms = axial * torsional, 4 * 13.9 * E * torsional, -4 * rho * E * axial
     assert len(roots) > 4 and (np.abs(sum(terms)) < 1e-9 * np.max(np.abs(terms), axis=0)).all()
+
+
+@pytest.mark.parametrize("penetration", [0.0, 0.5])
+def test_the_slope_of_the_lumped_equation(penetration):
+    """A wrong one would still give the roots, only later."""
+    more = {"axial_frequency": 0.8, "axial_damping": 0.15, "torsional_damping": 0.1}
+    equation = LumpedCutting(13.9, 4, penetration=penetration, **more)._equation(3.0)
+    s, h = np.array([0.3 + 0.4j, -0.2 + 2j, 1.5 - 0.7j]), 1e-5
+    (ahead, _), (behind, _) = equation(s + h), equation(s - h)
+    np.testing.assert_allclose(equation(s)[1], (ahead - behind) / (2 * h), rtol=1e-8)
