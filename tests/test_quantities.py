@@ -140,6 +140,22 @@ def test_xarray_over_cases_one_by_one():
     assert found.to_dataframe()["how"].tolist() == operations
 
 
+@pytest.mark.parametrize("cases", [{"s": [1.0, 2.0]}, [{"s": 1.0}, {"s": 2.0}]])
+def test_xarray_in_other_units(cases):
+    """Arguments and results alike, in the units that are told."""
+    pytest.importorskip("xarray")
+    found = cf.study(lambda s: {"depth": 2 * s, "count": 7}, cases)
+    found.units |= {"s": "m", "depth": "m"}
+    for units, unit, size in (("SI", "m", 1.0), ("field", "ft", 0.3048)):
+        data = found.to_xarray(units)
+        np.testing.assert_allclose(data["depth"], np.array([2.0, 4.0]) / size, rtol=1e-15)
+        np.testing.assert_allclose(data["s"], np.array([1.0, 2.0]) / size, rtol=1e-15)
+        assert data["depth"].attrs["units"] == data["s"].attrs["units"] == unit and data["count"].values.tolist() == [
+            7,
+            7,
+        ]
+
+
 def test_arrays_of_different_shapes():
     pytest.importorskip("xarray")
     found = cf.study(lambda n: np.arange(n), {"n": [2, 3]})

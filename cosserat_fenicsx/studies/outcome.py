@@ -97,23 +97,27 @@ class Study(Result):
         """
         xarray, units = import_library("xarray", "to_xarray"), Units(units)
         given, found = _columns(self)
+        known, failures = self.quantities, [self.why(i) for i in range(len(self.cases))]
+
+        def shown(name, array):
+            unit, size = units.of(known[name])
+            return array if size == 1.0 else array / size, {"units": unit}
+
         if self.grid is None:
             dims, shape = ("case",), (len(self.cases),)
             coordinates = {"case": np.arange(len(self.cases))}
-            coordinates |= {name: ("case", _labels(values)) for name, values in given.items()}
+            coordinates |= {name: ("case", *shown(name, _labels(values))) for name, values in given.items()}
         else:
             dims, shape = tuple(self.grid), tuple(map(len, self.grid.values()))
-            coordinates = {name: _labels(values) for name, values in self.grid.items()}
-        known, failures = self.quantities, [self.why(i) for i in range(len(self.cases))]
+            coordinates = {name: (name, *shown(name, _labels(values))) for name, values in self.grid.items()}
         variables = {"failure": (dims, np.array(failures).reshape(shape))}
         for name, values in found.items():
             array = _filled(values)
             if array.dtype == object and any(isinstance(value, np.ndarray) for value in values):
                 raise SceneError(f"to_xarray: the arrays of '{name}' differ in shape: expected one in all cases")
             more = tuple(f"{name}_{k}" for k in range(array.ndim - 1))
-            unit, size = units.of(known[name])
-            array = array if size == 1.0 else array / size
-            variables[name] = ((*dims, *more), array.reshape(*shape, *array.shape[1:]), {"units": unit})
+            array, about = shown(name, array)
+            variables[name] = ((*dims, *more), array.reshape(*shape, *array.shape[1:]), about)
         return xarray.Dataset(variables, coordinates)
 
     def plot(self, file: File | None = None, name: str | None = None, *, units: str | Mapping = "SI",
