@@ -75,7 +75,7 @@ class Buckling(Shapes):
         return self._differentiated(self, parameters)
 
     def uncertainty(
-        self, standard_deviations: Mapping[str | Parameter, float], correlation: np.ndarray | None = None
+        self, standard_deviations: Mapping[str | Parameter, float | str], correlation: np.ndarray | None = None
     ) -> Uncertainty:
         """The first-order standard deviation of `load_factors`, with the share of each parameter; see
         `Path.uncertainty`."""

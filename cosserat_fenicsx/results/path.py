@@ -261,7 +261,7 @@ class Path(RodResult):
 
     def uncertainty(
         self,
-        standard_deviations: Mapping[str | Parameter, float],
+        standard_deviations: Mapping[str | Parameter, float | str],
         query: Callable[[Self], object] | Event,
         correlation: np.ndarray | None = None,
     ) -> Uncertainty:

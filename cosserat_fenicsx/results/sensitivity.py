@@ -57,7 +57,7 @@ class Sensitivity(Mapping):
             return np.where(self.value != 0, self[name] * self.parameters[name] / self.value, np.nan)
 
     def uncertainty(
-        self, standard_deviations: Mapping[str | Parameter, float], correlation: np.ndarray | None = None
+        self, standard_deviations: Mapping[str | Parameter, float | str], correlation: np.ndarray | None = None
     ) -> "Uncertainty":
         """First-order (linear) propagation: variance = sum_ij q_i s_i rho_ij s_j q_j, with the derivatives q_i.
 

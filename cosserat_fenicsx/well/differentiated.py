@@ -59,7 +59,7 @@ class Differentiated:
 
     def uncertainty(
         self,
-        standard_deviations: Mapping[str, float],
+        standard_deviations: Mapping[str, float | str],
         query: str = "hook_load",
         correlation: np.ndarray | None = None,
     ) -> Uncertainty:
