@@ -523,3 +523,15 @@ def test_a_wire_that_hangs_as_an_arc(diameter, held):
     sag = c * (np.cosh(50.0 / c) - 1)
     drop = path.position(wire.at(55.0))[0, 2] - path.position(wire.start)[0, 2]
     assert drop == pytest.approx(-sag, rel=2e-3)
+
+
+def test_a_moment_that_a_support_takes_buckles_nothing():
+    """Rounding of the contact forces gave factors of 1e5 to 1e22, different on each mesh, and no convergence."""
+    points = np.array([(i, j, 0.0) for i in range(3) for j in range(3)])
+    edges = [(3 * i + j, 3 * i + j + d) for i in range(3) for j in range(3) for d in (1, 3)
+             if (j < 2 if d == 1 else i < 2)]  # fmt: skip
+    frame = cf.frame(points, np.array(edges), cf.Tube(0.09, 0.08), cf.Material(210e9, 0.3))
+    supports = [cf.Clamp(frame.at(0)), cf.Clamp(frame.at(8)), cf.Hinge(frame.at(4), (0, 0, 1))]
+    found = cf.buckling(frame.scene([cf.Moment(frame.at(4), (1e3, 0, 0))], supports), 2)
+    assert len(found) == 0 and np.isinf(found.bound) and found.conservative
+    assert "no rod bears the loads" in str(found) and "inf" not in str(found)

@@ -271,14 +271,20 @@ components = [{ type = "DrillPipe", size = "5 in 19.50 lb/ft" }]
 [mud]
 density = "10 ppg"
 """
-WELLS = WELL + """
+WELLS = (
+    WELL
+    + """
 [[operations]]
 type = "TripIn"
 """
-DRILLING = WELL + """
+)
+DRILLING = (
+    WELL
+    + """
 [drive]
 speed = "60 rpm"
 """
+)
 FILES = {"rods": DEMO.read_text(encoding="utf-8"), "motion": MOTION, "well": WELLS, "drilling": DRILLING}
 MISTAKES = [
     ("rods", 'station = "column.end"\nforce', 'sation = "column.end"\nforce',
@@ -481,3 +487,17 @@ def test_a_probable_mistake_in_units_is_a_warning_where_the_caller_is():
 def test_scenes_and_rods_in_one_line():
     assert repr(framed(named=False)) == "<Scene: rods post, beam; 2 supports, 6 loads, 1 joints>"
     assert repr(rods()[0]) == "<Rod 'post': Line, length 2 m>"
+
+
+def test_moduli_that_no_metal_has_are_asked_about_and_soft_ones_are_not():
+    """Steel typed in kPa, by its density or as a rolled profile; rubber, a catheter and titanium are not asked about."""
+
+    def doubts(E, density, section=None):
+        rod = cf.Rod(cf.Line((0, 0, 0), (3, 0, 0)), section or cf.Circle(0.01), cf.Material(E, 0.3, density), name="r")
+        return cf.Scene([rod], [cf.Clamp(rod.start)]).doubts
+
+    assert "E = 2.1e+08 Pa of a material of 7850 kg/m^3 is less" in doubts(210e6, 7850.0)[0]
+    assert "E = 2.1e+08 Pa of a rolled profile is less" in doubts(210e6, None, cf.Profile("IPE 200"))[0]
+    assert "is more than" in doubts(210e12, 7850.0)[0]
+    for E, density in ((210e9, 7850.0), (2e6, 1100.0), (200e6, 1050.0), (110e9, 4500.0), (16e9, 11340.0)):
+        assert doubts(E, density) == ()

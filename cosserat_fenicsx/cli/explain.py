@@ -29,6 +29,8 @@ _UNKNOWNS = {
     ("spatial", False): "centreline r and quaternion q in space",
 }
 
+_FREE = 8  # largest number of free ends that are named
+
 
 def explain(scene, load_factors, settings):
     """Sentences on a scene, the model that would be solved, and its size; the arguments are those of `solve`."""
@@ -92,10 +94,20 @@ def of_the_scene(scene):
         )
     lines.append(
         f"{len(scene.supports)} support(s): {', '.join(describe(x) for x in scene.supports) or 'none'}. "
-        f"{actions_in_words(scene)}"
+        f"{_free_ends(scene)}{actions_in_words(scene)}"
         + "".join(f" {joint.first} is joined to {joint.second}{_release(joint)}." for joint in scene.joints)
     )
     return lines
+
+
+def _free_ends(scene):
+    """A sentence that names the ends of rods without a support or a joint, among which a forgotten support is seen."""
+    held = [*(x.station for x in scene.supports), *(end for x in scene.joints for end in (x.first, x.second))]
+    held = {(station.rod.name, station.s) for station in held}
+    free = [end for rod in scene.rods if not getattr(rod.curve, "closed", False) for end in (rod.start, rod.end)]
+    free = [str(end) for end in free if (end.rod.name, end.s) not in held]
+    more = f" and {len(free) - _FREE} more" if len(free) > _FREE else ""
+    return f"Free ends: {', '.join(free[:_FREE]) or 'none'}{more}. "
 
 
 def _curve(curve):

@@ -32,7 +32,8 @@ class Buckling(Shapes):
         bound: no static bifurcation lies below this load factor, whether conservative or not. Where the loads have a
             potential it is the first of `load_factors`. Where they have none it is the load factor at which the
             symmetric part of the second variation becomes singular, which is neither an instability nor a bifurcation.
-            Where nothing is found it is the largest load factor that is considered, where linear extrapolation ends: a
+            Infinite where the supports take the loads and no rod bears any. Where nothing is found it is else the
+            largest load factor that is considered, where linear extrapolation ends: a
             rod's tangent has changed by 1.5 there, the contact force of a rod has reached the smallest of its axial
             and shear stiffnesses, or it or the contact moment 1e8 times EI/L^2 or EI/L of that rod.
         extent: that largest load factor; missing: how many load factors were asked for and not found up to it.
@@ -85,6 +86,8 @@ class Buckling(Shapes):
     @property
     def none(self):
         """That there is no critical load factor, in words."""
+        if math.isinf(self.bound):
+            return "no critical load factor: no rod bears the loads, which the supports take where they act"
         return f"no critical load factor up to {self.bound:.4g}, where linear extrapolation of the state ends"
 
     @property
@@ -124,7 +127,7 @@ class Buckling(Shapes):
         title = f"{self.scene.title}: " if self.scene.title else ""
         told = f"Critical load factors {in_words(self.load_factors)}, {largest_error(self.error)}"
         yield f"{title}{told if len(self) else self.none[0].upper() + self.none[1:]}."
-        if self.conservative:
+        if self.conservative and math.isfinite(self.bound):
             yield f"The loads have a potential: there is no static bifurcation below {self.bound:.7g} (bound)."
         if self.caution:
             yield self.caution

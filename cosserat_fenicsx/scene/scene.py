@@ -19,6 +19,7 @@ from cosserat_fenicsx.scene.action import Action, powers
 from cosserat_fenicsx.scene.describe import describe
 from cosserat_fenicsx.scene.planes import find_plane
 from cosserat_fenicsx.scene.rod import Rod, Station, StationOrName, station_named, with_names
+from cosserat_fenicsx.scene.rolled import Profile
 from cosserat_fenicsx.scene.signals import at, sample_times, signals_of
 from cosserat_fenicsx.scene.statical import Groups, check_held_once, touching
 from cosserat_fenicsx.scene.supports import InitialVelocity, Joint, Support
@@ -99,6 +100,8 @@ def check_magnitudes(scene, load_factor):
 
 # Young's moduli below this, Pa, are probably mistakes in units.
 _SOFTEST = 1e6
+# Densities of steel and cast iron, kg/m^3, and moduli of all metals so heavy, Pa; rolled profiles are of such metals.
+_STEEL, _METAL = (7000.0, 8200.0), (5e10, 5e11)
 _PARTS = {
     "supports": (Support, "a support such as Clamp(rod.start)"),
     "joints": (Joint, "a Joint(one.end, other.start)"),
@@ -296,10 +299,20 @@ class Scene(Part):
 
     def _softness(self):
         """Warnings about Young's moduli that may be in wrong units."""
-        soft = {rod.material.E for rod in self.rods if rod.material is not None and rod.material.E < _SOFTEST}
+        asked = {}
+        for rod in self.rods:
+            if rod.material is not None:
+                E, density = rod.material.E, rod.material.density
+                steel = f"of a material of {density:g} kg/m^3" if _STEEL[0] <= (density or 0) <= _STEEL[1] else ""
+                if isinstance(rod.section_at(0.0), Profile):
+                    steel = steel or "of a rolled profile"
+                if steel and not _METAL[0] <= E <= _METAL[1]:
+                    asked[E] = f"{steel} is {'less' if E < _METAL[0] else 'more'} than that of any such metal"
+                elif E < _SOFTEST:
+                    asked[E] = "is softer than most rubbers"
         return [
-            f"E = {E:g} Pa is softer than most rubbers: are the units SI (N, m, Pa; steel has 210e9)?"
-            for E in sorted(soft)
+            f'E = {E:g} Pa {why}: are the units SI (N, m, Pa; steel has 210e9, or "210 GPa")?'
+            for E, why in sorted(asked.items())
         ]
 
     def _thickness(self):

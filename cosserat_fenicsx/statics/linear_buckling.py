@@ -36,6 +36,7 @@ _REMAINING, _SQUARED = 0.1, 100.0
 # stretch of 100 %), the contact force of a rod reaches the smallest of its EA and GA (the shear-flexible column has a
 # spurious root under tension at about GA), or its contact force or moment reaches _HUGE times EI/L^2 or EI/L.
 _TURNED, _HUGE = 1.5, 1e8
+_BORNE = 1e-10  # contact forces over the loads below which supports carry these alone: what is found there is rounding
 
 
 def buckling(
@@ -152,22 +153,25 @@ def _critical(scene, layout, count, load_factor, tol, degree, comm):
             return model.snapshot()[1]
 
         change, most = _extent(model, moved, rates[0], unit)
-        sides = []
-        for step in (change, -change):
-            moved(step)
-            stability.whole.assemble(stress_alone=True)
-            sides.append((stability.whole.K.copy(), skew()))
-        slack, of_skew = (_decrease(*parts, change) for parts in zip(*sides, strict=True))
-        moved(0.0)
-        stability.whole.assemble()
-        symmetric, modes = _below(most, *eigen.largest_of_pencil(slack, stability.whole.K, count + 2, 1 / most))
+        slack, symmetric, modes = None, np.empty(0), []
+        if math.isfinite(most):
+            sides = []
+            for step in (change, -change):
+                moved(step)
+                stability.whole.assemble(stress_alone=True)
+                sides.append((stability.whole.K.copy(), skew()))
+            slack, of_skew = (_decrease(*parts, change) for parts in zip(*sides, strict=True))
+            moved(0.0)
+            stability.whole.assemble()
+            symmetric, modes = _below(most, *eigen.largest_of_pencil(slack, stability.whole.K, count + 2, 1 / most))
         if conservative:
             values, vectors = symmetric, modes
             critical, corrected = values[:count], np.ones(len(values[:count]), dtype=bool)
         else:
-            whole = (slack, of_skew), (stability.whole.K, skew())
-            found = static_bifurcations(*whole, count) if len(symmetric) else (symmetric, modes)
-            values, vectors = _below(most, *found)
+            values, vectors = symmetric, modes
+            if len(symmetric):
+                found = static_bifurcations((slack, of_skew), (stability.whole.K, skew()), count)
+                values, vectors = _below(most, *found)
             critical = np.append(symmetric[:1], values)
             corrected = np.arange(len(critical)) < 1
         chosen = [*([] if conservative else modes[:1]), *vectors][: len(critical)]
@@ -230,7 +234,8 @@ def _decrease(ahead, behind, change):
 
 
 def _extent(model, moved, slope, unit):
-    """The step of the load factor for difference quotients, and its largest change with physical critical loads.
+    """The step of the load factor for difference quotients, and its largest change with physical critical loads;
+    infinite where no rod bears the loads.
 
     Args:
         moved: (step) -> fields at the Gauss points of the state there, see `Snapshots.snapshot`.
@@ -240,6 +245,8 @@ def _extent(model, moved, slope, unit):
     step = min(_MOVED / fastest, 1 / unit)
     rates = (moved(step) - moved(-step)) / (2 * step)
     force, moment, tangent = (np.maximum(np.linalg.norm(part, axis=2), 1e-200) for part in np.split(rates, 3, axis=2))
+    if max(force.max(), moment.max()) < _BORNE * unit:
+        return step, math.inf
     lengths = [rod.length / model.scales.length for rod in model.scene.rods]
     L = np.repeat(lengths, model.layout.counts)[:, None]
     EI = model.section.J[:, :, :2].max(axis=2)
