@@ -271,20 +271,14 @@ components = [{ type = "DrillPipe", size = "5 in 19.50 lb/ft" }]
 [mud]
 density = "10 ppg"
 """
-WELLS = (
-    WELL
-    + """
+WELLS = WELL + """
 [[operations]]
 type = "TripIn"
 """
-)
-DRILLING = (
-    WELL
-    + """
+DRILLING = WELL + """
 [drive]
 speed = "60 rpm"
 """
-)
 FILES = {"rods": DEMO.read_text(encoding="utf-8"), "motion": MOTION, "well": WELLS, "drilling": DRILLING}
 MISTAKES = [
     ("rods", 'station = "column.end"\nforce', 'sation = "column.end"\nforce',
@@ -501,3 +495,9 @@ def test_moduli_that_no_metal_has_are_asked_about_and_soft_ones_are_not():
     assert "is more than" in doubts(210e12, 7850.0)[0]
     for E, density in ((210e9, 7850.0), (2e6, 1100.0), (200e6, 1050.0), (110e9, 4500.0), (16e9, 11340.0)):
         assert doubts(E, density) == ()
+
+
+def test_a_station_of_another_rod_of_the_same_name_is_told_apart():
+    one, other = (cf.Rod(cf.Line((0, 0, 0), (1, 0, 0)), cf.Circle(0.1), STEEL, name="mast") for _ in range(2))
+    with pytest.raises(cf.SceneError, match=r"another rod that is named 'mast' too.*give the station by name, 'mast.end'"):
+        cf.Scene([one], [cf.Clamp(other.end)])

@@ -183,7 +183,13 @@ class Scene(Part):
             instance("Scene", f"{field}.station", station, Station, "a station such as rod.end")
         places = (item.first, item.second) if isinstance(item, Joint) else (station or rod,)
         for place in filter(None, places):
-            if getattr(place, "rod", place) not in self._numbers:
+            if (rod := getattr(place, "rod", place)) not in self._numbers:
+                if rod.name in self._by_name:
+                    what = f"the station by name, '{place}'" if isinstance(place, Station) else f"it as '{rod.name}'"
+                    raise SceneError(
+                        f"Scene.{field} acts at {place}, of another rod that is named '{rod.name}' too (of another "
+                        f"scene, or made anew): expected a rod of this scene; give {what}, or take both from one scene"
+                    )
                 raise SceneError(
                     f"Scene.{field} acts at {place}, a station of a rod that is not in the scene: "
                     f"expected one of {', '.join(rod.name for rod in self.rods)}"

@@ -69,8 +69,8 @@ def bend_45():
     "statics",
     "NAFEMS R0024, test 3DNLG-5; Abaqus Benchmarks Guide, 3DNLG-5, elements B33",
     f"{SQUARE}, load 300, 450, 600, 3000 at the tip out of the plane; no shear strain",
-    "Abaqus prints results of three kinds of elements that differ by up to 1.3 %; B33 has no shear strain and cubic shape "
-    "functions. The two differ from here by its mesh.",
+    "Abaqus prints results of three kinds of elements that differ by up to 1.3 %; B33 has no shear strain and cubic "
+    "shape functions. The two differ from here by its mesh.",
 )
 def bend_nafems():
     rod = bend(np.inf, 7.03e5)
@@ -91,12 +91,12 @@ def bend_nafems():
 @problem(
     "Curved beam of Kynema",
     "statics",
-    "kynema/kynema, static_curved_composite_beam_bending.cpp and docs/sphinx/testing/curved.rst (public): 15 nodes, equal to "
-    "BeamDyn's to 1e-12",
-    "axis through (0, 0), (38.2683, -7.61205), (70.7107, -29.2893), section 1 x 1, kGA = 41.6667e5, GJ = 8.333e5, EA = 1e7, EI "
-    "= 8.333e5, load 600 across",
-    "Described as the bend of Bathe & Bolourchi, it is another problem: its axis is the parabola y(x) through three points "
-    "of the circle, and its GJ = 2 EI G/E not that of a square. The second row is the circle, 0.12 away.",
+    "kynema/kynema, static_curved_composite_beam_bending.cpp and docs/sphinx/testing/curved.rst (public): 15 nodes, "
+    "equal to BeamDyn's to 1e-12",
+    "axis through (0, 0), (38.2683, -7.61205), (70.7107, -29.2893), section 1 x 1, kGA = 41.6667e5, GJ = 8.333e5, EA "
+    "= 1e7, EI = 8.333e5, load 600 across",
+    "Described as the bend of Bathe & Bolourchi, it is another problem: its axis is the parabola y(x) through three "
+    "points of the circle, and its GJ = 2 EI G/E not that of a square. The second row is the circle, 0.12 away.",
 )
 def bend_kynema():
     section, rows = cf.Stiffness((41.6667e5,) * 2, 1e7, (8.333e5,) * 2, 8.333e5), []
@@ -139,8 +139,8 @@ def composite_cantilever():
     "statics",
     "Q. Wang et al., Wind Energy 20 (2017) 1439 (BeamDyn); kynema/kynema, static_twisted_composite_beam_bending.cpp "
     "(public)",
-    "L = 10, twisted by 90 degrees, EA = 2.5e10, GA = 8.2604167e9, GJ = 1.41872656e8, EI = 5.20833e8 and 1.30208333e8, tip "
-    "force -4e6",
+    "L = 10, twisted by 90 degrees, EA = 2.5e10, GA = 8.2604167e9, GJ = 1.41872656e8, EI = 5.20833e8 and "
+    "1.30208333e8, tip force -4e6",
     "The solid is nearer to the truth of the body than any rod: the second row differs by 0.6 %, the model's error.",
 )
 def twisted_cantilever():
@@ -173,13 +173,15 @@ PRINCETON = {
 @problem(
     "Princeton beam",
     "statics",
-    "L. Obrezkov et al. 2022, ANSYS beam, in EXUDYN, TestModels/ANCFBeamTest.py (public); experiment: E. H. Dowell & J. "
-    "Traybar, Princeton AMS reports 1194 and 1257 (1975)",
-    "L = 0.508 m, 12.3777 x 3.2024 mm, E = 71.7 GPa, nu = 0.31, tip load 8.896 and 13.345 N at 0 to 90 degrees to its height",
-    "The torsional stiffness behind the printed numbers is not printed: EXUDYN takes J = 1.069e-10 m^4, 5.7 % less than "
-    "Saint-Venant's 1.134e-10 m^4 here. Deflections across the load depend on it: up to 1.1 % of the largest. The same file "
-    "has ANSYS solid elements, 2 to 3 % stiffer than its beam and ours; which is nearer to the measured points is open, as "
-    "these are not in the public files.",
+    "L. Obrezkov et al. 2022, ANSYS beam, in EXUDYN, TestModels/ANCFBeamTest.py (public); experiment: E. H. Dowell & "
+    "J. Traybar, Princeton AMS reports 1194 and 1257 (1975)",
+    "L = 0.508 m, 12.3777 x 3.2024 mm, E = 71.7 GPa, nu = 0.31, tip load 8.896 and 13.345 N at 0 to 90 degrees to its "
+    "height",
+    "The torsional stiffness behind the printed numbers is not printed: EXUDYN takes J = 1.069e-10 m^4, 5.7 % less "
+    "than Saint-Venant's 1.134e-10 m^4 here. Deflections across the load depend on it: up to 1.1 % of the largest. The "
+    "same file "
+    "has ANSYS solid elements, 2 to 3 % stiffer than its beam and ours; which is nearer to the measured points is "
+    "open, as these are not in the public files.",
 )
 def princeton_beam():
     aluminium, rows = cf.Material(71.7e9, 0.31), []
@@ -220,7 +222,8 @@ HELIX = {
 @problem(
     "Helical roll-up of a straight rod",
     "statics",
-    "A. Ibrahimbegovic, Int. J. Numer. Methods Eng. 40 (1997) 2653; numbers by continuation of the strong form in 200 steps",
+    "A. Ibrahimbegovic, Int. J. Numer. Methods Eng. 40 (1997) 2653; numbers by continuation of the strong form in 200 "
+    "steps",
     "L = 10, EA = GA = 1e4, EI = GJ = 100; tip moment 200 pi about z (ten turns) and tip force 50 along z",
     "The article shows a curve of the displacement along the force, which changes its sign.",
 )
@@ -239,8 +242,10 @@ def helical_roll_up():
 @problem(
     "A ring that folds into three coils",
     "statics",
-    "Y. Goto, Y. Watanabe, T. Kasugai & M. Obata, Int. J. Solids Struct. 29 (1992) 893: a third of the radius at half a turn",
-    "as in demos/folding_ring.toml: R = 20, section 1 x 1/3, E = 2.1e7, nu = 0.3, two opposite points turned by pi each",
+    "Y. Goto, Y. Watanabe, T. Kasugai & M. Obata, Int. J. Solids Struct. 29 (1992) 893: a third of the radius at half "
+    "a turn",
+    "as in demos/folding_ring.toml: R = 20, section 1 x 1/3, E = 2.1e7, nu = 0.3, two opposite points turned by pi "
+    "each",
 )
 def folding_ring():
     found = cf.read(SCENES / "folding_ring.toml")

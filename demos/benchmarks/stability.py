@@ -68,8 +68,8 @@ def euler_columns():
     "stability",
     "J. A. Haringx, Philips Res. Rep. 3 (1948) 401: P (1 + P/GA) = P_E; F. Engesser 1891: P = P_E/(1 + P_E/GA)",
     "clamped and free, L = 1 m, EI = 1 N m^2, GA = 20 N and 2 N, incompressible",
-    "Two theories of one century. This package's shear force acts along the turned section, which is Haringx's: his loads "
-    "come out, and Engesser's are lower by 1.1 % and by 23 %.",
+    "Two theories of one century. This package's shear force acts along the turned section, which is Haringx's: his "
+    "loads come out, and Engesser's are lower by 1.1 % and by 23 %.",
 )
 def sheared_columns():
     rows, euler = [], math.pi**2 / 4
@@ -127,11 +127,11 @@ def lateral_buckling():
 @problem(
     "Right-angle frame under a force in its plane",
     "stability",
-    "J. H. Argyris et al., Comput. Methods Appl. Mech. Eng. 20 (1979) 105; J. C. Simo & L. Vu-Quoc, 58 (1986) 79; EXUDYN, "
-    "TestModels/rightAngleFrame.py (public): 1.088 N",
+    "J. H. Argyris et al., Comput. Methods Appl. Mech. Eng. 20 (1979) 105; J. C. Simo & L. Vu-Quoc, 58 (1986) 79; "
+    "EXUDYN, TestModels/rightAngleFrame.py (public): 1.088 N",
     "legs of 0.24 m, strip of 30 x 0.6 mm, E = 71.24 GPa, nu = 0.31, J = h w^3/3, clamped foot, force at the tip",
-    "EXUDYN's file tells of very bad convergence of its ANCF beam and none of its geometrically exact beam. Reversed, the "
-    "critical force is 0.680 N.",
+    "EXUDYN's file tells of very bad convergence of its ANCF beam and none of its geometrically exact beam. Reversed, "
+    "the critical force is 0.680 N.",
 )
 def right_angle_frame():
     E, h, w, leg = 71.24e9, 30e-3, 0.6e-3, 0.24
@@ -151,11 +151,12 @@ def right_angle_frame():
 @problem(
     "Clamped rod under tension and twist",
     "stability",
-    "A. G. Greenhill, Proc. Inst. Mech. Eng. 34 (1883) 182; determinant as in jakeryderv/cosseratbench, experiments/twist.py "
-    "(public): M L/B = 2.861 pi without tension",
-    "L = 1 m, round, bending stiffness B = 1 N m^2, GJ = 0.7 N m^2, inextensible; T L^2/B = 0, 1, 10, 30; one end turned",
-    "cosseratbench measures 0.978, 0.989, 0.991 of it with 25, 50, 100 elements of PyElastica; MuJoCo diverges beyond 5 "
-    "rad.",
+    "A. G. Greenhill, Proc. Inst. Mech. Eng. 34 (1883) 182; determinant as in jakeryderv/cosseratbench, "
+    "experiments/twist.py (public): M L/B = 2.861 pi without tension",
+    "L = 1 m, round, bending stiffness B = 1 N m^2, GJ = 0.7 N m^2, inextensible; T L^2/B = 0, 1, 10, 30; one end "
+    "turned",
+    "cosseratbench measures 0.978, 0.989, 0.991 of it with 25, 50, 100 elements of PyElastica; MuJoCo diverges beyond "
+    "5 rad.",
 )
 def tension_and_twist():
     exact, GJ, turn = (2.861 * math.pi, 9.134730088936223, 10.428856439276949, 13.113499752996033), 0.7, 20.0
@@ -177,8 +178,10 @@ def tension_and_twist():
 @problem(
     "Lee's frame",
     "stability",
-    "S.-L. Lee, F. S. Manuel & E. C. Rossow, J. Eng. Mech. Div. ASCE 94 (1968) 521; limit loads by shooting of the strong form",
-    "as in demos/lees_frame.toml: two legs of 120, hinged feet, E = 7.2e6, A = 6, I = 2, nu = 0.3, dead load at 24 of the beam",
+    "S.-L. Lee, F. S. Manuel & E. C. Rossow, J. Eng. Mech. Div. ASCE 94 (1968) 521; limit loads by shooting of the "
+    "strong form",
+    "as in demos/lees_frame.toml: two legs of 120, hinged feet, E = 7.2e6, A = 6, I = 2, nu = 0.3, dead load at 24 of "
+    "the beam",
     "The loads depend on shear: 18556.7 and -9414.4 without, 18544.5 and -9392.5 with a shear factor of 5/6.",
 )
 def lees_frame():
@@ -196,8 +199,8 @@ def lees_frame():
 @problem(
     "Deep arch, clamped and hinged",
     "stability",
-    "D. A. DaDeppo & R. Schmidt, J. Appl. Mech. 42 (1975) 894, doi:10.1115/1.3423734: 897; A. Ibrahimbegovic, Comput. Methods "
-    "Appl. Mech. Eng. 122 (1995) 11: 897.3",
+    "D. A. DaDeppo & R. Schmidt, J. Appl. Mech. 42 (1975) 894, doi:10.1115/1.3423734: 897; A. Ibrahimbegovic, Comput. "
+    "Methods Appl. Mech. Eng. 122 (1995) 11: 897.3",
     "R = 100 over 215 degrees, EI = 1e6, EA = GA = 1e8, dead force on the crown",
     "897 is of the inextensible elastica. Twenty straight 3-node elements find 906.",
 )
@@ -325,8 +328,8 @@ class FluidPressure(cf.LineAction):
     f"M. Levy 1884: p R^3/EI = 3; {TIMOSHENKO}, section 7.6: pi^2/a^2 - 1 for hinged arches of half angle a, k^2 - 1 with k "
     "tan a cot(k a) = 1 for clamped ones",
     "R = 1 m, EI = 1 N m^2, inextensible, in its plane; arches with a = 60 degrees",
-    "The pressure follows the rod. On the ring and between fixed ends it has a potential, but the package makes no use of "
-    "that: events of the path are located with the unsymmetric tangent.",
+    "The pressure follows the rod. On the ring and between fixed ends it has a potential, but the package makes no "
+    "use of that: events of the path are located with the unsymmetric tangent.",
 )
 def fluid_pressure():
     section, axis, rows, a = cf.Stiffness(**RIGID, bending=(1.0, 100.0), torsion=100.0), (0, 0, 1), [], math.pi / 3

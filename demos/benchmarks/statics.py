@@ -54,8 +54,8 @@ def elastica():
 @problem(
     "Roll-up of a straight rod to a circle",
     "statics",
-    "L. Euler, De curvis elasticis (1744): M = EI/R; J. C. Simo & L. Vu-Quoc, Comput. Methods Appl. Mech. Eng. 58 (1986) "
-    "79, doi:10.1016/0045-7825(86)90079-4",
+    "L. Euler, De curvis elasticis (1744): M = EI/R; J. C. Simo & L. Vu-Quoc, Comput. Methods Appl. Mech. Eng. 58 "
+    "(1986) 79, doi:10.1016/0045-7825(86)90079-4",
     "L = 1 m, EI = 2 N m^2, EA = GA = 200 N; end moment 2 pi k EI/L with k = 1/2, 1, 2",
 )
 def roll_up():
@@ -117,8 +117,8 @@ def eccentric_column():
 @problem(
     "Eccentric compression of a strut of a channel section",
     "statics",
-    "S. Timoshenko, Strength of Materials I (1955), p. 263, problem 1; Ansys verification manual, VM14 (public in PyMAPDL "
-    "examples)",
+    "S. Timoshenko, Strength of Materials I (1955), p. 263, problem 1; Ansys verification manual, VM14 (public in "
+    "PyMAPDL examples)",
     "half length 60 in, channel 8 x 2.26 x 0.39 x 0.22 in, E = 30e6 psi, 4000 lb on the back of the web (0.6465 in)",
     "The secant formula gives 0.10877 in with these dimensions; the printed number has a rounded moment of inertia.",
 )
@@ -219,8 +219,8 @@ def follower_force():
     "S. P. Timoshenko & J. M. Gere, Theory of Elastic Stability (2nd ed., 1961), table 2-4; Ansys verification manual, "
     "VM136",
     "L = 1 m, EI = 1 N m^2, inextensible, clamped and free; loads at which the tip turns by 20 to 176 degrees",
-    "The loads that are solved for are those of the elliptic integrals. The printed loads are cut, not rounded, and up to "
-    "0.0013 below them (2.541 for 2.5423 at 140 degrees); so are some of the printed coordinates.",
+    "The loads that are solved for are those of the elliptic integrals. The printed loads are cut, not rounded, and "
+    "up to 0.0013 below them (2.541 for 2.5423 at 140 degrees); so are some of the printed coordinates.",
 )
 def buckled_bar():
     angles = np.array([20.0, 40.0, 60.0, 80.0, 100.0, 120.0, 140.0, 160.0, 176.0])
