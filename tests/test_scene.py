@@ -192,6 +192,7 @@ def test_what_looks_like_a_slip_is_asked_about():
     assert scene(joints=True).doubts == () == scene(clamps="both").doubts
     thick = scene(across=100, joints=True)
     assert "rod 'one' is 100 m across and 4 m long: are all lengths in m?" in thick.doubts
+    assert ["of solid metal" in scene(across=a, joints=True).doubts[0] for a in (2.0, 3.0)] == [True, True]
     soft = scene(E=210e3, joints=True)
     assert "are the units SI" in soft.cautions[0]
     path = cf.solve(scene(), [1.0])

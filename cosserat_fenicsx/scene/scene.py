@@ -20,6 +20,7 @@ from cosserat_fenicsx.scene.describe import describe
 from cosserat_fenicsx.scene.planes import find_plane
 from cosserat_fenicsx.scene.rod import Rod, Station, StationOrName, station_named, with_names
 from cosserat_fenicsx.scene.rolled import Profile
+from cosserat_fenicsx.scene.sections import Circle, Rectangle
 from cosserat_fenicsx.scene.signals import at, sample_times, signals_of
 from cosserat_fenicsx.scene.statical import Groups, check_held_once, touching
 from cosserat_fenicsx.scene.supports import InitialVelocity, Joint, Support
@@ -102,6 +103,8 @@ def check_magnitudes(scene, load_factor):
 _SOFTEST = 1e6
 # Densities of steel and cast iron, kg/m^3, and moduli of all metals so heavy, Pa; rolled profiles are of such metals.
 _STEEL, _METAL = (7000.0, 8200.0), (5e10, 5e11)
+# Solid bars of metal that are thicker, m, are probably given in mm.
+_THICKEST = 1.5
 _PARTS = {
     "supports": (Support, "a support such as Clamp(rod.start)"),
     "joints": (Joint, "a Joint(one.end, other.start)"),
@@ -326,8 +329,12 @@ class Scene(Part):
         for rod in self.rods:
             section = rod.section_at(0.0)
             across = max(getattr(section, name, 0.0) for name in ("diameter", "outer_diameter", "width", "height"))
+            size = f"rod '{rod.name}' is {across:g} m across and {rod.length:g} m long"
             if across >= rod.length:
-                yield f"rod '{rod.name}' is {across:g} m across and {rod.length:g} m long: are all lengths in m?"
+                yield f"{size}: are all lengths in m?"
+            elif across > _THICKEST and isinstance(section, Circle | Rectangle):
+                if rod.material is not None and _METAL[0] <= rod.material.E <= _METAL[1]:
+                    yield f'{size}, of solid metal: are all lengths in m (or texts, such as "20 mm")?'
 
     def _unjoined(self):
         """Warnings about ends of different structures that lie at one point, unless both have supports."""
