@@ -63,7 +63,7 @@ typedef struct {
     const double *clearance, *stiffness, *friction, *damping, *arm; /* (nodes,); arm: radius of the rod's surface */
     double h, share, smallest;      /* the step; changes that end the sweeps, of the first one and of all */
     const double *tangent, *start;  /* (nodes, 3) of the tube; from its axis to the rod at the start, across it */
-    const double *compliance;       /* (nodes, 6, 2 reach + 1, 6) by each component of the force and moment of a node the
+    const float *compliance;        /* (nodes, 6, 2 reach + 1, 6) by each component of the force and moment of a node the
                                        motion of its neighbours, and of itself in the middle */
     double *moved;                  /* (nodes, 6) displacement and rotation in the step with the forces */
     double *force, *law;            /* (nodes, 6) force and moment; (nodes, 3) normal force, friction round and along */

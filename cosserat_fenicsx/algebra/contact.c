@@ -63,14 +63,14 @@ static void settle_friction(const double A[3], const double b[2], double most, d
     for (int j = 0; j < MOST_LOCAL; j++) {
         const double a = A[0] + shift + floor, d = A[2] + shift + floor, det = a * d - A[1] * A[1];
         T[0] = -(d * b[0] - A[1] * b[1]) / det, T[1] = -(a * b[1] - A[1] * b[0]) / det;
-        const double size = hypot(T[0], T[1]);
+        const double size = sqrt(T[0] * T[0] + T[1] * T[1]); /* hypot is slow */
         if (size <= most * (1 + 1e-15)) break;
         const double steep = (d * T[0] * T[0] - 2 * A[1] * T[0] * T[1] + a * T[1] * T[1]) / det;
         const double change = size * size / steep * (size - most) / most;
         if (!(change > 1e-16 * (shift + trace))) break;
         shift += change;
     }
-    const double size = hypot(T[0], T[1]);
+    const double size = sqrt(T[0] * T[0] + T[1] * T[1]);
     if (size > most) T[0] *= most / size, T[1] *= most / size;
 }
 
@@ -118,7 +118,7 @@ static double dot6(const double *a, const double *b)
 static void respond(const contact *c, int i, const double *v, double *Wv)
 {
     const size_t width = 6 * (2 * (size_t)c->reach + 1);
-    const double *W = c->compliance + i * 6 * width + 6 * c->reach;
+    const float *W = c->compliance + i * 6 * width + 6 * c->reach;
     for (int k = 0; k < 6; k++) Wv[k] = 0;
     for (int m = 0; m < 6; m++, W += width)
         for (int k = 0; k < 6; k++) Wv[k] += W[k] * v[m];
@@ -129,7 +129,7 @@ static void move_by(const contact *c, int i, const double *v)
 {
     const size_t width = 6 * (2 * (size_t)c->reach + 1);
     const int first = i < c->reach ? 0 : i - c->reach, end = i + c->reach < c->nodes ? i + c->reach + 1 : c->nodes;
-    const double *W = c->compliance + i * 6 * width + 6 * (first + c->reach - i);
+    const float *W = c->compliance + i * 6 * width + 6 * (first + c->reach - i);
     double *restrict to = c->moved + 6 * first;
     for (int j = 0; j < 6 * (end - first); j++)
         to[j] += W[j] * v[0] + W[j + width] * v[1] + W[j + 2 * width] * v[2] + W[j + 3 * width] * v[3]

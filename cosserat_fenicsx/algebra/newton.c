@@ -219,7 +219,8 @@ static void judge_increment(stepping *s, double step, double before)
     else if (s->iterations >= s->most) s->verdict = RAN_OUT;
     else if (s->iterations > 1) {
         const double left = log(s->enough / step);
-        s->fresh = rate > 0.9 || left / log(rate) > s->price + left / log(s->rate);
+        const int by_tangent = !c || c->omitted == 0; /* else what is omitted limits the contraction */
+        s->fresh = rate > 0.9 || (by_tangent && left / log(rate) > s->price + left / log(s->rate));
     }
 }
 

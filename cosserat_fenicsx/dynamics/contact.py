@@ -102,8 +102,9 @@ _FEW, _NEIGHBOURS = 16, 8
 # The compliance, which differs little from step to step, is updated where its relative error exceeds the second number
 # and this many times its smallest error. Responses below the third number (dimensionless) may be rounding.
 _WORSE, _MISSED, _ROUNDING = 10.0, 1e-3, 1e-9
-# Sweeps over the nodes: largest number, and changes of the motion that end them, over the first one and dimensionless.
-_MOST, _SHARE, _SMALLEST = 200, 1e-6, 1e-16
+# Sweeps over the nodes: largest number, and changes of the motion that end them, over the first one (with a complete
+# compliance, and with that of neighbours alone, which the next iteration corrects) and dimensionless.
+_MOST, _SHARE, _OF_NEIGHBOURS, _SMALLEST = 200, 1e-6, 1e-2, 1e-16
 
 
 class NodalContact(Pointers):
@@ -134,7 +135,8 @@ class NodalContact(Pointers):
             self._numbers[name][:] = np.concatenate([getattr(p, name) for p in touched])[order] / units[name]
         sizes = {"tangent": 3, "start": 3, "moved": 6, "force": 6, "law": 3, "before": 7, "now": 7, "free": 6, "last": 6}
         self._vectors = {name: np.zeros((n, size)) for name, size in sizes.items()}
-        self._compliance = np.zeros((n, 6, 2 * reach + 1, 6))
+        # of half the numbers' accuracy: it guides iterations, and its reading takes most of their time
+        self._compliance = np.zeros((n, 6, 2 * reach + 1, 6), dtype=np.float32)
         self._weaker = np.concatenate([np.full((len(p.slots), 2), p.weaker) for p in touched])[order]
         self._weaker[:, 1] *= model.time / scales.length
         self._slip, self._slip_begun = np.full(n, np.nan), np.zeros(n)  # speeds of slip in the last step
@@ -142,11 +144,12 @@ class NodalContact(Pointers):
         self._at_start = self.doubles(self._law_begun)
         self.c = contact = self._ffi.new("contact *")
         contact.nodes, contact.reach, contact.at_end = n, reach, at_end
-        contact.most, contact.share, contact.smallest = _MOST, _SHARE, _SMALLEST
+        contact.most, contact.share, contact.smallest = _MOST, _SHARE if n <= _FEW else _OF_NEIGHBOURS, _SMALLEST
         contact.worse, contact.least, contact.rounding = _WORSE, _MISSED, _ROUNDING
         contact.exact, contact.rows = n <= _FEW, self.integers(nodes.rows)
         of_unknowns = {name: np.zeros(problem.numbering.size) for name in ("load", "response")}
-        arrays = {"fixed": nodes.fixed, "compliance": self._compliance, **of_unknowns}
+        contact.compliance = self._ffi.from_buffer("float[]", self._compliance)
+        arrays = {"fixed": nodes.fixed, **of_unknowns}
         for name, array in {**self._numbers, **self._vectors, **arrays}.items():
             setattr(contact, name, self.doubles(array))
         self._known_for = np.nan  # the step length for which the compliance was computed, s
