@@ -127,6 +127,12 @@ class ElementRule:
         return cells[0], basis[0]
 
 
+def once_each(keys, make):
+    """[make(i) of the i-th of these keys], made once for equal keys: most rods of a frame are alike."""
+    found = {}
+    return [found[key] if key in found else found.setdefault(key, make(i)) for i, key in enumerate(keys)]
+
+
 def directors(q):
     """(k, 3, 3) rotation matrices of unit quaternions (k, 4), eq. (6); the columns are d_1, d_2, d_3."""
     a, b, c, d = q.T

@@ -308,10 +308,7 @@ class RodModel:
         scales, rods = self.scales, self.rods
         rods.place([b * rod.length / scales.length for rod, b in zip(scene.rods, layout.breaks, strict=True)])
         self.axes = np.array(scene.plane.axes) if self.signature.flat else np.eye(3)
-        self.reference = np.concatenate([
-            (rod.curve.position(x * rod.length) - scene.origin(rod)) / scales.length
-            for rod, x in zip(scene.rods, layout.node_s(self.nodes), strict=True)
-        ])  # fmt: skip
+        self.reference = layout.at_rest(scene, self.nodes) / scales.length
         data = rod_data(scene, layout, scales, self.rule, self.reference, coupled=self.signature.coupled)
         self._in_space = data
         self.section = self._section_data(data)

@@ -15,7 +15,8 @@ from dolfinx import fem
 from cosserat_fenicsx import compat
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.forms.law import CoupledLaw, DiagonalLaw
-from cosserat_fenicsx.numerics import lobatto_weights
+from cosserat_fenicsx.numerics import lobatto_weights, once_each
+from cosserat_fenicsx.scene.curves import frames_along
 from cosserat_fenicsx.scene.rod import require_inertia
 
 #: Arrays (.., 3) K and J, which may be infinite in K; and (.., 3, 3), or None where all sections are diagonal: the
@@ -141,13 +142,17 @@ def rod_data(scene, layout, scales, rule, reference, *, coupled):
         rule: the `ElementRule`; reference: (nodes, 3) positions at rest over the unit of length.
         coupled: whether the law couples strains.
     """
-    parts, frames = [], []
-    for rod, x in zip(scene.rods, layout.inside(rule.gauss), strict=True):
-        s = x.ravel() * rod.length
-        frames.append(rod.curve.frame(s).reshape(*x.shape, 3, 3))
-        parts.append(law_data(rod.stiffness_at(s.reshape(x.shape)), scales, coupled=coupled))
-    law, frames = joined(parts), np.concatenate(frames)
-    p, counts = len(rule.nodes) - 1, np.array(layout.counts)
+    xs, counts = layout.inside(rule.gauss), np.array(layout.counts)
+
+    def law_of_rod(i):
+        rod = scene.rods[i]
+        return law_data(rod.stiffness_at(xs[i] * rod.length), scales, coupled=coupled)
+
+    law = joined(once_each([(rod.profile.alike, count) for rod, count in zip(scene.rods, layout.counts, strict=True)],
+                           law_of_rod))  # fmt: skip
+    x, points = np.concatenate(xs), len(rule.gauss)
+    frames = frames_along([rod.curve for rod in scene.rods], x.ravel(), counts * points).reshape(*x.shape, 3, 3)
+    p = len(rule.nodes) - 1
     first = p * np.arange(counts.sum()) + np.repeat(np.arange(len(counts)), counts)
     h = layout.sizes(scene) / scales.length
     r_s = np.einsum("gj,cji->cgi", rule.slopes, reference[first[:, None] + np.arange(p + 1)]) / h[:, None, None]
@@ -197,12 +202,11 @@ def bending_lengths(data, lengths, counts):
     The compliances of a coil of radius R due to bending and to shear are proportional to R^2/EI and 1/K, whatever the
     length L of its wire: with K bounded by 1e6 EI/L^2 a spring of 40 turns would be 6 % too soft.
     """
-    tangents, scales = np.split(data.R_R[:, :, 2::3], np.cumsum(counts)[:-1]), []
-    for length, along in zip(lengths, tangents, strict=True):
-        along = along.reshape(-1, 3)
-        turned = np.arccos(np.clip(np.einsum("ki,ki->k", along[1:], along[:-1]), -1.0, 1.0)).sum()
-        scales.append(length / max(1.0, turned))
-    return np.repeat(scales, counts)
+    tangents = data.R_R[:, :, 2::3]
+    along, first = tangents.reshape(-1, 3), np.cumsum([0, *counts[:-1]]) * tangents.shape[1]
+    turned = np.append(0.0, np.arccos(np.clip(np.einsum("ki,ki->k", along[1:], along[:-1]), -1.0, 1.0)))
+    turned[first] = 0.0
+    return np.repeat(lengths / np.maximum(1.0, np.add.reduceat(turned, first)), counts)
 
 
 def bounded(data, stiff, sizes, lengths):

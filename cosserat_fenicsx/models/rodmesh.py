@@ -12,6 +12,7 @@ last rank, the multipliers."""
 import itertools
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from dolfinx import fem
@@ -19,7 +20,9 @@ from petsc4py import PETSc
 
 from cosserat_fenicsx import compat
 from cosserat_fenicsx.errors import SceneError
+from cosserat_fenicsx.numerics import once_each
 from cosserat_fenicsx.remember import per_scene
+from cosserat_fenicsx.scene.curves import positions_along
 
 #: Largest number of elements of all rods together.
 MOST_ELEMENTS = 100_000
@@ -63,7 +66,7 @@ class Layout:
             count = math.ceil(so_far[-1] - 1e-9)
             return np.interp(np.linspace(0, so_far[-1], count + 1), so_far, breaks)
 
-        return self._of_pieces(scene, divide)
+        return self._of_pieces(scene, divide, self._with(wanted))
 
     def with_short_ends(self, scene, longest):
         """The layout whose pieces have short elements at their ends, by repeated halving of the end elements.
@@ -86,15 +89,25 @@ class Layout:
             after = end - far[::-1] * (end - breaks[-2])
             return np.concatenate([[start], before, breaks[1:-1], after, [end]])
 
-        return self._of_pieces(scene, divide)
+        return self._of_pieces(scene, divide, self._with(longest))
 
     def pieces(self, scene):
         """For every rod the slices of its elements between neighbouring prescribed element ends."""
-        found = []
-        for i, rod in enumerate(scene.rods):
-            ends = np.searchsorted(self.breaks[i], _fixed_ends(scene, rod))
-            found.append([slice(a, b) for a, b in itertools.pairwise(ends.tolist())])
-        return found
+        fixed = _fixed_ends(scene)
+
+        def slices(i):
+            ends = np.searchsorted(self.breaks[i], fixed[i])
+            return [slice(a, b) for a, b in itertools.pairwise(ends.tolist())]
+
+        return once_each(zip(self.keys, fixed, strict=True), slices)
+
+    @cached_property
+    def keys(self):
+        """What is equal for rods whose elements end at the same shares of their lengths."""
+        return [b.tobytes() for b in self.breaks]
+
+    def _with(self, numbers):
+        return [(key, x.tobytes()) for key, x in zip(self.keys, numbers, strict=True)]
 
     def _piece(self, rod, start, end):
         """The element ends of a piece, and the numbers of its first element and of the one after its last."""
@@ -102,15 +115,18 @@ class Layout:
         return self.breaks[rod][first : last + 1], int(first), int(last)
 
     @classmethod
-    def _of_pieces(cls, scene, divide):
-        """The layout with the element ends `divide(rod index, start, end)` of every piece, its two ends included."""
-        breaks = []
-        for i, rod in enumerate(scene.rods):
-            pieces = [divide(i, a, b)[:-1] for a, b in itertools.pairwise(_fixed_ends(scene, rod))]
-            breaks.append(np.concatenate([*pieces, [1.0]]))
-        return cls(tuple(breaks))
+    def _of_pieces(cls, scene, divide, keys):
+        """The layout with the element ends `divide(rod index, start, end)` of every piece, its two ends included; equal
+        for rods with equal keys and pieces."""
+        fixed = _fixed_ends(scene)
 
-    @property
+        def breaks(i):
+            pieces = [divide(i, a, b)[:-1] for a, b in itertools.pairwise(fixed[i])]
+            return np.concatenate([*pieces, [1.0]])
+
+        return cls(tuple(once_each(zip(keys, fixed, strict=True), breaks)))
+
+    @cached_property
     def counts(self):
         """Elements of each rod."""
         return tuple(len(b) - 1 for b in self.breaks)
@@ -118,24 +134,38 @@ class Layout:
     def vertex(self, scene, station):
         """(rod index, element end) of a station of the layout's scene."""
         rod = scene.number(station.rod)
+        if station.s in (0.0, station.rod.length):
+            return rod, len(self.breaks[rod]) - 1 if station.s else 0
         return rod, int(np.argmin(np.abs(self.breaks[rod] - station.s / station.rod.length)))
 
     def sizes(self, scene):
         """Length of every element, m, rods one after another."""
-        return np.concatenate([np.diff(b) * rod.length for rod, b in zip(scene.rods, self.breaks, strict=True)])
+        return self.shares * np.repeat([rod.length for rod in scene.rods], self.counts)
+
+    @cached_property
+    def shares(self):
+        """(elements,) length of every element over that of its rod, rods one after another."""
+        return np.concatenate(once_each(self.keys, lambda i: np.diff(self.breaks[i])))
 
     def inside(self, x):
         """(elements, len(x)) arc length over rod length of places x in [0, 1] of every element, for each rod."""
-        return [b[:-1, None] + np.diff(b)[:, None] * x for b in self.breaks]
+        return once_each(self.keys, lambda i: self.breaks[i][:-1, None] + np.diff(self.breaks[i])[:, None] * x)
 
     def node_s(self, nodes):
         """Arc length over rod length of every node of each rod, for reference nodes sorted in [0, 1]."""
-        return [self.nodes_of(i, nodes) for i in range(len(self.breaks))]
+        return once_each(self.keys, lambda i: self.nodes_of(i, nodes))
 
     def nodes_of(self, i, nodes):
         """`node_s` of the i-th rod alone."""
         b = self.breaks[i]
         return np.append((b[:-1, None] + np.diff(b)[:, None] * nodes[:-1]).ravel(), 1.0)
+
+    def at_rest(self, scene, nodes):
+        """(N, 3) positions at rest of the nodes of all rods, for `node_s`, m, from the origin of their structure."""
+        of_rods = self.node_s(nodes)
+        counts = [len(x) for x in of_rods]
+        positions = positions_along([rod.curve for rod in scene.rods], np.concatenate(of_rods), counts)
+        return positions - np.repeat(scene.origins, counts, axis=0)
 
 
 @per_scene
@@ -152,7 +182,7 @@ def _equal(scene, elements):
     def equal(rod, start, end):
         return np.linspace(start, end, max(1, round(elements * (end - start))) + 1)
 
-    return Layout._of_pieces(scene, equal)
+    return Layout._of_pieces(scene, equal, [None] * len(scene.rods))
 
 
 @per_scene
@@ -160,19 +190,23 @@ def _finer(scene, layout, factor):
     return layout.resized(scene, [np.full(count, float(factor)) for count in layout.counts])
 
 
-def _fixed_ends(scene, rod):
-    """Element ends prescribed by supports, loads, joints and kinks, over the rod's length, from 0 to 1.
+@per_scene
+def _fixed_ends(scene):
+    """For every rod the element ends prescribed by supports, loads, joints and kinks, over its length, from 0 to 1.
 
     The part of a rod between two of them is called a piece.
     """
-    stations = {station.s / rod.length for station in scene.stations(rod)}
-    stations |= {s / rod.length for s in rod.breaks}
-    ends = [0.0]
-    for x in sorted(stations | {1.0}):  # nearly coincident stations share an element end
-        if x - ends[-1] > 1e-9:
-            ends.append(x)
-    ends[-1] = 1.0
-    return ends
+    found = []
+    for rod in scene.rods:
+        stations = {station.s / rod.length for station in scene.stations(rod)}
+        stations |= {s / rod.length for s in rod.breaks}
+        ends = [0.0]
+        for x in sorted(stations | {1.0}):  # nearly coincident stations share an element end
+            if x - ends[-1] > 1e-9:
+                ends.append(x)
+        ends[-1] = 1.0
+        found.append(tuple(ends))
+    return found
 
 
 def same_places(scene, other):

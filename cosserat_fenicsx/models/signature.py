@@ -76,7 +76,7 @@ class Signature:
             isinstance(points, bool) or not isinstance(points, numbers.Integral) or not 1 <= points <= 12
         ):
             raise SceneError(f"gauss_points = {points!r}: expected a whole number from 1 to 12")
-        infinite = any(np.isinf(rod.profile.range[1].K).any() for rod in scene.rods)
+        infinite = bool(np.isinf(scene.extremes[1].K).any())
         # On a fine mesh of a very slender rod, rounding errors of the condensed tangent reach the bending stiffness.
         rounding = _rounding(scene, layout, degree)
         formulation = formulation.for_stiffness(infinite, rounding)
@@ -114,11 +114,9 @@ _signature = per_scene(Signature._found)
 
 def _rounding(scene, layout, degree):
     """Rounding error of the largest entries of the condensed tangent over the bending stiffness at nodal spacing."""
-    return max(
-        np.finfo(float).eps * rod.profile.range[1].K.max() * rod.length**2 / rod.profile.range[0].J[:2].min()
-        * (cells * degree) ** 2
-        for rod, cells in zip(scene.rods, layout.counts, strict=True)
-    )  # fmt: skip
+    low, high = scene.extremes
+    slender = high.K.max(axis=1) * scene.lengths**2 / low.J[:, :2].min(axis=1)
+    return float(np.finfo(float).eps * (slender * (np.array(layout.counts) * degree) ** 2).max())
 
 
 class TermKind(namedtuple("TermKind", "work place sizes memory scaled evolve refreshed dead")):

@@ -12,7 +12,6 @@ from cosserat_fenicsx.results.compared import (
     ROTATION,
     ROUNDING,
     all_cell_nodes,
-    cell_nodes,
     cells_of,
     differences,
     halfway,
@@ -101,7 +100,9 @@ def estimate_error(fine, coarse, before=None, *, smooth=True):
 
 def _equal(layout):
     """Whether the elements of every rod are about as long as each other, but for pieces."""
-    return all(np.diff(breaks).max() <= _UNEQUAL * np.diff(breaks).min() for breaks in layout.breaks)
+    first = [cells.start for cells in cells_of(layout)]
+    longest, shortest = (bound.reduceat(layout.shares, first) for bound in (np.maximum, np.minimum))
+    return bool((longest <= _UNEQUAL * shortest).all())
 
 
 def error_before(apart, gain):
@@ -320,10 +321,8 @@ def layer_lengths(scene, scales, layout, rule, n):
         For every rod (elements,), over the length of the rod; None where all elements are shorter than these.
     """
     force = np.sqrt(3) * np.abs(n).max(initial=0.0) * scales.force
-    if all(
-        force * (np.diff(breaks).max() * rod.length / LONGEST_IN_LAYER) ** 2 <= rod.profile.range[0].J[:2].min()
-        for rod, breaks in zip(scene.rods, layout.breaks, strict=True)
-    ):
+    softest = np.repeat(scene.extremes[0].J[:, :2].min(axis=1), layout.counts)
+    if (force * (layout.sizes(scene) / LONGEST_IN_LAYER) ** 2 <= softest).all():
         return None
     largest = np.maximum(np.sqrt(np.square(n).sum(axis=3).max(axis=(0, 2))) * scales.force, 1e-300)
     lengths = []
@@ -353,28 +352,25 @@ def winding_lengths(path):
     torque = np.einsum("...i,...i", m, d3)
     bending = np.linalg.norm(m - torque[..., None] * d3, axis=-1)
     torque, bending = (scale * np.abs(x).max(axis=(0, 2)) for x in (torque, bending))
-    lengths = []
-    for rod, cells in zip(path.scene.rods, cells_of(path.layout), strict=True):
-        *flexural, torsional = rod.profile.range[0].J
-        soft, stiff = sorted(flexural)
-        tilting = max(0.0, (1 - soft / stiff) * (1 - torsional / stiff)) / (soft * torsional)
-        k = np.maximum(torque[cells] / soft, np.sqrt(tilting) * bending[cells])
-        lengths.append(1 / np.maximum(k * rod.length, 1e-300))
-    return lengths
+    counts, least = path.layout.counts, path.scene.extremes[0].J
+    soft, stiff, torsional = least[:, :2].min(axis=1), least[:, :2].max(axis=1), least[:, 2]
+    tilting = np.maximum(0.0, (1 - soft / stiff) * (1 - torsional / stiff)) / (soft * torsional)
+    soft, tilting, length = np.repeat([soft, tilting, path.scene.lengths], counts, axis=1)
+    k = np.maximum(torque / soft, np.sqrt(tilting) * bending)
+    return np.split(1 / np.maximum(k * length, 1e-300), np.cumsum(counts)[:-1])
 
 
 def turns_of(path, most):
     """For every rod (elements,): the largest angle, rad, by which the moments at the Gauss points turn sections along
     an element, relative to the rest state, at any point of a path; None where none is larger than `most`."""
     m = path._stacked("gauss_fields")[..., 3:6] * path.scales.moment
-    sizes = [np.diff(breaks) * rod.length for rod, breaks in zip(path.scene.rods, path.layout.breaks, strict=True)]
-    softest = [rod.profile.range[0].J.min() for rod in path.scene.rods]
-    steepest = max(lengths.max() / J for lengths, J in zip(sizes, softest, strict=True))
+    scene, layout = path.scene, path.layout
+    steepest = (layout.sizes(scene) / np.repeat(scene.extremes[0].J.min(axis=1), layout.counts)).max()
     if np.sqrt(3) * np.abs(m).max(initial=0.0) * steepest <= most:
         return None
     found = []
-    for rod, x, cells, lengths in zip(
-        path.scene.rods, path.layout.inside(path.rule.gauss), cells_of(path.layout), sizes, strict=True
+    for rod, x, cells, breaks in zip(
+        scene.rods, layout.inside(path.rule.gauss), cells_of(layout), layout.breaks, strict=True
     ):
         J, of_rod = rod.profile.range[0].J, m[:, cells]
         if rod.profile.coupled:  # J is about principal axes
@@ -383,7 +379,8 @@ def turns_of(path, most):
             q = path.motion(rod, x.ravel())[..., 3:].reshape(-1, 4)
             frames = directors(q).reshape(len(of_rod), *x.shape, 3, 3) @ rod.curve.frame(x * rod.length)
             of_rod = np.einsum("...ij,...i", frames, of_rod)
-        found.append((np.linalg.norm(of_rod / J, axis=3) @ path.rule.weights).max(axis=0) * lengths)
+        turned = (np.linalg.norm(of_rod / J, axis=3) @ path.rule.weights).max(axis=0)
+        found.append(turned * np.diff(breaks) * rod.length)
     return found if max(turns.max() for turns in found) > most else None
 
 
@@ -432,10 +429,7 @@ def unresolved(scene, layout, lengths):
 
 def resolves(layout, lengths):
     """Whether all elements are short enough for the boundary layers in them; `lengths` as `layer_lengths` returns."""
-    return lengths is None or all(
-        (np.diff(breaks) <= LONGEST_IN_LAYER * layers).all()
-        for breaks, layers in zip(layout.breaks, lengths, strict=True)
-    )
+    return lengths is None or bool((layout.shares <= LONGEST_IN_LAYER * np.concatenate(lengths)).all())
 
 
 def element_differences(fine, coarse):

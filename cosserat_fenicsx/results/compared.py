@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cosserat_fenicsx.errors import SceneError, nearest
+from cosserat_fenicsx.numerics import once_each
 from cosserat_fenicsx.remember import per_scene
 from cosserat_fenicsx.scene.action import acts_in_law, without_stress
 
@@ -27,14 +28,15 @@ def cells_of(layout):
 @lru_cache(maxsize=32)
 def cell_nodes(layout, degree):
     """For every rod (elements, degree + 1) the nodes of its elements, and their slice, numbered over all rods."""
-    rows = in_turn(degree * count + 1 for count in layout.counts)
-    return [(np.arange(x.start, x.stop - 1, degree)[:, None] + np.arange(degree + 1), x) for x in rows]
+    rows, nodes = in_turn(degree * count + 1 for count in layout.counts), all_cell_nodes(layout, degree)
+    return [(nodes[cells], x) for cells, x in zip(cells_of(layout), rows, strict=True)]
 
 
 @lru_cache(maxsize=32)
 def all_cell_nodes(layout, degree):
     """(elements, degree + 1) the nodes of the elements of all rods one after another."""
-    return np.concatenate([nodes for nodes, _ in cell_nodes(layout, degree)])
+    rods = np.repeat(np.arange(len(layout.counts)), layout.counts)
+    return (degree * np.arange(len(rods)) + rods)[:, None] + np.arange(degree + 1)
 
 
 class Compared(NamedTuple):
@@ -96,12 +98,7 @@ def transferred(coarse, fine, rule):
 def _by_pair(of_pair, coarse, fine):
     """`of_pair(i)` for every rod, found once for rods whose elements end at the same shares of the length on both
     meshes."""
-    keys = [(a.tobytes(), b.tobytes()) for a, b in zip(coarse.breaks, fine.breaks, strict=True)]
-    found = {}
-    for i, key in enumerate(keys):
-        if key not in found:
-            found[key] = of_pair(i)
-    return [found[key] for key in keys]
+    return once_each([(a.tobytes(), b.tobytes()) for a, b in zip(coarse.breaks, fine.breaks, strict=True)], of_pair)
 
 
 def halfway(places):
@@ -298,23 +295,22 @@ def of_sections(scene, scales, layout, p, by_statics, given=None):
         given: for every rod (least, largest) `Stiffnesses` of many points instead of the scene's, K and J (points, 3);
             the radii are (points, rods) then, and the errors (2, points).
     """
-    radii, force, moment = [], np.zeros(1), np.zeros(1)
-    for i, (rod, breaks) in enumerate(zip(scene.rods, layout.breaks, strict=True)):
-        low, high = rod.profile.range if given is None else given[i]
-        radii.append(gyration(low, high) / scales.length)
-        highest = np.where(np.isfinite(high.K), high.K, 0.0).max(axis=-1)
-        stiffness = 1.0 if by_statics else highest / scales.force
-        shortest = np.diff(breaks).min() * rod.length / scales.length
-        force = np.maximum(force, _OF_FORCE * stiffness * p * p / shortest)
-        moment = np.maximum(moment, p / shortest + stiffness * p / 2)
-    length = max(rod.length for rod in scene.rods) / scales.length
-    return np.stack(radii, axis=-1), length, _EPS * np.stack([force, moment])
-
-
-def gyration(low, high):
-    """Largest radius of gyration sqrt(EI/EA) of a rod, m, from its least and largest `Stiffnesses`; 0 where EA is
-    infinite."""
-    return np.sqrt(high.J[..., :2].max(axis=-1) / low.K[..., 2])
+    K, J = scene.extremes[1].K, scene.extremes[1].J
+    least = scene.extremes[0].K
+    if given is not None:
+        K, J, least = (
+            np.stack([getattr(bounds[k], name) for bounds in given], axis=-2)
+            for k, name in ((1, "K"), (1, "J"), (0, "K"))
+        )
+    stiffness = 1.0 if by_statics else np.where(np.isfinite(K), K, 0.0).max(axis=-1) / scales.force
+    first = [cells.start for cells in cells_of(layout)]
+    shortest = np.minimum.reduceat(layout.sizes(scene), first) / scales.length
+    noise = [x.max(axis=-1) for x in (_OF_FORCE * stiffness * p * p / shortest, p / shortest + stiffness * p / 2)]
+    return (
+        np.sqrt(J[..., :2].max(axis=-1) / least[..., 2]) / scales.length,
+        scene.lengths.max() / scales.length,
+        _EPS * np.stack([np.atleast_1d(x) for x in noise]),
+    )
 
 
 def differences(fine, coarse):

@@ -40,10 +40,7 @@ _BEYOND = 1e-9
 @per_scene
 def resting(scene, layout, rule):
     """(nodes, 3) positions at rest, m, of all nodes of all rods, relative to the origin of each structure."""
-    return np.concatenate([
-        rod.curve.position(x * rod.length) - scene.origin(rod)
-        for rod, x in zip(scene.rods, layout.node_s(rule.nodes), strict=True)
-    ])  # fmt: skip
+    return layout.at_rest(scene, rule.nodes)
 
 
 def _of_supports(k):

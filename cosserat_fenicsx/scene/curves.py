@@ -435,6 +435,35 @@ class Line(Curve):
         return np.broadcast_to(self._frame, (*np.shape(s), 3, 3))
 
 
+def positions_along(curves, x, counts):
+    """(n, 3) inertial points of curves one after another, m, at arc lengths over their lengths x (n,).
+
+    Args:
+        counts: of every curve, how many of the n places are on it.
+    """
+    if not _straight(curves):
+        return _one_by_one(curves, x, counts, "position")
+    start, end = (np.repeat(points, counts, axis=0) for points in
+                  ([curve.start for curve in curves], [curve.end for curve in curves]))  # fmt: skip
+    return (1 - x[:, None]) * start + x[:, None] * end
+
+
+def frames_along(curves, x, counts):
+    """(n, 3, 3) the R_R of curves one after another, see `positions_along`."""
+    if not _straight(curves):
+        return _one_by_one(curves, x, counts, "frame")
+    return np.repeat([curve._frame for curve in curves], counts, axis=0)
+
+
+def _straight(curves):
+    return all(type(curve) is Line for curve in curves)
+
+
+def _one_by_one(curves, x, counts, name):
+    parts = zip(curves, np.split(x, np.cumsum(counts)[:-1]), strict=True)
+    return np.concatenate([getattr(curve, name)(part * curve.length) for curve, part in parts])
+
+
 class _Uniform(Curve):
     """A curve of constant material curvature u: R_R(s) = R_R(0) exp(s u x), r(s) = r(0) + integral of R_R (0, 0, 1).
 

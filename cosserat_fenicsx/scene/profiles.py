@@ -290,6 +290,11 @@ class Sections:
         """Whether the section is constant along the whole rod."""
         return len(self.pieces) == 1 and not self._law[0]
 
+    @cached_property
+    def alike(self):
+        """What is equal for the same constant sections; for others the object itself."""
+        return self._fixed.tobytes() if self.constant else self
+
     def section(self, s, side):
         """The section at an arc length, m; `side` as for `Rod.stiffness_at`."""
         s = float(s)

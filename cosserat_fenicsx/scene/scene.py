@@ -18,6 +18,7 @@ from cosserat_fenicsx.parts import Items, Object, Part
 from cosserat_fenicsx.scene.action import Action, powers
 from cosserat_fenicsx.scene.describe import describe
 from cosserat_fenicsx.scene.planes import find_plane
+from cosserat_fenicsx.scene.profiles import Stiffnesses
 from cosserat_fenicsx.scene.rod import Rod, Station, StationOrName, station_named, with_names
 from cosserat_fenicsx.scene.rolled import Profile
 from cosserat_fenicsx.scene.sections import Circle, Rectangle
@@ -231,6 +232,12 @@ class Scene(Part):
         """
         return self._leaders[rod].curve.position(0.0)
 
+    @cached_property
+    def origins(self):
+        """(rods, 3) the `origin` of every rod."""
+        known = {leader: leader.curve.position(0.0) for leader in set(self._leaders.values())}
+        return np.array([known[self._leaders[rod]] for rod in self.rods])
+
     def over(self, duration):
         """A copy of the scene whose `horizon` is the duration (s)."""
         scene = copy.copy(self)
@@ -238,6 +245,18 @@ class Scene(Part):
             scene.__dict__.pop(name, None)
         store(scene, horizon=duration)
         return scene
+
+    @cached_property
+    def extremes(self):
+        """The least and the largest stiffnesses of every rod: two `Stiffnesses` with K and J (rods, 3) alone."""
+        ranges = zip(*(rod.profile.range for rod in self.rods), strict=True)
+        return tuple(Stiffnesses(*(np.array([getattr(x, name) for x in bound]) for name in "KJ"), None, None)
+                     for bound in ranges)  # fmt: skip
+
+    @cached_property
+    def lengths(self):
+        """(rods,) m."""
+        return np.array([rod.length for rod in self.rods])
 
     @cached_property
     def flatness(self):

@@ -90,16 +90,19 @@ def resolving_turns(scene, layout, largest):
 
     On others the path may be lost: a P4 element that turns by more than half a turn has equilibria of its own.
     """
-    wanted = []
-    for rod, breaks in zip(scene.rods, layout.breaks, strict=True):
-        here = [x for x in (*scene.supports, *scene.loads) if getattr(getattr(x, "station", None), "rod", None) is rod]
-        turn = max((_size(getattr(x, "rotation", None)) for x in here), default=0.0)
-        moment = sum(_size(getattr(x, "moment", None)) for x in here)
-        turn = largest * max(turn, moment * rod.length / rod.profile.range[0].J.min())
-        turn = turn if turn > _FIRST.many_turns else 0.0
-        wanted.append(
-            np.maximum(1.0, np.minimum(turn / _FIRST.turns * np.diff(breaks), _FIRST.most_for_turns / len(breaks)))
-        )
+    turns, moments = {}, {}
+    for x in (*scene.supports, *scene.loads):
+        if x.station is not None:
+            rod = x.station.rod
+            turns[rod] = max(turns.get(rod, 0.0), _size(getattr(x, "rotation", None)))
+            moments[rod] = moments.get(rod, 0.0) + _size(getattr(x, "moment", None))
+    wanted = [np.ones(count) for count in layout.counts]
+    for rod in turns:
+        turn = largest * max(turns[rod], moments[rod] * rod.length / rod.profile.range[0].J.min())
+        if turn > _FIRST.many_turns:
+            i = scene.number(rod)
+            sizes, most = np.diff(layout.breaks[i]), _FIRST.most_for_turns / len(layout.breaks[i])
+            wanted[i] = np.maximum(1.0, np.minimum(turn / _FIRST.turns * sizes, most))
     return layout.resized(scene, wanted) if max(map(np.max, wanted)) > 1 else None
 
 
@@ -155,8 +158,10 @@ def _acts_evenly(scene):
 @per_scene
 def _turning(scene):
     """The largest total turn of the axis of a rod, rad."""
-    tangents = (rod.curve.frame(np.linspace(0, rod.length, _FIRST.samples))[:, :, 2] for rod in scene.rods)
-    return float(max(2 * np.arcsin(np.linalg.norm(np.diff(t, axis=0), axis=1) / 2).sum() for t in tangents))
+    curved = [rod for rod in scene.rods if not isinstance(rod.curve, Line)]
+    tangents = (rod.curve.frame(np.linspace(0, rod.length, _FIRST.samples))[:, :, 2] for rod in curved)
+    turned = (2 * np.arcsin(np.linalg.norm(np.diff(t, axis=0), axis=1) / 2).sum() for t in tangents)
+    return float(max(turned, default=0.0))
 
 
 @per_scene
@@ -168,21 +173,26 @@ def first_layout(scene, degree, elements=FIRST_ELEMENTS):
 def resolving(scene, layout, degree, parts=4):
     """The mesh, refined locally where it does not resolve the curvature of the axis (by so many equal parts of an
     element), or sections and loads that are functions of s, whose local changes quadrature points may miss."""
-    varying = [_varying(scene, rod) for rod in scene.rods]
-    while True:
-        too_long = [
-            _too_long(rod, functions, breaks, degree, parts)
-            for rod, functions, breaks in zip(scene.rods, varying, layout.breaks, strict=True)
-        ]
-        if not any(marked.any() for marked in too_long):
-            return layout
-        layout = layout.resized(scene, [np.where(marked, 2.0, 1.0) for marked in too_long])
+    along = {}
+    for action in scene.actions:
+        loads = [value for value in vars(action).values() if isinstance(value, FunctionAlong)]
+        if loads and getattr(action, "rod", None) is not None:
+            along.setdefault(action.rod, []).extend(loads)
+    varying = {i: _varying(rod, along.get(rod, ())) for i, rod in enumerate(scene.rods)}
+    varying = {i: found for i, found in varying.items() if found or not isinstance(scene.rods[i].curve, Line)}
+    while varying:
+        wanted = [np.ones(count) for count in layout.counts]
+        for i, functions in varying.items():
+            wanted[i] += _too_long(scene.rods[i], functions, layout.breaks[i], degree, parts)
+        if max(map(np.max, wanted)) == 1:
+            break
+        layout = layout.resized(scene, wanted)
+    return layout
 
 
-def _varying(scene, rod):
-    """Functions, of (n,) arc lengths over the rod's length, that vary along a rod, with values (n, m)."""
-    loads = [value for action in scene.actions if getattr(action, "rod", None) is rod
-             for value in vars(action).values() if isinstance(value, FunctionAlong)]  # fmt: skip
+def _varying(rod, loads):
+    """Functions, of (n,) arc lengths over the rod's length, that vary along a rod, with values (n, m); `loads`: those
+    of loads along it."""
     functions = [lambda s, value=value: value(s * rod.length) for value in loads]
     low, high = rod.profile.range
     twisted = not isinstance(rod.curve, Line) and (low.J[0] != high.J[1] or rod.profile.coupled)

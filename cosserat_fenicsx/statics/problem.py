@@ -101,7 +101,7 @@ class Problem(Equations):
             return False
         if any(map(callable, (value for load in scene.loads for value in vars(load).values()))):
             return False
-        return all(map(np.array_equal, self._loaded[1].breaks, layout.breaks))
+        return self._loaded[1].keys == layout.keys
 
     def set_load_factor(self, load_factor):
         """Set the factor of loads and prescribed motions; while `begins`, that of permanent loads."""
