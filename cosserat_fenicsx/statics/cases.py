@@ -214,7 +214,9 @@ class CompiledScene:
         self._layouts = layout, layout.finer(reference, 2)
         iterations = [10 if signatures[0].formulation.force.of_motion is False else 30, CORRECTIONS]
         self._meshes = [
-            Loaded(make_solvers(self._comm, signature), reference, mesh, EI, self._load_factor, iterations=most, near=NEAR)
+            Loaded(
+                make_solvers(self._comm, signature), reference, mesh, EI, self._load_factor, iterations=most, near=NEAR
+            )
             for signature, mesh, most in zip(signatures, self._layouts, iterations, strict=True)
         ]
         for mesh in self._meshes:
@@ -227,9 +229,9 @@ class CompiledScene:
         if laws is not None and not signatures[0].coupled:
             self._law = [x for x, of_law in zip(parameters, laws, strict=True) if of_law]
             self._of_law = np.array(laws)
-            self._linear = [self._find_linear(mesh, steps) for mesh in self._meshes]
-            if not self._describes(other, checked):
-                self._linear = None
+            linear = [self._find_linear(mesh, steps) for mesh in self._meshes]
+            if self._describes(other, checked, linear):
+                self._linear = [_where_it_changes(*each) for each in zip(self._meshes, linear, strict=True)]
         how = "a linear map and the laws of the sections" if self._linear else "loading every case"
         self.why += [f"the {self.model} model, on {' and '.join(str(sum(x.counts)) for x in self._layouts)} elements",
                      f"data by {how}"]  # fmt: skip
@@ -280,21 +282,21 @@ class CompiledScene:
         return [(known, np.flatnonzero(column.any(axis=0)), column[:, column.any(axis=0)])
                 for known, column in zip(before, columns, strict=True)]  # fmt: skip
 
-    def _describes(self, scene, values):
+    def _describes(self, scene, values, linear):
         """Whether linear map and laws give the data of another scene."""
         K, J = laws_with(self._scene, self._law, values[None, self._of_law])
         if not self._fits(scene) or not np.isfinite(K).all():
             return False
-        for mesh, linear in zip(self._meshes, self._linear, strict=True):
-            read, more = mesh.arrays()
-            guessed = [known.copy() for known, *_ in linear]
-            for array, (known, places, derivatives) in zip(guessed, linear, strict=True):
+        for mesh, of_mesh in zip(self._meshes, linear, strict=True):
+            read, _ = mesh.arrays()
+            guessed = [known.copy() for known, *_ in of_mesh]
+            for array, (known, places, derivatives) in zip(guessed, of_mesh, strict=True):
                 array[places] = known[places] + (values - self._at) @ derivatives
             if self._law:
                 functions, *_ = mesh.stretched(K, J)
-                for to, places, name, which in mesh.law_places():
-                    k = next(k for k, array in enumerate(read) if array.ctypes.data == to.ctypes.data)
-                    guessed[k][places] = functions[name][0, which]
+                for name, place in mesh.law_places():
+                    k = next(k for k, array in enumerate(read) if array.ctypes.data == place.array.ctypes.data)
+                    guessed[k][place.places] = functions[name][0, place.which]
             mesh.load(scene)
             found = [array.copy() for array in _all(mesh)]
             mesh.load(self._reference)
@@ -374,22 +376,32 @@ class CompiledScene:
         """(what C writes, arguments of `Loaded.path`) of the cases on the k-th mesh."""
         if self._linear is None:
             return [], {}
-        mesh, linear, change = self._meshes[k], self._linear[k], array - self._at
-        read, more = mesh.arrays()
+        mesh, change = self._meshes[k], array - self._at
+        read, more = self._linear[k]
         written, named, rounding = [], {}, None
-        for to, (known, places, derivatives) in zip(read, linear, strict=False):
-            if len(places):
-                written.append((to, places, known[places] + change @ derivatives, np.arange(len(places))))
-        for name, (known, places, derivatives) in zip(more, linear[len(read) :], strict=True):
-            if len(places):
-                named[name] = np.tile(known, (len(change), 1))
-                named[name][:, places] += change @ derivatives
+        for place, known, derivatives in read:
+            written.append((place, known + change @ derivatives))
+        for name, places, known, derivatives in more:
+            named[name] = np.tile(known, (len(change), 1))
+            named[name][:, places] += change @ derivatives
         if self._law:
             functions, section, rounding = mesh.stretched(K, J)
-            written += [(to, places, functions[name], which) for to, places, name, which in mesh.law_places()]
+            written += [(place, functions[name]) for name, place in mesh.law_places()]
             named["section"], named["rounding"] = section, rounding
             named["stiffnesses"] = [2 * (Stiffnesses(K[:, i], J[:, i], None, None),) for i in range(K.shape[1])]
         return written + mesh.limits(rounding, named.pop("dead", None), named.pop("nodal", None)), named
+
+
+def _where_it_changes(mesh, linear):
+    """([(`Place`, numbers there at the reference, derivatives)] of what C reads, and the same of further arrays as (name,
+    places, all numbers, derivatives)), of the arrays that change."""
+    read, more = mesh.arrays()
+    of_names = zip(more, linear[len(read) :], strict=True)
+    return (
+        [(mesh.place(array, places), known[places], derivatives)
+         for array, (known, places, derivatives) in zip(read, linear, strict=False) if len(places)],
+        [(name, places, known, derivatives) for name, (known, places, derivatives) in of_names if len(places)],
+    )  # fmt: skip
 
 
 def _all(mesh):

@@ -1,5 +1,6 @@
 """One mesh of many cases of a scene: its problem stays loaded, and C writes the numbers of a case over those before."""
 
+from collections import namedtuple
 from functools import cached_property
 
 import numpy as np
@@ -36,6 +37,10 @@ class CasesPath(Path):
         return of_sections(self.scene, self.scales, self.layout, self.degree, by_statics, self.stiffnesses)
 
 
+#: Places of an array that C reads, which of the numbers of a case they take, and C's pointers to all three.
+Place = namedtuple("Place", "array places which to at of")
+
+
 class Loaded(Pointers):
     """A problem of its own on one mesh.
 
@@ -66,6 +71,11 @@ class Loaded(Pointers):
         self._cases = self._ffi.new("cases *")
         self._cases.sweep, self._cases.first, self._cases.near = sweep, abs(load_factor) / 10, near
         self._cases.patience = _SECONDS
+        only = self.integers(np.zeros(1))
+        self._of_rounding, self._of_loads = (
+            Place(None, only, [0], self._ffi.addressof(struct, name), only, only)
+            for struct, name in ((self.newton.c, "rounding"), (sweep, "loads"))
+        )
 
     def load(self, scene):
         """Load a scene of the same signature; its rest state is that of the cases."""
@@ -73,6 +83,9 @@ class Loaded(Pointers):
         self.problem.load(scene, self._layout)
         self.stability.load()
         self._rest = np.concatenate(self.problem.numbers())
+        model, lengths = self.model, [rod.length / self.model.scales.length for rod in scene.rods]
+        sizes = self._layout.sizes(scene) / model.scales.length
+        self._lengths = sizes, bending_lengths(model._in_space, lengths, self._layout.counts)
 
     def _take_limits(self):
         self._sweep.c.loads, self.newton.c.rounding = self.problem.load_norm, self.model.round_off
@@ -120,8 +133,7 @@ class Loaded(Pointers):
         K, J = K / scales.force, J / (scales.force * scales.length**2)
         whole = data._replace(K=at_points(K), J=at_points(J), R_R=tiled(data.R_R), v_R=tiled(data.v_R))
         section = model._section_data(whole)
-        sizes = self._layout.sizes(model.scene) / scales.length
-        lengths = bending_lengths(data, [rod.length / scales.length for rod in model.scene.rods], counts)
+        sizes, lengths = self._lengths
         stiff = bounded(
             section, model.signature.formulation.force.stiff, np.tile(sizes, cases), np.tile(lengths, cases)
         )
@@ -133,8 +145,13 @@ class Loaded(Pointers):
         rounding = model.round_off_of(of_cases, sizes)
         return {name: values.reshape(cases, -1) for name, values in found.items()}, of_cases, rounding
 
+    def place(self, array, places, which=None):
+        """A `Place` of an array that C reads."""
+        which = np.arange(len(places)) if which is None else which
+        return Place(array, places, which, self.doubles(array), self.integers(places), self.integers(which))
+
     def law_places(self):
-        """[(array that C reads, its places, name, numbers of `stretched` there)]; found once."""
+        """[(name, `Place`, which of the numbers of `stretched` it takes)]; found once."""
         if self._places is None:
             self._places, model = [], self.model
             for name in ("K", "K_inv", "K_stiff", "J"):
@@ -143,13 +160,13 @@ class Loaded(Pointers):
                 model.rods.fill(function, np.arange(np.prod(shape), dtype=float).reshape(shape))
                 which = function.x.array.astype(int)
                 function.x.array[:] = kept
-                self._places.append((function.x.array, np.arange(len(which)), name, which))
+                self._places.append((name, self.place(function.x.array, np.arange(len(which)), which)))
                 for form in self._packed():
                     for _, of_elements, column in form._places(function.x.array):
                         rows = np.arange(form.elements)[:, None] * form._w.shape[1]
                         places = rows + column + np.arange(of_elements.shape[1])
                         of_array = which[of_elements.astype(int).ravel()]
-                        self._places.append((form._w.reshape(-1), places.ravel(), name, of_array))
+                        self._places.append((name, self.place(form._w.reshape(-1), places.ravel(), of_array)))
         return self._places
 
     # -- cases -------------------------------------------------------------------------------------------------------
@@ -158,7 +175,7 @@ class Loaded(Pointers):
         """Solve cases in C, from rest, or from starts (cases, numbers) by Newton's method alone.
 
         Args:
-            written: [(array that C reads, its places, values (cases, n), which of these)].
+            written: [(`Place`, values (cases, n))].
 
         Returns:
             (which are undecided (cases,), unknowns (cases, n), fields (cases, elements, n) or None).
@@ -166,11 +183,10 @@ class Loaded(Pointers):
         c, sweep, problem, pointers = self._cases, self._sweep.c, self.problem, Pointers()
         self._take_limits()
         parts = self._ffi.new("written[]", max(1, len(written)))
-        for part, (to, place, values, which) in zip(parts, written, strict=False):
+        for part, (place, values) in zip(parts, written, strict=False):
             values = np.ascontiguousarray(values)
-            part.to = pointers.doubles(to) if isinstance(to, np.ndarray) else to
+            part.to, part.place, part.which, part.count = place.to, place.at, place.of, len(place.which)
             part.values, part.width = pointers.doubles(values), values.shape[1]
-            part.place, part.which, part.count = pointers.integers(place), pointers.integers(which), len(which)
         fields = problem.fields
         undecided, found = np.zeros(count, dtype=np.int32), np.zeros((count, problem.numbering.size))
         found_fields = np.zeros((count, fields.elements, fields.size)) if fields else None
@@ -200,16 +216,15 @@ class Loaded(Pointers):
             dead, nodal: (cases, n) dead loads, and forces from which statics gives n; or None where all are those of
                 the loaded scene.
         """
-        parts, only = [], np.zeros(1, dtype=np.int32)
+        parts = []
         if rounding is not None:
-            parts.append((self._ffi.addressof(self.newton.c, "rounding"), only, rounding[:, None], only))
+            parts.append((self._of_rounding, rounding[:, None]))
         if dead is not None or nodal is not None:
-            _, loaded = self.arrays()
+            known = self.problem._dead.array, *getattr(self.model, "nodal_forces", ())
             loads = 0.0
-            for name, values in (("dead", dead), ("nodal", nodal)):
-                values = loaded.get(name, np.zeros(1))[None] if values is None else values
-                loads = loads + np.linalg.norm(values, axis=1)
-            parts.append((self._ffi.addressof(self._sweep.c, "loads"), only, loads[:, None], only))
+            for values, loaded in zip((dead, nodal), known, strict=False):
+                loads = loads + np.linalg.norm(loaded.reshape(1, -1) if values is None else values, axis=1)
+            parts.append((self._of_loads, loads[:, None]))
         return parts
 
     def path(self, x, fields, why, section=None, known=None, densities=None, stiffnesses=None, rounding=None):

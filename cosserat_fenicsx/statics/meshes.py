@@ -266,7 +266,7 @@ class Grading:
 
 
 _GRADING = Grading()
-# Fields at Gauss points may be smaller than those between them by this factor.
+# Moments at Gauss points may be smaller than those at the ends of a rod, by less than this factor.
 _SURELY = 0.5
 
 
@@ -316,7 +316,7 @@ def plainly_resolved(path, J):
     lengths = max(rod.length for rod in scene.rods) / longest
     return (
         (layers <= 1)
-        & (turn <= _SURELY * min(_GRADING.turned, path.degree / 2))
+        & (turn <= min(_GRADING.turned, path.degree / 2))
         & (applied * turn * lengths <= _SURELY * _FIRST.many_turns)
     )
 

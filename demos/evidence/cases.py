@@ -1,7 +1,7 @@
 """Many cases of one scene: `compile` beside `solve`, processor time a case, and whether the digits are the same.
 
-    python demos/evidence/cases.py            medians of 5 alternating runs
-    python demos/evidence/cases.py --quick    few cases, to check the digits
+python demos/evidence/cases.py            medians of 5 alternating runs
+python demos/evidence/cases.py --quick    few cases, to check the digits
 """
 
 import numpy as np
@@ -17,9 +17,12 @@ SPREAD = 0.05  # of every number, relative
 
 
 def column(sideways):
-    """A slender column under its own dead force, pushed sideways; out of the plane where `sideways`."""
+    """A slender column under a dead force at its end, and half way up another one out of its plane where not 0."""
     rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, 1)), cf.Circle(0.01), cf.Material(E=2e11, nu=0.3), name="column")
-    return cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Force(rod.end, (3.0, sideways, -20.0))])
+    loads = [cf.Force(rod.end, (3.0, 0.0, -20.0))]
+    if sideways:
+        loads.append(cf.Force(rod.at(0.5), (0.0, sideways, 0.0)))
+    return cf.Scene([rod], [cf.Clamp(rod.start)], loads)
 
 
 def measured(scene, over, *, cases, calls, runs):
