@@ -657,3 +657,16 @@ def test_a_load_from_a_file_beside_its_scene(tmp_path):
         text.replace("[0.0, 0.0, 1.0]\npermanent", '{ type = "AlongTable", s = "load.csv" }\npermanent')
     )
     assert cf.read(tmp_path / "scene.toml").scene.loads[0].force == cf.signals.AlongTable(tmp_path / "load.csv")
+
+
+def test_units_of_data_are_what_their_names_say():
+    """Powers of force, length and time: kg is N s^2/m."""
+    base = {"1": (0, 0, 0), "rad": (0, 0, 0), "N": (1, 0, 0), "m": (0, 1, 0), "s": (0, 0, 1), "kg": (1, -1, 2)}
+    for unit, (*powers, _) in action._UNITS.items():
+        over, _, under = unit.removesuffix(" from origin").partition("/")
+        expected = np.zeros(3)
+        for sign, words in ((1, over.split()), (-1, under.split())):
+            for word in words:
+                name, _, power = word.partition("^")
+                expected += sign * int(power or 1) * np.array(base[name])
+        assert powers == expected.tolist(), unit

@@ -21,6 +21,7 @@ from cosserat_fenicsx.drilling.film import Stage
 from cosserat_fenicsx.drilling.history import DrillingHistory
 from cosserat_fenicsx.drilling.protocol import LEDGER, PROFILE, SERIES
 from cosserat_fenicsx.drilling.scenefile import DrillingScene, SimulateDrilling, StabilityMap
+from cosserat_fenicsx.drilling.stick_slip import cycle_of
 from cosserat_fenicsx.drilling.top_drive import DriveControl
 from cosserat_fenicsx.parts import arguments_of, from_data, members, to_data
 
@@ -668,3 +669,15 @@ def test_explain_tells_what_may_be_mistaken(tmp_path, capsys):
     assert main(["explain", str(ROOT / "demos" / "strings" / "stopped_block.toml")]) == 0
     told = capsys.readouterr().out
     assert "N/m in air." in told and "Hole: none, no walls" in told and "friction at the wall" not in told.lower()
+
+
+@pytest.mark.parametrize(("speeds", "starts"), [
+    ([9, 9, 0, 9, 9, 0, 9], [2.5, 5.5]),  # slow in one row alone, before the first start and between two
+    ([9, 9, 4, 9, 9, 0, 9], [5.5]),  # slowed down, but never to less than a tenth
+])  # fmt: skip
+def test_a_start_is_one_from_rest(speeds, starts):
+    rows = np.zeros((len(speeds), 1 + len(SERIES)))
+    rows[:, 0], rows[:, 1 + SERIES.index("bit_speed")] = np.arange(len(speeds)), speeds
+    rows[:, 1 + SERIES.index("drive_speed")] = 9.0
+    period = cycle_of(rows).period
+    assert period == pytest.approx(np.diff(starts)[0]) if len(starts) > 1 else np.isnan(period)
