@@ -439,6 +439,8 @@ def test_a_bit_law_as_a_function(law, model):
     expected, found = (cf.drilling.simulate(scene(x, **moves), 6.0, **options) for x in (law, _Falling(law)))
     assert expected.bit_speed.max() > 6.0 and (expected.bit_speed[10:] == 0).any()
     same(found, expected, 1e-6)
+    # Newton's method needs a few; what drops at once is halved in on
+    assert law is BIT_LAWS[-1] or found.counts["iterations"] < 12 * len(found.rows)
 
 
 def test_a_bit_law_as_a_function_starts_steadily_and_is_linearised():
