@@ -67,6 +67,7 @@ typedef struct {
                                        motion of its neighbours, and of itself in the middle */
     double *moved;                  /* (nodes, 6) displacement and rotation in the step with the forces */
     double *force, *law;            /* (nodes, 6) force and moment; (nodes, 3) normal force, friction round and along */
+    double *multiplier;             /* (nodes,) of friction at its bound, the last ones */
     const int *rows;                /* (nodes, 7) unknowns of this rank, or -1; nodes at one point follow each other */
     const double *fixed;            /* (nodes, 7) values where clamped, else 0 */
     double *before, *now;           /* (nodes, 7) unknowns at the start and with the last motion */

@@ -44,33 +44,35 @@ static double settle_normal(const contact *c, int i, double R0, double R_now, do
         else low = R;
         double next = R - off / (slope + 1 / give);
         if (!(next >= low && next <= high)) next = (low + high) / 2;
+        const double steep = slope;
         const int done = fabs(next - R) <= 1e-15 * (fabs(R) + c->clearance[i]);
         R = next, n = normal_force(c, i, R0, R, &slope);
-        if (done) break;
+        if (done || slope == steep) break; /* it is linear there */
     }
     return n;
 }
 
 /* T with |T| <= most that makes the slip A T + b zero, or else opposite to T: the minimum of T A T/2 + b T in that
-   disc, by Newton's method for the multiplier (More & Sorensen, SIAM J. Sci. Stat. Comput. 4 (1983) 553). */
-static void settle_friction(const double A[3], const double b[2], double most, double T[2])
+   disc, by Newton's method for the multiplier (More & Sorensen, SIAM J. Sci. Stat. Comput. 4 (1983) 553), from the given
+   one. From above its step goes below, and from there it rises to the solution. */
+static void settle_friction(const double A[3], const double b[2], double most, double *multiplier, double T[2])
 {
-    double shift = 0;
+    double shift = *multiplier, size = 0;
     T[0] = T[1] = 0;
-    if (!(most > 0)) return;
     const double trace = A[0] + A[2], floor = 1e-14 * trace;
-    if (!(trace > 0)) return;
+    if (!(most > 0) || !(trace > 0)) return;
     for (int j = 0; j < MOST_LOCAL; j++) {
-        const double a = A[0] + shift + floor, d = A[2] + shift + floor, det = a * d - A[1] * A[1];
-        T[0] = -(d * b[0] - A[1] * b[1]) / det, T[1] = -(a * b[1] - A[1] * b[0]) / det;
-        const double size = sqrt(T[0] * T[0] + T[1] * T[1]); /* hypot is slow */
-        if (size <= most * (1 + 1e-15)) break;
-        const double steep = (d * T[0] * T[0] - 2 * A[1] * T[0] * T[1] + a * T[1] * T[1]) / det;
-        const double change = size * size / steep * (size - most) / most;
-        if (!(change > 1e-16 * (shift + trace))) break;
-        shift += change;
+        const double a = A[0] + shift + floor, d = A[2] + shift + floor, inverse = 1 / (a * d - A[1] * A[1]);
+        T[0] = -(d * b[0] - A[1] * b[1]) * inverse, T[1] = -(a * b[1] - A[1] * b[0]) * inverse;
+        const double square = T[0] * T[0] + T[1] * T[1];
+        size = sqrt(square); /* hypot is slow */
+        if ((shift == 0 && size <= most) || fabs(size - most) <= 1e-12 * most) break;
+        const double steep = (d * T[0] * T[0] - 2 * A[1] * T[0] * T[1] + a * T[1] * T[1]) * inverse;
+        const double next = fmax(shift + square * (size - most) / (steep * most), 0);
+        if (!(fabs(next - shift) > 1e-16 * (shift + trace))) break;
+        shift = next;
     }
-    const double size = sqrt(T[0] * T[0] + T[1] * T[1]);
+    *multiplier = shift;
     if (size > most) T[0] *= most / size, T[1] *= most / size;
 }
 
@@ -194,7 +196,7 @@ static double settle_node(contact *c, int i)
         const double A[3] = {dot6(across, by[1]), (dot6(across, by[2]) + dot6(along, by[1])) / 2, dot6(along, by[2])};
         const double b[2] = {dot6(across, slip) - A[0] * law[1] - A[1] * law[2],
                              dot6(along, slip) - A[1] * law[1] - A[2] * law[2]};
-        settle_friction(A, b, c->friction[i] * N, T);
+        settle_friction(A, b, c->friction[i] * N, c->multiplier + i, T);
     }
     law[0] = N, law[1] = T[0], law[2] = T[1];
     for (int k = 0; k < 6; k++) {

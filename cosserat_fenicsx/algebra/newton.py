@@ -34,6 +34,7 @@ WORDS = (
     "Newton's iterations ran out",
 )  # fmt: skip
 
+
 @cache
 def petsc():
     """PETSc's functions that newton.c and sweep.c call, from the library that petsc4py has loaded."""

@@ -104,7 +104,9 @@ _FEW, _NEIGHBOURS = 16, 8
 _WORSE, _MISSED, _ROUNDING = 10.0, 1e-3, 1e-9
 # Sweeps over the nodes: largest number, and changes of the motion that end them, over the first one (with a complete
 # compliance, and with that of neighbours alone, which the next iteration corrects) and dimensionless.
-_MOST, _SHARE, _OF_NEIGHBOURS, _SMALLEST = 200, 1e-6, 1e-2, 1e-16
+_MOST, _SHARE, _OF_NEIGHBOURS, _SMALLEST = 200, 1e-6, 0.1, 1e-16
+# Numbers of a node in C.
+_OF_NODES = "clearance", "stiffness", "friction", "damping", "arm", "multiplier"
 
 
 class NodalContact(Pointers):
@@ -129,11 +131,21 @@ class NodalContact(Pointers):
         # nodes at the same point have the same neighbours: how they share a force would matter otherwise
         of, along = nodes.points, np.arange(n)
         reach = int((np.searchsorted(of, of + self._coupled, side="right") - 1 - along).max())
-        self._numbers = {name: np.zeros(n) for name in ("clearance", "stiffness", "friction", "damping", "arm")}
+        self._numbers = {name: np.zeros(n) for name in _OF_NODES}
         units = {"stiffness": scales.force / scales.length, "damping": model.time / scales.length}
         for name in ("stiffness", "damping"):
             self._numbers[name][:] = np.concatenate([getattr(p, name) for p in touched])[order] / units[name]
-        sizes = {"tangent": 3, "start": 3, "moved": 6, "force": 6, "law": 3, "before": 7, "now": 7, "free": 6, "last": 6}
+        sizes = {
+            "tangent": 3,
+            "start": 3,
+            "moved": 6,
+            "force": 6,
+            "law": 3,
+            "before": 7,
+            "now": 7,
+            "free": 6,
+            "last": 6,
+        }
         self._vectors = {name: np.zeros((n, size)) for name, size in sizes.items()}
         # of half the numbers' accuracy: it guides iterations, and its reading takes most of their time
         self._compliance = np.zeros((n, 6, 2 * reach + 1, 6), dtype=np.float32)
@@ -246,12 +258,14 @@ class NodalContact(Pointers):
         kept = {name: self._vectors[name].copy() for name in ("force", "law")}
         md = np.concatenate([place.md for place in self._walls])
         kept |= {"md": md, "slip": self._slip.copy(), "compliance": self._compliance.copy()}
+        kept["multiplier"] = self._numbers["multiplier"].copy()
         return {**kept, "known_for": self._known_for, "usual": self.c.usual, "stale": bool(self.c.stale)}
 
     def recall(self, memory):
         for name in ("force", "law"):
             self._vectors[name][:] = memory[name]
         self._compliance[:], self._slip[:] = memory["compliance"], memory["slip"]
+        self._numbers["multiplier"][:] = memory["multiplier"]
         self._known_for, self.c.usual = float(memory["known_for"]), float(memory["usual"])
         self.c.stale = bool(memory["stale"])
         for place, md in zip(self._walls, np.split(memory["md"], self._ends), strict=True):
