@@ -126,6 +126,40 @@ def test_derivatives_by_what_has_no_stress():
     assert found.derivatives["loads[0].force"] == pytest.approx((ahead - behind) / 2e-2, rel=1e-4)
 
 
+MOVING = cf.Stiffness(shear=(GA, GA), axial=EA, bending=(2.0, 2.0), torsion=1.6, mass=0.5, inertia=(1e-4, 1e-4, 2e-4))
+
+
+def test_the_work_of_a_muscle_in_motion():
+    """It is the change of the strain energy, so that the balance closes; and what is slow follows the equilibria."""
+    arm = rod_of(1.0, MOVING)
+    loads = [
+        cf.Actuation(arm, curvature=cf.signals.Sine((0.3, 1.0, 0.5), 2.0)),
+        cf.Thermal(arm, 1e-5, cf.signals.Ramp(100.0, 0, 0.4)),
+        cf.Growth(arm, lambda t: 1 + 0.1 * t),
+    ]
+    for scheme, exact in (("energy", 1e-11), ("generalised-alpha", 5e-3)):
+        history = cf.simulate(cantilever(*loads, rod=arm), 0.2, dt=0.01, scheme=scheme, elements=2)
+        assert np.abs(history.balance).max() < exact * history.work.max()
+    slow = cf.Rod(arm.curve, MOVING, name="slow", damping=cf.Damping(drag=6.0))
+    bent = cf.Actuation(slow, curvature=cf.signals.Ramp((0, 1.5, 0), 0, 8.0))
+    history = cf.simulate(
+        cantilever(bent, rod=slow), 10.0, dt=0.1, scheme="generalised-alpha", elements=2, model="spatial"
+    )
+    assert history.position(slow.end)[-1] == pytest.approx(((1 - np.cos(1.5)) / 1.5, 0, np.sin(1.5) / 1.5), abs=1e-4)
+    assert history.fields(-1)["curvature"][:, 1] == pytest.approx(1.5, abs=1e-3)
+
+
+def test_frequencies_of_a_guy():
+    """m omega^2 = EI k^4 + T k^2 with k = pi/L, of a hinged rod without shear."""
+    guy = rod_of(2.0, cf.Stiffness((inf, inf), EA, (EI, EI), GJ, mass=0.5, inertia=(1e-12, 1e-12, 1e-12)))
+    hinges = [cf.Hinge(end, (0, 1.0, 0)) for end in (guy.start, guy.end)]
+    k = np.pi / 2.0
+    for T in (0.0, 10.0):
+        acting = [cf.Pretension(guy, force=T, permanent=True)] if T else []
+        modes = cf.modes(cf.Scene([guy], hinges, acting), 1)
+        assert (2 * np.pi * modes.frequencies[0]) ** 2 == pytest.approx((EI * k**4 + T * k**2) / 0.5, rel=1e-6)
+
+
 REFUSED = {
     "nothing": (lambda: cf.Actuation(ROD), "expected a curvature or a strain that is not zero"),
     "not finite": (lambda: cf.Actuation(ROD, curvature=(0, np.nan, 0)), "Actuation.curvature"),

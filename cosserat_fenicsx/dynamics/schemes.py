@@ -220,7 +220,6 @@ class CollocationProblem(StepProblem):
     ties_class, acting_share, loads_share, takes_momentum = EndTies, 1.0, 1 - _BEFORE_END, False
 
     def begin_step(self, t, h):
-        self._middle, self._end = t + h / 2, t + self.loads_share * h
         self._start[:] = self._state
         self.model.take_scheme(self.rule.ahead(h / self.model.time))
         super().begin_step(t, h)
@@ -233,7 +232,7 @@ class CollocationProblem(StepProblem):
     def clamp_forces(self):
         """See `StepProblem`: at the end of the step."""
         if self.model.clamps.count:
-            self._take_loads(self._end)
+            self._take_loads(self._loaded_at)
             self._refresh(self.acting_share)
         return super().clamp_forces()
 

@@ -100,6 +100,7 @@ class StepProblem(Equations):
         self.c.contact = self.contact.c if walls else self._ffi.NULL
         of_contact = (COMPLIANCE | NODES * (model.comm.size > 1)) * bool(walls)
         self.c.hooks = self._hooks | (CONTACT | RESIDUAL) * bool(self._laws) | of_contact
+        self._law_moves = any(term.moves and term.kind.place == "law" for term in model.actions.terms)
         self._begun = False  # the reactions of another scene are no initial guess
         self.begin()
 
@@ -155,7 +156,9 @@ class StepProblem(Equations):
         model = self.model
         self.h = model.h.value = h / model.time
         self._start[:] = self._state
-        self._take_loads(t + self.loads_share * h)
+        self._loaded_at, self._middle, self._until = t + self.loads_share * h, t + h / 2, t + h
+        self._of_law = self._work_of_law(t, self._middle)
+        self._take_loads(self._loaded_at)
         self._known.set(0.0)
         if self.takes_momentum:
             self._assemble(self._momentum, self._known)
@@ -181,6 +184,17 @@ class StepProblem(Equations):
         model = self.model
         if model.actions.move and (model.loads_at(t) or model.comm.size > 1):  # all ranks, or none
             self._assemble_loads()
+
+    def _work_of_law(self, t, until):
+        """The work at the state of actions in the law from the time t to another (s), whose data stay: the change of
+        the strain energy."""
+        if not self._law_moves:
+            return 0.0
+        energies = []
+        for time in (t, until):
+            self._take_loads(time)
+            energies.append(self._scalar(self.model.forms.strain))
+        return energies[1] - energies[0]
 
     def _assemble_loads(self):
         """Assemble the loads that do not depend on the state, times the load factor, or unscaled where permanent."""
@@ -211,7 +225,8 @@ class StepProblem(Equations):
         self._done(self._lib.iterate(stepping))
 
     def work(self):
-        """Work of loads and supports in the step from `start` to the state, dimensionless, over all ranks."""
+        """Work of loads, supports and actions in the law in the step from `start` to the state, dimensionless, over all
+        ranks; data of the actions in the law are then those at the end of the step."""
         model, load_factor, done = self.model, self.load_factor, 0.0
         if self._live or self._loads.norm() > 0:
             self.numbering.from_local(model.passed(), self._vector)
@@ -222,6 +237,7 @@ class StepProblem(Equations):
             done -= self._known.dot(self._vector)
         if self.ties:
             done += model.comm.allreduce(self.ties.work(load_factor))
+        done += self._of_law + self._work_of_law(self._middle, self._until)
         return done - sum(part.books()[0] for part in self.touching)
 
     def momenta(self):
@@ -255,6 +271,8 @@ class StepProblem(Equations):
         clamps = self.model.clamps
         if not clamps.count:
             return np.empty((0, 6))
+        if self._law_moves:
+            self._take_loads(self._loaded_at)
         return clamps.of_step() - clamps.loads(self.load_factor, self._acting_at)
 
     def memory(self):

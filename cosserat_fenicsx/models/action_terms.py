@@ -314,6 +314,8 @@ class Term:
         if values == self._values:
             return False
         self._values, self.acting = values, []
+        for array in self._arrays if self.kind.place == "law" else ():
+            array[:] = 0.0
         for now, (action, rod, rows, s, _, elements) in zip(values, self._where, strict=True):
             now = with_values(action, now)
             if now is not action:
@@ -325,8 +327,9 @@ class Term:
         return True
 
     def _take(self, data, rod, rows):
+        adds = self.kind.place == "law"
         for array, datum in zip(self._arrays, data, strict=True):
-            array[rows] = self._scaled(datum, rod)
+            array[rows] = self._scaled(datum, rod) + (array[rows] if adds else 0.0)
 
     def _scaled(self, datum, rod):
         """The value of a `Datum`, dimensionless, vectors along the model's axes."""

@@ -238,7 +238,7 @@ def section_of(model):
     """The `equilibrium.Section` of a model, with the actions in its law (`Action.in_law`)."""
     section = model.cross_section()
     for _, term, factor in _terms(model, in_law=True):
-        k, e = (section.R_R.T * (factor * term.weight[0] * a) for a in term.data)
+        k, e = (section.R_R.T * (factor * a) for a in term.data)
         section = section._replace(v_0=section.v_0 + e, k_0=k if section.k_0 is None else section.k_0 + k)
     return section
 

@@ -135,7 +135,7 @@ class TermKind(namedtuple("TermKind", "work place sizes memory scaled evolve ref
 
 def place_actions(scene, layout):
     """Terms of the actions: [(`TermKind`, [(action, rod index, vertex or None)])]. Actions of one kind share a term if
-    they act at different places."""
+    they act at different places, or in the law, where their data add up."""
     terms, taken = [], []
     for action in scene.actions:
         work = work_of(action)
@@ -152,7 +152,7 @@ def place_actions(scene, layout):
         kind = TermKind(work, place, sizes, memory, scaled, action.evolve, action.refreshed is not None,
                         traits_of(action, scene.rods).dead)  # fmt: skip
         for (known, members), there in zip(terms, taken, strict=True):
-            if known == kind and there.isdisjoint(places):
+            if known == kind and (kind.place == "law" or there.isdisjoint(places)):
                 break
         else:
             members, there = [], set()

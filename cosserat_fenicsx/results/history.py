@@ -61,7 +61,7 @@ class History(RodResult):
         scheme: the scheme's name.
         steps: (n,) number of steps since the start.
         kinetic, strain: (n,) energies, J.
-        work: (n,) J, work of loads and prescribed motions since the start.
+        work: (n,) J, work of loads and prescribed motions, and of actuation that changes, since the start.
         dissipated: (n,) J, energy dissipated by damping since the start.
         balance: (n,) J, kinetic + strain - work + dissipated, minus its value at the start; zero for an exact solution.
         linear_momentum: (n, 3) kg m/s; angular_momentum: (n, 3) kg m^2/s about the inertial origin, inertial.
