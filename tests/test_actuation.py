@@ -73,6 +73,9 @@ def test_a_heated_bar_between_walls(model):
         critical = GA / 2 * (np.sqrt(1 + 4 * Euler / GA) - 1) / EA / 1e-3
         found = cf.solve(scene, (0, 2.0), model=model, tol=1e-9)
         assert [event.load_factor for event in found.events] == pytest.approx([critical] * 2, rel=1e-8)
+        derivatives = found.sensitivity(found.events[0], ["loads[0].dT", "rods.rod.section.axial"]).derivatives
+        assert derivatives["loads[0].dT"] == pytest.approx(-critical / 100.0, rel=1e-6)
+        assert derivatives["rods.rod.section.axial"] == pytest.approx(-critical / EA, rel=1e-6)
         assert critical * 1e-3 == pytest.approx(0.0017494951160363704, rel=1e-14)
         linear = cf.buckling(scene, 2, tol=1e-4)
         assert (np.abs(linear.load_factors / critical - 1) <= linear.error).all()

@@ -29,6 +29,7 @@ _UNITS = {
     "E": "Pa", "nu": "1", "density": "kg/m^3", "force": "N", "moment": "N m", "rotation": "rad", "gravity": "m/s^2",
     "friction": "1", "rotational": "N m/rad", "stiffness": "N/m^2", "Spring.stiffness": "N/m",
     "TubeRing.stiffness": "N/m", "LineForce.force": "N/m", "LineMoment.moment": "N m/m", "shear": "N", "axial": "N",
+    "curvature": "1/m", "rest_length": "m", "alpha": "1/K", "dT": "K", "gradient": "K/m",
     "bending": "N m^2", "torsion": "N m^2",
 }  # fmt: skip
 

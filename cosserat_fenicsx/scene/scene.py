@@ -123,7 +123,8 @@ class Scene(Part):
         supports: `Clamp`, `Pin`, `Hinge`, `Roller`, `Prescribed`.
         loads: actions on the rods: `Force`, `Moment`, `EccentricForce`, `FollowerForce`, `FollowerMoment`, `LineForce`,
             `LineMoment`, `Weight`, which are multiplied by the load factor or `permanent`; `Spring`, `Foundation`,
-            `Dashpot`, `Drag`, `PointMass`, `Wall`; or an `Action` of your own.
+            `Dashpot`, `Drag`, `PointMass`, `Wall`; `Actuation`, `Thermal`, `Growth`, `Pretension`; or an `Action` of
+            your own.
         joints: each a `Joint` between stations that touch; rods without a joint are independent of each other.
         velocities: each an `InitialVelocity`, at most one per rod; rods without one start at rest. For motions only.
         title: for tables and pictures.

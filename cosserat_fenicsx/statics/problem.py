@@ -148,12 +148,17 @@ class Problem(Equations):
         if not self.c.advance:
             return [slope]
         behind, ahead = (self._advanced(step) for step in (0.0, slope))
-        change, here = ahead - behind, self.load_factor
-        if any(kind.place == "law" and kind.scaled == "load" for kind in self.model.signature.terms):
-            self.set_load_factor(here + 1.0)  # the law is linear in the load factor
-            change += self._advanced(0.0) - behind
-            self.set_load_factor(here)
-        return [slope, change]
+        return [slope, ahead - behind + self.rate_by_law()]
+
+    def rate_by_law(self):
+        """The change of the carried contact force with the load factor at the state, by actions in the law."""
+        if not any(kind.place == "law" and kind.scaled == "load" for kind in self.model.signature.terms):
+            return 0.0
+        here, behind = self.load_factor, self._advanced(0.0)
+        self.set_load_factor(here + 1.0)  # the law is linear in the load factor
+        change = self._advanced(0.0) - behind
+        self.set_load_factor(here)
+        return change
 
     def mismatch(self):
         """The contact force by the strains minus the carried one: rounding of the strains times the stiffness; None

@@ -295,7 +295,8 @@ class Direct:
         """Derivatives of the numbers by the load factor, at the state where the tangent was factorised."""
         problem = self.problem
         self._by_data.take([0.0] * len(self._by_data.data()))
-        return self._response(problem.load_derivative(problem.x).copy(), np.zeros_like(self.model.state.x.array))
+        found = self._response(problem.load_derivative(problem.x).copy(), np.zeros_like(self.model.state.x.array))
+        return [found[0], *(carried + problem.rate_by_law() for carried in found[1:])]
 
     def _response(self, residual, moved):
         """The change of the numbers that balances a change of the residual, with the clamped nodes' moves `moved`."""
