@@ -168,7 +168,8 @@ REFUSED = {
     "not finite": (lambda: cf.Actuation(ROD, curvature=(0, np.nan, 0)), "Actuation.curvature"),
     "no length": (lambda: cf.Actuation(ROD, strain=(0, 0, -1.0)), "expected a stretch above -1"),
     "no length in a piece": (
-        lambda: cantilever(cf.Actuation(ROD, strain=cf.signals.AlongPieces([(0.1, (0, 0, -2.0))]))), "a stretch above -1"
+        lambda: cantilever(cf.Actuation(ROD, strain=cf.signals.AlongPieces([(0.1, (0, 0, -2.0))]))),
+        "a stretch above -1",
     ),
     "a jump": (
         lambda: cantilever(cf.Actuation(ROD, curvature=cf.signals.Along(lambda s: (0, 1.0 * (s > 0.1234567), 0)))),
