@@ -47,6 +47,25 @@ def test_a_tripod_of_hinged_bars_carries_by_tension_alone():
     assert moved[2] == pytest.approx(-axial * length / (frame.rods[0].stiffness.axial * cosine), rel=1e-5)
 
 
+def test_rods_that_bend_most_are_cut_into_more_elements():
+    """Two meshes suffice: the second one has short elements where halves would not do, and says how good it is."""
+    points = 3.0 * np.argwhere(np.ones((3, 3, 4)))
+    near = np.isclose(np.linalg.norm(points[:, None] - points, axis=2), 3.0)
+    feet = points[:, 2] == 0
+    near[np.ix_(feet, feet)] = False
+    edges = np.argwhere(np.triu(near))
+    frame = cf.frame(points, edges, cf.Tube(0.1, 0.08), STEEL, clamped=np.flatnonzero(feet))
+    top = np.flatnonzero(points[:, 2] == 9.0).tolist()
+    scene = frame.scene([cf.Force(frame.at(k), (3e3, 1.5e3, -3e4)) for k in top])
+    path, truth = cf.solve(scene, [1.0]), cf.solve(scene, [1.0], elements=8)
+    assert len(frame) == 63 and min(path.elements) == 2 < max(path.elements) <= 4
+    moved = [[found.displacement(rod.at(x))[0] for rod in frame.rods for x in (0.35, 0.75, 1.1)]
+             for found in (path, truth)]  # fmt: skip
+    largest = np.linalg.norm([truth.displacement(frame.at(k))[0] for k in top], axis=1).max()
+    error = np.linalg.norm(np.subtract(*moved), axis=1).max() / largest
+    assert path.errors.position[0] / 20 < error < path.errors.position[0] < 1e-6
+
+
 def mesh(**more):
     return meshio.Mesh(PORTAL, [("line", np.array(LEGS[:2])), ("line", np.array(LEGS[2:]))], **more)
 

@@ -1,5 +1,7 @@
 """Assembled matrices: their eigenvalues by SLEPc, which no other file imports, and the direct solver for each kind."""
 
+from pathlib import Path
+
 import numpy as np
 from petsc4py import PETSc
 from slepc4py import SLEPc
@@ -257,6 +259,14 @@ def constrained_factors(matrix, null=0.0):
     if A is not matrix:
         A.destroy()  # the PC keeps it
     return pc
+
+
+def reference_blas():
+    """Whether this process has loaded netlib's reference BLAS, which is slow; False where the system does not say."""
+    try:
+        return "/blas/libblas.so" in Path("/proc/self/maps").read_text(encoding="utf-8")
+    except OSError:
+        return False
 
 
 class RepeatedFactors:

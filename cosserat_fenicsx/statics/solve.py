@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 from mpi4py import MPI
 
+from cosserat_fenicsx.algebra.eigen import reference_blas
 from cosserat_fenicsx.checks import instance, tolerance, whole
 from cosserat_fenicsx.errors import NotConverged, SceneError, nearest
 from cosserat_fenicsx.models.choose import choose
@@ -34,6 +35,8 @@ from cosserat_fenicsx.statics.path.recorder import Tracing
 from cosserat_fenicsx.statics.refinement import refine
 from cosserat_fenicsx.statics.problem import Promoted, solvers_of
 
+# Rods of a frame from which on the BLAS decides on the time that the equations where rods meet take.
+_MANY = 1000
 # What `tol` bounds where contact forces oscillate.
 _MOTION = ("position", "rotation")
 _STEPS = StepControl()
@@ -172,6 +175,11 @@ def solve(
         except Promoted as found:
             path = take(choice.in_space(found.reason), bar)
     path.why.extend(_not_located(path))
+    if len(scene.rods) >= _MANY and reference_blas():
+        path.why.append(
+            "netlib's reference BLAS solves the equations where rods meet: OpenBLAS takes about a third of the time for "
+            "them (on Debian: apt install libopenblas0-serial)"
+        )
     if oscillates:
         path.why.append(
             "with more Gauss points than the degree, contact forces and moments oscillate inside elements: tol bounds "
