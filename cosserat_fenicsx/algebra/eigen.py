@@ -1,5 +1,6 @@
 """Assembled matrices: their eigenvalues by SLEPc, which no other file imports, and the direct solver for each kind."""
 
+import math
 from pathlib import Path
 
 import numpy as np
@@ -267,6 +268,31 @@ def reference_blas():
         return "/blas/libblas.so" in Path("/proc/self/maps").read_text(encoding="utf-8")
     except OSError:
         return False
+
+
+class RepeatedInertia:
+    """Eigenvalues' signs of symmetric matrices of one pattern on this rank, by factors with pivots of two rows too; the
+    symbolic analysis is made once. Arguments: see `RepeatedFactors` and `constrained_factors`."""
+
+    def __init__(self, starts, columns, null):
+        self._pattern = starts.astype(PETSc.IntType), columns.astype(PETSc.IntType)
+        size, entries = len(starts) - 1, np.ones(len(columns))
+        self._matrix = PETSc.Mat().createAIJ((size, size), csr=(*self._pattern, entries), comm=PETSc.COMM_SELF)
+        self._matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
+        self._pc = PETSc.PC().create(PETSc.COMM_SELF)
+        _factor_constrained(self._pc, self._matrix, null)
+
+    def of(self, values):
+        """(negative, zero) numbers of eigenvalues of the matrix of these entries, and the logarithm of the absolute
+        value of its determinant, NaN where it is singular."""
+        self._matrix.setValuesCSR(*self._pattern, values)
+        self._matrix.assemble()
+        self._pc.setOperators(self._matrix)
+        self._pc.setUp()
+        factor = self._pc.getFactorMatrix()
+        negative, zero, _ = factor.getInertia()
+        part, power = abs(factor.getMumpsRinfog(12)), factor.getMumpsInfog(34)  # the determinant: part times 2^power
+        return negative, zero, math.log(part) + power * math.log(2) if part and not zero else math.nan
 
 
 class RepeatedFactors:

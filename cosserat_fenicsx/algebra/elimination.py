@@ -7,7 +7,6 @@ segments of rods, and all ranks solve the whole interface, with the same numbers
 
 import contextlib
 import functools
-import math
 
 import numpy as np
 
@@ -318,25 +317,15 @@ class _Sparse:
     def solve(self, b):
         b[:] = self._factors.solve(b)
 
+    @functools.cached_property
+    def _symmetric(self):
+        return eigen.RepeatedInertia(self._starts, self._columns, _ROUNDING)
+
     def signs(self, values):
-        from scipy.sparse import csr_matrix, diags  # slow to import, and few scenes need it
-
-        matrix = csr_matrix((values, self._columns, self._starts), shape=(self._size, self._size))
-        scale = diags(_scale(matrix.diagonal()))
-        negative, zero, logarithm = _inertia((scale @ matrix @ scale).tocsr())
-        return negative, zero, logarithm - 2 * float(np.log(scale.diagonal()).sum())
-
-
-def _inertia(matrix):
-    """(negative, zero) numbers of eigenvalues of a symmetric scipy matrix, by factors with pivots of two rows too, and
-    the logarithm of the absolute value of its determinant, NaN where it is singular."""
-    matrix.sort_indices()
-    pc = eigen.constrained_factors(matrix, _ROUNDING)
-    factor = pc.getFactorMatrix()
-    negative, zero, _ = factor.getInertia()
-    part, power = abs(factor.getMumpsRinfog(12)), factor.getMumpsInfog(34)  # the determinant: part times 2^power
-    pc.destroy()
-    return negative, zero, math.log(part) + power * math.log(2) if part and not zero else math.nan
+        rows = np.repeat(np.arange(self._size), np.diff(self._starts))
+        scale = _scale(values[rows == self._columns])
+        negative, zero, logarithm = self._symmetric.of(values * scale[rows] * scale[self._columns])
+        return negative, zero, logarithm - 2 * float(np.log(scale).sum())
 
 
 def _scale(diagonal):
