@@ -96,6 +96,9 @@ def test_what_is_not_decided_goes_to_solve_and_says_so():
     assert "diameter" in found.failures[2] and np.isnan(found.values[2]).all()
     alone = cf.solve(scene_with(scene, compiled.names, [-3.0 * critical, 0.01]), [1.0], tol=1e-8)
     assert found.values[1, 0] == pytest.approx(alone.displacement("column.end")[0, 0], rel=1e-12)
+    light = scene_with(scene, compiled.names, [-1e-7, 0.01])
+    wanted = cf.solve(light, [1.0], tol=1e-8).displacement("column.end")[0, 0]
+    assert compiled([-1e-7, 0.01]).values[0] == pytest.approx(wanted, rel=1e-12)
     with pytest.raises(cf.SceneError, match="diameter"):
         compiled([-20.0, -0.01])
 

@@ -41,7 +41,7 @@ QUERIES = {"position": "position", "displacement": "position", "rotation_angle":
 _DEGREE, _FORMULATION = 4, "mixed"  # the defaults of `solve`
 # Changes of the parameters, over their sizes, of the scenes by which the dependence of the data is found and checked.
 _BESIDE, _APART, _CHECK = 0.043, 0.25, -0.117
-# Largest difference of data that count as the same, over the largest number of an array.
+# Largest relative difference of data that count as the same.
 _SAME = 2e-14
 _BLOCK = 256  # cases that are solved at once
 
@@ -268,7 +268,8 @@ class CompiledScene:
         ]  # fmt: skip
 
     def _find_linear(self, mesh, steps):
-        """[(numbers at the reference, places of those that change, their derivatives (parameters, n))] of all arrays."""
+        """[(numbers where all parameters are 0, places of those that change, their derivatives (parameters, n))] of all
+        arrays."""
         before = [array.copy() for array in _all(mesh)]
         columns = [np.zeros((len(steps), len(array))) for array in before]
         sizes = np.array([parameter_of(self._scene, name).size for name in self.names])
@@ -276,11 +277,18 @@ class CompiledScene:
             mesh.load(steps[j])
             for column, array, known in zip(columns, _all(mesh), before, strict=True):
                 change = array - known
-                change[np.abs(change) <= _SAME * np.abs(known).max(initial=0.0)] = 0.0
+                change[np.abs(change) <= _SAME * np.abs(known)] = 0.0
                 column[j] = change / (_APART * sizes[j])
         mesh.load(self._reference)
-        return [(known, np.flatnonzero(column.any(axis=0)), column[:, column.any(axis=0)])
-                for known, column in zip(before, columns, strict=True)]  # fmt: skip
+        found = []
+        for known, column in zip(before, columns, strict=True):
+            places = np.flatnonzero(column.any(axis=0))
+            rest = known[places] - self._at @ column[:, places]
+            terms = np.abs(known[places]) + np.abs(self._at) @ np.abs(column[:, places])
+            rest[np.abs(rest) <= 10 * _SAME * terms] = 0.0  # so that small loads keep digits
+            known[places] = rest
+            found.append((known, places, column[:, places]))
+        return found
 
     def _describes(self, scene, values, linear):
         """Whether linear map and laws give the data of another scene."""
@@ -291,7 +299,7 @@ class CompiledScene:
             read, _ = mesh.arrays()
             guessed = [known.copy() for known, *_ in of_mesh]
             for array, (known, places, derivatives) in zip(guessed, of_mesh, strict=True):
-                array[places] = known[places] + (values - self._at) @ derivatives
+                array[places] += values @ derivatives
             if self._law:
                 functions, *_ = mesh.stretched(K, J)
                 for name, place in mesh.law_places():
@@ -301,7 +309,10 @@ class CompiledScene:
             found = [array.copy() for array in _all(mesh)]
             mesh.load(self._reference)
             for a, b in zip(guessed, found, strict=True):
-                if a.shape != b.shape or np.abs(a - b).max(initial=0.0) > 10 * _SAME * np.abs(b).max(initial=0.0):
+                if a.shape != b.shape:
+                    return False
+                noise = np.finfo(float).eps * np.abs(b).max(initial=0.0)  # of sums that vanish
+                if (np.abs(a - b) > 10 * (_SAME * np.abs(b) + noise)).any():
                     return False
         return True
 
@@ -376,14 +387,14 @@ class CompiledScene:
         """(what C writes, arguments of `Loaded.path`) of the cases on the k-th mesh."""
         if self._linear is None:
             return [], {}
-        mesh, change = self._meshes[k], array - self._at
+        mesh = self._meshes[k]
         read, more = self._linear[k]
         written, named, rounding = [], {}, None
         for place, known, derivatives in read:
-            written.append((place, known + change @ derivatives))
+            written.append((place, known + array @ derivatives))
         for name, places, known, derivatives in more:
-            named[name] = np.tile(known, (len(change), 1))
-            named[name][:, places] += change @ derivatives
+            named[name] = np.tile(known, (len(array), 1))
+            named[name][:, places] += array @ derivatives
         if self._law:
             functions, section, rounding = mesh.stretched(K, J)
             written += [(place, functions[name]) for name, place in mesh.law_places()]
@@ -393,8 +404,8 @@ class CompiledScene:
 
 
 def _where_it_changes(mesh, linear):
-    """([(`Place`, numbers there at the reference, derivatives)] of what C reads, and the same of further arrays as (name,
-    places, all numbers, derivatives)), of the arrays that change."""
+    """([(`Place`, numbers there without parameters, derivatives)] of what C reads, and the same of further arrays as
+    (name, places, all numbers, derivatives)), of the arrays that change."""
     read, more = mesh.arrays()
     of_names = zip(more, linear[len(read) :], strict=True)
     return (
