@@ -98,7 +98,8 @@ def number(owner, field, value, expected, accept, above_zero=False, dimension=No
         if not isinstance(value, str):
             told = _Typed(f"{told!r} ({value:.10g} {unit})")
     if isinstance(value, bool) or not isinstance(value, numbers.Real):
-        refuse(owner, field, value, expected)
+        quoted = isinstance(value, str) and value.strip().lstrip("+-").replace(".", "", 1).isdigit()
+        refuse(owner, field, value, f"{expected}, without quotes" if quoted else expected)
     try:
         given = float(value)
     except OverflowError:  # an integer of more than 308 digits

@@ -50,12 +50,13 @@ DIMENSIONS = {
     "moment": Dimension(
         "N m", {**_same(1.0, "N m", "Nm", "N-m"), **_same(units.kNm, "kN m", "kNm", "kN-m"),
                 **{f"{k}{name}": (1e3 if k else 1.0) * units.ft_lbf for k in ("", "k")
-                   for name in ("ft-lbf", "ft lbf", "ft-lb", "ft lb", "ft-lbs", "lbf-ft", "lbf ft", "lb-ft", "lb ft")}},
+                   for name in ("ft-lbf", "ft lbf", "ft-lb", "ft lb", "ft-lbs", "ft lbs", "lbf-ft", "lbf ft", "lb-ft", "lb ft")}},
         "ft-lbf", 1e10),
     "density": Dimension(
         "kg/m^3", {"kg/m^3": 1.0, "kg/m3": 1.0,
                    **_same(units.g_per_cm3, "g/cm^3", "g/cm3", "sg", "SG", "t/m^3", "t/m3"),
-                   **_same(units.ppg, "ppg", "lb/gal", "lbm/gal")}, "ppg", 1e5),
+                   **_same(units.ppg, "ppg", "lb/gal", "lbm/gal"),
+                   **_same(units.pound / units.foot**3, "pcf", "lb/ft3", "lb/ft^3", "lbm/ft3")}, "ppg", 1e5),
     "mass per length": Dimension(
         "kg/m", {"kg/m": 1.0, **_same(units.lb_per_ft, "lb/ft", "lbm/ft", "ppf")}, "lb/ft", 1e6),
     "force per length": Dimension(

@@ -114,7 +114,10 @@ def test_a_survey_from_a_file(tmp_path):
         well = cf.well.WellPath.from_csv(file, **given)
         assert well.md.tolist() == pytest.approx([0, 304.8, 609.6]), heading
         assert np.degrees([well.inclination[2], well.azimuth[2]]) == pytest.approx([30, 45]), heading
-    file.write_text("MD (m),Inc (rad),Azi\n0,0,0\n900,0.3,0.2\n", encoding="utf-8")
+    for unit in ("usft", "US survey feet", "ftUS"):
+        file.write_text(f"MD ({unit}),Inc (deg),Azi (deg True){stations}".replace(";", ","), encoding="utf-8")
+        assert cf.well.WellPath.from_csv(file).md[2] == pytest.approx(2000 * 0.3048006096, rel=1e-10)
+    file.write_text("MD (mRKB),Inc (rad),Azi\n0,0,0\n900,0.3,0.2\n", encoding="utf-8")
     assert cf.well.WellPath.from_csv(file).inclination[1] == 0.3
 
 
@@ -149,6 +152,8 @@ def test_a_survey_from_a_workbook(tmp_path):
     ("MD (m),inc,azi\n0,0,0\n10,5,20", {"length_unit": "ft"}, "'MD .m.' says a unit of 1 m"),
     ("MD (m),inc,azi\n0,0,0\n10,5,20", {"length_unit": "yd"}, "length_unit = 'yd': known: cm, f"),
     ("md,inc (rad),azi\n0,0,0\n10,5,20", {"degrees": True}, "contradict"),
+    ("MD (kft),inc,azi\n0,0,0\n10,5,20", {}, r"'MD \(kft\)': unit 'kft' is not known: expected m, .*; or say it by len"),
+    ("md,inc (grad),azi\n0,0,0\n10,5,20", {}, "unit 'grad' is not known: expected deg, .*; or say it by degrees"),
     ("md,inc,direction\n0,0,0\n10,5,20", {}, "no column 'azi' in md, inc, direction: .*columns = "),
     ("md,azim,azimuth,inc\n0,0,0,0\n10,5,5,20", {}, "no column 'azi' in"),
     ("0,0,0\n10,5,20\n", {}, "expected a row of names, such as"),

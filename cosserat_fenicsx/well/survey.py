@@ -29,12 +29,23 @@ _NAMES = (
 _LENGTHS = {
     **dict.fromkeys(("m", "meter", "meters", "metre", "metres"), 1.0),
     **dict.fromkeys(("ft", "foot", "feet"), units.foot),
+    **dict.fromkeys(("usft", "ftus"), 1200 / 3937),  # of the United States' surveys
 }
 _ANGLES = {
     **dict.fromkeys(("deg", "degree", "degrees", "\N{DEGREE SIGN}"), True),
     **dict.fromkeys(("rad", "radian", "radians"), False),
 }
 _UNITS = {*_LENGTHS, *_ANGLES}
+# The arguments that give the units of the columns where headings do not.
+_SAY = ("length_unit, in m or by its name", "degrees (True or False)", "degrees (True or False)")
+# What else stands in brackets: units with words behind them, such as what depths are below, and the north of azimuths.
+_SPELT = (
+    (r"(us|u\.s\.)[ -]*(survey)?[ -]*(ft|foot|feet)|survey (ft|foot|feet)", "usft"),
+    (r"ft(?!us)", "ft"),
+    (r"m(et(er|re)s?)?(?![a-z])|m(r?kb|rt|brt|md|bdf)\b", "m"),
+    (r"deg|\N{DEGREE SIGN}", "deg"),
+    (r"(true|grid|magnetic|mag|[tgm]n?)\b", ""),
+)
 
 
 def read_columns(who, file, names, degrees, length_unit, sheet=None):
@@ -75,6 +86,14 @@ def read_columns(who, file, names, degrees, length_unit, sheet=None):
     if len(values) < 2:
         raise SceneError(f"{file}: {len(values)} stations below the row of names, expected at least two")
     depth, inclination, azimuth = np.array(values).T
+    for column, unit, known, given, field in zip(
+        columns, says, (_LENGTHS, _ANGLES, _ANGLES), (length_unit, degrees, degrees), _SAY, strict=True
+    ):
+        if unit and unit not in known and given is None:
+            raise SceneError(
+                f"{file}: '{heading[column].strip()}': unit '{unit}' is not known: expected {', '.join(known)}; or say it "
+                f"by {field}"
+            )
     depth = depth * _length_unit(who, file, heading[columns[0]], says[0], length_unit)
     return depth, inclination, azimuth, _degrees(file, [heading[x] for x in columns[1:]], says[1:], degrees)
 
@@ -174,7 +193,8 @@ def _split(heading):
     name, bracket, unit = re.match(r"([^\[(]*)([\[(]?)([^\])]*)", heading.replace("_", " ").strip().lower()).groups()
     words = name.split()
     if bracket:
-        return " ".join(words), "ft" if unit.startswith("ft") else unit.strip()  # feet below something: "ftKB"
+        unit = unit.strip()
+        return " ".join(words), next((name for spelt, name in _SPELT if re.match(spelt, unit)), unit)
     last = words.pop() if len(words) > 1 and words[-1] in _UNITS else ""
     return " ".join(words), last
 
