@@ -109,6 +109,7 @@ def test_a_survey_from_a_file(tmp_path):
         ("Measured Depth (ftKB);Inclination (deg);Azimuth (deg)", {}),
         ("# My company\nWell: A-1, 2024\n\nMD;INC;AZI\nft;deg;deg", {"length_unit": "ft"}),
         ("depth_ft;tilt;Azimuth", {"md": "Depth", "inc": "tilt"}),
+        ("Hole Depth (ft);Inc.;Azi True", {}),
     ):
         file.write_text(heading + stations, encoding="utf-8")
         well = cf.well.WellPath.from_csv(file, **given)

@@ -9,7 +9,6 @@ from functools import partial
 from cosserat_fenicsx import units
 from cosserat_fenicsx.cli.output import deliver, given, refuse_of_rods, units_of
 from cosserat_fenicsx.cli.say import DONE, say
-from cosserat_fenicsx.dimensions import in_si
 from cosserat_fenicsx.drilling.bit_laws import Stribeck
 from cosserat_fenicsx.drilling.choose import chosen, model_of
 from cosserat_fenicsx.drilling.motion import KIND, check_arguments
@@ -137,7 +136,7 @@ def _in_hole(scene, shown):
     """Lines on mud and hole, in some units."""
     mud = scene.mud
     if mud is not None:
-        yield f"Mud: {mud.density:g} kg/m^3, {mud.density / in_si('mud', '1 ppg', 'density'):.4g} ppg."
+        yield mud.in_words()
     if scene.hole is None:
         yield f"Hole: none, no walls; bit at md = {shown.told(scene.bit_depth, 'm')}, the string hangs vertically."
         return

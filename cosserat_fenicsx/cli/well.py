@@ -86,6 +86,7 @@ def explain(options, scene):
     shown = Units(units_of(options))
     lines = [scene.title] if scene.title else []
     lines += [scene.hole.path_in_words(shown), *scene.hole.sections_in_words(shown)]
+    lines += [] if scene.mud is None else [scene.mud.in_words()]
     lines += scene.string.in_words(scene.settings.get("depth", scene.hole.length), scene.mud, shown)
     for operation in scene.operations:
         on_bit = f"{shown.told(operation.weight, 'N')} and {shown.told(operation.torque, 'N m')}"

@@ -235,6 +235,10 @@ class Mud(Part):
                 "gallon 10 * units.ppg = 1198"
             )
 
+    def in_words(self):
+        """A sentence on its density."""
+        return f"Mud: {self.density:g} kg/m^3, {self.density / in_si('mud', '1 ppg', 'density'):.4g} ppg."
+
     def along(self, rod: Rod, outer: float | None = None, inner: float | None = None) -> tuple:
         """Actions of the mud on a moving rod: an `AddedMass`, across the rod alone, and a `LinearDrag`, if they are not
         zero.

@@ -21,9 +21,9 @@ from cosserat_fenicsx.results.result import import_library
 
 # Names of the same column in files.
 _NAMES = (
-    ("md", "measured depth", "meas depth", "meas. depth", "depth md", "md depth"),
-    ("inc", "incl", "inclination"),
-    ("azi", "az", "azim", "azimuth"),
+    ("md", "measured depth", "meas depth", "meas. depth", "depth md", "md depth", "hole depth", "survey depth"),
+    ("inc", "incl", "inclination", "inc.", "incl."),
+    ("azi", "az", "azm", "azim", "azimuth", "azi.", "azm.", "azi true", "azi grid", "azimuth true", "azimuth grid"),
 )
 # Units in headings: of lengths, m; of angles, whether it is a degree.
 _LENGTHS = {
