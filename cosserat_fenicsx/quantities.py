@@ -3,6 +3,7 @@
 A class of results says its quantities once; files, tables, data frames and charts follow from them.
 """
 
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -23,6 +24,10 @@ _PREFIXED = {
     "W": {"W": 1.0, "kW": 1e3, "MW": 1e6},
     "m": {"mm": 1e-3, "m": 1.0},
 }
+# Numbers, also "a to b", with a unit in a sentence, and no longer unit after it.
+_NUMBER = r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?"
+_WITH_UNIT = re.compile(rf"(?<![\w.])({_NUMBER})(?: (to|and) ({_NUMBER}))? (m|k?N m|k?N|kJ)(?![\w/^]| m\b| s\b)")
+_SI = {"kN m": ("N m", 1e3), "kN": ("N", 1e3), "kJ": ("J", 1e3)}
 # Numbers below this are written without an exponent.
 _PLAIN = 1e7
 #: Lengths (m) are shown in mm only below this.
@@ -145,6 +150,21 @@ class Units:
         """A number with its unit: one in an SI unit, of a dimension where several have that unit, as text."""
         shown, size = self.of(Quantity("number", unit=unit, dimension=dimension))
         return f"{value / size:{form}} {shown}"
+
+    def sentence(self, text: str) -> str:
+        """A sentence with its lengths, forces, moments and energies in these units, with as many digits as it has, at
+        least three."""
+        return text if self.si else _WITH_UNIT.sub(self._again, text)
+
+    def _again(self, found):
+        first, word, second, unit = found.groups()
+        si, size = _SI.get(unit, (unit, 1.0))
+        shown, other = self.of(Quantity("number", unit=si))
+        if shown == si:  # none was chosen
+            return found[0]
+        digits = [max(3, len(re.sub(r"e.*|\D", "", x).lstrip("0"))) for x in (first, second) if x]
+        told = [as_text(float(x) * size / other, n) for x, n in zip(filter(None, (first, second)), digits, strict=True)]
+        return f"{f' {word} '.join(told)} {shown}"
 
     def on_screen(self, quantity: Quantity, values: Any = ()) -> tuple[str, float]:
         """The unit of a quantity in tables and charts, and its size in the result's unit: SI units have the prefix that

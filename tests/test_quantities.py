@@ -53,6 +53,16 @@ def test_prefixes_on_the_screen():
     assert Units().on_screen(Quantity("speed", unit="rad/s", shown="rpm"), [1.0]) == ("rpm", units.rpm)
 
 
+@pytest.mark.parametrize(("text", "told"), [
+    ("md = 304.8 to 609.6 m, 44.48 kN", "md = 1000 to 2000 ft, 10 klbf"),
+    ("5 N m s/rad, 3 m/s, 2 N/m, 4 mm, 7 modes", "5 N m s/rad, 3 m/s, 2 N/m, 4 mm, 7 modes"),
+    ("to 0.14 N m", "to 0.103 ft-lbf"),
+])  # fmt: skip
+def test_sentences_in_field_units(text, told):
+    assert Units("field").sentence(text) == told and Units().sentence(text) == text
+    assert Units({"length": "m"}).sentence("3.1 m") == "3.1 m" and Units({"m": "ft"}).sentence("1 kN") == "1 kN"
+
+
 def test_columns_and_values():
     place = Quantity("position", unit="m", parts="xyz", frame="inertial")
     values = np.array([[1.0, 2.0, 3.0]]) * units.foot

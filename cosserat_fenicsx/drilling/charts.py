@@ -14,6 +14,7 @@ from cosserat_fenicsx.errors import SceneError, nearest
 from cosserat_fenicsx.pictures.charts import (
     COLOURS,
     STYLES,
+    chosen_unit,
     draw_chart,
     empty_figure,
     ledger,
@@ -21,10 +22,10 @@ from cosserat_fenicsx.pictures.charts import (
     room_for,
     scale,
     stacked,
+    unit_of,
 )
 from cosserat_fenicsx.quantities import Quantity
 from cosserat_fenicsx.ranks import world
-from cosserat_fenicsx.units import rpm
 
 _SPEED = Quantity("speed", unit="rad/s", shown="rpm")
 _TORQUE = Quantity("torque", unit="N m", shown="kN m")
@@ -124,30 +125,35 @@ def _some(times):
 
 
 def title_of(history):
-    """Model, drive, block and bit, for titles; gains of a PI control over the impedance: 1 of SoftTorque, 4 of
-    SoftSpeed."""
+    """Model, drive, block and bit, for titles; gains that no rule chose over the impedance of the string."""
     bit, words = history.scene.bit, []
     if turns(history) or not is_axial(history):
         words.append(_words_on_drive(history.scene))
     block = velocity_of_block(history, _some(history.times))
     if is_axial(history) and block.any():
         steady = np.ptp(block) < 1e-9 * np.abs(block).max()
-        way, fastest = "down" if block[0] > 0 else "up", f"{np.abs(block).max():.4g} m/s"
+        unit, size = chosen_unit("m/s")
+        way, fastest = "down" if block[0] > 0 else "up", f"{np.abs(block).max() / size:.4g} {unit}"
         words.append(f"block {way} at {fastest}" if steady else f"block moves at up to {fastest}")
     words.append("off bottom" if bit is None else f"{type(bit.law).__name__} bit")
     if bit is not None and bit.weight:
-        words.append(f"{bit.weight / 1e3:.4g} kN on bit")
+        unit, size = unit_of(_WEIGHT)
+        words.append(f"{bit.weight / size:.4g} {unit} on bit")
     return f"{history.model}: {', '.join(words)}"
 
 
 def _words_on_drive(scene):
     drive = scene.drive
     control = type(drive.control).__name__
-    if isinstance(drive.control, PI):
+    if isinstance(drive.control, PI) and drive.control.rule:
+        control = drive.control.rule
+    elif isinstance(drive.control, PI):
         Kp = drive.control.Kp
         impedance = None if scene.discs else scene.segments[0].torsional_impedance
-        control = f"PI (Kp = {Kp / impedance:.3g} impedances)" if impedance else f"PI (Kp = {Kp:.4g} N m s/rad)"
-    asked = f" at {drive.signal()(0.0) / rpm:.4g} rpm" if drive.signal().constant and drive.speed is not None else ""
+        told = f"{Kp / impedance:.3g} impedances" if impedance else f"{Kp:.4g} N m s/rad"
+        control = f"{control} (Kp = {told})"
+    rpm, size = unit_of(_SPEED)
+    asked = f" at {drive.signal()(0.0) / size:.4g} {rpm}" if drive.signal().constant and drive.speed is not None else ""
     return f"{control} drive{asked}"
 
 

@@ -8,12 +8,11 @@ from cosserat_fenicsx.checks import File, number
 from cosserat_fenicsx.drilling.protocol import LEDGER, PROFILE, SERIES
 from cosserat_fenicsx.drilling.scene import Drilling
 from cosserat_fenicsx.drilling.segments import Discs
-from cosserat_fenicsx.drilling.stick_slip import StickSlip, alias, stick_slip_of
+from cosserat_fenicsx.drilling.stick_slip import SPEED, TORQUE, StickSlip, alias, stick_slip_of
 from cosserat_fenicsx.errors import SceneError
-from cosserat_fenicsx.quantities import Quantity
+from cosserat_fenicsx.quantities import Quantity, as_text
 from cosserat_fenicsx.results import screen
 from cosserat_fenicsx.results.result import Result, by_name
-from cosserat_fenicsx.units import rpm
 
 #: Columns of the rows of a `StringModel`.
 COLUMNS = ("times", *SERIES, *LEDGER)
@@ -186,24 +185,28 @@ class DrillingHistory(Result):
 
     def _answer(self, units):
         if len(self) > 5:
-            yield str(self.stick_slip())
+            yield self.stick_slip().summary(units)
         if self.errors is not None:
             period, peak, *torques = self.errors
+            (rpm, turning), (moment, size) = (units.on_screen(x) for x in (SPEED, TORQUE))
             first = "" if np.isnan(period) else f"period {period:.2g} s, "
             yield (
-                f"Estimated errors by the step: {first}peak {peak / rpm:.2g} rpm, surface torque "
-                f"{max(torques) / 1e3:.2g} kN m."
+                f"Estimated errors by the step: {first}peak {peak / turning:.2g} {rpm}, surface torque "
+                f"{max(torques) / size:.2g} {moment}."
             )
         caution = alias(self)
         if caution:
             yield f"{caution[0].upper()}{caution[1:]}."
-        yield from self.why[:1]
+        yield from map(units.sentence, self.why[:1])
 
     def _more(self, units):
         if len(self) > 5:
             worked = {name: np.nan_to_num(getattr(self, f"work_of_{name}")[-1]) for name in ("drive", "hook", "weight")}
-            done = ", ".join(f"of the {name} {x / 1e3:.5g} kJ" for name, x in worked.items() if x or name == "drive")
-            yield f"Energy: work {done}; the ledger does not account for {self.balance[-1] / 1e3:.3g} kJ."
+            unit, size = units.on_screen(Quantity("energy", unit="J", shown="kJ"))
+            done = ", ".join(
+                f"of the {name} {as_text(x / size, 5)} {unit}" for name, x in worked.items() if x or name == "drive"
+            )
+            yield f"Energy: work {done}; the ledger does not account for {self.balance[-1] / size:.3g} {unit}."
         impulse = np.nan_to_num(self.impulse_on_bit)
         if len(impulse) and impulse[-1]:
             each = np.diff(impulse, prepend=0.0)
@@ -211,7 +214,7 @@ class DrillingHistory(Result):
                 f"Impacts of the bit on rigid rock: the largest impulse {each.max():.4g} N s, at t = "
                 f"{self.times[each.argmax()]:.5g} s, together {impulse[-1]:.4g} N s; the weight on bit is without them."
             )
-        yield from self.why[1:]
+        yield from map(units.sentence, self.why[1:])
 
     def _table(self, units, rows):
         if not len(self):

@@ -1,13 +1,15 @@
 """Starts, stops, period and peaks of the motion of a bit, and their errors by the time step."""
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from cosserat_fenicsx.drilling.protocol import SERIES
 from cosserat_fenicsx.errors import NotConverged, SceneError
+from cosserat_fenicsx.quantities import Quantity, Units
 
+SPEED, TORQUE = Quantity("speed", unit="rad/s", shown="rpm"), Quantity("torque", unit="N m", shown="kN m")
 #: A bit below this share of the drive's mean speed is at rest (the laws hold it at zero exactly).
 AT_REST = 1e-6
 # A bit that has started reaches this share.
@@ -52,17 +54,26 @@ class StickSlip:
         return len(self.starts) > 1 or self.stuck > 0.01
 
     def __str__(self):
+        return self.summary()
+
+    def summary(self, units: Any = "SI") -> str:
+        """The motion in a sentence, in some units: "SI", "field" or a dict of units by dimensions.
+
+        Raises:
+            SceneError: unknown units.
+        """
+        (rpm, turning), (moment, size) = (Units(units).on_screen(x) for x in (SPEED, TORQUE))
         if max(self.peak, -self.least, abs(self.drive)) == 0:
             return f"From {self.since:g} to {self.until:g} s neither drive nor bit turns."
-        rpm = 30 / np.pi
-        speed = f"bit speed {self.least * rpm:.4g} to {self.peak * rpm:.4g} rpm, mean {self.mean * rpm:.4g} rpm"
+        least, peak, mean = (x / turning for x in (self.least, self.peak, self.mean))
+        speed = f"bit speed {least:.4g} to {peak:.4g} {rpm}, mean {mean:.4g} {rpm}"
         if not self.sticks:
             what = f"no stick-slip: {speed}, severity {self.severity:.3g}"
         else:
             again = "" if np.isnan(self.period) else f"period {self.period:.5g} s, "
             what = f"stick-slip: {again}{speed}, at rest {100 * self.stuck:.3g} % of the time"
-        low, high = (x / 1e3 for x in self.torque)
-        return f"From {self.since:g} to {self.until:g} s: {what}; surface torque {low:.4g} to {high:.4g} kN m."
+        low, high = (x / size for x in self.torque)
+        return f"From {self.since:g} to {self.until:g} s: {what}; surface torque {low:.4g} to {high:.4g} {moment}."
 
 
 def crossings(times, speed, level, fast):
