@@ -15,6 +15,7 @@ from cosserat_fenicsx.drilling.bit_laws import RockSurface
 from cosserat_fenicsx.drilling.elements import AxialTorsional
 from cosserat_fenicsx.drilling.laws import check_bit
 from cosserat_fenicsx.drilling.linear.impedances import axial, torsional
+from cosserat_fenicsx.quantities import Units
 
 pytestmark = [pytest.mark.serial, pytest.mark.once]
 BAND = 60 / (2 * math.pi)  # Hz, of the reference
@@ -86,6 +87,13 @@ def test_a_drive_calms_the_first_mode_and_leaves_the_collars():
     text = answer.details()
     assert "SoftSpeed calms 0.191" in text and "densest in the collar" in answer.shape(collars).where
     assert "8.137 Hz moves" in text
+    short = answer.summary("field")
+    weight = float(answer.weights[0]) / cf.units.kip
+    assert f"rpm, {weight:.4g} klbf on bit" in short and "kN" not in short and "(klbf)" in short
+    headings = [column.header for column in answer._table(Units("field"), 12).columns]
+    assert headings[2:7] == [
+        "largest growth", "middle case (rpm)", "middle case (klbf)", "frequency there (Hz)", "growth there"
+    ]  # fmt: skip
 
 
 def test_a_tuned_drive_is_one_drive_whoever_tells_of_it():
@@ -109,7 +117,7 @@ def test_a_tuned_drive_is_one_drive_whoever_tells_of_it():
     columns, k = own.with_drives(0), own.unstable(0)[0]
     assert (columns["SoftSpeed"] == own.growth[0, 0]).all()
     text = own.details()
-    assert "SoftSpeed (own)" in text and "of the scene, SoftSpeed." in " ".join(text.split())
+    assert "(own)" in text and "of the scene, SoftSpeed." in " ".join(text.split())
     for other in (told(torque), told(cf.drilling.PI(38e3, 1e5))):
         near = int(np.abs(other.frequency[0, 0] - own.frequency[0, 0, k]).argmin())
         assert other.with_drives(0)["SoftSpeed"][near] == pytest.approx(own.growth[0, 0, k], rel=1e-9)

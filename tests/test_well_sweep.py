@@ -5,7 +5,7 @@ import json
 import math
 import os
 import signal
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -143,6 +143,8 @@ def test_lock_up_in_a_sweep_is_told():
     assert found.values["locked"][0, 0, 2] == pytest.approx(11000 - 9688.9, abs=1) and found.done.all()
     assert "locks up at md = 1311" in str(found) and found.models[0, 0].tolist() == ["buckled"] * 2 + [""]
     assert "bit at 9687 m: BEYOND WHAT ANY PIPE CARRIES" in str(found)
+    notes = found.columns("field")["notes"]
+    assert "bit at 36089.2 ft: locks up at md = 4301.5 ft" in found.summary("field") and "4301.5 ft" in notes[2]
 
 
 def measured(noise, block=0.0):
@@ -248,6 +250,28 @@ def test_charts(tmp_path):
     assert len(rows) == 6 and rows[0].startswith('depth (m),"trip out, friction 0.1: hook load (N)"')
     assert ": model" in rows[0] and "soft" in rows[1] and "model: soft" in str(found)
     assert float(rows[5].split(",")[1]) == pytest.approx(found.hook_load[0, 0, 4])
+
+
+def test_torques_below_their_error_are_shown_as_none():
+    """A string that slides with the torque of a motor, and one that is tripped: what the rod leaves of a torque is not
+    enlarged by an axis, and the friction of a string that rotates off bottom is none."""
+    pytest.importorskip("matplotlib")
+    answer = cf.well.torque_and_drag(HOLE, STRING, cf.well.Sliding(1e5, torque=2e3), mud=MUD, model="soft")
+    solved = answer.solved._replace(
+        torque=answer.solved.torque
+        + 0.05 * np.sin(np.arange(answer.solved.torque.size)).reshape(answer.solved.torque.shape)
+    )
+    panel = replace(answer, solved=solved).plot(units="field").axes[2]
+    panel.figure.canvas.draw()
+    low, high = panel.get_xlim()
+    assert high - low > 100 and low < 2e3 / cf.units.ft_lbf < high and not panel.xaxis.get_offset_text().get_text()
+    tripped = cf.well.torque_and_drag(HOLE, STRING, cf.well.TripOut(), mud=MUD, model="soft")
+    noisy = replace(tripped, solved=tripped.solved._replace(torque=0.05 + 0 * tripped.solved.torque))
+    assert "surface torque 0 ft-lbf" in " ".join(noisy.plot(units="field")._suptitle.get_text().split())
+    assert "surface torque 0 ft-lbf" in noisy.summary("field") and "torque (" not in noisy.summary("field")
+    off = cf.well.torque_and_drag(HOLE, STRING, cf.well.RotateOffBottom(), mud=MUD, model="soft")
+    off = replace(off, error=1e-4, solved=off.solved._replace(tension=off.solved.tension * (1 + 5e-5)))
+    assert off.drag > 10 and "(no drag)" in off.summary("field")
 
 
 def test_tables_of_pandas():

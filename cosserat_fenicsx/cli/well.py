@@ -6,9 +6,11 @@ from functools import partial
 
 from cosserat_fenicsx.cli.output import deliver, given, output_of, refuse_of_rods, units_of
 from cosserat_fenicsx.cli.say import DONE, say
+from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.quantities import Units
 from cosserat_fenicsx.ranks import on_first, world
 from cosserat_fenicsx.storage.store import discard
+from cosserat_fenicsx.well.buckled import LockUp
 from cosserat_fenicsx.well.scenefile import TorqueAndDragSettings
 
 # Ends of the names of files of an operation, and names of those of a sweep.
@@ -53,7 +55,7 @@ def run(options, scene, tables):
         }
 
     for operation, stem in zip(scene.operations, stems, strict=True):
-        solved = partial(scene.answer, operation)
+        solved = partial(_solved, scene, operation, Units(units))
         code = deliver(solved, options, names, partial(files_of, stem), tables, obeys=False)
         if code != DONE:
             return code
@@ -72,6 +74,14 @@ def run(options, scene, tables):
         return {"depth_sweep.csv": partial(sweep.write, units=units), "depth_sweep.png": chart}
 
     return deliver(swept, options, names, files_of_sweep, tables, obeys=False)
+
+
+def _solved(scene, operation, shown):
+    """The answer of an operation; a lock-up is told in the units that are shown."""
+    try:
+        return scene.answer(operation)
+    except LockUp as locked:
+        raise SceneError(shown.sentence(str(locked))) from None
 
 
 def _stems(operations):

@@ -8,7 +8,7 @@ import numpy as np
 
 from cosserat_fenicsx.checks import finite_array, refuse
 from cosserat_fenicsx.drilling.protocol import LEDGER
-from cosserat_fenicsx.drilling.stick_slip import AT_REST, alias, turns
+from cosserat_fenicsx.drilling.stick_slip import AT_REST, SPEED, TORQUE, WEIGHT, alias, turns
 from cosserat_fenicsx.drilling.top_drive import PI, Hook
 from cosserat_fenicsx.errors import SceneError, nearest
 from cosserat_fenicsx.pictures.charts import (
@@ -27,15 +27,12 @@ from cosserat_fenicsx.pictures.charts import (
 from cosserat_fenicsx.quantities import Quantity
 from cosserat_fenicsx.ranks import world
 
-_SPEED = Quantity("speed", unit="rad/s", shown="rpm")
-_TORQUE = Quantity("torque", unit="N m", shown="kN m")
 _FORCE = Quantity("force", unit="N", shown="kN")
-_WEIGHT = Quantity("weight on bit", unit="N", shown="kN")
 _DEPTH = Quantity("measured depth", unit="m", shown="m", dimension="length")
 #: {name: (quantity, whether it has values of either sign)} of what maps show.
 MAPPED = {
     "speed": (Quantity("speed of rotation", unit="rad/s", shown="rpm"), False),
-    "torque": (_TORQUE, True),
+    "torque": (TORQUE, True),
     "angle": (Quantity("turns"), False),
     "tension": (Quantity("tension", unit="N", shown="kN"), True),
     "displacement": (Quantity("displacement downwards", unit="m", shown="mm", dimension="diameter"), True),
@@ -137,7 +134,7 @@ def title_of(history):
         words.append(f"block {way} at {fastest}" if steady else f"block moves at up to {fastest}")
     words.append("off bottom" if bit is None else f"{type(bit.law).__name__} bit")
     if bit is not None and bit.weight:
-        unit, size = unit_of(_WEIGHT)
+        unit, size = unit_of(WEIGHT)
         words.append(f"{bit.weight / size:.4g} {unit} on bit")
     return f"{history.model}: {', '.join(words)}"
 
@@ -152,7 +149,7 @@ def _words_on_drive(scene):
         impedance = None if scene.discs else scene.segments[0].torsional_impedance
         told = f"{Kp / impedance:.3g} impedances" if impedance else f"{Kp:.4g} N m s/rad"
         control = f"{control} (Kp = {told})"
-    rpm, size = unit_of(_SPEED)
+    rpm, size = unit_of(SPEED)
     asked = f" at {drive.signal()(0.0) / size:.4g} {rpm}" if drive.signal().constant and drive.speed is not None else ""
     return f"{control} drive{asked}"
 
@@ -167,8 +164,8 @@ def _panels(history, rows):
     advance = line("bit_advance", None, BIT)
     shown = advance_unit(advance[0])[0]
     panels = [
-        (_SPEED, [line("drive_speed", "drive", DRIVE), line("bit_speed", lower, BIT)]),
-        (_TORQUE, [line("surface_torque", "at the surface", DRIVE), line("torque_on_bit", "on bit", BIT)]),
+        (SPEED, [line("drive_speed", "drive", DRIVE), line("bit_speed", lower, BIT)]),
+        (TORQUE, [line("surface_torque", "at the surface", DRIVE), line("torque_on_bit", "on bit", BIT)]),
         (_FORCE, [line("hook_load", "hook load", DRIVE), line("weight_on_bit", "weight on bit", BIT)]),
         (Quantity("impulse", unit="N s"), [line("impulse_on_bit", "impacts on rigid rock, their sum", BIT)]),
         (Quantity(f"advance of the {lower}", unit="m", shown=shown, dimension="length"), [advance]),
@@ -236,7 +233,7 @@ def draw_phase(history, since=None):
     figure = empty_figure(6.5, 5.5)
     panel = figure.subplots()
     lower = lower_end(history)
-    heading, size = scale(replace(_SPEED, label=f"speed of the {lower}"))
+    heading, size = scale(replace(SPEED, label=f"speed of the {lower}"))
     panel.plot(twist, history.bit_speed[rows] / size, color=BIT, label=lower)
     panel.axhline(float(history.drive_speed[rows].mean()) / size, color=DRIVE, label="drive, mean speed")
     panel.set(xlabel=f"twist between drive and {lower} (rad)", ylabel=heading)
@@ -347,7 +344,7 @@ def _maps(answer, modes):
     speeds, weights = np.argsort(answer.speeds), np.argsort(answer.weights)
     largest = max(float(np.nanmax(np.abs(answer.growth[:, :, modes]))), 1e-12)
     colours = SymLogNorm(largest / 30, vmin=-largest, vmax=largest)  # so that the sign is seen near the limit
-    (along, turning), (across, pressing) = scale(_SPEED), scale(_WEIGHT, answer.weights)
+    (along, turning), (across, pressing) = scale(SPEED), scale(WEIGHT, answer.weights)
     for panel, k in zip(axes.flat, modes, strict=False):
         growth = answer.growth[np.ix_(speeds, weights, [k])][:, :, 0].T
         x, y = answer.speeds[speeds] / turning, answer.weights[weights] / pressing
@@ -372,7 +369,7 @@ def _lines(answer, modes):
     panel = figure.subplots()
     by_speed = len(answer.weights) == 1
     x = answer.speeds if by_speed else answer.weights
-    heading, size = scale(_SPEED if by_speed else _WEIGHT, x)
+    heading, size = scale(SPEED if by_speed else WEIGHT, x)
     order = np.argsort(x)
     for n, k in enumerate(modes):
         growth = (answer.growth[:, 0, k] if by_speed else answer.growth[0, :, k])[order]
@@ -389,7 +386,7 @@ def draw_campbell(answer):
     """See `Campbell.plot`."""
     figure = empty_figure(7.0, 5.0)
     panel = figure.subplots()
-    heading, size = scale(_SPEED)
+    heading, size = scale(SPEED)
     fastest = answer.fastest / size
     for n, (kind, frequencies) in enumerate(answer.frequencies.items()):
         for i, frequency in enumerate(frequencies):
@@ -414,7 +411,7 @@ def draw_bounce(answer):
     figure = empty_figure(7.0, 4.2)
     panel = figure.subplots()
     order, weight = np.argsort(answer.speeds), answer.scene.bit.weight
-    (along, turning), (across, pressing) = scale(_SPEED), scale(_WEIGHT, answer.amplitude, weight)
+    (along, turning), (across, pressing) = scale(SPEED), scale(WEIGHT, answer.amplitude, weight)
     x, y = answer.speeds[order] / turning, answer.amplitude[order] / pressing
     panel.plot(x, y, color="tab:blue", label="amplitude of the weight on bit")
     panel.axhline(weight / pressing, color="black", linestyle="--", label="static weight on bit")

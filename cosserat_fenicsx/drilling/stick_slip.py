@@ -10,6 +10,7 @@ from cosserat_fenicsx.errors import NotConverged, SceneError
 from cosserat_fenicsx.quantities import Quantity, Units
 
 SPEED, TORQUE = Quantity("speed", unit="rad/s", shown="rpm"), Quantity("torque", unit="N m", shown="kN m")
+WEIGHT = Quantity("weight on bit", unit="N", shown="kN")
 #: A bit below this share of the drive's mean speed is at rest (the laws hold it at zero exactly).
 AT_REST = 1e-6
 # A bit that has started reaches this share.

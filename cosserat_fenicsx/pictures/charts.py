@@ -27,6 +27,7 @@ GREY = "0.45"
 #: Settings of matplotlib for all charts; size of the font of notes within a panel, points.
 STYLE = {"font.size": 9, "axes.titlesize": 9, "legend.fontsize": 8, "figure.titlesize": 10, "axes.grid": True,
          "grid.alpha": 0.3, "legend.frameon": False, "legend.borderaxespad": 0.2, "lines.linewidth": 1.2,
+         "axes.formatter.useoffset": False,
          "figure.constrained_layout.h_pad": 0.05}  # fmt: skip
 SMALL = 7.5
 # Default dots per inch; minimum, at which the smallest font has 9 pixels; allowed widths, pixels.

@@ -1,6 +1,6 @@
 """The answer of `torque_and_drag`: surface loads, and the state along the string."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from types import MappingProxyType
 from typing import Any, ClassVar
@@ -22,6 +22,8 @@ from cosserat_fenicsx.well.softstring import UP_TO
 
 # A torque below this share of the largest tension times the contact radius is nothing that errors are compared with.
 _LITTLE = 1e-2
+# A torque below this share of the largest tension times the contact radius is none.
+_NO_TORQUE = 1e-4
 
 
 def _axis_of_hole(k):
@@ -121,6 +123,15 @@ class TorqueAndDrag(Differentiated, Result):
     laid: Any
     pieces: Any
     solved: Any
+
+    @property
+    def quantities(self):
+        """{name: `Quantity`}, see `Result.quantities`; friction and torques up to their estimated errors are noise."""
+        known, (tension, torque) = super().quantities, scales_of(self.solved, self.pieces)
+        error, least = np.nan_to_num(self.error), _NO_TORQUE * tension * self.pieces.radius.max()
+        noise = {"drag": error * tension} | dict.fromkeys(("surface_torque", "torque"), max(error * torque, least))
+        known.update({x: replace(known[x], noise=max(known[x].noise, float(size))) for x, size in noise.items()})
+        return known
 
     @property
     def enough(self) -> bool:

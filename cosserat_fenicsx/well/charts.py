@@ -215,6 +215,8 @@ def fit_figure(fit):
 
 # Smallest ranges of the axes: side force (N/m), forces at points and moment (N, N m).
 _LEAST_SIDE, _LEAST = 1.0, 100.0
+# Least range of the axis of torque, of the largest one: it does not enlarge what the solution leaves.
+_LEAST_SHARE = 0.1
 # Most forces at points with numbers.
 _LABELS = 20
 _ACROSS = Quantity("across", unit="m", shown="mm", dimension="diameter")
@@ -233,7 +235,8 @@ def answer_figure(answer, between=None):
     and at points where there are such forces; bending moment where it is known; see `TorqueAndDrag.plot`."""
     top, bottom = depths_between("plot", between, answer.depth)
     points = points_between(answer, top, bottom)
-    turns = np.abs(answer.torque).max() > 1e-4 * np.abs(answer.tension).max() * answer.pieces.radius.max()
+    noise = answer.quantities["torque"].noise
+    turns = np.abs(answer.torque).max() > noise
     bends = np.nanmax(answer.bending_moment, initial=0.0) > 0
     draws = [_string, _tension, *([_torque] if turns else []), _side_force]
     draws += [*([_at_points] if points else []), *([_bending] if bends else [])]
@@ -251,10 +254,11 @@ def answer_figure(answer, between=None):
         _shoe(panels, depth / length, name)
     legend(*panels)
     (force_unit, force), (moment_unit, moment) = unit_of(_HOOK), unit_of(_SURFACE)
+    surface_torque = answer.surface_torque if abs(answer.surface_torque) > noise else 0.0
     figure.suptitle(
         f"{title_of(answer, top, bottom)}\n"
         f"hook load {_rounded(answer.hook_load / force)} {force_unit}, "
-        f"surface torque {_rounded(answer.surface_torque / moment)} {moment_unit}"
+        f"surface torque {_rounded(surface_torque / moment)} {moment_unit}"
     )
     return figure
 
@@ -363,7 +367,11 @@ def _tension(panel, answer, rows, depth):
 
 def _torque(panel, answer, rows, depth):
     heading, size = scale(_TORQUE)
-    panel.plot(answer.torque[rows] / size, depth, color="black")
+    torque = answer.torque[rows]
+    torque = np.where(np.abs(torque) > answer.quantities["torque"].noise, torque, 0.0) / size
+    panel.plot(torque, depth, color="black")
+    room = max(0.0, _LEAST_SHARE * np.abs(answer.torque).max() / size - np.ptp(torque)) / 2
+    panel.set_xlim(*np.array([torque.min() - room, torque.max() + room]) + np.ptp(torque) * np.array([-0.05, 0.05]))
     panel.set_xlabel(f"{heading}\nconvention: {answer.torque_convention}")
 
 

@@ -106,10 +106,12 @@ class DepthSweep(Result):
         """The name of the coefficients of friction j."""
         return f"friction {_as_text(self.friction[j]) or 'of the hole'}"
 
-    def noted(self, k: int | None = None) -> list[str]:
+    def noted(self, k: int | None = None, units: str | Mapping | Units = "SI") -> list[str]:
         """The notes in words, with operation, friction and depth; those of depth k alone where it is given."""
+        units = Units(units)
         return [
-            f"{self.label(*index[:2])}, bit at {self.depths[index[2]]:g} m: {note}"
+            f"{self.label(*index[:2])}, bit at {self._told('depth', units, self.depths[index[2]])}: "
+            + units.sentence(note)
             for index, note in sorted(self.notes.items())
             if k in (None, index[2])
         ]
@@ -117,6 +119,8 @@ class DepthSweep(Result):
     def columns(self, units: str | Mapping = "SI", axis: str = "") -> dict[str, np.ndarray]:
         """{heading: (depths,)} of loads and models of each operation and friction, and notes."""
         found, units, known = super().columns(units, axis), Units(units), self.quantities
+        if "notes" in found:
+            found["notes"] = np.array(["; ".join(self.noted(k, units)) for k in range(len(self.depths))])
         notes = found.pop("notes", None)
         for i in range(len(self.operations)):
             for j in range(len(self.friction)):

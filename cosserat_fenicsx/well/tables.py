@@ -70,7 +70,7 @@ def _shown(answer):
 def answer_in_words(answer, units):
     """Sentences: surface loads, whether the model is enough, cautions, buckling, and why this model."""
     friction = "no drag"
-    if abs(answer.drag) > 1e-9 * abs(answer.hook_load):
+    if abs(answer.drag) > max(1e-9 * abs(answer.hook_load), answer.quantities["drag"].noise):
         friction = f"friction {answer._told('drag', units, form='+.6g')}"
     yield (
         f"{answer.operation.name}, bit at {answer._told('md', units, answer.depth)}: hook load "
@@ -90,11 +90,11 @@ def answer_in_words(answer, units):
         if found:
             unit = units.on_screen(answer.quantities["md"])[0]
             yield f"{criteria.STATES[state]} buckling at md = {', '.join(found)} {unit}."
-    yield f"{answer.model}: {answer.why[0]}."
+    yield units.sentence(f"{answer.model}: {answer.why[0]}.")
     last = len(answer.why) - 1  # why a model that is not enough was not followed by a better one
     for i, line in enumerate(answer.why[1:], start=1):
         if _WARNS.search(line) or "lock up" in line or (i == last and not answer.enough):
-            yield f"{line}."
+            yield units.sentence(f"{line}.")
 
 
 def more_in_words(answer, units):
@@ -130,7 +130,7 @@ def more_in_words(answer, units):
                 f"hook load and surface torque have their own estimated errors, {answer.error:.0e}. A smaller tol "
                 "helps, but not where the end of a contact or component, or a survey station, is near"
             )
-    yield f"{answer.model}: {'; '.join(answer.why)}."
+    yield units.sentence(f"{answer.model}: {'; '.join(answer.why)}.")
 
 
 def _without_bit(answer):
@@ -170,7 +170,7 @@ def _on_bit(answer, units):
 def sweep_in_words(sweep, units):
     """Sentences: what was found, notes, and the largest error of a model."""
     yield f"{len(sweep)} of {sweep.done.size} answers over {len(sweep.depths)} depths of the bit."
-    notes, most = sweep.noted(), 12
+    notes, most = sweep.noted(units=units), 12
     yield from notes[:most]
     if len(notes) > most:
         yield f"and {len(notes) - most} more, see `notes`"

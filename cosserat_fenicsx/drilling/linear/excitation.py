@@ -13,7 +13,8 @@ from cosserat_fenicsx.drilling.linear.characteristic import speeds_and_weights
 from cosserat_fenicsx.drilling.linear.frequencies import natural_frequencies
 from cosserat_fenicsx.drilling.linear.impedances import axial
 from cosserat_fenicsx.drilling.scene import Drilling
-from cosserat_fenicsx.quantities import Quantity
+from cosserat_fenicsx.drilling.stick_slip import SPEED, WEIGHT
+from cosserat_fenicsx.quantities import Quantity, Units
 from cosserat_fenicsx.results.result import Result, by_name
 
 
@@ -91,8 +92,9 @@ class Campbell(_Drawn):
         return np.array([row[k] for row in self._rows])
 
     def _answer(self, units):
+        rpm, turning = units.on_screen(SPEED)
         found = " and ".join(f"{len(x)} of {kind}" for kind, x in self.frequencies.items())
-        yield f"{len(self)} critical speeds up to {self.fastest * 30 / math.pi:.4g} rpm."
+        yield f"{len(self)} critical speeds up to {self.fastest / turning:.4g} {rpm}."
         yield f"Natural frequencies up to {self.up_to:.4g} Hz: {found}; excitations: {', '.join(self.excitations)}."
 
 
@@ -174,10 +176,14 @@ class BitBounce(_Drawn):
         return np.array([brentq(excess, speeds[k], speeds[k + 1], xtol=1e-12) for k in changes])
 
     def __repr__(self):
-        lifted = self.speeds[self.lifts_off]
-        rpm = lifted * 30 / math.pi
+        return f"<BitBounce: {self._lifted(Units())}>"
+
+    def _lifted(self, units):
+        """Where the bit lifts off, in words."""
+        rpm, turning = units.on_screen(SPEED)
+        lifted = self.speeds[self.lifts_off] / turning
         text = f"the bit lifts off at {len(lifted)} of {len(self.speeds)} speeds"
-        return f"<BitBounce: {text}" + (f", from {rpm.min():.4g} to {rpm.max():.4g} rpm>" if len(lifted) else ">")
+        return text + (f", from {lifted.min():.4g} to {lifted.max():.4g} {rpm}" if len(lifted) else "")
 
     _chart = "draw_bounce"
     axis = _rows_axis = "speed"
@@ -192,7 +198,8 @@ class BitBounce(_Drawn):
         return len(self.speeds)
 
     def _answer(self, units):
-        yield f"{repr(self)[12:-1]}; the static weight on bit is {self.scene.bit.weight / 1e3:.4g} kN."
+        unit, size = units.on_screen(WEIGHT)
+        yield f"{self._lifted(units)}; the static weight on bit is {self.scene.bit.weight / size:.4g} {unit}."
 
 
 def bit_bounce(scene: Drilling, speeds: Numbers) -> BitBounce:

@@ -13,6 +13,7 @@ from cosserat_fenicsx.drilling.linear.characteristic import Steady, box_up_to, o
 from cosserat_fenicsx.drilling.linear.frequencies import SoftSpeed, SoftTorque, natural_frequencies, own_rule, with_rule
 from cosserat_fenicsx.drilling.linear.roots import all_roots, follow
 from cosserat_fenicsx.drilling.scene import Drilling
+from cosserat_fenicsx.drilling.stick_slip import SPEED, WEIGHT
 from cosserat_fenicsx.drilling.top_drive import Matched, Stiff, TopDrive
 from cosserat_fenicsx.quantities import Quantity
 from cosserat_fenicsx.results.result import Result, by_name
@@ -181,15 +182,15 @@ class Stability(Result):
         return rows, len(grows)
 
     def _answer(self, units):
-        yield f"{_range(self)}, all modes up to {self.up_to:.4g} Hz."
+        yield f"{_range(self, units)}, all modes up to {self.up_to:.4g} Hz."
         yield from (f"{caution}." for caution in self.cautions)
         rows, count = self._growing
         if not rows:
             k = int(np.nanargmax(np.nanmax(self.growth, axis=(0, 1))))
             i, j = self.worst(k)
             least = f"{self.frequency[i, j, k]:.4g} Hz, which decays by {-self.growth[i, j, k]:.3g} 1/s"
-            speed, weight = _case(self, i, j)
-            yield f"No mode grows. Least damped: {least} at {speed} rpm{weight and f', {weight} kN'}."
+            (rpm, kN), (speed, weight) = (x[0] for x in _case_units(units)), _case(self, units, i, j)
+            yield f"No mode grows. Least damped: {least} at {speed} {rpm}{weight and f', {weight} {kN}'}."
             return
         yield f"{count} modes grow."
         yield from (
@@ -203,9 +204,9 @@ class Stability(Result):
         own = own_rule(self.scene)
         drive = own or type(self.scene.drive.control).__name__
         yield (
-            "growth: in 1/s. fastest: the largest of all cases. at: the middle one of those in which the mode grows, "
-            f"its frequency and growth there, with the drive of the scene, {drive}. mode: counted from 0 by frequency "
-            f"there. To the right the growth with {'each drive' if own else 'other drives'}: "
+            "growth: in 1/s. largest growth: of all cases. middle case: of those in which the mode grows; frequency and "
+            f"growth there are those of the middle case, with the drive of the scene, {drive}. mode: counted from 0 by "
+            f"frequency there. To the right the growth with {'each drive' if own else 'other drives'}: "
             f"{_words(rows[0][3])}. gone: with that drive no mode is near."
         )
         for k, i, j, _ in rows:
@@ -219,12 +220,14 @@ class Stability(Result):
             return None
         own, cases, table = own_rule(self.scene), self.growth[:, :, 0].size, Table()
         headings = [f"{name} (own)" if name == own else name for name in growing[0][3]]
-        for heading in ("mode", "grows in", "fastest", "at rpm", "kN", "frequency (Hz)", "growth", *headings):
+        case = [f"middle case ({unit})" for unit, _ in _case_units(units)]
+        own_growth = ("frequency there (Hz)", "growth there")
+        for heading in ("mode", "grows in", "largest growth", *case, *own_growth, *headings):
             table.add_column(heading, justify="right", no_wrap=True)
         for k, i, j, drives in growing[:rows]:
             growth = self.growth[:, :, k]
             table.add_row(
-                str(k), f"{int((growth > 0).sum())} of {cases}", f"{np.nanmax(growth):.3g}", *_case(self, i, j),
+                str(k), f"{int((growth > 0).sum())} of {cases}", f"{np.nanmax(growth):.3g}", *_case(self, units, i, j),
                 f"{self.frequency[i, j, k]:.4f}", f"{growth[i, j]:.3g}",
                 *("gone" if math.isnan(x) else f"{x:.3g}" for x in drives.values()),
             )  # fmt: skip
@@ -433,18 +436,24 @@ def _frequencies(answer, rows):
     return ", ".join(f"{answer.frequency[i, j, k]:.3g}" for k, i, j, _ in sorted(rows)) + " Hz"
 
 
-def _case(answer, i, j):
-    """Speed in rpm and weight in kN of a case, "" without one."""
+def _case_units(units):
+    """(unit, size) of speeds and of weights on bit."""
+    return units.on_screen(SPEED), units.on_screen(WEIGHT)
+
+
+def _case(answer, units, i, j):
+    """Speed and weight of a case, "" without one."""
+    (_, turning), (_, pressing) = _case_units(units)
     weight = answer.weights[j]
-    return f"{answer.speeds[i] * 30 / math.pi:.4g}", "" if math.isnan(weight) else f"{weight / 1e3:.4g}"
+    return f"{answer.speeds[i] / turning:.4g}", "" if math.isnan(weight) else f"{weight / pressing:.4g}"
 
 
-def _range(answer):
-    rpm = answer.speeds * 30 / math.pi
-    text = f"{len(rpm)} speeds from {rpm.min():.4g} to {rpm.max():.4g} rpm"
-    if np.isnan(answer.weights).all():
+def _range(answer, units):
+    (rpm, turning), (kN, pressing) = _case_units(units)
+    speeds, weights = answer.speeds / turning, answer.weights / pressing
+    text = f"{len(speeds)} speeds from {speeds.min():.4g} to {speeds.max():.4g} {rpm}"
+    if np.isnan(weights).all():
         return text
-    kN = answer.weights / 1e3
-    if len(kN) == 1:
-        return f"{text}, {kN[0]:.4g} kN on bit"
-    return f"{text}, {len(kN)} weights on bit from {kN.min():.4g} to {kN.max():.4g} kN"
+    if len(weights) == 1:
+        return f"{text}, {weights[0]:.4g} {kN} on bit"
+    return f"{text}, {len(weights)} weights on bit from {weights.min():.4g} to {weights.max():.4g} {kN}"
