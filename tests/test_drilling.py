@@ -394,21 +394,6 @@ def test_what_is_grey_is_told_and_the_drive_is_named(drawn):
     assert "PI (Kp = 2 impedances) drive at 60 rpm" in title and title.endswith(", 25 klbf on bit")
 
 
-def test_sentences_follow_the_units():
-    t = np.linspace(0, 10, 101)
-    rows = np.zeros((101, 1 + len(SERIES) + len(LEDGER)))
-    rows[:, 0] = t
-    for name, value in (("drive_speed", 6.0), ("bit_speed", 6.0), ("surface_torque", 1e4 * cf.units.ft_lbf)):
-        rows[:, 1 + SERIES.index(name)] = value
-    rows[:, 1 + len(SERIES) + LEDGER.index("work_of_drive")] = 2e5 * cf.units.ft_lbf
-    history = DrillingHistory(scene(), "torsion", ("torsion", "cells of 30.48 m at most"), 0.1, np.arange(2.0), rows)
-    told = history.details("field")
-    for words in ("surface torque 1e+04 to 1e+04 ft-lbf", "work of the drive 200000 ft-lbf", "cells of 100 ft at most"):
-        assert words in told
-    assert history.stick_slip().summary("field") in told and "kN m" not in told and "kJ" not in told
-    assert str(history.stick_slip()).endswith("surface torque 13.56 to 13.56 kN m.")
-
-
 def test_long_runs_show_bands_between_extremes(monkeypatch):
     use(monkeypatch)
     history = cf.drilling.simulate(scene(), 1000.0, dt=0.02, profile_every=10.0)

@@ -4,9 +4,12 @@ import math
 
 import numpy as np
 import pytest
+from fake_string import scene
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx import units
+from cosserat_fenicsx.drilling.history import DrillingHistory
+from cosserat_fenicsx.drilling.protocol import LEDGER, SERIES
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.quantities import Quantity, Units, as_text
 
@@ -61,6 +64,21 @@ def test_prefixes_on_the_screen():
 def test_sentences_in_field_units(text, told):
     assert Units("field").sentence(text) == told and Units().sentence(text) == text
     assert Units({"length": "m"}).sentence("3.1 m") == "3.1 m" and Units({"m": "ft"}).sentence("1 kN") == "1 kN"
+
+
+def test_sentences_follow_the_units():
+    t = np.linspace(0, 10, 101)
+    rows = np.zeros((101, 1 + len(SERIES) + len(LEDGER)))
+    rows[:, 0] = t
+    for name, value in (("drive_speed", 6.0), ("bit_speed", 6.0), ("surface_torque", 1e4 * cf.units.ft_lbf)):
+        rows[:, 1 + SERIES.index(name)] = value
+    rows[:, 1 + len(SERIES) + LEDGER.index("work_of_drive")] = 2e5 * cf.units.ft_lbf
+    history = DrillingHistory(scene(), "torsion", ("torsion", "cells of 30.48 m at most"), 0.1, np.arange(2.0), rows)
+    told = history.details("field")
+    for words in ("surface torque 1e+04 to 1e+04 ft-lbf", "work of the drive 200000 ft-lbf", "cells of 100 ft at most"):
+        assert words in told
+    assert history.stick_slip().summary("field") in told and "kN m" not in told and "kJ" not in told
+    assert str(history.stick_slip()).endswith("surface torque 13.56 to 13.56 kN m.")
 
 
 def test_columns_and_values():
@@ -156,8 +174,8 @@ def test_xarray_in_other_units(cases):
     pytest.importorskip("xarray")
     found = cf.study(lambda s: {"depth": 2 * s, "count": 7}, cases)
     found.units |= {"s": "m", "depth": "m"}
-    for units, unit, size in (("SI", "m", 1.0), ("field", "ft", 0.3048)):
-        data = found.to_xarray(units)
+    for asked, unit, size in (("SI", "m", 1.0), ("field", "ft", 0.3048)):
+        data = found.to_xarray(asked)
         np.testing.assert_allclose(data["depth"], np.array([2.0, 4.0]) / size, rtol=1e-15)
         np.testing.assert_allclose(data["s"], np.array([1.0, 2.0]) / size, rtol=1e-15)
         assert data["depth"].attrs["units"] == data["s"].attrs["units"] == unit and data["count"].values.tolist() == [

@@ -109,7 +109,7 @@ def explain(options, found):
         if getattr(scene, name) is not None:
             lines.append(f"{name.capitalize()}: {getattr(scene, name)}.")
     name, why = chosen(scene, settings.get("model", "auto"))
-    lines += [f"Model: {line}." for line in why]
+    lines += [f"Model: {shown.sentence(line)}." for line in why]
     if "duration" in settings:
         check_arguments(scene, **{key: value for key, value in settings.items() if key != "model"})
         model = model_of(scene, name, settings.get("dt"), settings.get("elements"))
@@ -118,7 +118,7 @@ def explain(options, found):
             f"Motion: {settings['duration']:g} s in {steps} steps of {model.dt:.4g} s, {len(model.depths)} places "
             "along the string."
         )
-        lines += [f"{line[0].upper()}{line[1:]}." for line in model.why]
+        lines += [f"{line[0].upper()}{shown.sentence(line[1:])}." for line in model.why]
     if found.speeds:
         weights = f" and {len(found.weights)} weights on bit" if found.weights else ""
         lines.append(f"Stability at {len(found.speeds)} speeds{weights}.")
