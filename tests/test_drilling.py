@@ -687,3 +687,16 @@ def test_a_start_is_one_from_rest(speeds, starts):
     rows[:, 1 + SERIES.index("drive_speed")] = 9.0
     period = cycle_of(rows).period
     assert period == pytest.approx(np.diff(starts)[0]) if len(starts) > 1 else np.isnan(period)
+
+
+@pytest.mark.parametrize(("static", "unstable"), [(8e3, True), (5e3, False)])
+def test_an_unstable_steady_state_that_nothing_disturbs_says_so(static, unstable):
+    bit = cf.drilling.BitOnRock(cf.drilling.Stribeck(static, 5e3, 3.0), inertia=41.0)
+    steady = cf.drilling.Drilling(scene().string, cf.drilling.TopDrive(6.0), bit, start="steady")
+    history = cf.drilling.simulate(steady, 1.0)
+    title = history.plot()._suptitle.get_text()
+    for text in (history.stick_slip().caution, str(history), title.replace("\n", " ")):
+        assert (" ".join(text.split()).count("nothing disturbed it") == 1) == unstable
+    weights = cf.drilling.stability(steady, [6.0], [1e4, 2e4], up_to=1.0)
+    assert any("give radius=" in caution for caution in weights.cautions)
+    assert not any("give radius=" in x for x in cf.drilling.stability(steady, [6.0], [1e4], up_to=1.0).cautions)

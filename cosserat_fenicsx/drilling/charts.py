@@ -207,7 +207,9 @@ def draw_over_time(history, between=None):
             _shade_rest(panel, t, history.bit_speed[rows], history.drive_speed[rows], label)
     legend(*axes)
     axes[-1].set_xlabel("time (s)")
-    figure.suptitle(title_of(history) + ("\nbands between the extremes of oscillations" if many else ""))
+    caution = history.stick_slip().caution.replace(" and nothing", "\nand nothing") if len(history) > 5 else ""
+    text = "\nbands between the extremes of oscillations" if many else ""
+    figure.suptitle(title_of(history) + text + (f"\n{caution}" if caution else ""))
     return figure
 
 

@@ -253,6 +253,11 @@ class Stability(Result):
             )
         if self.scene.bit is not None and self.scene.bit.law.drills and hole is not None:
             left_out.append("friction at the wall damps axial motion of a string that rotates: left out here")
+        law = self.scene.bit.law if self.scene.bit is not None and not self.scene.bit.law.drills else None
+        if law is not None and len(self.weights) > 1:
+            at = [law.resistance(float(weight)) for weight in (self.weights.min(), self.weights.max())]
+            if None not in at and all(at[0](s) == at[1](s) for s in self.speeds):
+                left_out.append("the law's torque does not depend on the weight on bit: give radius=")
         return left_out
 
     @property
