@@ -700,3 +700,12 @@ def test_an_unstable_steady_state_that_nothing_disturbs_says_so(static, unstable
     weights = cf.drilling.stability(steady, [6.0], [1e4, 2e4], up_to=1.0)
     assert any("give radius=" in caution for caution in weights.cautions)
     assert not any("give radius=" in x for x in cf.drilling.stability(steady, [6.0], [1e4], up_to=1.0).cautions)
+
+
+def test_soft_torque_asks_for_the_depth():
+    string = scene().string
+    parts = string.components
+    endless = replace(string, components=(*parts[:-1], replace(parts[-1], length=None)))
+    with pytest.raises(cf.SceneError, match="SoftTorque.depth = None.*measured depth of the bit"):
+        cf.drilling.SoftTorque(endless, inertia=2000.0)
+    assert cf.drilling.SoftTorque(endless, inertia=2000.0, depth=3000.0).Kp > 0

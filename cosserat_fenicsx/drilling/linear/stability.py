@@ -428,11 +428,14 @@ def _words(names):
 def _advice(answer, rows, names):
     """Sentences on the modes that each drive damps, and those that still grow."""
     for name in names:
-        calmed = [row for row in rows if not row[3][name] > 0]
+        parts = {
+            "calms": [row for row in rows if row[3][name] <= 0],
+            "has no mode near": [row for row in rows if math.isnan(row[3][name])],
+        }
         left = [row for row in rows if row[3][name] > 0]
-        if calmed:
-            text = f"{name} calms {_frequencies(answer, calmed)}"
-            yield text + (f" and leaves {_frequencies(answer, left)} growing" if left else "")
+        text = " and ".join(f"{verb} {_frequencies(answer, found)}" for verb, found in parts.items() if found)
+        if text:
+            yield f"{name} {text}" + (f" and leaves {_frequencies(answer, left)} growing" if left else "")
         else:
             yield f"{name} calms none of them"
 
