@@ -102,10 +102,16 @@ def _operations(scene):
     """Steady operations, of which the one that compresses the string most is not known in advance."""
     bit, weight = scene.bit, static_weight(scene)
     law = None if bit is None else bit.law.resistance(bit.weight)
-    with warnings.catch_warnings():
-        if law is not None and bit.law.needs_weight:  # a torque by the weight may be small without a mistake in units
-            warnings.filterwarnings("ignore", r"RotaryDrilling\.torque", SceneWarning)
+    with warnings.catch_warnings(record=True) as doubts:
+        warnings.filterwarnings("always", r"RotaryDrilling\.torque", SceneWarning)
         drills = RotaryDrilling(weight, law.kinetic if law else 0.0) if weight > 0 else RotateOffBottom()
+    for doubt in doubts:
+        words = str(doubt.message)
+        if not words.startswith("RotaryDrilling.torque"):
+            warnings.warn(doubt.message, stacklevel=2)
+        elif not bit.law.needs_weight:  # a torque by the weight may be small without a mistake in units
+            words = words.replace("RotaryDrilling.torque", f"The torque of {type(bit.law).__name__}(...)")
+            warnings.warn(SceneWarning(f"{words}; coefficients of friction need radius= (m)"), stacklevel=2)
     yield drills
     if scene.hook is not None:
         signal = scene.hook.signal()
