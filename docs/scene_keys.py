@@ -4,7 +4,7 @@ import inspect
 import re
 
 from cosserat_fenicsx.dimensions import DIMENSIONS
-from cosserat_fenicsx.files.read import kinds
+from cosserat_fenicsx.files.read import KINDS, class_of
 from cosserat_fenicsx.kinds import FAMILIES, Object, arguments_of, is_family, members
 
 _TITLES = {"rods": "Files of rods", "well": "Files of strings in wells", "drilling": "Files of drill-strings in motion"}
@@ -57,7 +57,7 @@ def reachable(cls, found):
 def page():
     """The page as Markdown."""
     lines, found = [_HEAD], {}
-    for name, cls in kinds().items():
+    for name, cls in ((kind, class_of(kind)) for kind in KINDS):
         lines += [f"## {_TITLES[name]}", "", *table_of(cls), ""]
         reachable(cls, found)
     alone = [cls for cls, family in found.items() if not family]

@@ -203,3 +203,15 @@ def test_refused(case):
     make, words = REFUSED[case]
     with pytest.raises(cf.SceneError, match=words):
         make()
+
+
+@pytest.mark.parametrize(("acting", "load_factor"), [
+    (lambda rod: [cf.Growth(rod, 0.5), cf.Growth(rod, 0.4)], 1.0),
+    (lambda rod: [cf.Growth(rod, 0.5)], 2.5),
+    (lambda rod: [cf.Pretension(rod, rest_length=0.1), cf.Growth(rod, 0.3)], 1.0),
+])  # fmt: skip
+def test_a_rod_without_length_is_refused(acting, load_factor):
+    rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, 0.3)), cf.Stiffness((3e3, 3e3), 5e3, (0.02, 0.02), 0.016), name="rod")
+    scene = cf.Scene([rod], [cf.Clamp(rod.start)], [*acting(rod), cf.Force(rod.end, (0.01, 0, 0))])
+    with pytest.raises(cf.SceneError, match="of its length left without stress"):
+        cf.solve(scene, [load_factor])

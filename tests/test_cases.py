@@ -104,6 +104,25 @@ def test_what_is_not_decided_goes_to_solve_and_says_so():
 
 
 @pytest.mark.serial
+def test_numbers_that_a_part_refuses_are_refused():
+    """A negative mass, a rod that shrinks to nothing; numbers that are 0 or refused one after the other are taken."""
+    weighed = column(lambda rod: cf.Weight(), lambda rod: cf.PointMass(rod.end, 0.3), lambda rod: cf.Growth(rod, 1.01))
+    compiled = cf.compile(weighed, ["loads[1].mass", "loads[2].factor"], [("force", "column.start", 2)])
+    found = compiled.batch([[0.3, 1.01], [-0.1, 1.01], [0.3, -0.5]] + 3 * [[0.2, 1.02]])
+    assert sorted(found.failures) == [1, 2] and "mass" in found.failures[1] and np.isfinite(found.values[[0, 3]]).all()
+    tube = dataclasses.replace(column().rods[0], section=cf.Tube(0.02, 0.016))
+    wider = scene_with(cf.Scene([tube]), [f"rods[0].section.{x}_diameter" for x in ("inner", "outer")], [0.03, 0.04])
+    assert wider.rods[0].section == cf.Tube(0.04, 0.03)
+    compiled = cf.compile(column(force=(1.0, 0, 0)), ["loads[0].force[0]", "loads[0].force[2]"], ASKED[:1])
+    assert np.isfinite(compiled.batch([[0.0, -100.0], [1.0, -400.0], [0.0, -400.0]]).values).all()
+    for bad in ([["x", 1.0]], [1.0, 2.0], [[1.0]], [[1.0, np.nan]]):
+        with pytest.raises(cf.SceneError, match="rows of finite numbers"):
+            compiled.batch(bad)
+    with pytest.raises(cf.SceneError, match="query is empty"):
+        cf.compile(column(), "loads[0].force[0]", [])
+
+
+@pytest.mark.serial
 def test_a_case_without_a_fast_way():
     hinged = column(lambda rod: cf.Force(rod.at(0.5), (1.0, 0, 0)))
     hinged = dataclasses.replace(hinged, supports=[*hinged.supports, cf.Pin(hinged.rods[0].end)])

@@ -618,6 +618,17 @@ def test_a_support_on_a_body_of_six_degrees_of_freedom(tmp_path):
     )
     history = cf.simulate(scene, 1.0, dt=0.05, elements=2)
     np.testing.assert_allclose(history.position(rod.start)[-1] - point, moved(1.0), atol=1e-12)
-    for bad, words in ((rows[::-1], "ascending times"), (rows[:, :6], "seven columns"), (rows * 4, "half a turn")):
+    heading = np.column_stack([t, np.zeros((161, 5)), (170 + 60 * t + 180) % 360 - 180])  # recorded within a turn
+    vessel = cf.signals.BodyRotation(heading, True)
+    for time in (0.1, 0.33, 2.0, 7.9):
+        np.testing.assert_allclose(vessel(time), (0, 0, np.radians(170 + 60 * time)), atol=1e-9)
+    rolled = cf.signals.BodyRotation(np.column_stack([t, 0 * rows[:, :3], 40 + 0 * t, -40 + 0 * t, 150 + 30 * t]), True)
+    steps = np.diff([rolled(time) for time in np.linspace(0, 3, 301)], axis=0)
+    assert np.linalg.norm(steps, axis=1).max() < 0.02
+    for bad, words in (
+        (rows[::-1], "ascending times"),
+        (rows[:, :6], "seven columns"),
+        (rows * np.where(rows[:1] == 90, -1, 1) ** np.arange(161)[:, None], "quarter of a turn"),
+    ):
         with pytest.raises(cf.SceneError, match=words):
             cf.signals.BodyRotation(bad, True)

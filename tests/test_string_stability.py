@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from axial_scenes import column, hanging, unbalanced
+from fake_string import scene
 from reference_strings import GIVEN, RPM, drive_of, falling, pipe_and_collars, public_discs, tubes, weight_of_slope
 
 import cosserat_fenicsx as cf
@@ -537,3 +538,25 @@ def test_recall_leads_to_the_same_digits():
         rock.pass_over(*place)
     again.recall(rock.memory())
     assert [rock.pass_over(*x) for x in path[20:]] == [again.pass_over(*x) for x in path[20:]]
+
+
+@pytest.mark.parametrize(("static", "unstable"), [(8e3, True), (5e3, False)])
+def test_an_unstable_steady_state_that_nothing_disturbs_says_so(static, unstable):
+    bit = cf.drilling.BitOnRock(cf.drilling.Stribeck(static, 5e3, 3.0), inertia=41.0)
+    steady = cf.drilling.Drilling(scene().string, cf.drilling.TopDrive(6.0), bit, start="steady")
+    history = cf.drilling.simulate(steady, 1.0)
+    title = history.plot()._suptitle.get_text()
+    for text in (history.stick_slip().caution, str(history), title.replace("\n", " ")):
+        assert (" ".join(text.split()).count("nothing disturbed it") == 1) == unstable
+    weights = cf.drilling.stability(steady, [6.0], [1e4, 2e4], up_to=1.0)
+    assert any("give radius=" in caution for caution in weights.cautions)
+    assert not any("give radius=" in x for x in cf.drilling.stability(steady, [6.0], [1e4], up_to=1.0).cautions)
+
+
+def test_soft_torque_asks_for_the_depth():
+    string = scene().string
+    parts = string.components
+    endless = replace(string, components=(*parts[:-1], replace(parts[-1], length=None)))
+    with pytest.raises(cf.SceneError, match="SoftTorque.depth = None.*measured depth of the bit"):
+        cf.drilling.SoftTorque(endless, inertia=2000.0)
+    assert cf.drilling.SoftTorque(endless, inertia=2000.0, depth=3000.0).Kp > 0

@@ -158,7 +158,7 @@ static void respond_nearby(contact *c, double *change)
     for (int i = 0; i < c->nodes; i++) {
         const int *rows = c->rows + 7 * i;
         const double *q = c->now + 7 * i + 3, *free = c->free + 6 * i, *moved = c->moved + 6 * i;
-        if (i > 0 && memcmp(rows, rows - 7, 7 * sizeof *rows) == 0) continue; /* the same point once more */
+        const int again = i > 0 && memcmp(rows, rows - 7, 7 * sizeof *rows) == 0;
         double by[7], phi[3];
         for (int k = 0; k < 3; k++) by[k] = moved[k] - free[k], phi[k] = (moved[3 + k] - free[3 + k]) / 2;
         by[3] = -phi[0] * q[1] - phi[1] * q[2] - phi[2] * q[3];
@@ -167,7 +167,7 @@ static void respond_nearby(contact *c, double *change)
         by[6] = phi[0] * q[2] - phi[1] * q[1] + phi[2] * q[0];
         for (int k = 0; k < 7; k++) {
             sum += by[k] * by[k];
-            if (rows[k] >= 0) change[rows[k]] -= by[k];
+            if (!again && rows[k] >= 0) change[rows[k]] -= by[k];
         }
     }
     c->omitted = c->missing * sqrt(sum);

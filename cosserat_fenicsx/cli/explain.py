@@ -48,7 +48,7 @@ def explain(scene, load_factors, settings):
     else:
         layout, _ = meshes_for(scene, degree, tol, many)
         largest = float(np.abs(load_factors).max())
-        layout = turning_in_law(scene, resolving_turns(scene, layout, largest) or layout, largest)
+        layout = turning_in_law(scene, resolving_turns(scene, layout, largest) or layout, load_factors)
     first = elements or max(layout.counts)
 
     def signature_of(model):

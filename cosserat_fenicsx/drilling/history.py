@@ -1,5 +1,6 @@
 """`DrillingHistory`: a drill-string in motion over time."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -176,7 +177,10 @@ class DrillingHistory(Result):
         if len(self) < 3 or (self.times >= since).sum() < 3:
             raise SceneError(f"stick_slip.since = {since:g}: expected a time with at least three rows after it, up to "
                              f"{last:g} s")  # fmt: skip
-        return stick_slip_of(self, since)
+        from cosserat_fenicsx.drilling.linear.stability import undisturbed
+
+        found = stick_slip_of(self, since)
+        return replace(found, caution=undisturbed(self.scene, found.least, found.peak))
 
     # -- tables ------------------------------------------------------------------------------------------------------
 

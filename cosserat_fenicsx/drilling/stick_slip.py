@@ -15,8 +15,6 @@ WEIGHT = Quantity("weight on bit", unit="N", shown="kN")
 AT_REST = 1e-6
 # A bit that has started reaches this share.
 _FAST = 0.5
-# A bit whose speed changes by less than this share of it is not disturbed: the rest is rounding.
-_STILL = 1e-9
 
 
 @dataclass(frozen=True)
@@ -120,28 +118,7 @@ def stick_slip_of(history, since):
         float(periods.mean()) if len(periods) else np.nan, periods, starts, stops,
         float(lengths[slow].sum() / lengths[whole].sum()), float(np.ptp(bit) / 2 / max(abs(mean_drive), 1e-300)),
         (float(torque.min()), float(torque.max())), (float(bit_torque.min()), float(bit_torque.max())),
-        undisturbed(history, bit),
     )  # fmt: skip
-
-
-def undisturbed(history, bit):
-    """A caution where the bit's speed (n,), rad/s, stays that of a steady start whose linear theory has modes that
-    grow; else "", also where that theory does not apply."""
-    scene, speed = history.scene, float(np.abs(bit).max())
-    if scene is None or scene.start != "steady" or not speed or np.ptp(bit) >= _STILL * speed:
-        return ""
-    from cosserat_fenicsx.drilling.linear.stability import stability
-
-    try:
-        found = stability(scene, [speed])
-    except (SceneError, NotConverged):
-        return ""
-    growing = found.unstable(0)
-    if not growing:
-        return ""
-    frequency, growth = (values[0, 0, growing[0]] for values in (found.frequency, found.growth))
-    return (f"The steady state is unstable (a mode of {frequency:.3g} Hz grows by {growth:.3g} 1/s) and nothing "
-            "disturbed it: disturb it, as by a step of 1 % in the drive's speed.")  # fmt: skip
 
 
 def _mean(values, lengths):

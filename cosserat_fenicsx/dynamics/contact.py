@@ -165,7 +165,7 @@ class NodalContact(Pointers):
         for name, array in {**self._numbers, **self._vectors, **arrays}.items():
             setattr(contact, name, self.doubles(array))
         self._known_for = np.nan  # the step length for which the compliance was computed, s
-        contact.stale, contact.usual = True, np.inf
+        contact.stale, contact.usual, contact.missing = True, np.inf, 1.0
 
     # -- a step ------------------------------------------------------------------------------------------------------
 
@@ -259,7 +259,8 @@ class NodalContact(Pointers):
         md = np.concatenate([place.md for place in self._walls])
         kept |= {"md": md, "slip": self._slip.copy(), "compliance": self._compliance.copy()}
         kept["multiplier"] = self._numbers["multiplier"].copy()
-        return {**kept, "known_for": self._known_for, "usual": self.c.usual, "stale": bool(self.c.stale)}
+        return {**kept, "known_for": self._known_for, "usual": self.c.usual, "missing": self.c.missing,
+                "stale": bool(self.c.stale)}  # fmt: skip
 
     def recall(self, memory):
         for name in ("force", "law"):
@@ -267,7 +268,7 @@ class NodalContact(Pointers):
         self._compliance[:], self._slip[:] = memory["compliance"], memory["slip"]
         self._numbers["multiplier"][:] = memory["multiplier"]
         self._known_for, self.c.usual = float(memory["known_for"]), float(memory["usual"])
-        self.c.stale = bool(memory["stale"])
+        self.c.missing, self.c.stale = float(memory["missing"]), bool(memory["stale"])
         for place, md in zip(self._walls, np.split(memory["md"], self._ends), strict=True):
             place.md = md
 

@@ -133,7 +133,7 @@ def simulate(
         if not start.stable[-1]:
             cautions = ["the equilibrium that it starts from is unstable: rounding errors decide where it goes"]
     model, why = chosen_model(scene_over, model, scheme, start)
-    layout = turning_in_law(scene_over, Layout.of(scene, elements), abs(load_factor), elements)
+    layout = turning_in_law(scene_over, Layout.of(scene, elements), [load_factor], elements)
     with solvers_of(scene_over, layout, degree, scheme, load_factor, comm, model) as (problem, stepper):
         stepper.rho_inf = rho_inf
         cautions += pace.watch(scene, duration, load_factor, stepper.impulse_error)

@@ -11,7 +11,7 @@ import numpy as np
 from cosserat_fenicsx.errors import SceneError, nearest
 from cosserat_fenicsx.numerics import once_each
 from cosserat_fenicsx.remember import per_scene
-from cosserat_fenicsx.scene.action import acts_in_law, without_stress
+from cosserat_fenicsx.scene.action import without_stress
 
 
 def in_turn(sizes):
@@ -247,7 +247,7 @@ def sizes_of(path):
     rotation = np.maximum(2 * half.max(axis=1), moved / length)
     squares = np.add.reduceat(np.square(path._stacked("gauss_fields")[..., :6]), (0, 3), axis=3)
     force, moment = np.sqrt(squares.max(axis=(1, 2))).T
-    if acts_in_law(path.scene):
+    if path.scene.acts_in_law:
         held = _held(path)
         force, moment = np.maximum(force, _LEAST_MOMENT * held[0]), np.maximum(moment, held[1])
     force = np.maximum(np.maximum(force, moment / length), _NOTHING)

@@ -29,7 +29,7 @@ from cosserat_fenicsx.results.result import (
     write_columns,
 )
 from cosserat_fenicsx.results.states import States
-from cosserat_fenicsx.scene.action import acts_in_law, without_stress
+from cosserat_fenicsx.scene.action import without_stress
 from cosserat_fenicsx.scene.describe import describe
 from cosserat_fenicsx.scene.rod import RodOrName, Station, StationOrName
 
@@ -196,7 +196,7 @@ class RodResult(Result, Extremes, Reactions, Stresses, States):
         # at a jump the values of the element before, as for n and m
         viscous = self._viscous(which, rod)
         strain, curvature = rod.stiffness_at(s, "left").strains(n_material - viscous[0], m_material - viscous[1])
-        if acts_in_law(self.scene):
+        if self.scene.acts_in_law:
             records = [self._records[k] for k in which]
             parts = [without_stress(self.scene, rod, s, getattr(record, "time", 0.0)) for record in records]
             free = [full + r.load_factor * scaled for r, (full, scaled) in zip(records, parts, strict=True)]

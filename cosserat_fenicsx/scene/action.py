@@ -189,11 +189,6 @@ def has_permanent(scene):
     return any(action.permanent for action in scene.actions)
 
 
-def acts_in_law(scene):
-    """Whether an action of a scene is part of the law."""
-    return any(action.in_law for action in scene.actions)
-
-
 def without_stress(scene, rod, s, t=0.0):
     """What the actions in the law give sections of a rod without stress at arc lengths s (n,), m, and the time t (s).
 

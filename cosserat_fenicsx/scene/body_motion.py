@@ -46,9 +46,11 @@ class _OfBody(FunctionOfTime):
             refuse(self, "table", self.table, f"at least four rows of finite numbers in {_COLUMNS}")
         if not (np.diff(table[:, 0]) > 0).all():
             refuse(self, "table", self.table, "ascending times (s) in its first column")
-        angles = np.radians(table[:, 4:]) if self.degrees else table[:, 4:]
-        if np.abs(angles).max() > np.pi:
-            refuse(self, "table", self.table, "angles of at most half a turn; degrees = True where they are degrees")
+        turn = 360.0 if self.degrees else 2 * np.pi
+        table[:, 4:] = np.unwrap(table[:, 4:], axis=0, period=turn)  # headings that are kept within a turn
+        if np.abs(np.diff(table[:, 4:], axis=0)).max() > turn / 4:
+            refuse(self, "table", self.table, "angles that change by at most a quarter of a turn from row to row; "
+                   "degrees = True where they are degrees")  # fmt: skip
         store(self, table=tuple(map(tuple, table.tolist())))
 
     @cached_property
@@ -59,6 +61,14 @@ class _OfBody(FunctionOfTime):
         if self.degrees:
             table[:, 4:] = np.radians(table[:, 4:])
         return CubicSpline(table[:, 0], table[:, 1:])
+
+    @cached_property
+    def _vectors(self):
+        """(n, 3) rotation vectors of the rows, which change by less than half a turn from row to row."""
+        found = [np.zeros(3)]
+        for t in self._spline.x:
+            found.append(_nearest(self._at(t)[1].as_rotvec(), found[-1]))
+        return np.array(found[1:])
 
     def _at(self, t):
         """The displacement (3,) of the reference point, m, and the rotation, faded in."""
@@ -94,7 +104,7 @@ class BodyDisplacement(_OfBody):
 
     Raises:
         SceneError: a file that cannot be read, other columns, fewer than four rows, times that do not ascend, or angles
-            of more than half a turn.
+            that change by more than a quarter of a turn from row to row.
     """
 
     table: _Table
@@ -132,5 +142,14 @@ class BodyRotation(_OfBody):
         self._read()
 
     def __call__(self, t: float) -> tuple:
-        """The rotation vector at t."""
-        return tuple(self._at(t)[1].as_rotvec().tolist())
+        """The rotation vector at t, which is continuous: of more than half a turn where the body turns on."""
+        near = [np.interp(t, self._spline.x, column) for column in self._vectors.T]
+        return tuple(_nearest(self._at(t)[1].as_rotvec(), np.array(near)).tolist())
+
+
+def _nearest(vector, other):
+    """Of the rotation vectors of one rotation that which is nearest to another vector."""
+    angle = np.linalg.norm(vector)
+    axis = vector / angle if angle > 1e-9 else other / max(np.linalg.norm(other), 1e-300)
+    turns = np.round((other @ axis - (angle if angle > 1e-9 else 0.0)) / (2 * np.pi))
+    return vector + 2 * np.pi * turns * axis

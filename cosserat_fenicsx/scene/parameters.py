@@ -117,8 +117,6 @@ def parameter_of(scene, given):
         raise SceneError(f"parameter = {given!r}: expected a name such as 'rods.column.material.E', or a Parameter")
     owner, field, keys = _find(scene, given)
     leaf, size = getattr(owner, field), None
-    if not keys and isinstance(leaf, tuple) and len(leaf) == 1 and np.shape(leaf[0]) == (2,):
-        keys = [0, 1]  # one number for all of a length, kept as a piece (end, number)
     for key in keys:
         leaf, size = leaf[key], leaf
     if isinstance(leaf, bool) or not isinstance(leaf, numbers.Real):
@@ -140,9 +138,16 @@ def parameter_of(scene, given):
 
 
 def scene_with(scene, names, values):
-    """The scene with other numbers, by their names (see `parameter_of`), all of them changed."""
+    """The scene with other numbers, by their names (see `parameter_of`); those of one object are changed at once."""
+    groups = {}
     for name, value in zip(names, values, strict=True):
-        scene = parameter_of(scene, name).scene_of(float(value))
+        groups.setdefault(id(_find(scene, name)[0]), []).append((name, float(value)))
+    for group in groups.values():
+        fields = {}
+        for name, value in group:
+            owner, field, keys = _find(scene, name)
+            fields[field] = _put(fields.get(field, getattr(owner, field)), keys, value)
+        scene = _Rebuilding({id(owner): _made(owner, fields)}).of(scene)
     return scene
 
 
@@ -221,6 +226,9 @@ def _find(scene, name):
         keys, here = [*keys, token], here[token]
     if owner is scene:
         raise SceneError(f"parameter '{name}' is {_kind(here)}: expected the name of a number{_inside(here, name)}")
+    leaf = getattr(owner, field)
+    if not keys and isinstance(leaf, tuple) and len(leaf) == 1 and np.shape(leaf[0]) == (2,):
+        keys = [0, 1]  # one number for all of a length, kept as a piece (end, number)
     return owner, field, keys
 
 

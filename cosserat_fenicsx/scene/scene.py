@@ -102,7 +102,7 @@ def check_magnitudes(scene, load_factor):
 
 # Young's moduli below this, Pa, are probably mistakes in units.
 _SOFTEST = 1e6
-# Densities of steel and cast iron, kg/m^3, and moduli of all metals so heavy, Pa; rolled profiles are of such metals.
+# Densities, kg/m^3, and moduli, Pa, of steel and cast iron; rolled profiles are of these.
 _STEEL, _METAL = (7000.0, 8200.0), (5e10, 5e11)
 # Solid bars of metal that are thicker, m, are probably given in mm.
 _THICKEST = 1.5
@@ -317,6 +317,11 @@ class Scene(Part):
         for doubt in self.doubts:
             warn(doubt)
 
+    @cached_property
+    def acts_in_law(self):
+        """Whether an action is part of the law, see `Action.in_law`."""
+        return any(action.in_law for action in self.actions)
+
     @property
     def follows(self):
         """Whether there are follower loads, which have no potential."""
@@ -336,7 +341,7 @@ class Scene(Part):
                 if isinstance(rod.section_at(0.0), Profile):
                     steel = steel or "of a rolled profile"
                 if steel and not _METAL[0] <= E <= _METAL[1]:
-                    asked[E] = f"{steel} is {'less' if E < _METAL[0] else 'more'} than that of any such metal"
+                    asked[E] = f"{steel} is {'less' if E < _METAL[0] else 'more'} than that of steel or cast iron"
                 elif E < _SOFTEST:
                     asked[E] = "is softer than most rubbers"
         return [

@@ -29,7 +29,7 @@ from cosserat_fenicsx.scene.parameters import check_once, laws_with, parameter_o
 from cosserat_fenicsx.scene.profiles import Stiffnesses
 from cosserat_fenicsx.scene.scene import Scene
 from cosserat_fenicsx.statics.loaded import Loaded
-from cosserat_fenicsx.statics.meshes import meshes_for, plainly_resolved, resolving_turns
+from cosserat_fenicsx.statics.meshes import meshes_for, plainly_resolved, resolving_turns, turning_in_law
 from cosserat_fenicsx.statics.path.recorder import CORRECTIONS, NEAR
 from cosserat_fenicsx.statics.problem import make_solvers
 from cosserat_fenicsx.statics.refinement import RESOLVED
@@ -98,7 +98,10 @@ def compile(  # noqa: A001  public as cf.compile
     if not names:
         raise SceneError("compile: over is empty: expected at least one name of a number")
     check_once(scene, names)
-    return CompiledScene(scene, names, [_Query.of(scene, x) for x in query], float(load_factor), tol)
+    queries = [_Query.of(scene, x) for x in query]
+    if not queries:
+        raise SceneError("compile: query is empty: expected tuples such as ('displacement', 'rod.end', 0)")
+    return CompiledScene(scene, names, queries, float(load_factor), tol)
 
 
 @dataclass(frozen=True)
@@ -169,7 +172,7 @@ class CompiledScene:
             SceneError: another number of values, or values that the scene refuses.
             NotConverged: as of `solve`.
         """
-        found = self._solved(self._checked(np.asarray(values, dtype=float)[None]), raises=True)
+        found = self._solved(self._checked(values, 1)[None], raises=True)
         return Cases(found.values[0], found.errors[0], found.by_solve[0])
 
     def batch(self, array: np.ndarray) -> Cases:
@@ -181,11 +184,16 @@ class CompiledScene:
         Raises:
             SceneError: another shape, or values that are not finite.
         """
-        return self._solved(self._checked(np.asarray(array, dtype=float)), raises=False)
+        return self._solved(self._checked(array, 2), raises=False)
 
-    def _checked(self, array):
-        if array.ndim != 2 or array.shape[1] != len(self.names) or not np.isfinite(array).all():
-            raise SceneError(f"values of shape {array.shape[-1:]}: expected finite numbers for {', '.join(self.names)}")
+    def _checked(self, given, dimensions):
+        try:
+            array = np.asarray(given, dtype=float)
+        except (TypeError, ValueError):
+            array = np.full(1, np.nan)
+        if array.ndim != dimensions or array.shape[-1] != len(self.names) or not np.isfinite(array).all():
+            one = "finite numbers" if dimensions == 1 else "rows of finite numbers, one a case,"
+            raise SceneError(f"values = {given!r:.100}: expected {one} for {', '.join(self.names)}")
         return array
 
     # -- preparation -------------------------------------------------------------------------------------------------
@@ -239,7 +247,9 @@ class CompiledScene:
 
     def _kind_of(self, scene):
         """What decides on meshes and compiled code: (first mesh, usual one, mesh for turns, choice, signatures)."""
-        layout, usual = meshes_for(scene, _DEGREE, self._tol, False)
+        layout, usual = (
+            x and turning_in_law(scene, x, [self._load_factor]) for x in meshes_for(scene, _DEGREE, self._tol, False)
+        )
         choice = choose(scene, formulation=self._formulation, degree=_DEGREE)
         turning = resolving_turns(scene, layout, abs(self._load_factor))
         signatures = [
@@ -350,6 +360,9 @@ class CompiledScene:
         """(which cases are decided (n,), values and errors (n, queries))."""
         nothing = np.zeros(len(array), dtype=bool), *np.full((2, len(array), len(self._queries)), np.nan)
         K = J = None
+        admitted = np.ones(len(array), dtype=bool) if self._linear is None else self._admitted(array)
+        if not admitted.any():
+            return nothing
         if self._linear is None:
             try:
                 scene = scene_with(self._scene, self.names, array[0])
@@ -362,26 +375,49 @@ class CompiledScene:
             K, J = (np.array([[getattr(rod.profile.range[0], name) for rod in scene.rods]]) for name in "KJ")
         elif self._law:
             K, J = laws_with(self._scene, self._law, array[:, self._of_law])
-            sound = np.isfinite(J).all(axis=(1, 2))
-            if not sound.any():
+            admitted &= np.isfinite(J).all(axis=(1, 2))
+            if not admitted.any():
                 return nothing
-            K, J = (np.where(sound[:, None, None], x, x[sound][0]) for x in (K, J))
+            K, J = (np.where(admitted[:, None, None], x, x[admitted][0]) for x in (K, J))
         coarse, fine = self._meshes
         of_cases = [self._written(k, array, K, J) for k in range(2)]
         lost, x, fields = coarse.run(len(array), of_cases[0][0])
+        if lost.all():
+            return nothing
+        _fill(lost, x, fields)
         here = coarse.path(x, fields, self.why, **of_cases[0][1])
         rq, n = on_mesh(here, self._layouts[1])
         lost_too, x, fields = fine.run(len(array), of_cases[1][0], fine.starts(rq, n))
+        if lost_too.all():
+            return nothing
+        _fill(lost_too, x, fields)
         there = fine.path(x, fields, self.why, **of_cases[1][1])
         apart, _ = estimate_error(there, here)
         softest = J if J is not None else np.array([[rod.profile.range[0].J for rod in there.scene.rods]])
-        decided = ~(lost | lost_too) & (apart[POSITION] <= RESOLVED) & (there.worst <= self._tol)
-        if self._linear and self._law:
-            decided &= sound
+        decided = admitted & ~(lost | lost_too) & (apart[POSITION] <= RESOLVED) & (there.worst <= self._tol)
         for path in (here, there):
             decided &= plainly_resolved(path, softest)
             decided &= path.rounding <= self._tol
         return decided, *self._asked(there, slice(None))
+
+    def _admitted(self, array):
+        """Which cases the constructors of the scene admit, but for numbers of sections and materials that `laws_with`
+        checks. A range of numbers is admitted where its ends are; else each case is looked at."""
+        columns = np.flatnonzero(~self._of_law)
+        if len(array) > 2 * len(columns):
+            ends = [(self.names[j], end(array[:, j])) for j in columns for end in (np.min, np.max)]
+            if all(self._admits([name], [value]) for name, value in ends):
+                return np.ones(len(array), dtype=bool)
+        names = [self.names[j] for j in columns]
+        return np.array([not names or self._admits(names, row) for row in array[:, columns]], dtype=bool)
+
+    def _admits(self, names, values):
+        try:
+            scene = scene_with(self._scene, names, values)
+            turning_in_law(scene, self._layouts[0], [self._load_factor])
+        except SceneError:
+            return False
+        return True
 
     def _written(self, k, array, K, J):
         """(what C writes, arguments of `Loaded.path`) of the cases on the k-th mesh."""
@@ -401,6 +437,13 @@ class CompiledScene:
             named["section"], named["rounding"] = section, rounding
             named["stiffnesses"] = [2 * (Stiffnesses(K[:, i], J[:, i], None, None),) for i in range(K.shape[1])]
         return written + mesh.limits(rounding, named.pop("dead", None), named.pop("nodal", None)), named
+
+
+def _fill(lost, *arrays):
+    """Give cases that are lost the numbers of another one, so that arithmetic on all of them meets no zeros."""
+    for array in arrays:
+        if array is not None:
+            array[lost] = array[~lost][0]
 
 
 def _where_it_changes(mesh, linear):

@@ -26,7 +26,7 @@ from cosserat_fenicsx.results.accuracy import (
     unresolved,
 )
 from cosserat_fenicsx.results.compared import cells_of
-from cosserat_fenicsx.scene.action import acts_in_law, without_stress
+from cosserat_fenicsx.scene.action import without_stress
 from cosserat_fenicsx.scene.curves import Line
 from cosserat_fenicsx.scene.signals import sample_times
 
@@ -106,23 +106,31 @@ def resolving_turns(scene, layout, largest):
     return layout.resized(scene, wanted) if max(map(np.max, wanted)) > 1 else None
 
 
-def turning_in_law(scene, layout, largest, elements=None):
-    """The mesh, with elements that turn by at most a radian without stress (`Action.in_law`), up to a load factor.
+def turning_in_law(scene, layout, load_factors, elements=None):
+    """The mesh, with elements that turn by at most a radian without stress (`Action.in_law`), for load factors.
 
     Args:
-        largest: the load factor, in size; elements: those of a given mesh, which stays.
+        elements: those of a given mesh, which stays.
 
     Raises:
-        SceneError: more than a radian on a given mesh.
+        SceneError: more than a radian on a given mesh, or a rod that has no length left without stress.
     """
-    if not acts_in_law(scene):
+    if not scene.acts_in_law:
         return layout
     times = {t for action in scene.loads if action.in_law for t in sample_times(action, scene.horizon)}
-    wanted = []
+    reach, wanted = (min(load_factors), max(load_factors)), []
+    largest = max(map(abs, reach))
     for rod, breaks in zip(scene.rods, layout.breaks, strict=True):
         s = rod.length * (breaks[:-1, None] + np.diff(breaks)[:, None] * _FIRST.inside)
-        parts = np.array([without_stress(scene, rod, s.ravel(), t)[:, 0] for t in times])
-        sizes = np.linalg.norm(parts, axis=3).max(axis=0).reshape(2, *s.shape).max(axis=2)
+        parts = np.array([without_stress(scene, rod, s.ravel(), t) for t in times])
+        full, scaled = parts[:, :, 1, :, 2].transpose(1, 0, 2)
+        for factor in (0.0, *reach):
+            if (shortest := 1 + (full + factor * scaled).min()) <= 0:
+                raise SceneError(
+                    f"rod '{rod.name}' has {shortest:.3g} of its length left without stress at the load factor "
+                    f"{factor:g}, by what acts in its law (Growth, Thermal, Actuation, Pretension): expected more than 0"
+                )
+        sizes = np.linalg.norm(parts[:, :, 0], axis=3).max(axis=0).reshape(2, *s.shape).max(axis=2)
         turns = (sizes[0] + largest * sizes[1]) * np.diff(breaks) * rod.length
         if elements and turns.max() > _FIRST.in_law:
             raise SceneError(
@@ -431,7 +439,7 @@ def until_two_meshes_agree(owner, scene, on_mesh, tol, *, most, elements, degree
     Raises:
         NotConverged: the accuracy is not reached, or two meshes in a row cannot be solved.
     """
-    layout = turning_in_law(scene, Layout.of(scene, elements or FIRST_ELEMENTS), 1.0, elements)
+    layout = turning_in_law(scene, Layout.of(scene, elements or FIRST_ELEMENTS), [1.0], elements)
     coarse, best, worse = None, math.inf, 0
     failed = False  # whether the last mesh could not be solved
     before = coarse_layout = None  # relative differences of the halving before; the mesh of `coarse`

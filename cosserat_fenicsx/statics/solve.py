@@ -161,12 +161,12 @@ def solve(
                 return tracer.corrected(coarse)
 
         if elements is not None:
-            return trace(turning_in_law(scene, Layout.of(scene, elements), largest, elements))
+            return trace(turning_in_law(scene, Layout.of(scene, elements), load_factors, elements))
         many = free or len(load_factors) > FEW
         layout, usual = meshes_for(scene, degree, tol, many) if simple else (first_layout(scene, degree), None)
         turning = resolving_turns(scene, layout, largest)
         layout, usual = (layout, usual) if turning is None else (turning, None)
-        layout, usual = (x and turning_in_law(scene, x, largest) for x in (layout, usual))
+        layout, usual = (x and turning_in_law(scene, x, load_factors) for x in (layout, usual))
         return refine(trace, correct, scene, layout, tol, bounded[1], degree, usual)
 
     with Progress(load_factors, progress, comm) as bar:

@@ -15,11 +15,14 @@ from cosserat_fenicsx.drilling.linear.roots import all_roots, follow
 from cosserat_fenicsx.drilling.scene import Drilling
 from cosserat_fenicsx.drilling.stick_slip import SPEED, WEIGHT
 from cosserat_fenicsx.drilling.top_drive import Matched, Stiff, TopDrive
+from cosserat_fenicsx.errors import NotConverged, SceneError
 from cosserat_fenicsx.quantities import Quantity
 from cosserat_fenicsx.results.result import Result, by_name
 
 # Growth below this share of the root is rounding: a mode without losses.
 _NEUTRAL = 1e-11
+# A bit whose speed changes by less than this share of it is not disturbed: the rest is rounding.
+_STILL = 1e-9
 # Gauss points in a part, beside those for its waves.
 _POINTS = 8
 # Number of the fastest modes that are listed with their places and drives.
@@ -465,3 +468,25 @@ def _range(answer, units):
     if len(weights) == 1:
         return f"{text}, {weights[0]:.4g} {kN} on bit"
     return f"{text}, {len(weights)} weights on bit from {weights.min():.4g} to {weights.max():.4g} {kN}"
+
+
+def undisturbed(scene, least, peak):
+    """A caution where the bit of a `Drilling` keeps the speed of a steady start, though its linear theory has modes that
+    grow; else "", also where that theory does not apply.
+
+    Args:
+        least, peak: smallest and largest speed of the bit, rad/s.
+    """
+    speed = max(abs(least), abs(peak))
+    if scene is None or scene.start != "steady" or not speed or peak - least >= _STILL * speed:
+        return ""
+    try:
+        found = stability(scene, [speed])
+    except (SceneError, NotConverged):
+        return ""
+    growing = found.unstable(0)
+    if not growing:
+        return ""
+    frequency, growth = (values[0, 0, growing[0]] for values in (found.frequency, found.growth))
+    return (f"The steady state is unstable (a mode of {frequency:.3g} Hz grows by {growth:.3g} 1/s) and nothing "
+            "disturbed it: disturb it, as by a step of 1 % in the drive's speed.")  # fmt: skip
