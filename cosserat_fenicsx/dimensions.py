@@ -5,6 +5,7 @@ A number without a unit is in SI.
 
 import math
 import re
+from difflib import get_close_matches
 from typing import NamedTuple
 
 from cosserat_fenicsx import units
@@ -105,6 +106,12 @@ _FRACTION = re.compile(r"\s*(?:(\d+)(?:\s+|\s*-\s*))?(\d+)/([1-9]\d*)\s*(.*?)\s*
 _TONS = ("t", "ton", "tons", "tonne", "tonnes")
 
 
+def _like(unit, known):
+    """'did you mean ...?' for a unit that differs in capital letters or hardly at all, so that its size is the same."""
+    same = [name for name in known if name.lower() == unit.lower()] or get_close_matches(unit, list(known), 1, 0.8)
+    return f"did you mean '{same[0]}'?" if len(same) == 1 else "expected a known unit"
+
+
 def in_si(where, value, dimension):
     """A number in SI from text with a unit of a dimension, such as "5 in"; anything else as it is.
 
@@ -127,7 +134,7 @@ def in_si(where, value, dimension):
     if unit not in known:
         others = [name for name, other in DIMENSIONS.items() if unit in other.units]
         name = next(name for name, other in DIMENSIONS.items() if other.units is known)  # a diameter is a length
-        other = f"{unit} is a unit of {others[0]}, expected one of {name}" if others else nearest(unit, known)
+        other = f"{unit} is a unit of {others[0]}, expected one of {name}" if others else _like(unit, known)
         raise SceneError(f"{where} = {value!r}: {other} ({', '.join(known)})")
     return number * known[unit]
 

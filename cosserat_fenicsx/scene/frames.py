@@ -41,8 +41,11 @@ class Frame:
         Raises:
             SceneError: no such point, or no rod meets it.
         """
-        if not 0 <= point < len(self.points):
-            raise SceneError(f"Frame.at({point}): expected a number from 0 to {len(self.points) - 1}")
+        if not isinstance(point, int | np.integer) or not 0 <= point < len(self.points):
+            raise SceneError(
+                f"Frame.at({point}): expected the number of a point, from 0 to {len(self.points) - 1}; "
+                "Frame.nearest(place) finds it"
+            )
         if point not in self._ends:
             raise SceneError(f"Frame.at({point}): no rod meets this point: expected an end of an edge")
         return self._ends[point][0]
