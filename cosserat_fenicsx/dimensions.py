@@ -51,7 +51,8 @@ DIMENSIONS = {
     "moment": Dimension(
         "N m", {**_same(1.0, "N m", "Nm", "N-m"), **_same(units.kNm, "kN m", "kNm", "kN-m"),
                 **{f"{k}{name}": (1e3 if k else 1.0) * units.ft_lbf for k in ("", "k")
-                   for name in ("ft-lbf", "ft lbf", "ft-lb", "ft lb", "ft-lbs", "ft lbs", "lbf-ft", "lbf ft", "lb-ft", "lb ft")}},
+                   for name in ("ft-lbf", "ft lbf", "ft-lb", "ft lb", "ft-lbs", "ft lbs", "lbf-ft", "lbf ft", "lb-ft",
+                                "lb ft")}},
         "ft-lbf", 1e10),
     "density": Dimension(
         "kg/m^3", {"kg/m^3": 1.0, "kg/m3": 1.0,

@@ -31,8 +31,8 @@ def doubt_decay(owner: object, speed: float | None, most: float = 15.0, unit: st
         rate = f"'{speed:g} rpm', {speed * units.rpm:.3g} rad/s"
         rate += "" if unit == "rad/s" else ", with of_rotation=True"
         warn(
-            f"{type(owner).__name__}.speed = {speed:g} {unit} is faster than friction at rest fades, at 0.1 to 10 rad/s of "
-            f"a bit and below 2 m/s of slip: {speed:g} rev/min are {rate}"
+            f"{type(owner).__name__}.speed = {speed:g} {unit} is faster than friction at rest fades, at 0.1 to 10 "
+            f"rad/s of a bit and below 2 m/s of slip: {speed:g} rev/min are {rate}"
         )
 
 

@@ -113,16 +113,16 @@ class View:
         plotter.reset_camera_clipping_range()
 
 
-# Widths of letters, at least those of Arial, and height of a line over the font's size; pixels between labels, and to the
-# picture's edge.
+# Widths of letters, at least those of Arial, and height of a line over the font's size; pixels between labels, and to
+# the picture's edge.
 _LETTERS = {**dict.fromkeys(" .,:;'|!()[]-/Iijltfr", 0.34), **dict.fromkeys("mwMW@%", 0.95)}
 _LETTER, _CAPITAL, _LINE, _GAP, _EDGE = 0.56, 0.73, 1.15, 5, 4
 # Distances (pixels) of a label from its point, and turns (deg) of its direction, in the order of preference; distance
 # from which on a thin line leads back.
 _DISTANCES, _LEADER = (16, 26, 42, 64, 92, 128, 180, 250), 40
 _TURNS = (0, *(sign * turn for turn in range(20, 180, 20) for sign in (1, -1)), 180)
-# Pixels between a label and the middle of a rod; size of the cells in which lines are looked up, pixels; how much more a
-# label should keep off rods than off other lines.
+# Pixels between a label and the middle of a rod; size of the cells in which lines are looked up, pixels; how much more
+# a label should keep off rods than off other lines.
 _CLEAR, _CELL, _RODS = 10, 4, 4
 
 
@@ -164,8 +164,8 @@ class Labels:
         self._placed.append((*low, *high))
 
     def near(self, text, point, towards, *, size, colour="black"):
-        """A label near a point (3,), m, in the direction `towards` (3,) if there is room, else in another one; where its
-        line crosses those of other labels and these labels least, and then where it covers least.
+        """A label near a point (3,), m, in the direction `towards` (3,) if there is room, else in another one; where
+        its line crosses those of other labels and these labels least, and then where it covers least.
 
         Returns:
             whether there was room for it.

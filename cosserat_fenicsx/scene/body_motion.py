@@ -34,7 +34,7 @@ _FadeIn = Annotated[float, Number("time", Limits(0, what="a time"))]
 class _OfBody(FunctionOfTime):
     """Cubic splines through the rows of a table, which is held before the first and after the last row."""
 
-    def _read(self):
+    def validate(self):
         table = self.table
         if isinstance(table, str | PathLike):
             table = read_table(self, "table", table, 7, _COLUMNS)
@@ -99,8 +99,8 @@ class BodyDisplacement(_OfBody):
         degrees: whether the angles are degrees, not radians.
         point: the point in the reference position, m, as a rod's end that is held by the body.
         about: the reference point of the table, m, in the reference position.
-        fade_in: over this time, s, from the first row on, the motion grows smoothly from none, so that it may begin from
-            rest.
+        fade_in: over this time, s, from the first row on, the motion grows smoothly from none, so that it may begin
+            from rest.
 
     Raises:
         SceneError: a file that cannot be read, other columns, fewer than four rows, times that do not ascend, or angles
@@ -112,9 +112,6 @@ class BodyDisplacement(_OfBody):
     point: _Point
     about: _Point = (0.0, 0.0, 0.0)
     fade_in: _FadeIn = 0.0
-
-    def validate(self):
-        self._read()
 
     def __call__(self, t: float) -> tuple:
         """The displacement at t."""
@@ -138,9 +135,6 @@ class BodyRotation(_OfBody):
     degrees: bool
     fade_in: _FadeIn = 0.0
 
-    def validate(self):
-        self._read()
-
     def __call__(self, t: float) -> tuple:
         """The rotation vector at t, which is continuous: of more than half a turn where the body turns on."""
         near = [np.interp(t, self._spline.x, column) for column in self._vectors.T]
@@ -149,7 +143,7 @@ class BodyRotation(_OfBody):
 
 def _nearest(vector, other):
     """Of the rotation vectors of one rotation that which is nearest to another vector."""
-    angle = np.linalg.norm(vector)
-    axis = vector / angle if angle > 1e-9 else other / max(np.linalg.norm(other), 1e-300)
-    turns = np.round((other @ axis - (angle if angle > 1e-9 else 0.0)) / (2 * np.pi))
+    along = vector if np.linalg.norm(vector) > 1e-9 else other  # that of a whole turn has no axis of its own
+    axis = along / max(np.linalg.norm(along), 1e-300)
+    turns = np.round((other - vector) @ axis / (2 * np.pi))
     return vector + 2 * np.pi * turns * axis

@@ -128,7 +128,8 @@ def turning_in_law(scene, layout, load_factors, elements=None):
             if (shortest := 1 + (full + factor * scaled).min()) <= 0:
                 raise SceneError(
                     f"rod '{rod.name}' has {shortest:.3g} of its length left without stress at the load factor "
-                    f"{factor:g}, by what acts in its law (Growth, Thermal, Actuation, Pretension): expected more than 0"
+                    f"{factor:g}, by what acts in its law (Growth, Thermal, Actuation, Pretension): expected more than "
+                    "0"
                 )
         sizes = np.linalg.norm(parts[:, :, 0], axis=3).max(axis=0).reshape(2, *s.shape).max(axis=2)
         turns = (sizes[0] + largest * sizes[1]) * np.diff(breaks) * rod.length

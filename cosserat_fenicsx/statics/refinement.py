@@ -26,7 +26,15 @@ from cosserat_fenicsx.results.accuracy import (
 )
 from cosserat_fenicsx.results.compared import NAMES, POSITION
 from cosserat_fenicsx.results.records import find_again, keep_confirmed
-from cosserat_fenicsx.statics.meshes import balanced, halved, loose_edges, resolving, with_edges, with_layers, with_turns
+from cosserat_fenicsx.statics.meshes import (
+    balanced,
+    halved,
+    loose_edges,
+    resolving,
+    with_edges,
+    with_layers,
+    with_turns,
+)
 from cosserat_fenicsx.statics.problem import Promoted
 
 

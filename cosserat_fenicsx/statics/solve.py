@@ -177,8 +177,8 @@ def solve(
     path.why.extend(_not_located(path))
     if len(scene.rods) >= _MANY and reference_blas():
         path.why.append(
-            "netlib's reference BLAS solves the equations where rods meet: OpenBLAS takes about a third of the time for "
-            "them (on Debian: apt install libopenblas0-serial)"
+            "netlib's reference BLAS solves the equations where rods meet: OpenBLAS takes about a third of the time "
+            "for them (on Debian: apt install libopenblas0-serial)"
         )
     if oscillates:
         path.why.append(

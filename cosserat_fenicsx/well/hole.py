@@ -164,7 +164,8 @@ class Borehole(Part):
         return (
             f"Well: {len(path.md)} stations to md = {units.told(path.length, 'm')}, which is north {north}, east "
             f"{east} and down {down}; largest inclination {math.degrees(path.inclination.max()):.2f} degrees, largest "
-            f"dogleg {path.dogleg_severity[worst] / size:.2f} degrees per {unit} below {units.told(path.md[worst], 'm')}."
+            f"dogleg {path.dogleg_severity[worst] / size:.2f} degrees per {unit} below "
+            f"{units.told(path.md[worst], 'm')}."
         )
 
     def sections_in_words(self, units: Units) -> list[str]:

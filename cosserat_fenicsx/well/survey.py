@@ -91,8 +91,8 @@ def read_columns(who, file, names, degrees, length_unit, sheet=None):
     ):
         if unit and unit not in known and given is None:
             raise SceneError(
-                f"{file}: '{heading[column].strip()}': unit '{unit}' is not known: expected {', '.join(known)}; or say it "
-                f"by {field}"
+                f"{file}: '{heading[column].strip()}': unit '{unit}' is not known: expected {', '.join(known)}; or say "
+                f"it by {field}"
             )
     depth = depth * _length_unit(who, file, heading[columns[0]], says[0], length_unit)
     return depth, inclination, azimuth, _degrees(file, [heading[x] for x in columns[1:]], says[1:], degrees)

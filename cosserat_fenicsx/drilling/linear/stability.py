@@ -207,9 +207,9 @@ class Stability(Result):
         own = own_rule(self.scene)
         drive = own or type(self.scene.drive.control).__name__
         yield (
-            "growth: in 1/s. largest growth: of all cases. middle case: of those in which the mode grows; frequency and "
-            f"growth there are those of the middle case, with the drive of the scene, {drive}. mode: counted from 0 by "
-            f"frequency there. To the right the growth with {'each drive' if own else 'other drives'}: "
+            "growth: in 1/s. largest growth: of all cases. middle case: of those in which the mode grows; frequency "
+            f"and growth there are those of the middle case, with the drive of the scene, {drive}. mode: counted from 0 "
+            f"by frequency there. To the right the growth with {'each drive' if own else 'other drives'}: "
             f"{_words(rows[0][3])}. gone: with that drive no mode is near."
         )
         for k, i, j, _ in rows:
@@ -471,8 +471,8 @@ def _range(answer, units):
 
 
 def undisturbed(scene, least, peak):
-    """A caution where the bit of a `Drilling` keeps the speed of a steady start, though its linear theory has modes that
-    grow; else "", also where that theory does not apply.
+    """A caution where the bit of a `Drilling` keeps the speed of a steady start, though its linear theory has modes
+    that grow; else "", also where that theory does not apply.
 
     Args:
         least, peak: smallest and largest speed of the bit, rad/s.
