@@ -108,8 +108,11 @@ _TONS = ("t", "ton", "tons", "tonne", "tonnes")
 
 
 def _like(unit, known):
-    """'did you mean ...?' for a unit that differs in capital letters or hardly at all, so that its size is the same."""
-    same = [name for name in known if name.lower() == unit.lower()] or get_close_matches(unit, list(known), 1, 0.8)
+    """'did you mean ...?' for a unit that differs in capital letters, is written out, or differs hardly at all, so that
+    its size is the same."""
+    same = [name for name in known if name.lower() == unit.lower()]
+    same = same or [name for name in known if unit.startswith(name) and len(unit) > len(name) + 1 > 2]  # "minutes"
+    same = same or get_close_matches(unit, list(known), 1, 0.9)
     return f"did you mean '{same[0]}'?" if len(same) == 1 else "expected a known unit"
 
 

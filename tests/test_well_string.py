@@ -299,6 +299,17 @@ def test_field_units(text, dimension, value):
     assert in_si("x", text, dimension) == pytest.approx(value, rel=1e-7)
 
 
+@pytest.mark.parametrize(("text", "dimension", "words"), [
+    ("-12 KN/m", "force per length", "did you mean 'kN/m'"),
+    ("1 minute", "time", "did you mean 'min'"),
+    ("5 Nmm", "moment", "expected a known unit"),  # 'Nm' is a thousand times as large
+    ("2 mile", "length", "expected a known unit"),
+])  # fmt: skip
+def test_only_units_of_the_same_size_are_suggested(text, dimension, words):
+    with pytest.raises(cf.SceneError, match=words):
+        in_si("x", text, dimension)
+
+
 @pytest.mark.parametrize(("old", "new", "words"), [
     ('"Bit", diameter = "8.5 in"', '"Bit", diameter = "8.5 yards"', "yards"),
     ("weight = 80e3", 'weight = "8 tons"', "expected tf, 1000 kgf, or kN or klbf: there are several tons"),
