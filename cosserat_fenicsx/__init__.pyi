@@ -17,6 +17,8 @@ from cosserat_fenicsx.actions.springs import Dashpot as Dashpot
 from cosserat_fenicsx.actions.springs import Foundation as Foundation
 from cosserat_fenicsx.actions.springs import PointMass as PointMass
 from cosserat_fenicsx.actions.springs import Spring as Spring
+from cosserat_fenicsx.actions.tendons import Helical as Helical
+from cosserat_fenicsx.actions.tendons import Tendon as Tendon
 from cosserat_fenicsx.actions.walls import Wall as Wall
 from cosserat_fenicsx.dynamics.natural_modes import modes as modes
 from cosserat_fenicsx.dynamics.resuming import read_history as read_history

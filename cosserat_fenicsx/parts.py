@@ -138,7 +138,9 @@ def _checked(value, check):
     return value
 
 
-class FunctionAlong(Part, family="function along a rod", homes=("cosserat_fenicsx.scene.signals",)):
+class FunctionAlong(
+    Part, family="function along a rod", homes=("cosserat_fenicsx.scene.signals", "cosserat_fenicsx.actions.tendons")
+):
     """Base of functions of the arc length of a rod, m."""
 
 

@@ -37,3 +37,13 @@ def follower_force(point, test, F):
 def follower_moment(point, test, M):
     """Moment that turns with the section; M is inertial, at rest."""
     return ufl.dot(point.R * M, test.phi)
+
+
+def tendon(point, test, T, a, a_s):
+    """The tension T of a thread through the points r + R a, without friction: -T times the change of its length per
+    unit of arc length. It is `equilibrium.balance` of the force T t and the moment R a x T t, t the thread's direction;
+    `a` and its derivative a_s are inertial, at rest."""
+    arm, arm_s = point.R * a, point.R * (a_s + ufl.cross(point.curvature, a))
+    along = point.r_s + arm_s
+    change = test.phi_r_s + ufl.cross(test.phi_s, arm) + ufl.cross(test.phi, arm_s)
+    return -T * ufl.dot(along, change) / ufl.sqrt(ufl.dot(along, along))

@@ -50,7 +50,7 @@ def motion_of(r_s, theta, theta_s):
 def point_of(U, U_s, *, rest, frame, r_t=NONE, omega=NONE):
     """The `Point` of the three components (r_1, r_2, theta), vectors in (e_1, e_2, e_3); arguments as in `Point`."""
     return Point(
-        in_plane(U), in_plane(U_s), rotation_matrix(U[2]), along_normal(U[2]),
+        in_plane(U), in_plane(U_s), rotation_matrix(U[2]), along_normal(U[2]), curvature=along_normal(U_s[2]),
         rest=rest, frame=frame, r_t=r_t, omega=omega,
     )  # fmt: skip
 

@@ -17,13 +17,15 @@ class Point:
             models, where positions are computed afterwards.
         R: rotation from the reference, a matrix.
         theta: rotation vector from the reference; in space for angles below a full turn, in a plane for any angle.
+        curvature: axial vector of R^T R', `equilibrium.Motion.curvature`; None in the determinate models.
         r_t, omega: velocity and angular velocity; zero at rest.
         rest, frame: functions that give the position at rest, from the same origin, and [d_1R d_2R d_3R], the directors
             at rest as columns. They are called only where a virtual work needs them.
     """
 
-    def __init__(self, r, r_s, R, theta, *, rest, frame, r_t=NONE, omega=NONE):
-        self.r, self.r_s, self.R, self.theta, self.r_t, self.omega = r, r_s, R, theta, r_t, omega
+    def __init__(self, r, r_s, R, theta, *, rest, frame, curvature=None, r_t=NONE, omega=NONE):
+        self.r, self.r_s, self.R, self.theta, self.curvature = r, r_s, R, theta, curvature
+        self.r_t, self.omega = r_t, omega
         self._rest, self._frame = rest, frame
 
     @cached_property
@@ -42,14 +44,15 @@ class Point:
         return self.R * self._frame()
 
     def variable(self):
-        """The same point with r, r_s and R as UFL variables, by which expressions can be differentiated."""
-        moved = [None if x is None else ufl.variable(x) for x in (self.r, self.r_s, self.R)]
+        """The same point with r, r_s, R and curvature as UFL variables, by which expressions can be differentiated."""
+        *moved, curvature = (None if x is None else ufl.variable(x) for x in (self.r, self.r_s, self.R, self.curvature))
         turned = moved[2] * self.R.T  # the identity; its derivative is that of R
         small = (
             ufl.as_vector([turned[2, 1] - turned[1, 2], turned[0, 2] - turned[2, 0], turned[1, 0] - turned[0, 1]]) / 2
         )
         theta = self.theta + _by_small_rotation(self.theta, small)
-        return Point(*moved, theta, rest=self._rest, frame=self._frame, r_t=self.r_t, omega=self.omega)
+        others = dict(rest=self._rest, frame=self._frame, r_t=self.r_t, omega=self.omega)
+        return Point(*moved, theta, curvature=curvature, **others)
 
 
 def _by_small_rotation(theta, phi):
@@ -67,12 +70,13 @@ def variation(work, point, test, direction):
     """The change of a virtual work `work(point, test)` in a direction of small displacement and inertial rotation.
 
     Args:
-        direction: a `VirtualMotion`: phi_r, phi_r_s and phi, with dR = phi x R.
+        direction: a `VirtualMotion`: phi_r, phi_r_s, phi and phi_s, with dR = phi x R and d(curvature) = R^T phi_s.
     """
     moved = point.variable()
     value = work(moved, test)
     change = 0
-    for of, by in ((moved.r, direction.phi_r), (moved.r_s, direction.phi_r_s)):
+    bent = None if moved.curvature is None else point.R.T * direction.phi_s
+    for of, by in ((moved.r, direction.phi_r), (moved.r_s, direction.phi_r_s), (moved.curvature, bent)):
         if of is not None:
             change += ufl.dot(ufl.diff(value, of), by)
     slope = ufl.diff(value, moved.R)

@@ -73,8 +73,11 @@ def motion_of(r_s, q, q_s, q_node):
 
 def point_of(U, U_s, *, rest, frame, r_t=NONE, omega=NONE):
     """The `Point` of the seven components (r, q); arguments as in `Point`."""
-    (r, q), (r_s, _) = parts_of(U), parts_of(U_s)
-    return Point(r, r_s, rotation_matrix(q), rotation_vector(q), rest=rest, frame=frame, r_t=r_t, omega=omega)
+    (r, q), (r_s, q_s) = parts_of(U), parts_of(U_s)
+    return Point(
+        r, r_s, rotation_matrix(q), rotation_vector(q), curvature=curvature(q, q_s) / ufl.dot(q, q),
+        rest=rest, frame=frame, r_t=r_t, omega=omega,
+    )  # fmt: skip
 
 
 def velocities(U, U_t):

@@ -286,12 +286,12 @@ def action_work(model, dx, test, point_at, unknowns, accepted_at=None, test_at=N
 
 
 def action_densities(model, point_at):
-    """Force and moment per length of the distributed actions: {number of the term: (place, UFL (6,))}, place "line"
-    (Gauss points) or "node" (for actions integrated there)."""
+    """Force and moment per length of the distributed actions, threads excepted: {number of the term: (place, UFL (6,))},
+    place "line" (Gauss points) or "node" (for actions integrated there)."""
     found = {}
     for number, term, factor, point in acting_at(model, point_at):
         place = term.kind.place
-        if place != "point":
+        if place != "point" and not term.kind.thread:
             force, moment = resultants(term.work, point)
             density = factor * ufl.as_vector([*force, *moment])
             if not isinstance(density, ufl.constantvalue.Zero):  # as of what resists velocities, in statics

@@ -119,11 +119,11 @@ def _rounding(scene, layout, degree):
     return float(np.finfo(float).eps * (slender * (np.array(layout.counts) * degree) ** 2).max())
 
 
-class TermKind(namedtuple("TermKind", "work place sizes memory scaled evolve refreshed dead")):
+class TermKind(namedtuple("TermKind", "work place sizes memory scaled evolve refreshed dead thread")):
     """A kind of action: its virtual work, where it is integrated ("point", "line" at Gauss points, "node", or "law" for
     a part of the law, without work), the sizes of its data and of its memory, its factor ("load" factor, "permanent"
-    factor, or 1: "full"), its `Action.evolve`, whether its data depend on the position, and whether it is independent
-    of the state (`traits.Traits`)."""
+    factor, or 1: "full"), its `Action.evolve`, whether its data depend on the position, whether it is independent of
+    the state (`traits.Traits`), and whether it is a thread (`Action.is_thread`)."""
 
     __slots__ = ()
 
@@ -150,7 +150,7 @@ def place_actions(scene, layout):
         scaled = "load" if action.scaled else "permanent" if action.permanent else "full"
         sizes, memory = (tuple(datum.size for datum in data) for data in (data, action.memory))
         kind = TermKind(work, place, sizes, memory, scaled, action.evolve, action.refreshed is not None,
-                        traits_of(action, scene.rods).dead)  # fmt: skip
+                        traits_of(action, scene.rods).dead, action.is_thread)  # fmt: skip
         for (known, members), there in zip(terms, taken, strict=True):
             if known == kind and (kind.place == "law" or there.isdisjoint(places)):
                 break

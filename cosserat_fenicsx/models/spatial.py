@@ -159,7 +159,8 @@ class CirculatoryModel(SpatialModel):
 
         work = partial(action_work, self, dx, point_at=point_at, unknowns=(U, U_node))
         form = varied_actions(work(test), test, direction)
-        of_bracket = work(VirtualMotion(NONE, ufl.cross(direction.phi, test.phi), NONE, NONE))
+        bracket_s = ufl.cross(direction.phi_s, test.phi) + ufl.cross(direction.phi, test.phi_s)
+        of_bracket = work(VirtualMotion(NONE, ufl.cross(direction.phi, test.phi), NONE, bracket_s))
         for factor, part in (
             *((self.load_factor, part) for part in of_bracket.dead.values()),
             *((self.permanent_factor, part) for part in of_bracket.permanent.values()),

@@ -13,6 +13,7 @@ from cosserat_fenicsx.results.accuracy import leading_of
 from cosserat_fenicsx.results.compared import NAMES, Errors, all_cell_nodes, of_sections, sizes_of, words_of
 from cosserat_fenicsx.results.records import Event, Records
 from cosserat_fenicsx.results.recovery import element_contact
+from cosserat_fenicsx.results.threads import Threads
 from cosserat_fenicsx.results.result import by_name
 from cosserat_fenicsx.results.rods import RodResult
 from cosserat_fenicsx.results.sensitivity import Sensitivity, Uncertainty
@@ -81,7 +82,7 @@ class Path(RodResult):
     galerkin = False
     #: whether every point is a path of its own, as of many cases
     apart = False
-    _computed = (*RodResult._computed, "_contact", "conservative", "_reference", "_roughness", "_in_elements")
+    _computed = (*RodResult._computed, "_contact", "_cut", "conservative", "_reference", "_roughness", "_in_elements")
     # functions of a path that compute its `conservative` and its `sensitivity`
     _potential = _differentiated = None
 
@@ -340,7 +341,13 @@ class Path(RodResult):
     @cached_property
     def _contact(self):
         """(points, elements, nodes per element, 6) n and m, dimensionless; they jump at point loads."""
-        return element_contact(self, self._all)
+        return Threads(self).taken_from(self._cut) if self.scene.has_threads else self._cut
+
+    @cached_property
+    def _cut(self):
+        """As `_contact`, with the forces of threads along the rods: all that a cut carries."""
+        carried = Threads(self).at_gauss() if self.scene.has_threads else 0.0
+        return element_contact(self, self._all, carried)
 
     def _at_clamp(self, point, joined):
         """See `Reactions`: from the contact forces and moments at the ends of the elements there."""
@@ -348,9 +355,9 @@ class Path(RodResult):
         for rod, vertex in joined:
             cells = self._cells(rod)
             if vertex > 0:
-                internal += self._contact_in(cells.start + vertex - 1)[:, -1]
+                internal += self._cut[:, cells.start + vertex - 1, -1]
             if cells.start + vertex < cells.stop:
-                internal -= self._contact_in(cells.start + vertex)[:, 0]
+                internal -= self._cut[:, cells.start + vertex, 0]
         return internal
 
     def _contact_of(self, k):

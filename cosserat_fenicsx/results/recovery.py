@@ -8,27 +8,29 @@ from cosserat_fenicsx.numerics import directors, product_conjugate
 from cosserat_fenicsx.results.compared import all_cell_nodes, cell_nodes
 
 
-def element_contact(path, records):
-    """(n, elements, p + 1, 6) n and m (dimensionless, inertial) of `Records` at the nodes of every element.
+def element_contact(path, records, carried=0.0):
+    """(n, elements, p + 1, 6) n and m (dimensionless, inertial) of `Records` at the nodes of every element: those of
+    the rods, and `carried`, what threads along them carry at the Gauss points (results/threads.py).
 
     At the element ends they follow from the element's weak form with the shape functions of its ends as test functions,
     which is as accurate as the nodal positions (order 2p). At the nodes between they are interpolated by the polynomial
     through both ends and the Gauss points. Virtual rotations are those of the formulation, see `Path.galerkin`.
     """
-    rule, p, fields = path.rule, path.degree, records["gauss_fields"]
+    rule, p, r_s = path.rule, path.degree, records["gauss_fields"][..., 6:]
     h, cells = _elements(path.layout, path.scene, path.scales.length, p)
-    n, r_s = fields[..., :3], fields[..., 6:]
+    fields = records["gauss_fields"][..., :6] + carried
+    n = fields[..., :3]
     at_gauss, at_nodes = records["densities"]
-    density = np.zeros_like(fields[..., :6]) if at_gauss is None else at_gauss.copy()
+    density = np.zeros_like(fields) if at_gauss is None else at_gauss.copy()
     density[..., 3:] += r_s[..., _NEXT] * n[..., _LAST] - r_s[..., _LAST] * n[..., _NEXT]
-    along = np.matmul(rule.contact_from_fields, fields[..., :6])
+    along = np.matmul(rule.contact_from_fields, fields)
     along += np.matmul(rule.contact_from_densities, density * h)
     if path.galerkin or at_nodes is not None:
         more = np.zeros((*along.shape[:2], 2, 6))
         if at_nodes is not None:
             more -= h * rule.lobatto[[0, p], None] * at_nodes[:, :, [0, p]]
         if path.galerkin:
-            q, m = records["rq"][:, :, 3:][:, cells], fields[..., 3:6]
+            q, m = records["rq"][:, :, 3:][:, cells], fields[..., 3:]
             for i, end in enumerate((0, p)):
                 grad, value = rule.weights * rule.slopes[:, end], rule.weights * rule.at_gauss[:, end]
                 plain = np.matmul(grad, m) - h[..., 0] * np.matmul(value, density[..., 3:])

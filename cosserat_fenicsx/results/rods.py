@@ -29,6 +29,7 @@ from cosserat_fenicsx.results.result import (
     write_columns,
 )
 from cosserat_fenicsx.results.states import States
+from cosserat_fenicsx.results.threads import TendonState, Threads
 from cosserat_fenicsx.scene.action import without_stress
 from cosserat_fenicsx.scene.describe import describe
 from cosserat_fenicsx.scene.rod import RodOrName, Station, StationOrName
@@ -154,6 +155,21 @@ class RodResult(Result, Extremes, Reactions, Stresses, States):
     def moment(self, station: StationOrName) -> np.ndarray:
         """(n, 3) contact moment m, N m, inertial; sign and side as in `force`."""
         return self._contact_at(station)[:, 3:] * self.scales.moment
+
+    def tendon(self, tendon) -> TendonState:
+        """Tension and length of a tendon in every state.
+
+        Args:
+            tendon: one of the `Tendon`s in `result.scene.loads`.
+
+        Raises:
+            SceneError: it is not one of them.
+        """
+        found = next((load for load in self.scene.loads if load.is_thread and load == tendon), None)
+        if found is None:
+            raise SceneError(f"tendon: {tendon!r} is no tendon of the scene: expected one of result.scene.loads")
+        threads = Threads(self)
+        return TendonState(threads.tension(found), threads.length(found))
 
     def centreline(self, k: int = -1, rod: RodOrName | None = None) -> np.ndarray:
         """(nodes, 3) m, inertial: the nodes of a rod (default the first) at point k."""

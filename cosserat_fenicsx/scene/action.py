@@ -107,11 +107,14 @@ class Action(Part, family="load or action", homes=("cosserat_fenicsx.scene.loads
             contact begins.
         in_law: whether it is no load but a part of the law along a rod. Its `data` are then what sections have without
             stress beyond the reference, inertial in the reference: curvature and twist, rad/m, and strain, 1.
+        is_thread: whether it is the tension of a thread along a rod, which is no part of the rod's contact force. Its
+            `data` are then the tension, N, and the arm from the axis to the thread, m, and its derivative along the
+            rod, inertial in the reference.
         traits: None; or a dict of the fields of `models.traits.Traits`, where it takes long to find them from `work`.
     """
 
     at_nodes, scaled, permanent, follows, memory, evolve, traits = False, True, False, False, (), None, None
-    delayed, resists, touches, presses, in_law = None, None, False, False, False
+    delayed, resists, touches, presses, in_law, is_thread = None, None, False, False, False, False
 
     def acts_on(self, rod):
         """Whether it acts along a rod."""

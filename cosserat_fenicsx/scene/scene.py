@@ -318,6 +318,11 @@ class Scene(Part):
             warn(doubt)
 
     @cached_property
+    def has_threads(self):
+        """Whether a thread runs along a rod, see `Action.is_thread`."""
+        return any(action.is_thread for action in self.actions)
+
+    @cached_property
     def acts_in_law(self):
         """Whether an action is part of the law, see `Action.in_law`."""
         return any(action.in_law for action in self.actions)
