@@ -72,7 +72,7 @@ def signs(result, shown, shapes, span, place):
             one["vectors"] = floats(vectors.reshape(len(shown), -1, 3) / top[mark.unit])
         found.append(one)
     drawn = np.cumsum([len(one.get("at", [0])) for one in found]) <= _MOST
-    left_out, words = int((~drawn).sum()), without_sign(scene, False)
+    left_out, words = int((~drawn).sum()), without_sign(scene, False, threads=False)
     notes = [f"not drawn: {words}"] if words else []
     notes += [f"{left_out} supports, joints or loads not drawn"] if left_out else []
     _, right, _, up = view_of(span)

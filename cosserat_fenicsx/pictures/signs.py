@@ -18,6 +18,8 @@ from cosserat_fenicsx.scene.supports import Hinge, Prescribed, Roller
 
 # Size of a sign over the extent of the drawing; from this number of signs on they are smaller, at least by this share.
 _SIZE, _MANY, _SMALLEST = 0.048, 12, 0.5
+# Points of a thread along a rod.
+_ALONG_THREAD = 201
 # Share of a force normal to a plane scene from which on the scene is seen from a corner.
 _OUT_OF_PLANE = 0.1
 
@@ -37,6 +39,19 @@ class Resting:
     def line(self, rod):
         """(n, 3) the centreline of a rod, m."""
         return rod.curve.position(np.linspace(0, rod.length, 101))
+
+    def beside(self, rod, arms):
+        """(n, 3) points off the centreline, m, at even arc lengths; arms (n, 3), m, turn with the sections and are
+        inertial in the reference, and reach out of the rod as it is drawn."""
+        line, directors = self._sections(rod, np.linspace(0, 1, len(arms)))
+        sizes = np.linalg.norm(arms, axis=1, keepdims=True)
+        arms = arms * np.maximum(1.0, 1.05 * self._radii[rod] / np.maximum(sizes, 1e-30))
+        material = np.einsum("kji,kj->ki", rod.curve.frame(np.linspace(0, rod.length, len(arms))), arms)
+        return line + np.einsum("kij,kj->ki", directors, material)
+
+    def _sections(self, rod, x):
+        s = x * rod.length
+        return rod.curve.position(s), rod.curve.frame(s)
 
     def pose(self, station):
         """The `Pose` of a section."""
@@ -64,13 +79,13 @@ class Deformed(Resting):
         self.factor, self.time = (1.0, result.along_axis[k]) if timed else (result.along_axis[k], 0.0)
 
     def line(self, rod):
-        return self._moved(rod, np.linspace(0, 1, 101))[0]
+        return self._sections(rod, np.linspace(0, 1, 101))[0]
 
     def pose(self, station):
-        places, directors = self._moved(station.rod, np.array([station.s / station.rod.length]))
+        places, directors = self._sections(station.rod, np.array([station.s / station.rod.length]))
         return self._pose(station, places[0], directors[0])
 
-    def _moved(self, rod, x):
+    def _sections(self, rod, x):
         places, directors = self._result.sample(self._k, rod, x)
         reference = rod.curve.position(x * rod.length)
         return reference + self._magnify * (places - reference) + self._shift, directors
@@ -95,6 +110,10 @@ def signs_of(pyvista, scene, shapes, everywhere, span):
         symbols.support(mark, last.pose(mark.station))
     for mark in joints_of(scene):
         symbols.joint(mark, last.pose(mark.station))
+    for thread in (load for load in scene.loads if load.is_thread):
+        s = np.linspace(0, thread.rod.length, _ALONG_THREAD)
+        _, arms, _ = at(thread, 0.0).data(thread.rod, s)
+        symbols.thread(last.beside(thread.rod, arms.value))
     top = {}
     for _, mark, _ in loads:
         if mark.unit:
@@ -131,9 +150,12 @@ def span_of(scene, shapes, everywhere):
     return span
 
 
-def without_sign(scene, tubes):
-    """Words for the loads that are not drawn; tubes: whether tubes around rods are."""
-    left_out = [load for load in scene.loads if not has_sign(load, scene) and not (tubes and load.tube() is not None)]
+def without_sign(scene, tubes, threads=True):
+    """Words for the loads that are not drawn; tubes, threads: whether tubes around rods and threads along them are."""
+    left_out = [
+        load for load in scene.loads
+        if not has_sign(load, scene) and not (tubes and load.tube() is not None) and not (threads and load.is_thread)
+    ]  # fmt: skip
     return ", ".join(dict.fromkeys(map(describe, left_out)))
 
 

@@ -17,6 +17,7 @@ COLOURS = {
     "moments": "#e8710a",
     "springs": "#1f77b4",
     "masses": "#222222",
+    "tendons": "#0f8b6d",
 }
 GROUPS = {
     "clamp": "supports", "pin": "supports", "hinge": "supports", "roller": "supports", "moved": "moved supports",
@@ -249,6 +250,11 @@ class Symbols:
         if tails:
             middle = len(tails) // 2
             self.texts.append((text, tails[middle], tails[middle] - feet[middle], COLOURS[GROUPS[mark.kind]]))
+
+    def thread(self, points):
+        """A thread along a rod through points (n, 3), m."""
+        self.covers.append(points)
+        self._lines["tendons"].append(self._pyvista.lines_from_points(points))
 
     def everywhere(self, mark, corner, text):
         """One arrow, beside the rods, for a load that acts on all of them."""

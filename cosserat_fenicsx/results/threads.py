@@ -9,9 +9,8 @@ from cosserat_fenicsx.results.compared import cell_nodes
 from cosserat_fenicsx.scene.action import without_stress
 from cosserat_fenicsx.scene.signals import at
 
-# Iterations for the strains of sections from what a cut carries, and the relative change at which they end. The share of
-# a thread in the stiffness of a section is small, and its square is that of an iteration.
-_MOST, _SAME = 50, 1e-13
+# Newton's iterations for n and m of a rod from what a cut carries, and the relative change at which they end.
+_MOST, _SAME = 30, 1e-13
 # Share of an element's length by which its ends are inside it, where data may jump.
 _INSIDE = 1e-9
 
@@ -42,30 +41,39 @@ class Threads:
             places = _Places(self._result, thread.rod, self._result.rule.gauss)
             R, k = places.turned(self._records)
             v = np.einsum("...ji,...j->...i", R, self._records["gauss_fields"][:, places.cells, :, 6:])
-            found[:, places.cells] += _inertial(R, self._carried(thread, places, v, k))
+            found[:, places.cells] += _inertial(R, self._carried(thread, places, v, k)[0])
         return found
 
     def taken_from(self, cut):
         """(n, elements, p + 1, 6) n and m of the rods at the nodes from what cuts carry, dimensionless, inertial.
 
         At the ends of elements the strains follow from n and m by the law, and the force of the threads from the
-        strains; in between the polynomial through the ends and the Gauss points is used.
+        strains: six equations for n and m, NaN where they are not met. In between the polynomial through the ends and
+        the Gauss points is used.
         """
         rule, at_gauss = self._result.rule, self.at_gauss()
         at_ends = np.zeros((*at_gauss.shape[:2], 2, 6))
         for rod in {thread.rod: None for thread in self._threads}:
             places = _Places(self._result, rod, np.array([_INSIDE, 1 - _INSIDE]))
             R, _ = places.turned(self._records)
-            whole = _material(R, cut[:, places.cells][:, :, [0, -1]])
-            share = np.zeros_like(whole)
-            for _ in range(_MOST):
-                before, (v, k) = share, places.strains(self._records, whole - share)
-                share = sum(self._carried(x, places, v, k) for x in self._threads if x.rod is rod)
-                if np.abs(share - before).max() <= _SAME * np.abs(whole).max():
-                    break
-            at_ends[:, places.cells] = _inertial(R, share)
+            whole = _inertial(np.swapaxes(R, -1, -2), cut[:, places.cells][:, :, [0, -1]])
+            at_ends[:, places.cells] = _inertial(R, self._share(places, whole))
         ends_and_gauss = np.concatenate([at_ends[:, :, :1], at_gauss, at_ends[:, :, 1:]], axis=2)
         return cut - np.matmul(rule.from_ends_and_gauss, ends_and_gauss)
+
+    def _share(self, places, whole):
+        """(n, elements, points, 6) the part of threads in what cuts carry, `whole`, material, dimensionless."""
+        own, (without, compliance) = whole.copy(), places.law(self._records)
+        threads = [thread for thread in self._threads if thread.rod is places.rod]
+        for _ in range(_MOST):
+            strains = without + np.einsum("ekij,nekj->neki", compliance, own)
+            parts = [self._carried(thread, places, strains[..., :3], strains[..., 3:]) for thread in threads]
+            share, slope = (sum(values) for values in zip(*parts, strict=True))
+            step = np.linalg.solve(np.eye(6) + slope @ compliance, (whole - share - own)[..., None])[..., 0]
+            own += step
+            if np.abs(step).max() <= _SAME * np.abs([own, share]).max():
+                return whole - own
+        return np.full_like(whole, np.nan)
 
     def tension(self, thread):
         """(n,) N."""
@@ -83,11 +91,14 @@ class Threads:
         return sizes @ self._result.rule.weights @ np.diff(places.breaks) * places.rod.length
 
     def _carried(self, thread, places, v, k):
-        """(n, elements, points, 6) T t and p x T t, material, for strains v and u - u_R, dimensionless."""
+        """T t and p x T t (n, elements, points, 6) for strains v and u - u_R, and their derivatives by these (.., 6,
+        6), material, dimensionless."""
         arm, along = _along(thread, places, v, k)
+        size = np.linalg.norm(along, axis=-1, keepdims=True)
+        t, lever = along / size, np.concatenate([np.broadcast_to(np.eye(3), (*arm.shape, 3)), _skew(arm)], axis=-2)
         tension = self.tension(thread)[:, None, None, None] / self._result.scales.force
-        force = tension * along / np.linalg.norm(along, axis=-1, keepdims=True)
-        return np.concatenate([force, np.cross(np.broadcast_to(arm, force.shape), force)], axis=-1)
+        across = (tension / size)[..., None] * (np.eye(3) - t[..., :, None] * t[..., None, :])
+        return np.einsum("ekij,nekj->neki", lever, tension * t), lever @ across @ np.swapaxes(lever, -1, -2)
 
 
 def _along(thread, places, v, k):
@@ -128,24 +139,26 @@ class _Places:
         k = 2 * conjugate_product(here, slope) / squared
         return R, np.einsum("kji,nkj->nki", self.frames, k.reshape(len(q), -1, 3)).reshape(k.shape)
 
-    def strains(self, records, contact):
-        """v and u - u_R, material, dimensionless, for n and m (n, elements, points, 6), material, dimensionless."""
-        n, m = (a.reshape(len(contact), -1, 3) for a in np.split(contact, 2, axis=-1))
-        e, k = self.rod.stiffness_at(self.s).strains(n * self._scales.force, m * self._scales.moment)
-        times = records["time"] if "time" in records.columns else np.zeros(len(records))
-        for i, (t, load_factor) in enumerate(zip(times, records["load_factor"], strict=True)):
-            full, scaled = (
-                without_stress(self._scene, self.rod, self.s, t) if self._scene.acts_in_law else np.zeros((2, 2))
-            )
-            k[i] += full[0] + load_factor * scaled[0]
-            e[i] += full[1] + load_factor * scaled[1]
-        v = e + [0.0, 0.0, 1.0]
-        return v.reshape(*contact.shape[:3], 3), k.reshape(*contact.shape[:3], 3) * self.length
+    def law(self, records):
+        """v and u - u_R without stress (n, elements, points, 6), and their derivatives by n and m (elements, points, 6,
+        6), material, dimensionless, in statics."""
+        along, sizes = self.rod.stiffness_at(self.s), np.repeat([1.0, self.length], 3)
+        units = np.broadcast_to(np.eye(6)[:, None], (6, len(self.s), 6))
+        by_unit = along.strains(units[..., :3] * self._scales.force, units[..., 3:] * self._scales.moment)
+        compliance = np.moveaxis(np.concatenate(by_unit, axis=-1) * sizes, 0, -1).reshape(*self.shape, 6, 6)
+        without = np.tile([0.0, 0, 1, 0, 0, 0], (len(records), len(self.s), 1))
+        if self._scene.acts_in_law:
+            full, scaled = (values[::-1] for values in without_stress(self._scene, self.rod, self.s))
+            free = full + np.multiply.outer(records["load_factor"], scaled)
+            without += np.concatenate([free[:, 0], free[:, 1]], axis=-1) * sizes
+        return without.reshape(len(records), *self.shape, 6), compliance
 
 
 def _inertial(R, a):
+    """Two vectors (.., 6) multiplied by matrices R (.., 3, 3)."""
     return np.concatenate([np.einsum("...ij,...j->...i", R, part) for part in np.split(a, 2, axis=-1)], axis=-1)
 
 
-def _material(R, a):
-    return _inertial(np.swapaxes(R, -1, -2), a)
+def _skew(a):
+    """(.., 3, 3) the matrices of the cross product by vectors (.., 3)."""
+    return np.cross(a[..., None, :], np.eye(3)).swapaxes(-1, -2)
