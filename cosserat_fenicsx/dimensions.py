@@ -67,6 +67,7 @@ DIMENSIONS = {
         "m/s", {"m/s": 1.0, "m/min": 1 / units.minute, **_same(1 / units.hour, "m/h", "m/hr"),
                 "ft/min": units.foot / units.minute, **_same(units.foot / units.hour, "ft/h", "ft/hr")},
         "ft/min", 1e5),
+    "wave speed": Dimension("m/s", {"m/s": 1.0, "km/s": units.km, "ft/s": units.foot}, "ft/s"),
     "rotation": Dimension("1/min", _same(1.0, "rpm", "RPM", "1/min"), "rpm", 1e6),
     "angular velocity": Dimension("rad/s", {"rad/s": 1.0, **_same(units.rpm, "rpm", "RPM", "1/min")}, "rpm", 1e5),
     "pressure": Dimension(
@@ -82,17 +83,23 @@ DIMENSIONS = {
     "frequency": Dimension("Hz", {"Hz": 1.0}, "Hz"),
     "acceleration": Dimension("m/s^2", {"m/s^2": 1.0, "ft/s^2": units.foot}, "ft/s^2"),
     "mass": Dimension("kg", {"kg": 1.0, "t": units.tonne, "lbm": units.pound}, "lbm"),
-    "moment of inertia": Dimension("kg m^2", {"kg m^2": 1.0}, "kg m^2", 1e10),
+    "moment of inertia": Dimension(
+        "kg m^2", {"kg m^2": 1.0, "lbm ft^2": units.pound * units.foot**2}, "lbm ft^2", 1e10),
     "stiffness": Dimension(
-        "N/m", {"N/m": 1.0, "kN/m": units.kN, "MN/m": units.MN, "kN/mm": units.kN / units.mm}, "N/m", 1e13),
-    "torsional stiffness": Dimension("N m/rad", {"N m/rad": 1.0, "kN m/rad": units.kNm}, "N m/rad"),
+        "N/m", {"N/m": 1.0, "kN/m": units.kN, "MN/m": units.MN, "kN/mm": units.kN / units.mm,
+                "lbf/ft": units.lbf_per_ft, "lbf/in": units.lbf / units.inch}, "lbf/ft", 1e13),
+    "torsional stiffness": Dimension(
+        "N m/rad", {"N m/rad": 1.0, "kN m/rad": units.kNm, "ft-lbf/rad": units.ft_lbf}, "ft-lbf/rad"),
     "stiffness per length": Dimension("N/m^2", {"N/m^2": 1.0, "MN/m^2": units.MN, "Pa": 1.0, "MPa": units.MPa,
                                                 "GPa": units.GPa}, "N/m^2", 1e15),
-    "damping": Dimension("N s/m", {"N s/m": 1.0, "kN s/m": units.kN}, "N s/m"),
+    "damping": Dimension("N s/m", {"N s/m": 1.0, "kN s/m": units.kN, "lbf s/ft": units.lbf_per_ft}, "lbf s/ft"),
     "damping per length": Dimension("N s/m^2", {"N s/m^2": 1.0}, "N s/m^2", 1e10),
     "drag per length": Dimension("N s^2/m^3", {"N s^2/m^3": 1.0}, "N s^2/m^3"),
-    "torsional damping": Dimension("N m s/rad", {"N m s/rad": 1.0, "kN m s/rad": units.kNm}, "N m s/rad", 1e10),
-    "bending stiffness": Dimension("N m^2", {"N m^2": 1.0, "kN m^2": units.kN, "MN m^2": units.MN}, "N m^2"),
+    "torsional damping": Dimension(
+        "N m s/rad", {"N m s/rad": 1.0, "kN m s/rad": units.kNm, "ft-lbf s/rad": units.ft_lbf}, "ft-lbf s/rad", 1e10),
+    "bending stiffness": Dimension(
+        "N m^2", {"N m^2": 1.0, "kN m^2": units.kN, "MN m^2": units.MN, "lbf in^2": units.lbf * units.inch**2,
+                  "lbf ft^2": units.lbf * units.foot**2}, "lbf in^2"),
     "energy": Dimension("J", {"J": 1.0, "kJ": 1e3, "MJ": 1e6, "ft-lbf": units.ft_lbf}, "ft-lbf"),
     "power": Dimension("W", {"W": 1.0, "kW": 1e3, "MW": 1e6, "hp": 550 * units.ft_lbf}, "hp"),
     "curvature": Dimension("1/m", {"1/m": 1.0, "1/ft": 1 / units.foot}, "1/ft"),

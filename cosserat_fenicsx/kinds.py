@@ -218,6 +218,10 @@ class Kind:
         """The JSON Schema of its data; `definitions`: of classes, to which it adds."""
         return {}
 
+    def told(self, value, units):
+        """A value as text, in some `Units`."""
+        return value.in_words(units) if hasattr(value, "arguments") else f"{value}"
+
     @property
     def words(self):
         """What is expected."""
@@ -290,6 +294,9 @@ class Number(Kind):
         admitted = (lambda x: self.limits.admit(x) and x == int(x)) if self.whole else self.limits.admit
         found = checks.number(owner, field, value, self.words, admitted, above_zero, self.dimension)
         return int(found) if self.whole else found
+
+    def told(self, value, units):
+        return units.told(value, self.unit, self.dimension) if self.dimension else f"{value:g}"
 
     def schema(self, definitions):
         low, high = self.limits.low, self.limits.high
@@ -499,6 +506,9 @@ class Optional(Kind):
 
     def write(self, value, writing):
         return None if value is None else self.inner.write(value, writing)
+
+    def told(self, value, units):
+        return self.inner.told(value, units)
 
     def schema(self, definitions):
         return self.inner.schema(definitions)

@@ -94,6 +94,15 @@ class Part(metaclass=_Readable):
         """{name: value} that the constructor makes an equal object from."""
         return {field.name: getattr(self, field.name) for field in dataclasses.fields(self) if field.init}
 
+    def in_words(self, units):
+        """Its class and the arguments that are not their defaults, in some `Units`: "Motor(torque 10 kN m)"."""
+        kinds, words = fields_of(type(self)), []
+        for field in dataclasses.fields(self):
+            value = getattr(self, field.name)
+            if field.name in kinds and value is not None and not (value is field.default or value == field.default):
+                words.append(f"{field.name} {kinds[field.name].told(value, units)}")
+        return f"{type(self).__name__}({', '.join(words)})" if words else type(self).__name__
+
     @classmethod
     def constructors(cls):
         """What makes objects from tables: the class, and other methods that have arguments of their own."""

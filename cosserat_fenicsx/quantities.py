@@ -19,6 +19,7 @@ _PREFIXED = {
     "N": {"N": 1.0, "kN": 1e3, "MN": 1e6},
     "N m": {"N m": 1.0, "kN m": 1e3, "MN m": 1e6},
     "N/m": {"N/m": 1.0, "kN/m": 1e3, "MN/m": 1e6},
+    "N m^2": {"N m^2": 1.0, "kN m^2": 1e3, "MN m^2": 1e6},
     "Pa": {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "GPa": 1e9},
     "J": {"J": 1.0, "kJ": 1e3, "MJ": 1e6},
     "W": {"W": 1.0, "kW": 1e3, "MW": 1e6},
@@ -146,9 +147,10 @@ class Units:
                 return self._chosen[name], known[self._chosen[name]] / known[quantity.unit]
         return quantity.unit, 1.0
 
-    def told(self, value: float, unit: str, dimension: str = "", form: str = "g") -> str:
-        """A number with its unit: one in an SI unit, of a dimension where several have that unit, as text."""
-        shown, size = self.of(Quantity("number", unit=unit, dimension=dimension))
+    def told(self, value: float, unit: str, dimension: str = "", form: str = "g", shown: str = "") -> str:
+        """A number with its unit: one in an SI unit, of a dimension where several have that unit, as text; `shown`:
+        see `Quantity`."""
+        shown, size = self.on_screen(Quantity("number", unit=unit, dimension=dimension, shown=shown), [value])
         return f"{value / size:{form}} {shown}"
 
     def sentence(self, text: str) -> str:

@@ -661,20 +661,22 @@ def test_explain_tells_what_may_be_mistaken(tmp_path, capsys):
     assert main(["explain", str(tmp_path / "scene.toml")]) == 0
     told = capsys.readouterr().out
     for words in (
-        "N/m in mud.",
+        "N/m in mud, impedance",
         "Mud: 1198.26 kg/m^3, 10 ppg.",
         "to 2500 m, 0.31115 m wide, friction 0.2.",
         "Bit at md = 2500 m; largest inclination of the hole 60 degrees.",
-        "Drive: 0 to 60 rpm, which depends on time, PI(",
+        "Drive: 0 rpm to 60 rpm, which depends on time, PI(",
         "its torque does not follow the weight: that takes coefficients and a radius",
-        "Hook: 5e+06 N/m, the block moves upwards at 0 to 0.0027778 m/s.",
+        "Hook: 5000 kN/m, the block moves upwards at 0 m/s to 0.0027778 m/s, which depends on time.",
     ):
         assert words in told, words
     assert main(["explain", str(tmp_path / "scene.toml"), "--units", "field"]) == 0
-    assert "to 8202.1 ft, 12.25 in wide, friction 0.2." in capsys.readouterr().out
+    told = capsys.readouterr().out
+    assert "to 8202.1 ft, 12.25 in wide, friction 0.2." in told and "ft-lbf s/rad in torsion" in told
+    assert not re.search(r"\d (k?N|N m|m|m/s|N s/m|N m s/rad|kg m\^2|rad/s)\b", told), told
     assert main(["explain", str(ROOT / "demos" / "strings" / "stopped_block.toml")]) == 0
     told = capsys.readouterr().out
-    assert "N/m in air." in told and "Hole: none, no walls" in told and "friction at the wall" not in told.lower()
+    assert "N/m in air, impedance" in told and "Hole: none, no walls" in told and "friction at the wall" not in told.lower()
 
 
 @pytest.mark.parametrize(("speeds", "starts"), [

@@ -557,12 +557,12 @@ def test_the_command_line_explains_them(capsys):
         assert main(["explain", str(file)]) == 0
     told = capsys.readouterr().out
     for words in (
-        "String, drill pipe: 3000 m, impedance 296.38 N m s/rad in torsion",
+        "String, drill pipe: 3000 m, 261.97 N/m in air, impedance 296.38 N m s/rad in torsion",
         "Model: axial and torsional: the hook moves.",
-        "Motion: 120 s in 36234 steps of 0.003312 s, 305 places along the string.",
-        "Drive: 40 rpm, PI(Kp=38000.0, Ki=100000.0), inertia 2900 kg m^2.",
+        "Motion: 36234 steps of 0.003312 s, 305 places along the string.",
+        "Drive: 40 rpm, PI(Kp 38000 N m s/rad, Ki 100000 N m/rad), inertia 2900 kg m^2.",
         "Bit: none, the lower end is free.",
-        "Stability at 20 speeds and 20 weights on bit.",
+        "Asked for: stability at 20 speeds and 20 weights on bit.",
     ):
         assert words in told, words
 

@@ -371,7 +371,7 @@ def test_the_command_line_in_field_units(tmp_path, capsys):
     assert main(["explain", str(VOLVE), "--units", "field"]) == 0
     told = capsys.readouterr().out
     assert "Hole, open hole: to 11279.5 ft, 8.5 in wide, friction 0.3." in told
-    assert "String, bit: md 11278.5 to 11279.5 ft, 79.89 lbf/ft in mud, touches the wall at a radius of 4.25 in" in told
+    assert "String, bit: md 11278.5 to 11279.5 ft, 79.89 lbf/ft in mud, 8.5 in wide where it touches the wall" in told
     assert "rotary drilling, on bit 17.9847 klbf and 3500 ft-lbf." in told
     soft = ["run", str(VOLVE), "-o", str(tmp_path), "--no-picture", "--model", "soft"]
     assert main([*soft, "--units", "field"]) == 0
@@ -387,17 +387,26 @@ def test_the_command_line_in_field_units(tmp_path, capsys):
 
 
 def test_holes_and_strings_are_printed_with_units():
-    """By the sentences of `cosserat explain`."""
+    """By the sentences of `cosserat explain`, in the units asked for, on a screen of 100 columns and 30 rows."""
     found = cf.read(VOLVE)
-    hole, string = str(found.hole).splitlines(), str(found.string).splitlines()
+    hole, string = found.hole.details().splitlines(), found.string.details().splitlines()
     assert hole[0].startswith("Well: 74 stations to md = 3438 m, which is north -346.44 m") and len(hole) == 3
     assert hole[2] == "Hole, open hole: to 3438 m, 0.2159 m wide, friction 0.3."
-    assert string[1].startswith(
-        "String, collar: length 90 m, 136.59 kg/m in air, touches the wall at a radius of 0.082"
-    )
+    assert string[1].startswith("String, collar: length 90 m, 136.59 kg/m in air, 0.1651 m wide where it touches")
     given = cf.well.DrillString([cf.well.Component(None, None, 241.13, 0.0635, name="pipe")])
-    assert str(given) == ("String, pipe: up to the surface, 241.13 N/m in mud, touches the wall at a radius of 0.0635 m, "
-                          "stiffness not known.")  # fmt: skip
+    assert given.details() == ("String, pipe: up to the surface, 241.13 N/m in mud, 0.127 m wide where it touches the "
+                               "wall, stiffness not known.")  # fmt: skip
+    drilling = cf.read(DEMOS / "strings" / "tuned_drive.toml")
+    for part in (found, found.hole, found.string, drilling, drilling.scene):
+        field = part.summary(units="field")
+        assert not re.search(r"\d (k?N|m|N/m|k?N m|MN m\^2|rad/s)\b", field) and str(part) == part.summary()
+        assert all(len(text.splitlines()) <= 30 and max(map(len, text.splitlines())) <= 100
+                   for text in (field, part.summary()))  # fmt: skip
+    assert "Ki 3115.71 ft-lbf/rad" in drilling.summary("field") and "EI = 4.28e+08 lbf in^2" in found.summary("field")
+    many = cf.well.DrillString([cf.well.DrillPipe(10.0, "5 19.5")] * 40)
+    assert str(many).endswith("... more by `details()`") and len(many.details().splitlines()) == 40
+    with pytest.raises(cf.SceneError, match="expected 'SI', 'field' or a dict"):
+        found.summary("metric")
 
 
 def test_doubts_are_said_once_and_without_code(tmp_path, capsys):

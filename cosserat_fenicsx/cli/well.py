@@ -16,17 +16,6 @@ from cosserat_fenicsx.well.scenefile import TorqueAndDragSettings
 # Ends of the names of files of an operation, and names of those of a sweep.
 _ENDINGS = (".csv", "_contacts.csv", ".png", "_3d.png")
 _OF_SWEEPS = ("depth_sweep.csv", "depth_sweep", "depth_sweep.png")
-_SOFT = (
-    "the soft string by a differential equation along the axis, and what that leaves out is estimated with each answer."
-)
-_ROD = "the exact rod in contact with the wall, stiff and with its clearance, on meshes that are refined until tol."
-#: What the models of `torque_and_drag` solve.
-_MODELS = {
-    "soft": _SOFT,
-    "buckled": f"{_SOFT[:-1]}; with the wall force of a helix where it is one.",
-    "rod": _ROD,
-    "auto": f"first {_SOFT} Where that is above tol: {_ROD}",
-}
 
 
 def _scene(options, scene):
@@ -92,17 +81,4 @@ def _stems(operations):
 
 def explain(options, scene):
     """The text of `cosserat explain` of a `WellScene`."""
-    scene = _scene(options, scene)
-    shown = Units(units_of(options))
-    lines = [scene.title] if scene.title else []
-    lines += [scene.hole.path_in_words(shown), *scene.hole.sections_in_words(shown)]
-    lines += [] if scene.mud is None else [scene.mud.in_words()]
-    lines += scene.string.in_words(scene.settings.get("depth", scene.hole.length), scene.mud, shown)
-    for operation in scene.operations:
-        on_bit = f"{shown.told(operation.weight, 'N')} and {shown.told(operation.torque, 'N m')}"
-        lines.append(f"Operation: {operation.name}, on bit {on_bit}.")
-    if scene.sweep:
-        lines.append(f"Sweep over {len(scene.sweep['depths'])} depths of the bit.")
-    model, tol = scene.settings.get("model", "auto"), scene.settings.get("tol", 1e-4)
-    lines.append(f"Model: {model}, tol = {tol:g}: {_MODELS[model]}")
-    return "\n".join(lines)
+    return _scene(options, scene).details(units_of(options))

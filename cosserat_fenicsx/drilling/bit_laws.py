@@ -134,6 +134,13 @@ class Stribeck(BitLaw):
     def needs_weight(self) -> bool:
         return self.radius is not None
 
+    def in_words(self, units):
+        if self.radius is None:
+            return super().in_words(units)
+        speed = f", speed {units.told(self.speed, 'rad/s')}" if self.speed else ""
+        radius = units.told(self.radius, "m", "diameter", ".5g")
+        return f"Stribeck(static {self.static:g}, dynamic {self.dynamic:g}{speed}, radius {radius})"
+
     def torque(self, speed: float, weight: float) -> float:
         law = self.resistance(weight)
         return float(law(speed)) if speed > 0 else law.still

@@ -6,17 +6,20 @@ from functools import cached_property
 from typing import Literal
 
 from cosserat_fenicsx.checks import refuse
-from cosserat_fenicsx.drilling.bit_laws import BitOnRock
+from cosserat_fenicsx.drilling.bit_laws import BitOnRock, Stribeck
 from cosserat_fenicsx.drilling.segments import Discs, Segment, segment_of
 from cosserat_fenicsx.drilling.top_drive import Hook, TopDrive
 from cosserat_fenicsx.drilling.wall_friction import FrictionLaw, ViscousDrag
 from cosserat_fenicsx.parts import Depth, Part
+from cosserat_fenicsx.quantities import Units
+from cosserat_fenicsx.results.screen import InWords
+from cosserat_fenicsx.units import rpm
 from cosserat_fenicsx.well.components import DrillString, weight_in_mud
 from cosserat_fenicsx.well.hole import Borehole, Mud
 
 
 @dataclass(frozen=True)
-class Drilling(Part):
+class Drilling(InWords, Part):
     """A drill-string with its drive, hook, bit and friction.
 
     Args:
@@ -96,3 +99,76 @@ class Drilling(Part):
             refuse(self, "bit", None, "a BitOnRock, whose weight is to change")
         bit = self.bit if weight is None else replace(self.bit, weight=weight)
         return replace(self, drive=drive, bit=bit)
+
+    def sentences(self, units: Units, duration: float | None = None):
+        """On string, hole, drive, bit, hook and friction, in some units.
+
+        Args:
+            duration: s, up to which speeds that depend on time are said.
+        """
+        if self.discs:
+            inertias = ", ".join(units.told(x, "kg m^2") for x in self.discs.inertias)
+            yield f"String: {len(self.discs.inertias)} discs from the drive down, of {inertias}."
+        else:
+            yield from self._string_in_words(units)
+        drive, bit, hook = self.drive, self.bit, self.hook
+        asked = "no speed asked for"
+        if drive.speed is not None:
+            asked = _over_time(drive.signal(), "rad/s", "angular velocity", units, duration)
+        inertia = f", inertia {units.told(drive.inertia, 'kg m^2')}" if drive.inertia else ""
+        yield f"Drive: {asked}, {drive.control.in_words(units)}{inertia}."
+        yield "Bit: none, the lower end is free." if bit is None else f"Bit: {', '.join(_at_bit(bit, units))}."
+        if hook is not None:
+            stiff = units.told(hook.stiffness, "N/m", "stiffness") if math.isfinite(hook.stiffness) else "rigid"
+            upwards = _over_time(hook.signal(), "m/s", "speed", units, duration)
+            yield f"Hook: {stiff}, the block moves upwards at {upwards}."
+        for name in ("friction", "drag"):
+            if (law := getattr(self, name)) is not None:
+                yield f"{name.capitalize()}: {law.in_words(units)}."
+
+    def _string_in_words(self, units):
+        mud, told = self.mud, units.told
+        fluid = " in air" if mud is not None or self.hole is None else ""
+        fluid = " in mud" if mud is not None and mud.density > 0 else fluid
+        for part in self.segments:
+            torsion = told(part.torsional_impedance, "N m s/rad", form=".5g")
+            axial = told(part.axial_impedance, "N s/m", form=".5g")
+            speeds = [told(x, "m/s", "wave speed", ".5g") for x in (part.torsional_speed, part.axial_speed)]
+            yield (
+                f"String, {part.name}: {told(part.length, 'm')}, "
+                f"{told(part.weight, 'N/m', 'force per length', '.5g', 'N/m')}{fluid}, impedance {torsion} in torsion and "
+                f"{axial} along the axis, waves at {' and '.join(speeds)}."
+            )
+        if mud is not None:
+            yield from mud.sentences(units)
+        depth = told(self.bit_depth, "m")
+        if self.hole is None:
+            yield f"Hole: none, no walls; bit at md = {depth}, the string hangs vertically."
+            return
+        yield from self.hole.sections_in_words(units)
+        inclination = math.degrees(self.hole.path.inclination.max())
+        yield f"Bit at md = {depth}; largest inclination of the hole {inclination:.4g} degrees."
+
+
+def _over_time(signal, unit, dimension, units, duration):
+    """A speed, or from which to which it goes up to a time (s), in some units; of rotation in rpm."""
+
+    def told(value):
+        return f"{value / rpm:.5g} rpm" if unit == "rad/s" else units.told(value, unit, dimension, ".5g")
+
+    if signal.constant:
+        return told(signal(0.0))
+    until = duration or max(signal.jumps, default=1.0)
+    times = [*(until * k / 200 for k in range(201)), *(t for t in signal.jumps if 0 <= t <= until)]
+    values = [signal(t) for t in times]
+    return f"{told(min(values))} to {told(max(values))}, which depends on time"
+
+
+def _at_bit(bit, units):
+    yield bit.law.in_words(units)
+    if bit.weight:
+        yield f"{units.told(bit.weight, 'N')} on bit"
+    if bit.inertia:
+        yield f"inertia {units.told(bit.inertia, 'kg m^2')}"
+    if bit.weight and isinstance(bit.law, Stribeck) and bit.law.radius is None:
+        yield "its torque does not follow the weight: that takes coefficients and a radius"

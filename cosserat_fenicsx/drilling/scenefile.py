@@ -45,6 +45,8 @@ from cosserat_fenicsx.drilling.top_drive import DriveControl, Hook, TopDrive
 from cosserat_fenicsx.drilling.wall_friction import FrictionLaw, ViscousDrag, WallFriction
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.parts import Depth, Number, Part, Time, Values, positive
+from cosserat_fenicsx.quantities import Units
+from cosserat_fenicsx.results.screen import InWords
 from cosserat_fenicsx.well.components import DrillString
 from cosserat_fenicsx.well.hole import Borehole, Mud
 
@@ -96,7 +98,7 @@ class StabilityMap(Part):
 
 
 @dataclass(frozen=True)
-class DrillingScene(Part):
+class DrillingScene(InWords, Part):
     """A drill-string in motion and its computations, from `read`.
 
     Args:
@@ -146,6 +148,18 @@ class DrillingScene(Part):
         chosen(self.scene, model)
         if self.weights:
             self.scene.with_case(weight=self.weights[0])  # refused where there is no bit
+
+    def sentences(self, units: Units):
+        """On the `Drilling` and on what is asked for, in some units."""
+        duration = self.settings.get("duration")
+        if self.title:
+            yield self.title
+        yield from self.scene.sentences(units, duration)
+        if duration is not None:
+            yield f"Asked for: a motion of {duration:g} s."
+        if self.speeds:
+            weights = f" and {len(self.weights)} weights on bit" if self.weights else ""
+            yield f"Asked for: stability at {len(self.speeds)} speeds{weights}."
 
     @property
     def settings(self) -> dict[str, Any]:

@@ -140,6 +140,9 @@ class RodScene(Part):
     solve: Solve | None = None
     simulate: Simulate | None = None
 
+    def __repr__(self):
+        return f"<RodScene of {self.scene!r}>"
+
     def validate(self):
         names = [field.name for field in dataclasses.fields(Scene)]
         store(self, scene=Scene(**{name: getattr(self, name) for name in names}))

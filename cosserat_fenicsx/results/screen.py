@@ -10,6 +10,7 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
+from cosserat_fenicsx.quantities import Units
 from cosserat_fenicsx.quantities import as_text as value_text
 
 #: Most rows of a table in `details` and in `print`; lines of a printed page, and characters of a line.
@@ -133,17 +134,18 @@ def as_text(table, width=140, most=None):
     return capture.get().rstrip()
 
 
-def page(answer, table_of):
+def page(answer, table_of=None):
     """Sentences and a table that fit a screen.
 
     Args:
         answer: sentences; those that do not fit are left out, from the end. table_of: a function of the number of rows
-            that returns a rich table, or None where there is nothing to show.
+            that returns a rich table, or None where there is nothing to show; None without a table.
     """
     lines = [line for told in answer for line in textwrap.wrap(told, WIDTH, break_on_hyphens=False)]
-    if len(lines) > LINES - _FRAME - _FEWEST:
-        lines = [*lines[: LINES - _FRAME - _FEWEST - 1], "... more by `details()`"]
-    rows = SHORT
+    room = LINES - (0 if table_of is None else _FRAME + _FEWEST)
+    if len(lines) > room:
+        lines = [*lines[: room - 1], "... more by `details()`"]
+    rows = 0 if table_of is None else SHORT
     while rows >= 1 and (shown := table_of(rows)) is not None:
         text = as_text(shown, WIDTH, 1).splitlines()
         beyond = len(lines) + len(text) - LINES
@@ -151,3 +153,22 @@ def page(answer, table_of):
             return "\n".join([*lines, *text])
         rows -= beyond
     return "\n".join(lines)
+
+
+class InWords:
+    """What is printed as sentences: a part of a scene, or a whole one. Subclasses have `sentences`."""
+
+    def __str__(self) -> str:
+        return self.summary()
+
+    def summary(self, units="SI") -> str:
+        """What `print` shows, in some units (see `Result`): sentences, at most 30 lines of 100 characters.
+
+        Raises:
+            SceneError: unknown units.
+        """
+        return page(self.sentences(Units(units)))
+
+    def details(self, units="SI") -> str:
+        """All sentences of `summary`, a line each."""
+        return "\n".join(self.sentences(Units(units)))

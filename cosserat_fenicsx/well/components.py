@@ -24,6 +24,7 @@ from cosserat_fenicsx.checks import doubt_width, positive, refuse, store
 from cosserat_fenicsx.errors import SceneError, nearest
 from cosserat_fenicsx.parts import Diameter, ForcePerLength, Length, MassPerLength, Part, between
 from cosserat_fenicsx.quantities import Units
+from cosserat_fenicsx.results.screen import InWords
 from cosserat_fenicsx.scene.sections import Circle, Material, Stiffness, Tube
 
 # A number with a unit of lengths, and nothing after it.
@@ -374,12 +375,12 @@ def weight_in_mud(component, mud):
 
 
 def in_words(part, where, weight, units):
-    """A sentence on a component: where it is, its weight, its contact radius and its stiffness, in some units."""
+    """A sentence on a component: where it is, its weight, its width and its stiffness, in some units."""
     stiff, S = "stiffness not known", part.stiffness
     if S is not None and S.matrix is None:
         stiff = f"EI = {units.told(min(S.bending), 'N m^2', form='.4g')}"
-    radius = units.told(part.contact_radius, "m", "diameter")
-    return f"String, {part.name}: {where}, {weight}, touches the wall at a radius of {radius}, {stiff}."
+    wide = units.told(2 * part.contact_radius, "m", "diameter", ".5g")
+    return f"String, {part.name}: {where}, {weight}, {wide} wide where it touches the wall, {stiff}."
 
 
 @dataclass(frozen=True)
@@ -392,7 +393,7 @@ class Laid:
 
 
 @dataclass(frozen=True)
-class DrillString(Part):
+class DrillString(InWords, Part):
     """A string of components.
 
     Args:
@@ -429,22 +430,21 @@ class DrillString(Part):
                     expected += f"; where the list runs the other way, say order='{other}'"
                 refuse(part, "length", None, expected)
 
-    def __str__(self):
-        units, lines = Units(), []
+    def sentences(self, units: Units):
+        """On its components from the bit up, in some units."""
         for part in self.components:
             where = "up to the surface" if part.length is None else f"length {units.told(part.length, 'm')}"
             if part.weight is not None:
-                weight = f"{units.told(part.weight, 'N/m', 'force per length', '.2f')} in mud"
+                weight = f"{units.told(part.weight, 'N/m', 'force per length', '.2f', 'N/m')} in mud"
             else:
                 weight = f"{units.told(part.mass, 'kg/m', form='.2f')} in air"
-            lines.append(in_words(part, where, weight, units))
-        return "\n".join(lines)
+            yield in_words(part, where, weight, units)
 
-    def in_words(self, depth, mud, units):
+    def sentences_at(self, depth, mud, units):
         """Sentences on the components in their places, with the bit at a measured depth (m) in a mud, in some units."""
         for place in self.laid(depth):
             where = f"md {units.told(place.top, 'm').split()[0]} to {units.told(place.bottom, 'm')}"
-            weight = units.told(weight_in_mud(place.component, mud), "N/m", "force per length", ".2f")
+            weight = units.told(weight_in_mud(place.component, mud), "N/m", "force per length", ".2f", "N/m")
             yield in_words(place.component, where, f"{weight} in mud", units)
 
     def laid(self, depth):

@@ -15,6 +15,7 @@ from cosserat_fenicsx.dimensions import in_si, size_of
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.parts import Density, Depth, Diameter, FileName, Friction, Number, Part, WallStiffness, at_least
 from cosserat_fenicsx.quantities import Units
+from cosserat_fenicsx.results.screen import InWords
 from cosserat_fenicsx.scene.rod import Rod
 from cosserat_fenicsx.scene.sections import Circle, Tube
 from cosserat_fenicsx.well.path import WellPath
@@ -57,7 +58,7 @@ def _depth(i, depth, unit):
 
 
 @dataclass(frozen=True)
-class Borehole(Part):
+class Borehole(InWords, Part):
     """A hole along an axis.
 
     Args:
@@ -151,14 +152,14 @@ class Borehole(Part):
             warn(f"Borehole: the survey ends at {self.path.length:.6g} m and the sections at {above:.6g} m; "
                           f"the hole ends at the shallower one{feet}")  # fmt: skip
 
-    def __str__(self):
-        units = Units()
-        return "\n".join([self.path_in_words(units), *self.sections_in_words(units)])
+    def sentences(self, units: Units) -> list[str]:
+        """On its path and its sections, in some units."""
+        return [self.path_in_words(units), *self.sections_in_words(units)]
 
     def path_in_words(self, units: Units) -> str:
         """A sentence on the path, in some units."""
         path = self.path
-        north, east, down = (units.told(x, "m", form=".2f") for x in path.position(path.length))
+        north, east, down = (units.told(round(x, 6) + 0.0, "m", form=".2f") for x in path.position(path.length))
         worst = int(np.argmax(path.dogleg_severity))
         unit, size = ("30 m", constants.deg_per_30m) if units.si else ("100 ft", constants.deg_per_100ft)
         return (
@@ -172,7 +173,7 @@ class Borehole(Part):
         """A sentence on each section, in some units."""
         return [
             f"Hole, {section.name or f'section {i}'}: to {units.told(section.to, 'm')}, "
-            f"{units.told(section.diameter, 'm', 'diameter')} wide, friction {section.friction:g}."
+            f"{units.told(section.diameter, 'm', 'diameter', '.5g')} wide, friction {section.friction:g}."
             for i, section in enumerate(self.sections, start=1)
         ]
 
@@ -203,7 +204,7 @@ class Borehole(Part):
 
 
 @dataclass(frozen=True)
-class Mud(Part):
+class Mud(InWords, Part):
     """The fluid in the hole and in the string, at rest.
 
     Args:
@@ -236,9 +237,9 @@ class Mud(Part):
                 "gallon 10 * units.ppg = 1198"
             )
 
-    def in_words(self):
-        """A sentence on its density."""
-        return f"Mud: {self.density:g} kg/m^3, {self.density / in_si('mud', '1 ppg', 'density'):.4g} ppg."
+    def sentences(self, units: Units) -> list[str]:
+        """On its density, in SI and in ppg, whatever the units."""
+        return [f"Mud: {self.density:g} kg/m^3, {self.density / constants.ppg:.4g} ppg."]
 
     def along(self, rod: Rod, outer: float | None = None, inner: float | None = None) -> tuple:
         """Actions of the mud on a moving rod: an `AddedMass`, across the rod alone, and a `LinearDrag`, if they are not

@@ -48,6 +48,8 @@ import numpy as np
 
 from cosserat_fenicsx.checks import File
 from cosserat_fenicsx.parts import Depth, Number, Part, Values, positive
+from cosserat_fenicsx.quantities import Units
+from cosserat_fenicsx.results.screen import InWords
 from cosserat_fenicsx.well.answer import TorqueAndDrag
 from cosserat_fenicsx.well.components import DrillString
 from cosserat_fenicsx.well.hole import Borehole, Mud
@@ -56,6 +58,18 @@ from cosserat_fenicsx.well.pieces import pieces_of
 from cosserat_fenicsx.well.rod.rod_answer import check_rod
 from cosserat_fenicsx.well.solve import CONVENTIONS, ROD, check_settings, torque_and_drag
 from cosserat_fenicsx.well.sweep import DepthSweep, depth_sweep
+
+_SOFT = (
+    "the soft string by a differential equation along the axis, and what that leaves out is estimated with each answer."
+)
+_ROD = "the exact rod in contact with the wall, stiff and with its clearance, on meshes that are refined until tol."
+#: What the models of `torque_and_drag` solve.
+_MODELS = {
+    "soft": _SOFT,
+    "buckled": f"{_SOFT[:-1]}; with the wall force of a helix where it is one.",
+    "rod": _ROD,
+    "auto": f"first {_SOFT} Where that is above tol: {_ROD}",
+}
 
 
 @dataclass(frozen=True)
@@ -99,7 +113,7 @@ def _given(settings):
 
 
 @dataclass(frozen=True)
-class WellScene(Part):
+class WellScene(InWords, Part):
     """A string in its hole and its operations, from `read`.
 
     Args:
@@ -135,6 +149,25 @@ class WellScene(Part):
                     for operation in self.operations:
                         convention = asked.get("torque_convention", CONVENTIONS[0])
                         check_rod(hole, laid, operation, self.mud, convention)
+
+    def sentences(self, units: Units):
+        """On hole, mud, string, operations and model, in some units."""
+        if self.title:
+            yield self.title
+        yield from self.hole.sentences(units)
+        if self.mud is not None:
+            yield from self.mud.sentences(units)
+        settings, sweep = self.settings, self.sweep
+        yield from self.string.sentences_at(settings.get("depth", self.hole.length), self.mud, units)
+        for operation in self.operations:
+            on_bit = f"{units.told(operation.weight, 'N')} and {units.told(operation.torque, 'N m')}"
+            loads = f"on bit {on_bit}" if operation.weight or operation.torque else "no load on the bit"
+            yield f"Operation: {operation.name}, {loads}."
+        if sweep:
+            low, high = (units.told(x, "m") for x in (sweep["depths"].min(), sweep["depths"].max()))
+            yield f"Sweep over {len(sweep['depths'])} depths of the bit, {low} to {high}."
+        model, tol = settings.get("model", "auto"), settings.get("tol", 1e-4)
+        yield f"Model: {model}, tol = {tol:g}: {_MODELS[model]}"
 
     @property
     def hole(self) -> Borehole:
