@@ -3,6 +3,7 @@
 See `parts`, which this module serves: annotations become kinds by `kind_of`.
 """
 
+import contextlib
 import dataclasses
 import functools
 import importlib
@@ -111,6 +112,44 @@ def misplaced(where, message):
     return problem
 
 
+@contextlib.contextmanager
+def concerning(*where):
+    """A `SceneError` from inside is about this place of a file, unless it has one of its own."""
+    try:
+        yield
+    except SceneError as problem:
+        problem.where = problem.where or where
+        raise
+
+
+# How messages begin: the name of a class or a part; a field, "Scene.loads[0]", "Scene: loads[0]", "simulate: depth = ".
+_BEGINS = re.compile(r"(\w[\w -]*?)(?:\.(\w+)|: (\w+)(?= =|\[)|:)(?:\[(\d+)\])?")
+
+
+def _concerned(message, given):
+    """The place in a file that a message on a whole scene is about, by what it begins with and by the arguments that
+    are given, {name: value}; None where that is not known."""
+    found = _BEGINS.match(message)
+    owner, *fields, number = found.groups() if found else ("", None, None, None)
+    field = fields[0] or fields[1]
+    for name, value in given.items():
+        items = enumerate(value) if isinstance(value, list | tuple) else [(None, value)]
+        for i, item in items:
+            if owner == name or owner in _names_in(item):
+                return tuple(x for x in (name, i, field) if x is not None)
+    known = next((name for name in given if field and f"_{name}".endswith(f"_{field}")), None)
+    return None if known is None else (known, *([int(number)] if number else []))
+
+
+def _names_in(part):
+    """The names of a part and of all parts in it, as messages have them."""
+    if isinstance(part, list | tuple):
+        return {name for item in part for name in _names_in(item)}
+    if not hasattr(part, "arguments"):
+        return set()
+    return {checks.name_of(part), getattr(part, "name", "")} | _names_in(list(part.arguments().values()))
+
+
 @dataclasses.dataclass(frozen=True)
 class Reading:
     """Where data are read from.
@@ -152,6 +191,7 @@ def made(make, data, where=(), reading=Reading()):
         return make(**given)
     except SceneError as problem:
         if not where:
+            problem.where = problem.where or _concerned(str(problem), given)
             raise
         at = "" if str(problem).startswith(f"{spoken(where)}.") else f"{spoken(where)}: "
         field = re.match(r"\w+\.(\w+)", str(problem))  # 'Owner.field = value: ...'

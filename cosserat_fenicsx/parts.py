@@ -35,8 +35,8 @@ from cosserat_fenicsx.kinds import FAMILIES, Writing, fields_of, table_schema
 from cosserat_fenicsx.kinds import (
     FileName as FileName, Items as Items, Kind as Kind, Limits as Limits, NotData as NotData, Number as Number,
     Object as Object, Reading as Reading, Several as Several, Text as Text, Values as Values,
-    arguments_of as arguments_of, between as between, made as made, members as members, misplaced as misplaced,
-    spoken as spoken,
+    arguments_of as arguments_of, between as between, concerning as concerning, made as made, members as members,
+    misplaced as misplaced, spoken as spoken,
 )  # fmt: skip
 
 

@@ -5,6 +5,7 @@ import csv
 import math
 import os
 import pickle
+import re
 import subprocess
 import sys
 import tomllib
@@ -527,3 +528,30 @@ def test_pictures_without_their_libraries_are_left_out(kind, table, picture, tmp
     assert (tmp_path / "out" / table).exists() and not (tmp_path / "out" / picture).exists()
     assert table in done.stdout and picture not in done.stdout
     assert picture in done.stderr and "pip install 'cosserat-fenicsx[pictures]'" in done.stderr
+
+
+@pytest.mark.parametrize(("file", "old", "new", "line"), [
+    ("wells/volve_f12", "length = 90.0", "length = 9000.0", r"\[string\].*: DrillString: collar reaches"),
+    ("wells/volve_f12", '"Bit", diameter = "8.5 in"', '"Bit", diameter = 0.45', r"\[string\].*: bit: "),
+    ("wells/volve_f12", "friction = [0.1, 0.2, 0.3]", "friction = [[0.1]]", "friction = .*: Borehole.friction = "),
+    ("wells/volve_f12", 'model = "soft"', 'model = "sift"', r"\[depth_sweep\].*: torque_and_drag.model = 'sift'"),
+    ("wells/assembly", 'model = "rod"', "depth = 900.0", "depth = .*: torque_and_drag: depth = 900 m"),
+    ("strings/stick_slip", "[simulate]", "[wall_friction]\nstatic = 1\n[simulate]", r"\[wall.*: Drilling.friction = "),
+    ("strings/stick_slip", "[simulate]", "[simulate]\nsave_every = 300.0", "save_every = .*: simulate.save_every = "),
+    ("strings/four_discs", "[simulate]", "[mud]\ndensity = 1e3\n[simulate]", r"\[mud\].*: Drilling.mud = "),
+    ("tripod", 'second = "three.end"', 'second = "three.start"', "second.*: Joint of one.end"),
+    ("tripod", 'station = "three.start"', 'station = "one.start"', "Hinge.*: Scene: supports"),
+    ("tripod", "[solve]", "[[loads]]\ntype = 'Force'\nstation = 'four.end'\nforce = [1, 0, 0]\n[solve]",
+     "four.*: Scene.loads.2..station = 'four.end'"),
+])  # fmt: skip
+def test_errors_of_a_whole_scene_have_the_line_of_their_table(tmp_path, file, old, new, line):
+    """The line that the message gives, or one of the two after it, has the words that the message is about."""
+    text = (DEMOS / f"{file}.toml").read_text(encoding="utf-8")
+    assert text.count(old) == 1
+    text = text.replace(old, new).replace('survey = "', f'survey = "{DEMOS / "wells"}/')
+    (tmp_path / "scene.toml").write_text(text, encoding="utf-8")
+    with pytest.raises(cf.SceneError, match=r"scene\.toml, line \d+, column 1: ") as refused:
+        cf.read(tmp_path / "scene.toml")
+    number = int(re.search(r"line (\d+)", str(refused.value))[1])
+    here, message = " ".join(text.splitlines()[number - 1 : number + 2]), str(refused.value).partition("column 1")[2]
+    assert re.search(line, f"{here} {message}"), (here, message)

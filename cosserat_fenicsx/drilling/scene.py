@@ -60,7 +60,7 @@ class Drilling(InWords, Part):
                 refuse(self, "hook", self.hook, "None for Discs without masses, which turn alone")
             return
         if self.friction is not None and self.hole is None:
-            refuse(self, "hole", None, "a Borehole, where there is friction at its wall")
+            refuse(self, "friction", self.friction, "None, or a hole (Borehole) beside it, at whose wall it acts")
         if self.depth is None and self.hole is None and self.string.components[-1].length is None:
             refuse(self.string.components[-1], "length", None, "a length (m), where there is neither hole nor depth")
         _ = self.segments
@@ -131,12 +131,12 @@ class Drilling(InWords, Part):
         fluid = " in air" if mud is not None or self.hole is None else ""
         fluid = " in mud" if mud is not None and mud.density > 0 else fluid
         for part in self.segments:
+            weight = told(part.weight, "N/m", "force per length", ".5g", "N/m")
             torsion = told(part.torsional_impedance, "N m s/rad", form=".5g")
             axial = told(part.axial_impedance, "N s/m", form=".5g")
             speeds = [told(x, "m/s", "wave speed", ".5g") for x in (part.torsional_speed, part.axial_speed)]
             yield (
-                f"String, {part.name}: {told(part.length, 'm')}, "
-                f"{told(part.weight, 'N/m', 'force per length', '.5g', 'N/m')}{fluid}, impedance {torsion} in torsion and "
+                f"String, {part.name}: {told(part.length, 'm')}, {weight}{fluid}, impedance {torsion} in torsion and "
                 f"{axial} along the axis, waves at {' and '.join(speeds)}."
             )
         if mud is not None:

@@ -44,7 +44,7 @@ from cosserat_fenicsx.drilling.segments import Discs
 from cosserat_fenicsx.drilling.top_drive import DriveControl, Hook, TopDrive
 from cosserat_fenicsx.drilling.wall_friction import FrictionLaw, ViscousDrag, WallFriction
 from cosserat_fenicsx.errors import SceneError
-from cosserat_fenicsx.parts import Depth, Number, Part, Time, Values, positive
+from cosserat_fenicsx.parts import Depth, Number, Part, Time, Values, misplaced, positive
 from cosserat_fenicsx.quantities import Units
 from cosserat_fenicsx.results.screen import InWords
 from cosserat_fenicsx.well.components import DrillString
@@ -132,7 +132,7 @@ class DrillingScene(InWords, Part):
 
     def validate(self):
         if (self.string is None) == (self.discs is None):
-            raise SceneError("expected [drive], and either [string] or [discs]")
+            raise misplaced(("discs",) if self.discs else None, "expected [drive], and either [string] or [discs]")
         parts = {"bit": self.bit, "hole": self.well, "hook": self.hook, "mud": self.mud, "drag": self.drag}
         parts |= {"friction": self.wall_friction, "depth": self.depth, "start": self.start}
         string, drive = self.string or self.discs, self.drive

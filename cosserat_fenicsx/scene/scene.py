@@ -14,7 +14,7 @@ import numpy as np
 
 from cosserat_fenicsx.checks import instance, store, warn
 from cosserat_fenicsx.errors import SceneError, nearest
-from cosserat_fenicsx.parts import Items, Object, Part
+from cosserat_fenicsx.parts import Items, Object, Part, concerning
 from cosserat_fenicsx.scene.action import Action, powers
 from cosserat_fenicsx.scene.describe import describe
 from cosserat_fenicsx.scene.planes import find_plane
@@ -162,7 +162,10 @@ class Scene(Part):
         by_name, numbers = {rod.name: rod for rod in self.rods}, {rod: i for i, rod in enumerate(self.rods)}
         store(self, _by_name=by_name, _numbers=numbers, _given=self.supports)
         for field in _PARTS:
-            items = [with_names(f"Scene.{field}[{i}]", x, by_name) for i, x in enumerate(getattr(self, field))]
+            items = []
+            for i, x in enumerate(getattr(self, field)):
+                with concerning(field, i):
+                    items.append(with_names(f"Scene.{field}[{i}]", x, by_name))
             store(self, **{field: tuple(items)})
         for field, (kind, expected) in _PARTS.items():
             for i, item in enumerate(getattr(self, field)):

@@ -47,7 +47,7 @@ from typing import Annotated, Any
 import numpy as np
 
 from cosserat_fenicsx.checks import File
-from cosserat_fenicsx.parts import Depth, Number, Part, Values, positive
+from cosserat_fenicsx.parts import Depth, Number, Part, Values, concerning, positive
 from cosserat_fenicsx.quantities import Units
 from cosserat_fenicsx.results.screen import InWords
 from cosserat_fenicsx.well.answer import TorqueAndDrag
@@ -139,16 +139,23 @@ class WellScene(InWords, Part):
         here = [settings.pop("depth", hole.length)]
         friction, depths = sweep.get("friction", []), sweep.get("depths", [])
         of_sweep = {name: sweep[name] for name in ("model", "tol") if name in sweep}
-        for value in friction if isinstance(friction, list) else [friction]:
-            hole.with_friction(value)
-        for asked, places in ((settings, here), ({**settings, **of_sweep}, depths)):
-            check_settings(**asked)
-            for depth in places:
-                _, laid = pieces_of(hole, self.string, self.operations[0], self.mud, depth)
-                if asked.get("model") == ROD:
-                    for operation in self.operations:
-                        convention = asked.get("torque_convention", CONVENTIONS[0])
-                        check_rod(hole, laid, operation, self.mud, convention)
+        with concerning("depth_sweep", "friction"):
+            for value in friction if isinstance(friction, list) else [friction]:
+                hole.with_friction(value)
+        self._check(settings, here)
+        with concerning("depth_sweep"):
+            self._check({**settings, **of_sweep}, depths)
+
+    def _check(self, asked, depths):
+        """Refuse settings of `torque_and_drag`, and what does not fit the hole at some depths."""
+        hole = self.well
+        check_settings(**asked)
+        for depth in depths:
+            _, laid = pieces_of(hole, self.string, self.operations[0], self.mud, depth)
+            if asked.get("model") == ROD:
+                for operation in self.operations:
+                    convention = asked.get("torque_convention", CONVENTIONS[0])
+                    check_rod(hole, laid, operation, self.mud, convention)
 
     def sentences(self, units: Units):
         """On hole, mud, string, operations and model, in some units."""
