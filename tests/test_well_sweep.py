@@ -172,6 +172,11 @@ def test_friction_from_measurements():
     loads = [m.hook_load for m in noisy.measurements if m.hook_load is not None]
     off = [m.hook_load_sd for m in noisy.measurements if m.hook_load is not None] * noisy.residuals[: len(loads)]
     assert np.sort(computed) == pytest.approx(np.sort(np.array(loads) - off) / 1e3)
+    assumed = "(assumed where none is given)"
+    assert f"deviations: 10 kN of hook loads {assumed} and 500 N m of surface torques {assumed}." in " ".join(
+        str(noisy).split()
+    )
+    assert f"2.24809 klbf of hook loads {assumed} and 368.781 ft-lbf of" in " ".join(noisy.summary("field").split())
     block = cf.well.calibrate_friction(HOLE, STRING, measured(0.0, 250e3), mud=MUD, block_weight=None)
     assert block.block_weight == pytest.approx(250e3, rel=1e-6) and block.friction == pytest.approx(
         [0.2, 0.3], abs=1e-6
@@ -209,6 +214,7 @@ def test_the_interval_covers_as_often_as_it_says():
             for depth, torque in torques.items()
         ]
         fit = cf.well.calibrate_friction(HOLE, STRING, readings, mud=MUD, confidence=0.5)
+        assert "Standard deviations: 300 N m of surface torques." in str(fit)
         hits += int(fit.interval[0, 0] < 0.2 < fit.interval[0, 1])
     assert 11 <= hits <= 29  # 20 with a standard deviation of 3.2
 

@@ -48,7 +48,8 @@ class RigMeasurement(Part):
         hook_load: N, as the indicator shows it; None if not read. It includes the weight of block and top drive, the
             `block_weight` of `calibrate_friction`, which is zero unless given or fitted.
         torque: at the surface, N m; None if not read.
-        hook_load_sd, torque_sd: their standard deviations, N and N m: the weights of the readings.
+        hook_load_sd, torque_sd: their standard deviations, N and N m: the weights of the readings. Those that are not
+            given are assumed, 10 kN and 500 N m, which the printed fit says.
 
     Raises:
         SceneError: neither was read, or numbers outside their range.
@@ -147,6 +148,7 @@ class FrictionFit(Result):
     def _answer(self, units):
         yield f"Coefficients of friction by least squares, with {100 * self.confidence:g} % intervals."
         yield f"misfit {self.misfit:.3g} (1: as the standard deviations say)"
+        yield f"Standard deviations: {' and '.join(self._deviations(units))}."
         for section, friction in zip(self.quantities["section"].of(self), self.friction, strict=True):
             if friction < 1e-6:
                 yield f"The friction of section {section} is at 0, its bound: the readings ask for less than none."
@@ -154,6 +156,15 @@ class FrictionFit(Result):
             low, high = (self._told("block_weight", units, x) for x in self.block_interval)
             yield f"block weight {self._told('block_weight', units)}, from {low} to {high}"
         yield from (f"DOUBTFUL: {doubt}" for doubt in self.doubts)
+
+    def _deviations(self, units):
+        """The standard deviations of the readings in words, hook loads before torques."""
+        for query, name, unit in (("hook_load", "hook_load_sd", "N"), ("surface_torque", "torque_sd", "N m")):
+            sizes = sorted({x.sd for x in self._readings if x.query == query})
+            if sizes:
+                told = " to ".join(dict.fromkeys(units.told(x, unit) for x in (sizes[0], sizes[-1])))
+                assumed = " (assumed where none is given)" if getattr(RigMeasurement, name) in sizes else ""
+                yield f"{told} of {query.replace('_', ' ')}s{assumed}"
 
 
 def calibrate_friction(
