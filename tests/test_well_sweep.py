@@ -300,24 +300,13 @@ def test_the_chart_of_a_sweep_marks_lock_up_and_thrusts_beyond_all_others():
     operations, depths = (cf.well.TripIn(), cf.well.RotateOffBottom()), np.arange(1e3, 6e3, 1e3)
     found = cf.well.DepthSweep(operations, depths, (None,), values, {(0, 0, 4): "locks up"})
     hook, torque = found.plot().axes
-    thrust, locked = (text.get_text() for text in hook.texts)
-    assert thrust == "-70,000 kN, beyond the axis: close to lock-up"
-    assert locked == "bit at 5000 m: locks up, from md = 90 m of the string on"
+    marks = {line.get_marker(): list(line.get_ydata()) for line in hook.lines if len(line.get_ydata())}
+    assert not hook.texts and marks["<"] == [4000.0] and marks["X"] == [5000.0] and marks["."] == list(depths)
     assert -1e3 < hook.get_xlim()[0] < -300 and 300 < hook.get_xlim()[1] < 1e3
     told = [text.get_text() for text in hook.get_legend().get_texts()]
-    assert told == ["trip in", "rotate off bottom", "by the exact rod, others soft", "locks up, or no answer"]
+    assert told == ["trip in", "rotate off bottom", "by the exact rod, others soft", "load beyond the axis",
+                    "locks up, or no answer"]  # fmt: skip
     assert hook.figure.get_suptitle().endswith("7 of 10 answers so far") and len(torque.lines) == 2
-
-
-def test_notes_in_the_chart_of_a_sweep_do_not_cover_each_other():
-    """Of lines that lock up at the same depth."""
-    pytest.importorskip("matplotlib")
-    values = {name: np.full((1, 3, 2), np.nan) for name in module.KEPT}
-    values["hook_load"][0, :, 0], values["locked"][0, :, 1] = (1e5, 2e5, 3e5), (10.0, 20.0, 30.0)
-    notes = {(0, j, 1): "locks up" for j in range(3)}
-    (hook,) = cf.well.DepthSweep((cf.well.TripIn(),), np.array([1e3, 2e3]), (0.1, 0.2, 0.3), values, notes).plot().axes
-    assert [text.xy[1] for text in hook.texts] == [2e3] * 3
-    assert min(np.diff(sorted(text.xyann[1] for text in hook.texts))) > hook.texts[0].get_fontsize()
 
 
 def test_the_largest_error_of_a_sweep_names_its_quantity_and_place():

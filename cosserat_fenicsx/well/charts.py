@@ -126,8 +126,11 @@ def sweep_figure(sweep):
         panels[1].set_xlabel(torque_label)
     if both:
         panels[0].plot([], [], "s", color=GREY, markersize=7, fillstyle="none", label="by the exact rod, others soft")
-    if (sweep.done & np.isnan(sweep.hook_load)).any():
-        panels[0].plot([], [], "X", color=GREY, linestyle="none", label="locks up, or no answer")
+    mark, hook = {"color": GREY, "linestyle": "none"}, sweep.hook_load / force
+    if ((hook < low) | (hook > high)).any():
+        panels[0].plot([], [], "<" if (hook < low).any() else ">", **mark, label="load beyond the axis")
+    if (sweep.done & np.isnan(hook)).any():
+        panels[0].plot([], [], "X", **mark, label="locks up, or no answer")
     legend(*panels)
     part = "" if sweep.done.all() else f", {len(sweep)} of {sweep.done.size} answers so far"
     what = "Hook load and torque" if turns else "Hook load"
@@ -148,24 +151,14 @@ def _usual_range(loads):
 
 
 def _without_answer(axes, sweep, i, j, limits, colour):
-    """Marks where a line's loads are beyond the axis, with their numbers, and where it has none, with the place of
-    lock-up."""
-    (force_unit, force), (length_unit, length) = unit_of(_HOOK), unit_of(_BIT_DEPTH)
+    """Marks where a line's loads are beyond the axis, and where it has none."""
+    force, length = unit_of(_HOOK)[1], unit_of(_BIT_DEPTH)[1]
     loads, depths = sweep.hook_load[i, j] / force, sweep.depths / length
-    note = {"fontsize": SMALL, "color": colour, "va": "center", "textcoords": "offset points"}
-
-    def offset(depth, right):
-        """In points: notes at one depth are below each other."""
-        return right, -1.3 * SMALL * sum(text.xy[1] == depth for text in axes.texts)
-
     if np.isfinite(limits).all():
         axes.set_xlim(*limits)
     for k in np.flatnonzero((loads < limits[0]) | (loads > limits[1])):
-        left = loads[k] < limits[0]
-        at = limits[0] if left else limits[1]
-        axes.plot(at, depths[k], "<" if left else ">", color=colour, clip_on=False)
-        axes.annotate(f"{loads[k]:,.0f} {force_unit}, beyond the axis: close to lock-up", (at, depths[k]),
-                      offset(depths[k], 8 if left else -8), ha="left" if left else "right", **note)  # fmt: skip
+        end, mark = (limits[0], "<") if loads[k] < limits[0] else (limits[1], ">")
+        axes.plot(end, depths[k], mark, color=colour, clip_on=False)
     shown = None
     for k in np.argsort(depths):
         if np.isfinite(loads[k]):
@@ -174,11 +167,6 @@ def _without_answer(axes, sweep, i, j, limits, colour):
             # below the load at the depth before
             at = {"transform": axes.get_yaxis_transform()} if shown is None else {}
             axes.plot(0.02 if shown is None else shown, depths[k], "X", color=colour, clip_on=False, **at)
-            locked = sweep.values["locked"][i, j, k] / length
-            if shown is not None and np.isfinite(locked):
-                told = f"bit at {depths[k]:.6g} {length_unit}: locks up, "
-                told += f"from md = {locked:.5g} {length_unit} of the string on"
-                axes.annotate(told, (shown, depths[k]), offset(depths[k], 8), **note)
 
 
 def fit_figure(fit):
