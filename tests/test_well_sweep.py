@@ -310,13 +310,16 @@ def test_the_chart_of_a_sweep_marks_lock_up_and_thrusts_beyond_all_others():
 
 
 def test_the_largest_error_of_a_sweep_names_its_quantity_and_place():
+    """Over the largest load of the sweep: 60 % of a torque of 10 N m are nothing beside 10 kN m."""
     values = {name: np.full((2, 1, 3), 1e-3) for name in module.KEPT}
-    values["model"][:] = 1
+    values["hook_load"][:], values["surface_torque"][:] = 5e5, (1e4, 1e4, 10.0)
+    values["torque_left_out"][1, 0] = 100.0, 50.0, 6.0
     operations, depths = (cf.well.TripIn(), cf.well.RotateOffBottom()), np.array([1e3, 2e3, 5409.0])
-    for worst, told in ((0.5, "5e-01"), (np.inf, "without a bound: it may lock up")):
-        values["model_error"][0, 0, 1] = worst
-        last = list(cf.well.DepthSweep(operations, depths, (None,), values, {})._answer(Units()))[-2]
-        assert "hook load and surface torque" in last and last.endswith(f"{told} (trip in, bit at 2000 m)")
+    for worst, told in ((2.5e4, "at most 25 kN, 5 % of the largest one"), (np.inf, "without a bound, since it may")):
+        values["hook_left_out"][0, 0, 1] = worst
+        *_, hook, torque = list(cf.well.DepthSweep(operations, depths, (None,), values, {})._answer(Units()))[:-1]
+        assert hook.startswith(f"hook load: what the model leaves out is {told}") and "(trip in, bit at 2000 m)" in hook
+        assert torque.startswith("surface torque") and "100 N m, 1 % of the largest one (rotate off" in torque
 
 
 def test_axes_in_space_have_two_numbers_or_none():

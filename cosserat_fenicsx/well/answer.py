@@ -93,6 +93,7 @@ class TorqueAndDrag(Differentiated, Result):
             tension and torque along the string (over 1 % of that tension times the contact radius where this is more).
         model_error: estimate, also relative, of how far those of the rod in contact may be, which is stiff and has
             a clearance: the error of the model, not of its solution. NaN: not estimated, of the rod itself.
+        left_out: the same of hook load (N) and of surface torque (N m), not relative.
         enough: whether both are within `tol`, as far as they are estimated, of hook load and surface torque alone;
             False warns that the model does not suffice for the accuracy asked for.
         torque_convention: "coulomb" or "johancsik", see `torque_and_drag`.
@@ -119,6 +120,7 @@ class TorqueAndDrag(Differentiated, Result):
     why: tuple[str, ...]
     error: float
     model_error: float
+    left_out: tuple[float, float]
     differences: dict[str, tuple[float, float]]
     laid: Any
     pieces: Any

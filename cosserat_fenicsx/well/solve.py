@@ -139,8 +139,8 @@ def _flexible(given, model, tol, torque_convention, pieces, laid):
         why.append(f"the {used} string's error in the {exceeding} exceeds tol = {tol:g}: solving the rod in contact")
     ends = [(x.tension[-1, -1], x.torque[-1, -1]) for x in (solved, soft)]
     differences = {SOFT: tuple(float(a - b) for a, b in zip(*ends, strict=True))} if buckled else {}
-    answer = TorqueAndDrag(*given, used, tol, torque_convention, tuple(whole), error, max(shares.values()), differences,
-                           laid, pieces, solved)  # fmt: skip
+    answer = TorqueAndDrag(*given, used, tol, torque_convention, tuple(whole), error, max(shares.values()),
+                           tuple(parts.total for parts in left_out), differences, laid, pieces, solved)  # fmt: skip
     return answer, why
 
 

@@ -31,7 +31,7 @@ from cosserat_fenicsx.well.pieces import pieces_of
 from cosserat_fenicsx.well.solve import AUTO, BUCKLED, ROD, SOFT, torque_and_drag
 
 #: Numbers that are kept of an answer; `locked` is where the string locks up, m, or NaN; `model` the index of its model.
-KEPT = ("hook_load", "surface_torque", "error", "model_error", "locked", "model")
+KEPT = ("hook_load", "surface_torque", "error", "model_error", "hook_left_out", "torque_left_out", "locked", "model")
 _MODELS = (SOFT, BUCKLED, ROD)
 KIND = Kind(
     what="sweep", home="well.sweep", call="depth_sweep", again="the same call of depth_sweep continues from there",
@@ -48,9 +48,10 @@ class DepthSweep(Result):
 
     Attributes:
         operations, depths (m), friction: as asked for; friction is (None,) for the hole's own.
-        values: {name: array (operations, friction, depths)} of "hook_load" (N), "surface_torque" (N m), "error" and
-            "model_error" (see `TorqueAndDrag`), "locked" (m): where the string locks up, which leaves the others NaN,
-            and "model", from which `models` follows. NaN: not computed yet.
+        values: {name: array (operations, friction, depths)} of "hook_load" (N), "surface_torque" (N m), "error",
+            "model_error", "hook_left_out" (N) and "torque_left_out" (N m) (see `TorqueAndDrag`), "locked" (m): where
+            the string locks up, which leaves the others NaN, and "model", from which `models` follows. NaN: not
+            computed yet.
         notes: {(operation, friction, depth): text}, by indices, of the answers to look at: why there is none (the
             string locks up, no equilibrium was found), or why it is not as accurate as asked.
     """
@@ -72,6 +73,8 @@ class DepthSweep(Result):
         *(Quantity(name, label, unit, axes=_CASES, getter=lambda x, name=name: x.values[name])
           for name, label, unit in (("error", "estimated relative error of the solution", "1"),
                                     ("model_error", "estimated relative error of the model", "1"),
+                                    ("hook_left_out", "estimated error of the model's hook load", "N"),
+                                    ("torque_left_out", "estimated error of the model's surface torque", "N m"),
                                     ("locked", "measured depth where it locks up", "m"))),
         Quantity("models", "model", axes=_CASES),
         Quantity("notes", axes=("depth",),
@@ -313,12 +316,12 @@ def _answer(hole, string, operation, depth, settings):
         # an equilibrium that is not as accurate as asked is one
         found, none = getattr(failed, "answer", None), (np.nan,) * len(KEPT)
         rod = float(_MODELS.index(ROD))
-        numbers = found and (found.hook_load, found.surface_torque, found.error, np.nan, np.nan, rod)
+        numbers = found and (found.hook_load, found.surface_torque, found.error, *[np.nan] * 4, rod)
         return numbers or none, str(failed)
     notes = [line for line in answer.why if line.startswith("BEYOND")]
     if settings["model"] == AUTO and not answer.enough:
         why = [line for line in answer.why if line.startswith("NOT ENOUGH")]
         why += [] if answer.model == ROD else answer.why[-1:]  # why it is not the rod
         notes += [answer.words, *why]
-    numbers = (answer.hook_load, answer.surface_torque, answer.error, answer.model_error, np.nan)
+    numbers = (answer.hook_load, answer.surface_torque, answer.error, answer.model_error, *answer.left_out, np.nan)
     return (*numbers, float(_MODELS.index(answer.model))), "; ".join(notes)

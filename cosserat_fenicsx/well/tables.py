@@ -174,13 +174,17 @@ def sweep_in_words(sweep, units):
     yield from notes[:most]
     if len(notes) > most:
         yield f"and {len(notes) - most} more, see `notes`"
-    told = sweep.values["model_error"]
-    if not np.isnan(told).all():
+    for name, kept in (("hook_load", "hook_left_out"), ("surface_torque", "torque_left_out")):
+        told, loads = sweep.values[kept], sweep.values[name]
+        if not np.nanmax(told, initial=0.0) > 0:
+            continue
         i, j, k = np.unravel_index(np.nanargmax(told), told.shape)
-        worst = "without a bound: it may lock up" if np.isinf(told[i, j, k]) else f"{told[i, j, k]:.0e}"
+        worst, most = told[i, j, k], np.nanmax(np.abs(loads), initial=1e-300)
+        size = f"at most {sweep._told(name, units, worst, '.3g')}, {100 * worst / most:.1g} % of the largest one"
+        size = "without a bound, since it may lock up" if np.isinf(worst) else size
         yield (
-            "largest relative error of hook load and surface torque by what the model leaves out, estimated: "
-            f"{worst} ({sweep.label(i, j)}, bit at {sweep._told('depth', units, sweep.depths[k])})"
+            f"{sweep.quantities[name].label}: what the model leaves out is {size} "
+            f"({sweep.label(i, j)}, bit at {sweep._told('depth', units, sweep.depths[k])}), estimated"
         )
     used = sorted({*sweep.models.ravel()} - {""})
     if len(used) == 1:
@@ -199,5 +203,5 @@ def over_depths(sweep, units, rows):
                 given.append((replace(known["surface_torque"], short=f"{label}, torque"), sweep.surface_torque[i, j]))
             if len(used) > 1:
                 given.append((replace(known["models"], label=f"{label}, model"), sweep.models[i, j]))
-    title = "hook load, and surface torque where the string rotates, over the depth of the bit"
+    title = "loads over the depth of the bit"
     return screen.table([(known["depth"], sweep.depths), *given], units, rows, title)

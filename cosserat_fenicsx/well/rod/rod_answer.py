@@ -59,7 +59,8 @@ class RodInContact(TorqueAndDrag):
         differences = {name: (here[0] - hook, here[1] - torque) for name, (hook, torque) in there.items()}
         given |= {"model": "rod", "error": solved.error, "differences": differences, "solved": solved}
         why = (*decided, *_found(flexible, solved, differences))
-        return cls(**{**given, "model_error": _of_buckling(flexible, solved, differences), "why": why})
+        model_error, left_out = _of_buckling(flexible, solved, differences)
+        return cls(**{**given, "model_error": model_error, "left_out": left_out, "why": why})
 
     @property
     def enough(self):
@@ -130,13 +131,13 @@ class RodInContact(TorqueAndDrag):
 
 def _of_buckling(flexible, solved, differences):
     """Of an equilibrium that would buckle: how far it is from the buckled soft string where that has a helix, else what
-    a snake and all that a soft string leaves out may change. NaN of a stable one."""
+    a snake and all that a soft string leaves out may change: `model_error` and `left_out`. NaN of a stable one."""
     if solved.negative_modes == 0:
-        return np.nan
+        return np.nan, (np.nan, np.nan)
     if not flexible.helical.any():
-        return flexible.model_error
-    scales = scales_of(flexible.solved, flexible.pieces)
-    return max(share(abs(x), scale) for x, scale in zip(differences[flexible.model], scales, strict=True))
+        return flexible.model_error, flexible.left_out
+    sizes, scales = tuple(map(abs, differences[flexible.model])), scales_of(flexible.solved, flexible.pieces)
+    return max(map(share, sizes, scales)), sizes
 
 
 def _found(flexible, solved, differences):
