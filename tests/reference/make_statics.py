@@ -21,7 +21,7 @@ sys.path.insert(0, str(HERE.parent))
 import bvp  # noqa: E402
 from checked import check  # noqa: E402
 from clamped_ring import critical_twist  # noqa: E402
-from frames import hinged_frame, lee_frame, shallow_arch  # noqa: E402
+from frames_by_shooting import hinged_frame, lee_frame, shallow_arch  # noqa: E402
 from planar_truth import Frame, Leg, Section  # noqa: E402
 
 RIGID = (np.inf, np.inf, np.inf)
