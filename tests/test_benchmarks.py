@@ -341,9 +341,9 @@ def test_the_first_event_of_an_imperfect_arch_is_a_limit_point(sideways, top):
     assert path.events[0].kind == "limit"
 
 
-# an arch, a toggle that is nearly perfect, a dome of six arcs
+# a toggle that is nearly perfect, a dome of six arcs
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [0, 3, 12])
+@pytest.mark.parametrize("seed", [3, 12])
 def test_structures_follow_small_steps(seed):
     given = imperfect_structures.structure(seed)
     truth = imperfect_structures.small_steps(given, imperfect_structures.STEP)

@@ -98,7 +98,7 @@ def test_newton_work(far, most, reference):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("turns, elements", [(1, 8), (2, 16), (4, 32), pytest.param(10, 64, marks=pytest.mark.serial)])
+@pytest.mark.parametrize("turns, elements", [(1, 8), (2, 16), (4, 32)])
 def test_roll_up_closes(turns, elements):
     rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, 20.0)), cf.Circle(0.2), cf.Material(E=210e9))
     M = 2 * np.pi * turns * rod.stiffness.bending[1] / rod.length

@@ -57,10 +57,9 @@ def test_stick_slip_of_the_bit_is_that_of_the_string():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("scheme", ["energy", "generalised-alpha"])
-def test_other_schemes_agree(scheme):
+def test_other_schemes_agree():
     mixed = cf.drilling.mixed_scene(drilling(), 3000.0)
-    histories = [cf.simulate(mixed.scene, 3.0, dt=0.005, scheme=x, **SMALL) for x in ("momentum", scheme)]
+    histories = [cf.simulate(mixed.scene, 3.0, dt=0.005, scheme=x, **SMALL) for x in ("momentum", "generalised-alpha")]
     (_, one), (_, other) = (mean_speeds(history, mixed.rod) for history in histories)
     np.testing.assert_allclose(other, one, atol=0.02)
 

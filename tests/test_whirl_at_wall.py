@@ -49,7 +49,7 @@ def test_rolling_needs_the_friction_that_theory_says(share, rolls):
         assert turning / spin[late].mean() > 0.97 * COLLAR["rolling_ratio"]
 
 
-def test_the_energy_of_a_bouncing_collar_stays_for_ten_thousand_steps():
+def test_the_energy_of_a_bouncing_collar_stays_for_thousands_of_steps():
     rod = collar(drag=0.0)
     wall = HoleWall(rod, AXIS, CLEARANCE + ARM, ARM, stiffness=1e8)
 
@@ -58,7 +58,7 @@ def test_the_energy_of_a_bouncing_collar_stays_for_ten_thousand_steps():
 
     start = cf.InitialVelocity(rod, linear=linear, angular=lambda s: (0.0, 0.0, 0.0))
     scene = cf.Scene([rod], [cf.Pin(rod.start), cf.Pin(rod.end)], [wall], velocities=[start])
-    history = cf.simulate(scene, 10.0, dt=1e-3, scheme="energy", save_every=0.05, **MESH)
-    assert history.steps[-1] == 10000
+    history = cf.simulate(scene, 2.5, dt=1e-3, scheme="energy", save_every=0.05, **MESH)
+    assert history.steps[-1] == 2500
     assert (-history.work).max() > 0.1 * history.kinetic[0]  # it touches
     assert np.abs(history.balance).max() < 1e-8 * history.kinetic[0]
