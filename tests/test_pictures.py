@@ -170,6 +170,19 @@ def test_lines_to_labels_do_not_cross(seed):
             assert not ((shares > 0) & (shares < 1)).all()
 
 
+def test_labels_of_the_lower_end_keep_off_the_string():
+    """Five long ones where there is no room beside the end: farther away, not over the string."""
+    way = np.array([0.7, 0, -0.7])
+    string = np.linspace(0, 10, 400)[:, None] * way
+    view = View.of(string, np.ptp(string, axis=0), (1100, 1000))
+    labels, pixels = Labels(view, [string]), view.pixels(string)
+    labels.reserve((pixels[-1, 0] + 60, 0), (1100, 1000))
+    for x in (10.0, 9.9, 9.7, 9.6, 9.5):
+        assert labels.near(f"0.914 klbf at {x + 4921:.1f} ft", x * way, np.array([1.0, 0, 1]), size=30)
+    for x0, y0, x1, y1 in labels.boxes[1:]:
+        assert not ((pixels > (x0, y0)) & (pixels < (x1, y1))).all(axis=1).any()
+
+
 def test_numbers_of_an_axis_are_even():
     """Every n-th one, from that on which leaves most room where another label stands at an end."""
     view = View.of(np.array([[0.0, 0, 0], [10, 0, 5]]), np.array([10.0, 0, 5]), (700, 500))

@@ -119,7 +119,7 @@ _LETTERS = {**dict.fromkeys(" .,:;'|!()[]-/Iijltfr", 0.34), **dict.fromkeys("mwM
 _LETTER, _CAPITAL, _LINE, _GAP, _EDGE = 0.56, 0.73, 1.15, 5, 4
 # Distances (pixels) of a label from its point, and turns (deg) of its direction, in the order of preference; distance
 # from which on a thin line leads back.
-_DISTANCES, _LEADER = (16, 26, 42, 64, 92, 128, 180, 250), 40
+_DISTANCES, _LEADER = (16, 26, 42, 64, 92, 128, 180, 250, 340, 460), 40
 _TURNS = (0, *(sign * turn for turn in range(20, 180, 20) for sign in (1, -1)), 180)
 # Pixels between a label and the middle of a rod; size of the cells in which lines are looked up, pixels; how much more
 # a label should keep off rods than off other lines.
@@ -165,7 +165,8 @@ class Labels:
 
     def near(self, text, point, towards, *, size, colour="black"):
         """A label near a point (3,), m, in the direction `towards` (3,) if there is room, else in another one; where
-        its line crosses those of other labels and these labels least, and then where it covers least.
+        its line crosses those of other labels and these labels least and it covers no rod, and then where it covers
+        least.
 
         Returns:
             whether there was room for it.
@@ -179,9 +180,9 @@ class Labels:
             way = np.array([cos * wish[0] - sin * wish[1], sin * wish[0] + cos * wish[1]])
             # the label's edge is at the distance, its corner in directions between
             box = _box(text, anchor + distance * way + half * np.clip(1.5 * way, -1, 1), size)
-            if self._free(box) and (0, covered := self._covers(box)) < least:
+            if self._free(box) and (covered := self._covers(box)) < least:
                 line = anchor, anchor + (distance - _GAP) * way
-                costs = self._crosses(line, box), covered
+                costs = self._crosses(line, box) + covered[0], covered[1]
                 if costs < least:
                     best, least = (box, distance, line), costs
                 if costs == (0, 0):
@@ -250,10 +251,12 @@ class Labels:
         return int(found.sum() + _crosses_boxes(np.array(line), boxes).sum())
 
     def _covers(self, box):
-        """How much of the lines a rectangle covers: a number of cells, of rods `_RODS` times as many."""
+        """How much a rectangle covers: 1 where a rod is among it, else 0; and a number of cells of lines, of rods `_RODS`
+        times as many."""
         low = np.maximum(np.array(box[:2]) - _CLEAR, 0) // _CELL
         high = np.maximum(np.array(box[2:]) + _CLEAR, 0) // _CELL
-        return int(self._covered[int(low[0]) : int(high[0]) + 1, int(low[1]) : int(high[1]) + 1].sum())
+        cells = self._covered[int(low[0]) : int(high[0]) + 1, int(low[1]) : int(high[1]) + 1]
+        return int(cells.max(initial=0) >= _RODS), int(cells.sum())
 
 
 def _overlap(box, other):
