@@ -8,7 +8,7 @@ import pytest
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.errors import Interrupted
 from cosserat_fenicsx.ranks import apart
-from cosserat_fenicsx.scene.parameters import parameter_of, scene_with
+from cosserat_fenicsx.scene.parameters import laws_with, parameter_of, scene_with
 from cosserat_fenicsx.statics import loaded
 
 STEEL = cf.Material(E=2e11, nu=0.3, density=7800.0)
@@ -113,6 +113,9 @@ def test_numbers_that_a_part_refuses_are_refused():
     tube = dataclasses.replace(column().rods[0], section=cf.Tube(0.02, 0.016))
     wider = scene_with(cf.Scene([tube]), [f"rods[0].section.{x}_diameter" for x in ("inner", "outer")], [0.03, 0.04])
     assert wider.rods[0].section == cf.Tube(0.04, 0.03)
+    names = [f"rods[0].section.{x}_diameter" for x in ("inner", "outer")]  # both at once: one alone is refused
+    _, J = laws_with(cf.Scene([tube]), [parameter_of(cf.Scene([tube]), x) for x in names], np.array([[0.03, 0.04]]))
+    assert J[0, 0] == pytest.approx(wider.rods[0].profile.range[0].J, rel=1e-14)
     compiled = cf.compile(column(force=(1.0, 0, 0)), ["loads[0].force[0]", "loads[0].force[2]"], ASKED[:1])
     assert np.isfinite(compiled.batch([[0.0, -100.0], [1.0, -400.0], [0.0, -400.0]]).values).all()
     for bad in ([["x", 1.0]], [1.0, 2.0], [[1.0]], [[1.0, np.nan]]):

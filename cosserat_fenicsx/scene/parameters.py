@@ -142,13 +142,22 @@ def scene_with(scene, names, values):
     groups = {}
     for name, value in zip(names, values, strict=True):
         groups.setdefault(id(_find(scene, name)[0]), []).append((name, float(value)))
-    for group in groups.values():
-        fields = {}
-        for name, value in group:
-            owner, field, keys = _find(scene, name)
-            fields[field] = _put(fields.get(field, getattr(owner, field)), keys, value)
-        scene = _Rebuilding({id(owner): _made(owner, fields)}).of(scene)
+    for group in groups.values():  # one may hold another, so that each is found again
+        scene = _Rebuilding(_changed((*_find(scene, name), value) for name, value in group)).of(scene)
     return scene
+
+
+def _changed(numbers):
+    """{id of an object: the same with other numbers}, all numbers of one at once.
+
+    Args:
+        numbers: (object, its field, indices within the field, value) of each.
+    """
+    owners, fields = {}, {}
+    for owner, field, keys, value in numbers:
+        owners[id(owner)], of_owner = owner, fields.setdefault(id(owner), {})
+        of_owner[field] = _put(of_owner.get(field, getattr(owner, field)), keys, value)
+    return {key: _made(owners[key], changed) for key, changed in fields.items()}
 
 
 def laws_with(scene, parameters, values):
@@ -163,15 +172,13 @@ def laws_with(scene, parameters, values):
     found = np.empty((len(values), len(scene.rods), 6))
     for i, rod in enumerate(scene.rods):
         found[:, i, :3], found[:, i, 3:] = rod.profile.range[0].K, rod.profile.range[0].J
+    places = [(parameter.owner, parameter.place[1], parameter.place[2:]) for parameter in parameters]
     of_rods = [i for i, rod in enumerate(scene.rods) if _holds(rod, parameters)]
     for row, numbers_of_case in zip(found, values.tolist(), strict=True):
         try:
-            known = {}
-            for parameter, value in zip(parameters, numbers_of_case, strict=True):
-                _, field, *keys = parameter.place
-                owner = known.get(id(parameter.owner), parameter.owner)
-                known[id(parameter.owner)] = _made(owner, {field: _put(getattr(owner, field), keys, value)})
-            rebuilding = _Rebuilding(known)
+            rebuilding = _Rebuilding(
+                _changed((*place, value) for place, value in zip(places, numbers_of_case, strict=True))
+            )
             for i in of_rods:
                 rod = scene.rods[i]
                 k = rebuilding.of(rod.section).stiffness(rebuilding.of(rod.material))
