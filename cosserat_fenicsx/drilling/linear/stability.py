@@ -17,6 +17,7 @@ from cosserat_fenicsx.drilling.stick_slip import SPEED, WEIGHT
 from cosserat_fenicsx.drilling.top_drive import Matched, Stiff, TopDrive
 from cosserat_fenicsx.errors import NotConverged, SceneError
 from cosserat_fenicsx.quantities import Quantity
+from cosserat_fenicsx.remember import per_scene
 from cosserat_fenicsx.results.result import Result, by_name
 
 # Growth below this share of the root is rounding: a mode without losses.
@@ -480,6 +481,12 @@ def undisturbed(scene, least, peak):
     speed = max(abs(least), abs(peak))
     if scene is None or scene.start != "steady" or not speed or peak - least >= _STILL * speed:
         return ""
+    return _grows_undisturbed(scene, float(f"{speed:.9g}"))
+
+
+@per_scene
+def _grows_undisturbed(scene, speed):
+    """The caution at a speed of the bit (rad/s), or ""; remembered, as every summary of a motion asks for it."""
     try:
         found = stability(scene, [speed])
     except (SceneError, NotConverged):
