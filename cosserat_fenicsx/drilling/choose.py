@@ -1,16 +1,14 @@
 """The choice of the model of a drill-string in motion, its reasons, and what the model leaves out."""
 
-import warnings
-
 import numpy as np
 
 from cosserat_fenicsx.checks import refuse
 from cosserat_fenicsx.drilling.elements import AxialTorsional
 from cosserat_fenicsx.drilling.torsion import TorsionWaves
 from cosserat_fenicsx.drilling.wall_friction import law_of, static_weight
-from cosserat_fenicsx.errors import NotConverged, SceneError, SceneWarning, nearest
+from cosserat_fenicsx.errors import NotConverged, SceneError, nearest
 from cosserat_fenicsx.well import criteria
-from cosserat_fenicsx.well.operations import RotaryDrilling, RotateOffBottom, TripIn, TripOut
+from cosserat_fenicsx.well.operations import RotaryDrilling, RotateOffBottom, TripIn, TripOut, doubt_on_bit
 from cosserat_fenicsx.well.solve import torque_and_drag
 
 TORSION, BOTH = "torsion", "axial and torsional"
@@ -98,21 +96,27 @@ def _buckled(scene, name):
     ]
 
 
+class _Drills(RotaryDrilling):
+    """What a bit does, which is doubted by the bit's own names."""
+
+    def validate(self):
+        pass
+
+
+_Drills.name = RotaryDrilling.name
+
+
 def _operations(scene):
     """Steady operations, of which the one that compresses the string most is not known in advance."""
     bit, weight = scene.bit, static_weight(scene)
     law = None if bit is None else bit.law.resistance(bit.weight)
-    with warnings.catch_warnings(record=True) as doubts:
-        warnings.filterwarnings("always", r"RotaryDrilling\.torque", SceneWarning)
-        drills = RotaryDrilling(weight, law.kinetic if law else 0.0) if weight > 0 else RotateOffBottom()
-    for doubt in doubts:
-        words = str(doubt.message)
-        if not words.startswith("RotaryDrilling.torque"):
-            warnings.warn(doubt.message, stacklevel=2)
-        elif not bit.law.needs_weight:  # a torque by the weight may be small without a mistake in units
-            words = words.replace("RotaryDrilling.torque", f"The torque of {type(bit.law).__name__}(...)")
-            warnings.warn(SceneWarning(f"{words}; coefficients of friction need radius= (m)"), stacklevel=2)
-    yield drills
+    torque = law.kinetic if law else 0.0
+    if weight > 0:
+        doubt_on_bit("BitOnRock.weight", weight, "weight")
+        if not bit.law.needs_weight:  # a torque by the weight may be small without a mistake in units
+            called = f"The torque of {type(bit.law).__name__}(...)"
+            doubt_on_bit(called, torque, "torque", "; coefficients of friction need radius= (m)")
+    yield _Drills(weight, torque) if weight > 0 else RotateOffBottom()
     if scene.hook is not None:
         signal = scene.hook.signal()
         speeds = [signal(t) for t in (0.0, *signal.jumps)]

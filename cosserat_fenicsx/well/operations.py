@@ -22,6 +22,17 @@ _DOUBTFUL = {"weight": (500.0, "N"), "torque": (50.0, "N m")}
 _SLOW = 20.0
 
 
+def doubt_on_bit(called, value, what, more=""):
+    """Warn of a "weight" or "torque" on bit (N, N m) that is probably in another unit; `called`: its name in the
+    warning, which ends with `more`."""
+    least, unit = _DOUBTFUL[what]
+    if 0 < abs(value) < least:
+        warn(
+            f"{called} = {value:g} {unit} is hardly a {what} on bit: 25 kN are 25e3, 25 klbf 25 * units.kip; 5 kN m "
+            f"are 5e3, 4000 ft-lbf 4000 * units.ft_lbf{more}"
+        )
+
+
 class Operation(Part, family="operation"):
     """Base of operations with a string.
 
@@ -43,13 +54,8 @@ class Operation(Part, family="operation"):
 
     def validate(self):
         """Warn of a weight or a torque on bit that is probably in another unit."""
-        for name, (least, unit) in _DOUBTFUL.items():
-            value = getattr(self, name)
-            if 0 < abs(value) < least:
-                warn(
-                    f"{type(self).__name__}.{name} = {value:g} {unit} is hardly a {name} on bit: 25 kN are 25e3, 25 "
-                    "klbf 25 * units.kip; 5 kN m are 5e3, 4000 ft-lbf 4000 * units.ft_lbf"
-                )
+        for name in _DOUBTFUL:
+            doubt_on_bit(f"{type(self).__name__}.{name}", getattr(self, name), name)
 
     def direction(self, radius: float) -> tuple[float, float]:
         """(c, e) for a contact radius (m)."""
