@@ -58,13 +58,6 @@ def require_real_scalars(scalar_type=PETSc.ScalarType):
 require_real_scalars()
 
 
-_REASONS = PETSc.SNES.ConvergedReason
-#: SNES's reason for a residual that is not a number.
-RESIDUAL_NOT_A_NUMBER = (
-    _REASONS.DIVERGED_FNORM_NAN if PETSc.Sys.getVersion() < (3, 25) else _REASONS.DIVERGED_FUNCTION_NANORINF
-)
-
-
 @contextlib.contextmanager
 def quiet_compiler():
     """Silence the just-in-time compiler's log: 0.5 reports every build and cache look-up at INFO on the root logger."""

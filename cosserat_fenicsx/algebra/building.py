@@ -4,7 +4,6 @@ Only a C compiler and Python's headers are needed, which dolfinx needs as well.
 """
 
 import contextlib
-import ctypes
 import functools
 import hashlib
 import os
@@ -19,7 +18,7 @@ import numpy as np
 
 from cosserat_fenicsx import code_cache, compat
 from cosserat_fenicsx.code_cache import instructions
-from cosserat_fenicsx.compat import PETSc, compiling
+from cosserat_fenicsx.compat import compiling
 
 SOURCES = tuple(Path(__file__).with_name(name) for name in ("chain.c", "newton.c", "sweep.c", "cases.c", "contact.c"))
 # What -ffast-math would add hides numbers that are not finite, and changes sums. Python's own -fwrapv slows loops down.
@@ -31,9 +30,8 @@ def module(*sources):
     """cffi's (ffi, lib) of C files (default: this folder's) and the header of the first one, which must only declare;
     lines with # are for C alone.
 
-    C finds the number of arguments of FFCx's kernels as KERNEL_ARGUMENTS, and PETSc's integers as PetscInt. Processes
-    that come at the same time wait for the one that compiles; a file that is damaged or belongs to another system is
-    made again.
+    C finds the number of arguments of FFCx's kernels as KERNEL_ARGUMENTS. Processes that come at the same time wait for
+    the one that compiles; a file that is damaged or belongs to another system is made again.
 
     Raises:
         InstallationError: there is no C compiler that works, or the cache cannot be used.
@@ -73,21 +71,11 @@ def _compile(name, *task):
 def _task(sources):
     """Name of the module, files, header and flags."""
     flags = [*_FLAGS, *instructions(), f"-DKERNEL_ARGUMENTS={compat.KERNEL_ARGUMENTS}"]
-    flags.append(f"-DPetscInt=int{8 * np.dtype(PETSc.IntType).itemsize}_t")
     flags += code_cache.more_flags()
     header = sources[0].with_suffix(".h")
     contents = [file.read_bytes() for file in (*sources, header)]
     key = hashlib.sha256(repr((contents, flags, code_cache.SUFFIX, cffi.__version__)).encode())
     return f"cosserat_{sources[0].stem}_{key.hexdigest()[:20]}", sources, header, flags
-
-
-def undisturbed(name, *pointers):
-    """Call a C function of this folder that calls PETSc, which is not made for threads: unlike cffi, without letting
-    other threads of Python run meanwhile."""
-    ffi, lib = module()
-    address = int(ffi.cast("intptr_t", ffi.addressof(lib, name)))
-    function = ctypes.PYFUNCTYPE(ctypes.c_int, *[ctypes.c_void_p] * len(pointers))(address)
-    return function(*(int(ffi.cast("intptr_t", pointer)) for pointer in pointers))
 
 
 def _build(name, folder, sources, header, flags):

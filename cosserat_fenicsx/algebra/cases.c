@@ -28,14 +28,12 @@ static int correct_case(cases *c, int k)
     newton *n = s->newton;
     const double *start = c->starts + (size_t)k * s->numbers;
     double *found = s->work;
-    int reason, sideways;
+    int sideways;
     if (put(s, start, *s->load_factors)) return 1;
     n->loads = fabs(*s->load_factors) * s->loads;
-    begin(n);
-    if (s->library->SNESSolve(s->snes, 0, s->x) || s->library->SNESGetConvergedReason(s->snes, &reason)) return 1;
-    if (reason <= 0 || n->verdict != CONVERGED) return 1;
-    advance(n->problem);
-    if (take(s, found) || !(largest(s, found, start) <= c->near) || negative_modes(s->stability, &sideways)) return 1;
+    if (equilibrate(n, s->x) || n->verdict != CONVERGED) return 1;
+    take(s, found);
+    if (!(largest(s, found, start) <= c->near) || negative_modes(s->stability, &sideways)) return 1;
     memcpy(c->found + (size_t)k * n->problem->size, found, n->problem->size * sizeof *found);
     if (s->fields) tabulate_all(s->fields, c->found_fields + (size_t)k * s->fields->elements * s->fields->size);
     return 0;

@@ -98,20 +98,20 @@ typedef struct {
     void *self;                     /* for the hooks */
 } problem;
 
-/* Why Newton's method stopped, by SNES and in time steps; words in newton.py. */
+/* Why Newton's method stopped; words in newton.py. */
 enum { ITERATING, CONVERGED, SINGULAR, NOT_A_NUMBER, GROWN, RAN_OUT };
 
-/* Newton's method by SNES. */
+/* Newton's method for an equilibrium. */
 typedef struct {
     problem *problem;
     int nodes, block, motion;       /* of this rank; unknowns of a node, and those of them that are motion */
     double root;                    /* of the number of motions of all ranks */
     double increment, rounding, loads; /* limits of the increment and of the residual: rounding + 1e-6 (1 + loads) */
     int period, contracts;          /* steps that are compared; whether quadratic convergence is expected */
-    int most, iterations;
+    int most, iterations, verdict;
     double steps[4];                /* sizes of the last ones, the latest first */
-    int verdict, reasons[6];        /* SNES's reasons for the verdicts; PETSc 3.25 may end a solution with the one of the
-                                       solution before */
+    double *b, *change;             /* (unknowns,) residual, and the step that is subtracted */
+    void *self;                     /* for the hook that finds steps in its own way, or 0 */
 } newton;
 
 /* Newton's method of a time step, see `Iteration` in dynamics/stepper.py. */
@@ -125,27 +125,6 @@ typedef struct {
     int fresh, served, iterations, verdict;
     double spent, enough;
 } stepping;
-
-
-/* PETSc's functions of these names, found by Python. */
-typedef struct {
-    int (*VecGetArrayRead)(void *, const double **);
-    int (*VecRestoreArrayRead)(void *, const double **);
-    int (*VecGetArray)(void *, double **);
-    int (*VecRestoreArray)(void *, double **);
-    int (*SNESSetFunction)(void *, void *, void *, void *);
-    int (*SNESSetJacobian)(void *, void *, void *, void *, void *);
-    int (*SNESSetConvergenceTest)(void *, void *, void *, void *);
-    int (*SNESSetUpdate)(void *, void *);
-    int (*SNESSetApplicationContext)(void *, void *);
-    int (*SNESGetApplicationContext)(void *, void *);
-    int (*PCShellSetApply)(void *, void *);
-    int (*PCShellSetContext)(void *, void *);
-    int (*PCShellGetContext)(void *, void *);
-    int (*SNESGetSolutionUpdate)(void *, void **);
-    int (*SNESSolve)(void *, void *, void *);
-    int (*SNESGetConvergedReason)(void *, int *);
-} petsc;
 
 /* The second variation, in parts that are decoupled. */
 typedef struct {
@@ -173,12 +152,10 @@ enum { DONE, LEFT, LATER, FULL };
 
 /* A continuation in the load factor, see statics/path/load_control.py. */
 typedef struct {
-    petsc *library;
     newton *newton;
     second_variation *stability;
     step_control *control;
-    void *snes, *x;
-    double *load_factor;
+    double *x, *load_factor;
     int numbers, moves, known, negative; /* of a point: unknowns, then carried ones; displacements of a node; points */
     double turn, loads;
     double *points, known_load_factors[3]; /* (3, numbers), the last one is the current */
@@ -228,9 +205,8 @@ int residual(problem *p, const double *x, double *b);
 int tangent(problem *p);
 int solve(problem *p, const double *b, double *x);
 void advance(problem *p);
-void begin(newton *n);
+int equilibrate(newton *n, double *x);
 int iterate(stepping *s);
-int attach(petsc *functions, newton *n, void *snes, void *vector, void *matrix, void *pc);
 
 void find_motion(contact *c, const double *now);
 int settle(contact *c);

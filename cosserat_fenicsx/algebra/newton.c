@@ -6,12 +6,12 @@
 #include <string.h>
 
 enum { STATE = 1, RESIDUAL = 2, TANGENT = 4, INTERFACE = 8, ADD_UP = 16, SUM = 32, MATRICES = 64, CONTACT = 256, COMPLIANCE = 512,
-       NODES = 1024 };
+       NODES = 1024, STEP = 2048 };
 enum { FAILED = 1 };
 
 static int python_hook(void *self, int what, double *a, double *b);
 
-static int hook(problem *p, int what, double *a, double *b)
+static int hook(const problem *p, int what, double *a, double *b)
 {
     return p->hooks & what ? python_hook(p->self, what, a, b) : 0;
 }
@@ -254,44 +254,7 @@ int iterate(stepping *s)
     return take_state(p, s->x);
 }
 
-/* ---- SNES -------------------------------------------------------------------------------------------------------- */
-
-static const petsc *with; /* PETSc is one library for the whole process */
-
-static int snes_function(void *snes, void *x, void *b, void *context)
-{
-    const newton *n = context;
-    const double *from;
-    double *to;
-    (void)snes;
-    if (with->VecGetArrayRead(x, &from) || with->VecGetArray(b, &to)) return FAILED;
-    const int failed = residual(n->problem, from, to);
-    return with->VecRestoreArrayRead(x, &from) || with->VecRestoreArray(b, &to) || failed;
-}
-
-static int snes_jacobian(void *snes, void *x, void *A, void *P, void *context)
-{
-    (void)snes, (void)x, (void)A, (void)P;
-    return tangent(((newton *)context)->problem);
-}
-
-static int apply(void *pc, void *b, void *x)
-{
-    newton *n;
-    const double *from;
-    double *to;
-    if (with->PCShellGetContext(pc, &n) || with->VecGetArrayRead(b, &from) || with->VecGetArray(x, &to)) return FAILED;
-    const int failed = solve(n->problem, from, to);
-    return with->VecRestoreArrayRead(b, &from) || with->VecRestoreArray(x, &to) || failed;
-}
-
-static int update(void *snes, PetscInt iteration)
-{
-    newton *n;
-    if (with->SNESGetApplicationContext(snes, &n)) return FAILED;
-    if (iteration > 0) advance(n->problem);
-    return 0;
-}
+/* ---- equilibria -------------------------------------------------------------------------------------------------- */
 
 /* See `error_is_small`. Convergence is not taken for quadratic (`contracts`) on slender rods whose contact force is carried
    or unknown: rounding makes their tangent inexact for motions of low stiffness. Where n follows from the motion alone,
@@ -309,54 +272,56 @@ static int has_converged(const newton *n)
     return error_is_small(step, before, n->contracts, n->increment);
 }
 
-/* Norm of the part of SNES's last step that is motion: forces and multipliers differ in scale and in rounding error. */
-static int motion(const newton *n, void *snes, double *size)
+/* Root of the sum of squares over all ranks. */
+static int root_of(const problem *p, double sum, double *root)
 {
-    void *change;
-    const double *x;
-    double sum = 0;
-    if (with->SNESGetSolutionUpdate(snes, &change) || with->VecGetArrayRead(change, &x)) return FAILED;
-    for (int i = 0; i < n->nodes; i++)
-        for (int j = 0; j < n->motion; j++) sum += x[i * n->block + j] * x[i * n->block + j];
-    if (with->VecRestoreArrayRead(change, &x) || hook(n->problem, SUM, &sum, 0)) return FAILED;
-    *size = sqrt(sum) / n->root;
+    if (hook(p, SUM, &sum, 0)) return FAILED;
+    *root = sqrt(sum);
     return 0;
 }
 
-static int test(void *snes, PetscInt iteration, double size, double change, double norm, int *reason, void *context)
+/* Judge the residual b after a step, or at the start where `change` is 0. Of the step only the part that is motion counts:
+   forces and multipliers differ in scale and in rounding error. */
+static int judge_residual(newton *n, const double *b, const double *change)
 {
-    newton *n = context;
-    double step;
-    (void)size, (void)change;
+    const problem *p = n->problem;
+    double norm = 0, step = 0;
+    for (int i = 0; i < p->size; i++) norm += b[i] * b[i];
+    if (root_of(p, norm, &norm)) return FAILED;
     n->verdict = isfinite(norm) ? ITERATING : NOT_A_NUMBER;
-    *reason = n->reasons[n->verdict];
-    if (n->verdict != ITERATING || iteration == 0) return 0;
-    if (motion(n, snes, &step)) return FAILED;
+    if (n->verdict != ITERATING || !change) return 0;
+    for (int i = 0; i < n->nodes; i++)
+        for (int j = i * n->block; j < i * n->block + n->motion; j++) step += change[j] * change[j];
+    if (root_of(p, step, &step)) return FAILED;
+    step /= n->root;
     memmove(n->steps + 1, n->steps, 3 * sizeof step);
     n->steps[0] = step, n->iterations++;
     const int balanced = norm <= 1e-6 * (1 + n->loads) + n->rounding;
     if (!(step < 1e3)) n->verdict = GROWN;
     else if (balanced && has_converged(n)) n->verdict = CONVERGED;
     else if (n->iterations >= n->most) n->verdict = RAN_OUT;
-    *reason = n->reasons[n->verdict];
     return 0;
 }
 
-/* Before a solution by SNES from the state. */
-void begin(newton *n)
+/* Newton's method with full steps from the state, whose unknowns are x; these, the state and the carried contact force
+   follow. */
+int equilibrate(newton *n, double *x)
 {
     problem *p = n->problem;
     n->iterations = 0, n->verdict = ITERATING;
     if (p->advance) memcpy(p->before, p->state, p->locals * sizeof *p->state);
-}
-
-/* Give SNES its callbacks, and a PC of the type shell, where there is one, the tangent's inverse. */
-int attach(petsc *functions, newton *n, void *snes, void *vector, void *matrix, void *pc)
-{
-    with = functions;
-    return with->SNESSetFunction(snes, vector, snes_function, n)
-        || with->SNESSetJacobian(snes, matrix, matrix, snes_jacobian, n)
-        || with->SNESSetConvergenceTest(snes, test, n, 0)
-        || with->SNESSetApplicationContext(snes, n) || with->SNESSetUpdate(snes, update)
-        || (pc && (with->PCShellSetContext(pc, n) || with->PCShellSetApply(pc, apply)));
+    if (residual(p, x, n->b) || judge_residual(n, n->b, 0)) return FAILED;
+    while (n->verdict == ITERATING) {
+        if (n->iterations > 0) advance(p);
+        if (tangent(p)) return FAILED;
+        if (n->self ? python_hook(n->self, STEP, n->b, n->change) : solve(p, n->b, n->change)) return FAILED;
+        if (p->singular) {
+            n->verdict = SINGULAR;
+            return 0;
+        }
+        for (int i = 0; i < p->size; i++) x[i] -= n->change[i];
+        if (residual(p, x, n->b) || judge_residual(n, n->b, n->change)) return FAILED;
+    }
+    if (n->verdict == CONVERGED) advance(p);
+    return 0;
 }

@@ -1,49 +1,29 @@
-"""Newton's method on a `Problem`: PETSc's SNES with full steps, stopped on the increment and the residual together.
+"""Newton's method on a `Problem` with full steps, in C, stopped on the increment and the residual together.
 
-A test of the residual norm alone is unreliable (on slender rods the rounding error of |F| grows with EA L^2/EI), and
-PETSc's default line search impairs convergence on eq. (1); so the line search is `basic` and the convergence test is
-defined here. `LimitedNewton` takes single steps of limited length, for states far from the solution.
+A test of the residual norm alone is unreliable: on slender rods the rounding error of |F| grows with EA L^2/EI. Line
+searches impair convergence on eq. (1). `LimitedNewton` takes single steps of limited length, for states far from the
+solution.
 """
 
-import ctypes
 import math
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cached_property
 
 import numpy as np
 from mpi4py import MPI
-from petsc4py import PETSc
 
-from cosserat_fenicsx.algebra.building import module, undisturbed
 from cosserat_fenicsx.algebra.elimination import ZERO_PIVOT
-from cosserat_fenicsx.compat import RESIDUAL_NOT_A_NUMBER
+from cosserat_fenicsx.algebra.equations import Called
 from cosserat_fenicsx.errors import NotConverged
 
 #: Newton stops when the increment, or the remaining error estimated from the contraction, is below this (root mean
 #: square over the nodal unknowns, positions in units of L).
 INCREMENT = 1e-11
-_Reason = PETSc.SNES.ConvergedReason
-# SNES's reasons for the verdicts in chain.h.
-_REASONS = (
-    _Reason.CONVERGED_ITERATING, _Reason.CONVERGED_SNORM_RELATIVE, _Reason.DIVERGED_LINEAR_SOLVE, RESIDUAL_NOT_A_NUMBER,
-    _Reason.DIVERGED_DTOL, _Reason.DIVERGED_MAX_IT,
-)  # fmt: skip
-#: The verdicts in words, of SNES and of time steps.
+#: The verdicts in words.
 WORDS = (
     "", "converged", "the tangent is singular", "the residual is not a number", "Newton's steps grew without bound",
     "Newton's iterations ran out",
 )  # fmt: skip
-
-
-@cache
-def petsc():
-    """PETSc's functions that newton.c and sweep.c call, from the library that petsc4py has loaded."""
-    ffi, _ = module()
-    library, table = ctypes.CDLL(PETSc.__file__), ffi.new("petsc *")
-    for name, field in ffi.typeof("petsc").fields:
-        address = ctypes.cast(getattr(library, name), ctypes.c_void_p).value
-        setattr(table, name, ffi.cast(field.type, address))
-    return table
 
 
 @dataclass(frozen=True)
@@ -55,24 +35,16 @@ class Solved:
     reason: str
 
 
-def take_full_steps(snes):
-    """Take full Newton steps: the line search `basic`, which petsc4py 3.18 can set only through an option."""
-    option, options = f"cosserat_{id(snes):x}_snes_linesearch_type", PETSc.Options()
-    snes.setOptionsPrefix(option.removesuffix("snes_linesearch_type"))
-    options[option] = "basic"
-    snes.setFromOptions()
-    options.delValue(option)
-
-
-class Newton:
-    """Newton's method for one problem: PETSc's SNES with the callbacks of newton.c.
+class Newton(Called):
+    """Newton's method for one problem, see `equilibrate` in newton.c.
 
     Args:
         problem: a `Problem`.
     """
 
     def __init__(self, problem):
-        self.problem, (self._ffi, self._lib) = problem, module()
+        super().__init__()
+        self.problem = problem
         model, numbering, comm = problem.model, problem.numbering, problem.model.comm
         self.c = newton = self._ffi.new("newton *")
         newton.problem, newton.nodes, newton.block = problem.c, numbering.nodes, numbering.block
@@ -80,28 +52,8 @@ class Newton:
         newton.root = math.sqrt(comm.allreduce(numbering.nodes * newton.motion))
         newton.increment, newton.period = INCREMENT, 1 if model.carries_force else 2
         newton.contracts = not (model.signature.slender and model.carries_force)
-        newton.reasons = _REASONS
-        self.snes = snes = PETSc.SNES().create(comm)
-        snes.setType("newtonls")
-        self._matrix = PETSc.Mat().create(comm)  # SNES wants one; only its inverse is ever applied
-        self._matrix.setSizes(((numbering.size, numbering.total),) * 2)
-        self._matrix.setType("shell")
-        self._matrix.setUp()
-        ksp = snes.getKSP()
-        ksp.setType("preonly")
-        self._attach(snes, ksp.getPC())
-        take_full_steps(snes)
-
-    def _attach(self, snes, pc):
-        pc.setType("shell")
-        self._give(snes, pc.handle)
-
-    def _give(self, snes, pc):
-        handles = (
-            self._ffi.cast("void *", handle) for handle in (snes.handle, self.problem.b.handle, self._matrix.handle, pc)
-        )
-        if undisturbed("attach", petsc(), self.c, *handles):
-            raise MemoryError("PETSc's SNES does not take its callbacks")
+        self._step = numbering.vector()
+        newton.b, newton.change = (self.doubles(vector.array_w) for vector in (problem.b, self._step))
 
     @cached_property
     def bordered(self):
@@ -111,7 +63,6 @@ class Newton:
     def allow(self, iterations):
         """Set the largest number of iterations."""
         self.c.most = iterations
-        self.snes.setTolerances(max_it=iterations + 1)  # newton.c stops before SNES's own limit
 
     def _take_loads(self):
         """Set the limits of the residual's norm."""
@@ -126,29 +77,18 @@ class Newton:
         """
         problem, newton = self.problem, self.c
         self._take_loads()
-        self._lib.begin(newton)
-        try:
-            self.snes.solve(None, problem.x)
-        except PETSc.Error:
-            problem.raise_failure()
-            raise
-        reason, verdict = self.snes.getConvergedReason(), newton.verdict
-        converged = reason > 0 and verdict == self._lib.CONVERGED
-        if converged:  # the residual was last evaluated at x, so the state agrees with it
-            problem.advance()
-        elif problem.c.singular and reason <= 0:
-            verdict = self._lib.SINGULAR
-        elif reason > 0 or reason == RESIDUAL_NOT_A_NUMBER:
-            verdict = self._lib.NOT_A_NUMBER
-        return Solved(converged, newton.iterations, WORDS[verdict] or f"PETSc's reason {reason}")
+        failed = self._lib.equilibrate(newton, problem._written(problem.x))
+        self.raise_failure()
+        problem._done(failed)
+        return Solved(newton.verdict == self._lib.CONVERGED, newton.iterations, WORDS[newton.verdict])
 
 
 class BorderedNewton(Newton):
     """Newton's method for (x, eta): equilibrium, and a plane <normal, x - x_0> + weight (eta - eta_0) = 0.
 
-    SNES solves for x alone. Where it applies the tangent's inverse, the bordered system is solved by block elimination
+    C solves for x alone. Where it applies the tangent's inverse, the bordered system is solved by block elimination
     (Keller, in: Applications of Bifurcation Theory, 1977, 359): with the tangent A, A d1 = R and A d2 = dR/deta the
-    step is -(d1 + d2 deta), and the plane gives deta. The load factor eta is updated with x, so that SNES's next
+    step is -(d1 + d2 deta), and the plane gives deta. The load factor eta is updated with x, so that the next
     residual and tangent are those of the new (x, eta). Products with `normal` are the model's inner products over all
     ranks, so that all ranks have the same load factor.
 
@@ -156,12 +96,10 @@ class BorderedNewton(Newton):
     path; the component of each step along this null vector is removed.
     """
 
-    def _attach(self, snes, pc):
-        self.neutral = None
-        self._slope, self._free, self._force = (self.problem.numbering.vector() for _ in range(3))
-        pc.setType("python")
-        pc.setPythonContext(self)
-        self._give(snes, 0)
+    def __init__(self, problem):
+        super().__init__(problem)
+        self.neutral, self.c.self = None, self._handle
+        self._slope, self._free, self._force = (problem.numbering.vector() for _ in range(3))
 
     @property
     def neutral(self):
@@ -185,10 +123,10 @@ class BorderedNewton(Newton):
         self._normal, self._weight, self.neutral = normal, weight, neutral
         self._x0, self._load_factor0 = self.problem.x.array_r.copy(), self.problem.load_factor
 
-    def apply(self, pc, residual, step):
-        """PETSc calls this to compute the step, which it subtracts from x."""
-        problem, inner = self.problem, self.problem.model.inner
-        problem.solve(residual, step)
+    def _answer(self, what, a, b):
+        """The step, which C subtracts from x."""
+        problem, inner, step = self.problem, self.problem.model.inner, self._step
+        problem.solve(problem.b, step)
         problem.solve(problem.load_derivative(problem.x), self._slope)
         if self.neutral is not None:
             self._leave_out_neutral(step)

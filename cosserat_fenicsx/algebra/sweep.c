@@ -137,23 +137,17 @@ static int predict(const sweep *s, double load_factor, double *guess)
 static int put(const sweep *s, const double *numbers, double load_factor)
 {
     const problem *p = s->newton->problem;
-    double *x;
     *s->load_factor = load_factor;
-    if (s->library->VecGetArray(s->x, &x)) return 1;
-    memcpy(x, numbers, p->size * sizeof *x);
-    if (s->library->VecRestoreArray(s->x, &x)) return 1;
-    memcpy(p->carried, numbers + p->size, p->carries * sizeof *x);
+    memcpy(s->x, numbers, p->size * sizeof *numbers);
+    memcpy(p->carried, numbers + p->size, p->carries * sizeof *numbers);
     return take_state(s->newton->problem, numbers);
 }
 
-static int take(const sweep *s, double *numbers)
+static void take(const sweep *s, double *numbers)
 {
     const problem *p = s->newton->problem;
-    const double *x;
-    if (s->library->VecGetArrayRead(s->x, &x)) return 1;
-    memcpy(numbers, x, p->size * sizeof *x);
-    memcpy(numbers + p->size, p->carried, p->carries * sizeof *x);
-    return s->library->VecRestoreArrayRead(s->x, &x);
+    memcpy(numbers, s->x, p->size * sizeof *numbers);
+    memcpy(numbers + p->size, p->carried, p->carries * sizeof *numbers);
 }
 
 /* The derivative of x by the load factor at the state, whose unknowns are x; see `Problem.load_derivative`. */
@@ -207,16 +201,14 @@ static int attempt(sweep *s, double goal)
     double *guess = s->work, *found = s->work + s->numbers, *factors = s->known_load_factors;
     const double *here = s->points + (size_t)(s->known - 1) * s->numbers;
     const double taken = fabs(goal - factors[s->known - 1]);
-    int reason, sideways;
+    int sideways;
     s->control->shrink = 0.5;
     if (!predict(s, goal, guess) || put(s, guess, goal)) return UNSURE;
     n->loads = fabs(goal) * s->loads;
-    begin(n);
-    if (s->library->SNESSolve(s->snes, 0, s->x) || s->library->SNESGetConvergedReason(s->snes, &reason)) return UNSURE;
+    if (equilibrate(n, s->x)) return UNSURE;
     s->iterations += n->iterations;
-    if (reason <= 0 || n->verdict != CONVERGED) return REJECTED;
-    advance(n->problem);
-    if (take(s, found)) return UNSURE;
+    if (n->verdict != CONVERGED) return REJECTED;
+    take(s, found);
     const double off = largest(s, found, guess);
     if (!isfinite(off)) return REJECTED;
     int judged = judge(s, here, guess, found, off);

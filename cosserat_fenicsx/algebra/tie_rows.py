@@ -5,7 +5,7 @@ from petsc4py import PETSc
 
 #: Penalty stiffness that replaces a constraint in the second variation, over the stiffness of the elements there.
 _HELD = 1e3
-#: A diverging Newton step may overflow: the residual is then not a number, which stops SNES; numpy need not warn.
+#: A diverging Newton step may overflow: the residual is then not a number, which stops it; numpy need not warn.
 _WILD = {"invalid": "ignore", "over": "ignore"}
 
 

@@ -6,7 +6,7 @@ from functools import cached_property
 import numpy as np
 from dolfinx import fem
 
-from cosserat_fenicsx.algebra.building import Pointers, undisturbed
+from cosserat_fenicsx.algebra.building import Pointers
 from cosserat_fenicsx.interrupts import obey
 from cosserat_fenicsx.models.rod_data import bending_lengths, bounded, field_values
 from cosserat_fenicsx.results.compared import of_sections
@@ -196,7 +196,7 @@ class Loaded(Pointers):
         if fields:
             c.found_fields = pointers.doubles(found_fields)
         try:
-            while undisturbed("run_cases", c) == self._lib.LATER:
+            while self._lib.run_cases(c) == self._lib.LATER:
                 self._checked()
             self._checked()
         finally:

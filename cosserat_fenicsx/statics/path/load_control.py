@@ -14,8 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cosserat_fenicsx.algebra.building import Pointers, undisturbed
-from cosserat_fenicsx.algebra.newton import petsc
+from cosserat_fenicsx.algebra.building import Pointers
 from cosserat_fenicsx.checks import number, refuse, whole
 from cosserat_fenicsx.errors import NotConverged
 from cosserat_fenicsx.interrupts import obey
@@ -242,9 +241,7 @@ class Sweep(Pointers):
         problem, model, ffi = track.problem, track.model, self._ffi
         self.c = sweep = ffi.new("sweep *")
         sweep.newton, sweep.stability = track.newton.c, track.stability.c
-        sweep.library = petsc()
-        sweep.snes, sweep.x = (ffi.cast("void *", each.handle) for each in (track.newton.snes, problem.x))
-        sweep.load_factor = self.doubles(problem.load_factor_array)
+        sweep.x, sweep.load_factor = self.doubles(problem.x.array_w), self.doubles(problem.load_factor_array)
         unknowns, numbers = problem.numbering.size, problem.numbering.size + problem.c.carries
         sweep.numbers, sweep.moves, sweep.turn = numbers, model.moves, model.turn
         sweep.change, sweep.patience = CHANGE, _SECONDS
@@ -294,7 +291,7 @@ class Sweep(Pointers):
         track.newton.c.rounding = track.model.round_off
         while True:
             before = sweep.iterations
-            why = undisturbed("run", sweep)
+            why = self._lib.run(sweep)
             k = sweep.records
             track.iterations += int(self._recorded.iterations[:k].sum()) + sweep.iterations - before
             sweep.records = 0
