@@ -9,7 +9,7 @@ import cosserat_fenicsx as cf
 from cosserat_fenicsx.errors import Interrupted
 from cosserat_fenicsx.ranks import apart
 from cosserat_fenicsx.scene.parameters import laws_with, parameter_of, scene_with
-from cosserat_fenicsx.statics import loaded
+from cosserat_fenicsx.statics import pair
 
 STEEL = cf.Material(E=2e11, nu=0.3, density=7800.0)
 
@@ -163,7 +163,7 @@ def test_ctrl_c_leaves_it_usable(monkeypatch):
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patched:
-        patched.setattr(loaded, "obey", stop)
+        patched.setattr(pair, "obey", stop)
         with pytest.raises((KeyboardInterrupt, Interrupted)):
             compiled.batch([[1.0], [2.5]])
     np.testing.assert_array_equal(compiled([2.0]).values, before)

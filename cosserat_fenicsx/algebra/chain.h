@@ -169,22 +169,67 @@ typedef struct {
     double *work;                   /* (6, numbers) */
 } sweep;
 
-/* Numbers that differ from case to case: to[place[j]] = values[k * width + which[j]] in the case k. */
+/* Numbers that differ from case to case: to[place[j]] = values[which[j]] of the case. */
 typedef struct {
     double *to;
-    const double *values;
     const int *place, *which;
-    int count, width;
+    int count;
 } written;
 
-/* Many cases of one problem, see cases.c. */
+/* What the unknowns of a model are: theta, q, (r, theta) or (r, q). */
+enum { IN_PLANE, IN_SPACE, PLANAR, SPATIAL };
+
+/* A mesh of rods that clamps and rigid joints hold, without couplings of strains, and its last state. Elements and nodes
+   are in the order of the scene; a rod's first node is p times its first element plus the number of the rod. Frames and
+   units are those of the forms. */
 typedef struct {
-    sweep *sweep;                   /* with one load factor, for all of them */
+    sweep *sweep;
+    int kind, rods, elements, nodes, p, points, components, forces; /* of a node's unknowns; of n */
+    const int *first;               /* (rods + 1,) elements */
+    const int *order;               /* (rods, 3) of a tree, from the clamps on: rod, its element end there, node of the rod
+                                       before or -1 */
+    const int *from, *field_from;   /* (nodes, components) unknowns, or -1 where held at rest; (elements, points, n) */
+    const double *at_rest, *rest, *reference; /* a point of the sweep; (nodes, components); (nodes, 3) positions */
+    const double *basis, *slopes, *from_slopes, *by_fields, *by_densities; /* see ElementRule */
+    const double *sizes, *axes;     /* (elements,) lengths; (3, 3) rows */
+    const double *K, *J, *R_R, *v_R, *known, *density; /* (elements, points, n): law, reference, n at load factor 1 where
+                                       statics gives it, loads per length, or 0 */
+    const double *gyrations, *limits; /* (rods,) radii; rounding of n and of m, least stiffness J, of bending, relative
+                                       rounding of the motion */
+    double longest;                 /* element */
+    double *nodal, *placed, *motion, *gauss, *contact; /* (nodes, components), (nodes, 3), (nodes, 7) displacement and q,
+                                       (elements, points, 9) n, m and r', (elements, p + 1, 6) */
+} mesh;
+
+/* kind: position, rotation, force or moment; place: among displacement, q, n and m. */
+typedef struct {
+    int kind, place, rod, cell;
+    const double *weights;          /* (p + 1,) */
+    double offset, unit;            /* of the value: offset + unit * number */
+} query;
+
+/* Two meshes that are compared, see compared.c; the constants are those of results/accuracy.py and compared.py. */
+typedef struct {
+    mesh *coarse, *fine;
+    int places, equal, queries, moves, numbers; /* places of a coarse element; whether fine elements are of one length */
+    const double *inside, *weights; /* (places, p + 1) of a coarse element; (all places, p + 1) of the fine ones */
+    const int *cells;               /* (all places,) fine elements */
+    const double *start, *move_weight; /* (numbers,) a point of the fine mesh at rest; what is added to it: numbers of */
+    const int *move_to, *move_from; /* the coarse state, each (moves,): unknowns of the nodes, then n at Gauss points */
+    double length, held[2];         /* longest rod; force and moment that actions without stress would need */
+    double ahead, far, of_ends, safety, safety_below, asymptotic, nothing, least_moment, vanishing, rounding, noise;
+    double resolved, tol, in_layer, turned;
+    query *query;
+} comparison;
+
+/* Many cases, see cases.c. */
+typedef struct {
+    comparison *meshes;
     written *written;
-    int parts, count, next, corrects; /* corrects: Newton's method from `starts`, else a sweep from rest */
-    const double *starts;           /* (cases, numbers of a point), or those at rest alone */
+    int parts, count, next, width;
+    const double *values;           /* (cases, width) */
     double first, near, patience;   /* first step; largest motion of a correction; seconds after which to return */
-    double *found, *found_fields;   /* (cases, unknowns), (cases, elements, size) */
+    double *found, *errors;         /* (cases, queries) */
     int *undecided;                 /* (cases,) */
 } cases;
 

@@ -22,11 +22,11 @@ from cosserat_fenicsx.results.rods import resting
 #: Largest number of points of a path that are all sample points.
 FEW = 3
 # Ratios of the largest difference to the one at element ends, above which the ends clearly superconverge.
-_AHEAD, _FAR_AHEAD = 4, 30
+AHEAD, FAR_AHEAD = 4, 30
 # The same ratio, below which the error of the element ends dominates.
-_OF_ENDS = 2
+OF_ENDS = 2
 # Safety factors of the assumed gain: usual, and for relative differences below the third number (asymptotic range).
-_SAFETY, _SAFETY_BELOW, _ASYMPTOTIC = 4, 2, 1e-3
+SAFETY, SAFETY_BELOW, ASYMPTOTIC = 4, 2, 1e-3
 # Assumed error over the difference of two meshes where a kink lies inside elements; divisor of the gain where it lies
 # at their ends.
 _ROUGH, _NEARLY = 2.0, 4.0
@@ -79,13 +79,13 @@ def estimate_error(fine, coarse, before=None, *, smooth=True):
     p = fine.degree
     _, difference, at_ends, shared = _differences(fine, coarse)
     relative = shared / fine._reference.sizes
-    part = np.where(relative < _ASYMPTOTIC, 1 / _SAFETY_BELOW, 1 / _SAFETY)
+    part = np.where(relative < ASYMPTOTIC, 1 / SAFETY_BELOW, 1 / SAFETY)
     if before is None:
-        ahead, far = difference > _AHEAD * at_ends, difference > _FAR_AHEAD * at_ends
+        ahead, far = difference > AHEAD * at_ends, difference > FAR_AHEAD * at_ends
         # n is constant where no loads act along rods, so that the ends cause all of its error
-        far[FORCE] |= far[:FORCE].all(axis=0) & (difference[FORCE] <= _OF_ENDS * at_ends[FORCE])
-        sure = (far | (relative == 0))[: len(NAMES)].all(axis=0) & _equal(fine.layout)
-        part = np.where(sure, part, 1 / _SAFETY)
+        far[FORCE] |= far[:FORCE].all(axis=0) & (difference[FORCE] <= OF_ENDS * at_ends[FORCE])
+        sure = (far | (relative == 0))[: len(NAMES)].all(axis=0) & equal_elements(fine.layout)
+        part = np.where(sure, part, 1 / SAFETY)
         uniform = all(rod.uniform for rod in fine.scene.rods)
         gain = np.where(far & uniform, part * 2.0 ** (p + 1), np.where(ahead, max(1.0, 2.0 ** (p - 3)), 1.0))
     else:
@@ -93,12 +93,12 @@ def estimate_error(fine, coarse, before=None, *, smooth=True):
         gain = np.clip(part * (seen - 1), 1, part * 2.0 ** (p + 1))
     if any(action.presses for action in fine.scene.actions):
         gain = np.maximum(gain / _NEARLY, 1.0) if smooth else np.full_like(gain, 1 / _ROUGH)
-    gain[relative == 0] = 2.0 ** (p + 1) / _SAFETY_BELOW
+    gain[relative == 0] = 2.0 ** (p + 1) / SAFETY_BELOW
     fine.set_errors(relative / gain)
     return relative, gain
 
 
-def _equal(layout):
+def equal_elements(layout):
     """Whether the elements of every rod are about as long as each other, but for pieces."""
     first = [cells.start for cells in cells_of(layout)]
     longest, shortest = (bound.reduceat(layout.shares, first) for bound in (np.maximum, np.minimum))

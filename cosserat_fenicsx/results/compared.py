@@ -214,14 +214,14 @@ def _norms(values):
 # Differences of positions and of rotations up to this are rounding alone, in units of the scales' length and rad.
 ROUNDING = 1e-14
 # Sizes, in the scales' units, below which a quantity is taken to vanish; and the least moment over n times the length.
-_NOTHING, _LEAST_MOMENT = 1e-9, 1e-9
+NOTHING, LEAST_MOMENT = 1e-9, 1e-9
 # Least size of positions and of rotations over the largest of the path: unloaded states differ by rounding.
 _AT_REST = 1e-6
 # Moments up to this multiple of their rounding at all points of a path count as zero, as in straight bars.
-_VANISHING = 10.0
+VANISHING = 10.0
 # Rounding of n over the stiffness times the rounding of one difference of positions; multiple of their rounding up to
 # which differences of n and m on two meshes count as zero.
-_OF_FORCE, _NOISE = 4.0, 2.0
+OF_FORCE, NOISE = 4.0, 2.0
 _EPS = np.finfo(float).eps
 
 #: sizes: (4, points) that the errors are relative to, dimensionless; turning: (points,) whether the size of positions
@@ -241,39 +241,38 @@ def sizes_of(path):
     """
     gyrations, length, noise = path._of_sections
     squares = np.add.reduceat(np.square(path._motion), (0, 3, 4), axis=2)
-    moved = np.maximum(np.sqrt(squares[..., 0].max(axis=1)), _NOTHING)
+    moved = np.maximum(np.sqrt(squares[..., 0].max(axis=1)), NOTHING)
     half = np.sqrt(np.maximum.reduceat(squares[..., 2], _first_nodes(path.layout, path.degree), axis=1))
     turned = np.sqrt(8) * (half * gyrations).max(axis=1)  # |R - 1| = sqrt(8) |sin(angle/2)|
     rotation = np.maximum(2 * half.max(axis=1), moved / length)
     squares = np.add.reduceat(np.square(path._stacked("gauss_fields")[..., :6]), (0, 3), axis=3)
     force, moment = np.sqrt(squares.max(axis=(1, 2))).T
     if path.scene.acts_in_law:
-        held = _held(path)
-        force, moment = np.maximum(force, _LEAST_MOMENT * held[0]), np.maximum(moment, held[1])
-    force = np.maximum(np.maximum(force, moment / length), _NOTHING)
+        held = held_by_law(path.scene, path.layout, path.rule, path.scales, path._array("load_factor"))
+        force, moment = np.maximum(force, LEAST_MOMENT * held[0]), np.maximum(moment, held[1])
+    force = np.maximum(np.maximum(force, moment / length), NOTHING)
     noise = np.pad(noise, ((2, 0), (0, 0)))
-    vanishing = moment <= _VANISHING * noise[3]
-    least = np.where(vanishing if path.apart else vanishing.all(), 1.0, _LEAST_MOMENT)
-    moment = np.maximum(np.maximum(moment, least * length * force), _NOTHING)
+    vanishing = moment <= VANISHING * noise[3]
+    least = 1.0 if vanishing.all() else LEAST_MOMENT
+    moment = np.maximum(np.maximum(moment, least * length * force), NOTHING)
     sizes = np.array([np.maximum(moved, turned), rotation, force, moment])
-    if not path.apart:
-        sizes[:2] = np.maximum(sizes[:2], _AT_REST * sizes[:2].max(axis=1, initial=0.0)[:, None])
+    sizes[:2] = np.maximum(sizes[:2], _AT_REST * sizes[:2].max(axis=1, initial=0.0)[:, None])
     for criterion in path.criteria:
         own = np.maximum(criterion.sizes(path), 1e-300)
         sizes, noise = np.vstack([sizes, own]), np.vstack([noise, np.zeros((1, noise.shape[1]))])
     return Sizes(sizes, turned > moved, np.broadcast_to(noise, sizes.shape))
 
 
-def _held(path):
+def held_by_law(scene, layout, rule, scales, load_factors):
     """(2, points) the largest force and moment, dimensionless, that would hold sections to their strains in the
     reference, against `action.without_stress`; without infinite stiffnesses."""
-    sizes, load_factors = np.zeros((2, len(path))), np.array([record.load_factor for record in path._records])
-    for rod, x in zip(path.scene.rods, path.layout.node_s(path.rule.nodes), strict=True):
-        along, (full, scaled) = rod.stiffness_at(x * rod.length), without_stress(path.scene, rod, x * rod.length)
+    sizes = np.zeros((2, len(load_factors)))
+    for rod, x in zip(scene.rods, layout.node_s(rule.nodes), strict=True):
+        along, (full, scaled) = rod.stiffness_at(x * rod.length), without_stress(scene, rod, x * rod.length)
         for k, load_factor in enumerate(load_factors):
             strains = full + load_factor * scaled
             held = [np.linalg.norm(a, axis=1).max() for a in along.contact(strains[1], strains[0])]
-            sizes[:, k] = np.maximum(sizes[:, k], np.array(held) / (path.scales.force, path.scales.moment))
+            sizes[:, k] = np.maximum(sizes[:, k], np.array(held) / (scales.force, scales.moment))
     return sizes
 
 
@@ -284,33 +283,33 @@ def _first_nodes(layout, degree):
 
 
 @per_scene
-def of_sections(scene, scales, layout, p, by_statics, given=None):
+def of_sections(scene, scales, layout, p, by_statics):
     """The radii of gyration of the rods, the longest length, and errors of n and of m by rounding, (2, 1),
-    dimensionless.
+    dimensionless."""
+    (least, _), (K, J) = ((x.K / scales.force, x.J / (scales.force * scales.length**2)) for x in scene.extremes)
+    gyrations, noise = rounding_of(least, K, J, shortest_of(scene, scales, layout), p, by_statics)
+    return gyrations, scene.lengths.max() / scales.length, noise[:, None]
+
+
+def shortest_of(scene, scales, layout):
+    """(rods,) the shortest element of every rod, dimensionless."""
+    first = [cells.start for cells in cells_of(layout)]
+    return np.minimum.reduceat(layout.sizes(scene), first) / scales.length
+
+
+def rounding_of(least, K, J, shortest, p, by_statics):
+    """Radii of gyration (.., rods), and errors of n and of m by rounding (2, ..), dimensionless.
 
     n is a stiffness times differences of positions over the spacing of the nodes, unless it follows from statics;
     m likewise of rotations, with a share of the moment of n over the spacing of the nodes.
 
     Args:
-        given: for every rod (least, largest) `Stiffnesses` of many points instead of the scene's, K and J (points, 3);
-            the radii are (points, rods) then, and the errors (2, points).
+        least: the least K, and K, J: the largest (.., rods, 3); shortest: elements (rods,).
     """
-    K, J = scene.extremes[1].K, scene.extremes[1].J
-    least = scene.extremes[0].K
-    if given is not None:
-        K, J, least = (
-            np.stack([getattr(bounds[k], name) for bounds in given], axis=-2)
-            for k, name in ((1, "K"), (1, "J"), (0, "K"))
-        )
-    stiffness = 1.0 if by_statics else np.where(np.isfinite(K), K, 0.0).max(axis=-1) / scales.force
-    first = [cells.start for cells in cells_of(layout)]
-    shortest = np.minimum.reduceat(layout.sizes(scene), first) / scales.length
-    noise = [x.max(axis=-1) for x in (_OF_FORCE * stiffness * p * p / shortest, p / shortest + stiffness * p / 2)]
-    return (
-        np.sqrt(J[..., :2].max(axis=-1) / least[..., 2]) / scales.length,
-        scene.lengths.max() / scales.length,
-        _EPS * np.stack([np.atleast_1d(x) for x in noise]),
-    )
+    stiffness = np.ones(K.shape[:-1]) if by_statics else np.where(np.isfinite(K), K, 0.0).max(axis=-1)
+    gyrations = np.sqrt(J[..., :2].max(axis=-1) / least[..., 2])
+    of_force, of_moment = OF_FORCE * stiffness * p * p / shortest, p / shortest + stiffness * p / 2
+    return gyrations, _EPS * np.stack([of_force.max(axis=-1), of_moment.max(axis=-1)])
 
 
 def differences(fine, coarse):
@@ -340,7 +339,7 @@ def differences(fine, coarse):
             turned = np.where(sizes.turning[:, None], radius * apart[:, part, 1], 0.0)
             apart[:, part, 0] = np.maximum(apart[:, part, 0], turned)
     everywhere, at_ends = apart.max(axis=1).T, apart[:, places.ends].max(axis=1).T
-    everywhere[everywhere <= np.maximum(ROUNDING, _NOISE * sizes.rounding[: len(NAMES)])] = 0.0
+    everywhere[everywhere <= np.maximum(ROUNDING, NOISE * sizes.rounding[: len(NAMES)])] = 0.0
     shared, ratios = everywhere, np.divide(fine.layout.counts, coarse.layout.counts)
     if ratios.max() > 2:
         shares = np.minimum((2 / ratios) ** fine.degree, 1.0)

@@ -80,8 +80,6 @@ class Path(RodResult):
     _quantities = _QUANTITIES
     #: whether the formulation's virtual rotations are changes of q instead of independent small rotations
     galerkin = False
-    #: whether every point is a path of its own, as of many cases
-    apart = False
     _computed = (*RodResult._computed, "_contact", "_cut", "conservative", "_reference", "_roughness", "_in_elements")
     # functions of a path that compute its `conservative` and its `sensitivity`
     _potential = _differentiated = None
@@ -332,7 +330,7 @@ class Path(RodResult):
         """(4, n) errors of n and m by rounding, over their largest sizes on the path; 0 for the others, see
         `rounding`."""
         sizes = self._reference.sizes
-        return self._reference.rounding / (sizes if self.apart else sizes.max(axis=1, initial=1e-300)[:, None])
+        return self._reference.rounding / sizes.max(axis=1, initial=1e-300)[:, None]
 
     def mode(self, event: Event, rod: RodOrName | None = None) -> np.ndarray:
         """(nodes, 3) the mode of an event at the nodes of a rod (default the first), see `Event`."""

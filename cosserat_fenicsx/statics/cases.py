@@ -22,17 +22,15 @@ from cosserat_fenicsx.models.choose import choose
 from cosserat_fenicsx.models.formulation import formulation_of
 from cosserat_fenicsx.models.signature import Signature
 from cosserat_fenicsx.ranks import communicator
-from cosserat_fenicsx.results.accuracy import estimate_error, on_mesh
-from cosserat_fenicsx.results.compared import NAMES, POSITION
+from cosserat_fenicsx.results.compared import NAMES
 from cosserat_fenicsx.scene.action import path_dependent
 from cosserat_fenicsx.scene.parameters import check_once, laws_with, parameter_of, scene_with
-from cosserat_fenicsx.scene.profiles import Stiffnesses
 from cosserat_fenicsx.scene.scene import Scene
 from cosserat_fenicsx.statics.loaded import Loaded
-from cosserat_fenicsx.statics.meshes import meshes_for, plainly_resolved, resolving_turns, turning_in_law
+from cosserat_fenicsx.statics.meshes import meshes_for, resolving_turns, turning_in_law
+from cosserat_fenicsx.statics.pair import Pair
 from cosserat_fenicsx.statics.path.recorder import CORRECTIONS, NEAR
 from cosserat_fenicsx.statics.problem import make_solvers
-from cosserat_fenicsx.statics.refinement import RESOLVED
 from cosserat_fenicsx.statics.solve import check_arguments, solve
 
 #: What a case may be asked for: {name of a method of `Path`: the estimated error that bounds its own}.
@@ -41,8 +39,6 @@ QUERIES = {"position": "position", "displacement": "position", "rotation_angle":
 _DEGREE, _FORMULATION = 4, "mixed"  # the defaults of `solve`
 # Changes of the parameters, over their sizes, of the scenes by which the dependence of the data is found and checked.
 _BESIDE, _APART, _CHECK = 0.043, 0.25, -0.117
-# Largest relative difference of data that count as the same.
-_SAME = 2e-14
 _BLOCK = 256  # cases that are solved at once
 
 
@@ -98,18 +94,25 @@ def compile(  # noqa: A001  public as cf.compile
     if not names:
         raise SceneError("compile: over is empty: expected at least one name of a number")
     check_once(scene, names)
-    queries = [_Query.of(scene, x) for x in query]
+    queries = [Query.of(scene, x) for x in query]
     if not queries:
         raise SceneError("compile: query is empty: expected tuples such as ('displacement', 'rod.end', 0)")
     return CompiledScene(scene, names, queries, float(load_factor), tol)
 
 
 @dataclass(frozen=True)
-class _Query:
+class Query:
+    """What is asked of every case: a method of `Path`, at a share of the length of a rod, and a component or None."""
+
     name: str
     rod: int
-    share: float  # of the rod's length
+    share: float
     component: int | None
+
+    @property
+    def kind(self):
+        """The estimated error that bounds its own."""
+        return QUERIES[self.name]
 
     @classmethod
     def of(cls, scene, given):
@@ -133,7 +136,7 @@ class _Query:
         rod = path.scene.rods[self.rod]
         station = rod.end if self.share == 1 else rod.at(self.share * rod.length)
         values = getattr(path, self.name)(station)
-        k = NAMES.index(QUERIES[self.name])
+        k = NAMES.index(self.kind)
         unit = (path.scales.length, 1.0, path.scales.force, path.scales.moment)[k]
         return values if self.component is None else values[:, self.component], path._errors[k] * (
             path._reference.sizes[k] * unit
@@ -152,11 +155,11 @@ class CompiledScene:
     def __init__(self, scene, names, queries, load_factor, tol):
         self.names, self.why, self.model = tuple(names), [], ""
         self._scene, self._queries, self._load_factor, self._tol = scene, queries, load_factor, tol
-        self._meshes, self._linear = None, None
+        self._pair, self._linear = None, False
         self._comm, self._lock = communicator(), threading.Lock()
         obstacle = "there are several ranks" if self._comm.size > 1 else self._prepare()
         if obstacle:
-            self._meshes, self.model = None, ""
+            self._pair, self.model = None, ""
             self.why.append(f"every case goes to solve: {obstacle}")
 
     def __repr__(self):
@@ -218,32 +221,33 @@ class CompiledScene:
         if turning is not None:
             return "prescribed rotations or moments turn a rod by many radians"
         self.model, EI = choice.model, Scales.of(scene).moment * Scales.of(scene).length
-        self._usual = usual is not None
-        self._layouts = layout, layout.finer(reference, 2)
         iterations = [10 if signatures[0].formulation.force.of_motion is False else 30, CORRECTIONS]
-        self._meshes = [
-            Loaded(
-                make_solvers(self._comm, signature), reference, mesh, EI, self._load_factor, iterations=most, near=NEAR
-            )
-            for signature, mesh, most in zip(signatures, self._layouts, iterations, strict=True)
+        meshes = [
+            Loaded(make_solvers(self._comm, signature), reference, mesh, EI, self._load_factor, iterations=most)
+            for signature, mesh, most in zip(signatures, (layout, layout.finer(reference, 2)), iterations, strict=True)
         ]
-        for mesh in self._meshes:
+        for mesh in meshes:
             weakref.finalize(self, release, mesh.solvers).atexit = False
-        model = self._meshes[0].model
-        if self._meshes[0].problem.begins or any(kind.scaled == "full" for kind in model.signature.terms):
+        if meshes[0].problem.begins or any(kind.scaled == "full" for kind in signatures[0].terms):
             return "loads act that the load factor does not scale"
-        self._reference = reference
-        laws = self._find_laws(parameters, steps) if all(x.profile.constant for x in scene.rods) else None
-        if laws is not None and not signatures[0].coupled:
-            self._law = [x for x, of_law in zip(parameters, laws, strict=True) if of_law]
-            self._of_law = np.array(laws)
-            linear = [self._find_linear(mesh, steps) for mesh in self._meshes]
-            if self._describes(other, checked, linear):
-                self._linear = [_where_it_changes(*each) for each in zip(self._meshes, linear, strict=True)]
+        self._pair = Pair(meshes, reference, self._queries, self._tol, self._load_factor, near=NEAR)
+        self._reference, self._layout, self._of_law = reference, layout, np.zeros(len(base), dtype=bool)
+        if all(x.profile.constant for x in scene.rods) and not signatures[0].coupled:
+            self._find_dependence(parameters, steps, _APART * sizes, checked, other)
         how = "a linear map and the laws of the sections" if self._linear else "loading every case"
-        self.why += [f"the {self.model} model, on {' and '.join(str(sum(x.counts)) for x in self._layouts)} elements",
+        self.why += [f"the {self.model} model, on {' and '.join(str(sum(x.layout.counts)) for x in meshes)} elements",
                      f"data by {how}"]  # fmt: skip
         return ""
+
+    def _find_dependence(self, parameters, steps, changes, checked, other):
+        """Find how the numbers that C reads depend on the parameters."""
+        self._of_law = np.array(self._find_laws(steps))
+        self._law = [x for x, of_law in zip(parameters, self._of_law, strict=True) if of_law]
+        laws = laws_with(self._scene, self._law, checked[None, self._of_law]) if self._law else None
+        if self._fits(other) and (laws is None or np.isfinite(laws[0]).all()):
+            others = [(j, changes[j], steps[j]) for j in np.flatnonzero(~self._of_law)]
+            self._linear = self._pair.depend(self._at, others, (checked, other, laws))
+        self._pair.load(self._reference)
 
     def _kind_of(self, scene):
         """What decides on meshes and compiled code: (first mesh, usual one, mesh for turns, choice, signatures)."""
@@ -268,7 +272,7 @@ class CompiledScene:
             and all(map(np.array_equal, layout.breaks, known[0].breaks))
         )  # fmt: skip
 
-    def _find_laws(self, parameters, steps):
+    def _find_laws(self, steps):
         """Which parameters change the stiffnesses of rods."""
         before = [rod.profile.range[0] for rod in self._reference.rods]
         return [
@@ -277,61 +281,12 @@ class CompiledScene:
             for scene in steps
         ]  # fmt: skip
 
-    def _find_linear(self, mesh, steps):
-        """[(numbers where all parameters are 0, places of those that change, their derivatives (parameters, n))] of all
-        arrays."""
-        before = [array.copy() for array in _all(mesh)]
-        columns = [np.zeros((len(steps), len(array))) for array in before]
-        sizes = np.array([parameter_of(self._scene, name).size for name in self.names])
-        for j in np.flatnonzero(~self._of_law):
-            mesh.load(steps[j])
-            for column, array, known in zip(columns, _all(mesh), before, strict=True):
-                change = array - known
-                change[np.abs(change) <= _SAME * np.abs(known)] = 0.0
-                column[j] = change / (_APART * sizes[j])
-        mesh.load(self._reference)
-        found = []
-        for known, column in zip(before, columns, strict=True):
-            places = np.flatnonzero(column.any(axis=0))
-            rest = known[places] - self._at @ column[:, places]
-            terms = np.abs(known[places]) + np.abs(self._at) @ np.abs(column[:, places])
-            rest[np.abs(rest) <= 10 * _SAME * terms] = 0.0  # so that small loads keep digits
-            known[places] = rest
-            found.append((known, places, column[:, places]))
-        return found
-
-    def _describes(self, scene, values, linear):
-        """Whether linear map and laws give the data of another scene."""
-        K, J = laws_with(self._scene, self._law, values[None, self._of_law])
-        if not self._fits(scene) or not np.isfinite(K).all():
-            return False
-        for mesh, of_mesh in zip(self._meshes, linear, strict=True):
-            read, _ = mesh.arrays()
-            guessed = [known.copy() for known, *_ in of_mesh]
-            for array, (known, places, derivatives) in zip(guessed, of_mesh, strict=True):
-                array[places] += values @ derivatives
-            if self._law:
-                functions, *_ = mesh.stretched(K, J)
-                for name, place in mesh.law_places():
-                    k = next(k for k, array in enumerate(read) if array.ctypes.data == place.array.ctypes.data)
-                    guessed[k][place.places] = functions[name][0, place.which]
-            mesh.load(scene)
-            found = [array.copy() for array in _all(mesh)]
-            mesh.load(self._reference)
-            for a, b in zip(guessed, found, strict=True):
-                if a.shape != b.shape:
-                    return False
-                noise = np.finfo(float).eps * np.abs(b).max(initial=0.0)  # of sums that vanish
-                if (np.abs(a - b) > 10 * (_SAME * np.abs(b) + noise)).any():
-                    return False
-        return True
-
     # -- cases -------------------------------------------------------------------------------------------------------
 
     def _solved(self, array, *, raises):
         shape = len(array), len(self._queries)
         found = Cases(np.full(shape, np.nan), np.full(shape, np.nan), np.ones(len(array), dtype=bool))
-        if self._meshes:
+        if self._pair:
             step = _BLOCK if self._linear else 1
             for first in range(0, len(array), step):
                 part = slice(first, first + step)
@@ -359,46 +314,27 @@ class CompiledScene:
     def _fast(self, array):
         """(which cases are decided (n,), values and errors (n, queries))."""
         nothing = np.zeros(len(array), dtype=bool), *np.full((2, len(array), len(self._queries)), np.nan)
-        K = J = None
-        admitted = np.ones(len(array), dtype=bool) if self._linear is None else self._admitted(array)
-        if not admitted.any():
-            return nothing
-        if self._linear is None:
+        if not self._linear:
             try:
                 scene = scene_with(self._scene, self.names, array[0])
             except SceneError:
                 return nothing
             if not self._fits(scene):
                 return nothing
-            for mesh in self._meshes:
-                mesh.load(scene)
-            K, J = (np.array([[getattr(rod.profile.range[0], name) for rod in scene.rods]]) for name in "KJ")
-        elif self._law:
+            self._pair.load(scene)
+            return self._pair.run(1)
+        K = J = None
+        admitted = self._admitted(array)
+        if self._law:
             K, J = laws_with(self._scene, self._law, array[:, self._of_law])
-            admitted &= np.isfinite(J).all(axis=(1, 2))
-            if not admitted.any():
-                return nothing
-            K, J = (np.where(admitted[:, None, None], x, x[admitted][0]) for x in (K, J))
-        coarse, fine = self._meshes
-        of_cases = [self._written(k, array, K, J) for k in range(2)]
-        lost, x, fields = coarse.run(len(array), of_cases[0][0])
-        if lost.all():
+            admitted = admitted & np.isfinite(J).all(axis=(1, 2))
+        if not admitted.any():
             return nothing
-        _fill(lost, x, fields)
-        here = coarse.path(x, fields, self.why, **of_cases[0][1])
-        rq, n = on_mesh(here, self._layouts[1])
-        lost_too, x, fields = fine.run(len(array), of_cases[1][0], fine.starts(rq, n))
-        if lost_too.all():
-            return nothing
-        _fill(lost_too, x, fields)
-        there = fine.path(x, fields, self.why, **of_cases[1][1])
-        apart, _ = estimate_error(there, here)
-        softest = J if J is not None else np.array([[rod.profile.range[0].J for rod in there.scene.rods]])
-        decided = admitted & ~(lost | lost_too) & (apart[POSITION] <= RESOLVED) & (there.worst <= self._tol)
-        for path in (here, there):
-            decided &= plainly_resolved(path, softest)
-            decided &= path.rounding <= self._tol
-        return decided, *self._asked(there, slice(None))
+        if not admitted.all():  # others stand for cases that are refused
+            which = np.where(admitted, np.arange(len(array)), np.argmax(admitted))
+            array, K, J = (x if x is None else x[which] for x in (array, K, J))
+        decided, values, errors = self._pair.run(len(array), self._pair.numbers(array, K, J))
+        return decided & admitted, values, errors
 
     def _admitted(self, array):
         """Which cases the constructors of the scene admit, but for numbers of sections and materials that `laws_with`
@@ -414,53 +350,10 @@ class CompiledScene:
     def _admits(self, names, values):
         try:
             scene = scene_with(self._scene, names, values)
-            turning_in_law(scene, self._layouts[0], [self._load_factor])
+            turning_in_law(scene, self._layout, [self._load_factor])
         except SceneError:
             return False
         return True
-
-    def _written(self, k, array, K, J):
-        """(what C writes, arguments of `Loaded.path`) of the cases on the k-th mesh."""
-        if self._linear is None:
-            return [], {}
-        mesh = self._meshes[k]
-        read, more = self._linear[k]
-        written, named, rounding = [], {}, None
-        for place, known, derivatives in read:
-            written.append((place, known + array @ derivatives))
-        for name, places, known, derivatives in more:
-            named[name] = np.tile(known, (len(array), 1))
-            named[name][:, places] += array @ derivatives
-        if self._law:
-            functions, section, rounding = mesh.stretched(K, J)
-            written += [(place, functions[name]) for name, place in mesh.law_places()]
-            named["section"], named["rounding"] = section, rounding
-            named["stiffnesses"] = [2 * (Stiffnesses(K[:, i], J[:, i], None, None),) for i in range(K.shape[1])]
-        return written + mesh.limits(rounding, named.pop("dead", None), named.pop("nodal", None)), named
-
-
-def _fill(lost, *arrays):
-    """Give cases that are lost the numbers of another one, so that arithmetic on all of them meets no zeros."""
-    for array in arrays:
-        if array is not None:
-            array[lost] = array[~lost][0]
-
-
-def _where_it_changes(mesh, linear):
-    """([(`Place`, numbers there without parameters, derivatives)] of what C reads, and the same of further arrays as
-    (name, places, all numbers, derivatives)), of the arrays that change."""
-    read, more = mesh.arrays()
-    of_names = zip(more, linear[len(read) :], strict=True)
-    return (
-        [(mesh.place(array, places), known[places], derivatives)
-         for array, (known, places, derivatives) in zip(read, linear, strict=False) if len(places)],
-        [(name, places, known, derivatives) for name, (known, places, derivatives) in of_names if len(places)],
-    )  # fmt: skip
-
-
-def _all(mesh):
-    read, more = mesh.arrays()
-    return [*read, *more.values()]
 
 
 def _obstacle(scene):

@@ -16,7 +16,6 @@ from cosserat_fenicsx.parts import FunctionAlong
 from cosserat_fenicsx.progress import MeshProgress
 from cosserat_fenicsx.remember import per_scene
 from cosserat_fenicsx.results.accuracy import (
-    LONGEST_IN_LAYER,
     contact_edges,
     element_differences,
     expected_differences,
@@ -306,28 +305,21 @@ def with_turns(scene, path):
     return path.layout.resized(scene, [np.maximum(1.0, np.ceil(found / most)) for found in turns])
 
 
-def plainly_resolved(path, J):
-    """(points,) whether the mesh of a path surely resolves boundary layers, half-waves of buckling and turns, by bounds
-    that need no look at its elements; nor do moments then turn a rod by many radians.
+def surely_resolved(scene, layout, degree):
+    """Bounds with which the mesh surely resolves boundary layers, half-waves of buckling and turns, without a look at
+    its elements; nor do moments then turn a rod by many radians.
 
-    Args:
-        J: (points or 1, rods, 3) the least stiffnesses J of the rods at each point, N m^2.
+    Returns:
+        (longest element l, m; most): |n| (l/LONGEST_IN_LAYER)^2 is at most the least EI, and |m| l at most `most` times
+        the least of EI and GJ.
     """
-    fields, scene, scales = path._stacked("gauss_fields"), path.scene, path.scales
-    force, moment = (np.sqrt(np.square(fields[..., part]).sum(axis=-1)).max(axis=(1, 2)) * unit
-                     for part, unit in ((slice(0, 3), scales.force), (slice(3, 6), scales.moment)))  # fmt: skip
-    longest = max(
-        np.diff(breaks).max() * rod.length for rod, breaks in zip(scene.rods, path.layout.breaks, strict=True)
-    )
-    turn = moment * longest / J.min(axis=(1, 2))
-    layers = force * (longest / LONGEST_IN_LAYER) ** 2 / J[..., :2].min(axis=(1, 2))
+    longest = max(np.diff(breaks).max() * rod.length for rod, breaks in zip(scene.rods, layout.breaks, strict=True))
+    most = min(_GRADING.turned, degree / 2)
     applied = 2 * sum(hasattr(load, "moment") for load in scene.loads)
-    lengths = max(rod.length for rod in scene.rods) / longest
-    return (
-        (layers <= 1)
-        & (turn <= min(_GRADING.turned, path.degree / 2))
-        & (applied * turn * lengths <= _SURELY * _FIRST.many_turns)
-    )
+    if applied:
+        lengths = max(rod.length for rod in scene.rods) / longest
+        most = min(most, _SURELY * _FIRST.many_turns / (applied * lengths))
+    return longest, most
 
 
 def with_edges(scene, path):

@@ -1,0 +1,305 @@
+/* Two meshes of a case: the state of the finer one from that of the coarser, the error estimate of both, and queries. What
+   is compared, and with what margins, is said in results/compared.py and results/accuracy.py, contact forces at nodes in
+   results/recovery.py, and the states of each model in its file of models/. */
+#include "chain.h"
+
+#include <math.h>
+#include <string.h>
+
+
+
+static double square(const double *a, int n)
+{
+    double sum = 0;
+    for (int i = 0; i < n; i++) sum += a[i] * a[i];
+    return sum;
+}
+
+/* ---- the state in space ------------------------------------------------------------------------------------------ */
+
+/* b = scale * w a for the nodal values a (p + 1, size) of an element. */
+static void weigh(const double *w, int n, const double *a, int size, double scale, double *b)
+{
+    for (int k = 0; k < size; k++) b[k] = 0;
+    for (int j = 0; j < n; j++)
+        for (int k = 0; k < size; k++) b[k] += w[j] * a[j * size + k];
+    for (int k = 0; k < size; k++) b[k] *= scale;
+}
+
+/* n, m and r' of a determinate planar model at a Gauss point, in the plane: g = (n, m, r') (5,). */
+static void plane_point(const mesh *m, int e, int g, const double *theta, double load_factor, double *out)
+{
+    const int i = e * m->points + g, n = m->p + 1;
+    const double *t_R = m->R_R + 2 * i, *v_R = m->v_R + 2 * i, *K = m->K + 3 * i, *known = m->known + 2 * i;
+    double turned, curvature;
+    weigh(m->basis + g * n, n, theta, 1, 1, &turned);
+    weigh(m->slopes + g * n, n, theta, 1, 1 / m->sizes[e], &curvature);
+    const double c = cos(turned), s = sin(turned);
+    const double t[2] = {c * t_R[0] - s * t_R[1], s * t_R[0] + c * t_R[1]}, a[2] = {-t[1], t[0]};
+    const double force[2] = {load_factor * known[0], load_factor * known[1]};
+    const double sheared = v_R[0] + (a[0] * force[0] + a[1] * force[1]) / K[0];
+    const double stretched = v_R[1] + (t[0] * force[0] + t[1] * force[1]) / K[2];
+    out[2] = m->J[3 * i + 1] * curvature;
+    for (int k = 0; k < 2; k++) out[k] = force[k], out[3 + k] = sheared * a[k] + stretched * t[k];
+}
+
+/* The same in space: out = (n, m, r') (9,), from the quaternions of the element's nodes. */
+static void space_point(const mesh *m, int e, int g, const double *nodes, double load_factor, double *out)
+{
+    const int i = e * m->points + g, n = m->p + 1;
+    const double *R_R = m->R_R + 9 * i, *K = m->K + 3 * i, *J = m->J + 3 * i, *v_R = m->v_R + 3 * i;
+    const double *known = m->known + 3 * i;
+    double q[4], s[4], T[3][3];
+    weigh(m->basis + g * n, n, nodes, 4, 1, q);
+    weigh(m->slopes + g * n, n, nodes, 4, 1 / m->sizes[e], s);
+    const double a = q[0], b = q[1], c = q[2], d = q[3], squared = square(q, 4);
+    const double R[3][3] = {{a * a + b * b - c * c - d * d, 2 * (b * c - a * d), 2 * (b * d + a * c)},
+                            {2 * (b * c + a * d), a * a - b * b + c * c - d * d, 2 * (c * d - a * b)},
+                            {2 * (b * d - a * c), 2 * (c * d + a * b), a * a - b * b - c * c + d * d}};
+    const double turn[3] = {a * s[1] - s[0] * b - (c * s[3] - d * s[2]), a * s[2] - s[0] * c - (d * s[1] - b * s[3]),
+                            a * s[3] - s[0] * d - (b * s[2] - c * s[1])};
+    for (int k = 0; k < 3; k++)
+        for (int l = 0; l < 3; l++)
+            T[k][l] = (R[k][0] * R_R[l] + R[k][1] * R_R[3 + l] + R[k][2] * R_R[6 + l]) / squared;
+    for (int k = 0; k < 3; k++) out[k] = load_factor * known[k], out[3 + k] = out[6 + k] = 0;
+    for (int l = 0; l < 3; l++) {
+        const double curvature = 2 * (R_R[l] * turn[0] + R_R[3 + l] * turn[1] + R_R[6 + l] * turn[2]) / squared;
+        const double v = v_R[l] + (T[0][l] * out[0] + T[1][l] * out[1] + T[2][l] * out[2]) / K[l];
+        for (int k = 0; k < 3; k++) out[3 + k] += T[k][l] * J[l] * curvature, out[6 + k] += T[k][l] * v;
+    }
+}
+
+/* (n, m, r') of a plane as those in space. */
+static void in_space(const double *axes, const double *in, double *out)
+{
+    for (int k = 0; k < 3; k++) {
+        out[k] = in[0] * axes[k] + in[1] * axes[3 + k], out[3 + k] = in[2] * axes[6 + k];
+        out[6 + k] = in[3] * axes[k] + in[4] * axes[3 + k];
+    }
+}
+
+/* Displacements of the nodes of all rods of a tree from r' at the Gauss points, from the clamps outwards. */
+static void place_nodes(const mesh *m)
+{
+    const int n = m->p + 1;
+    for (const int *order = m->order; order < m->order + 3 * m->rods; order += 3) {
+        const int rod = order[0], entry = m->first[rod] + order[1];
+        const double *start = order[2] < 0 ? m->reference + 3 * (m->p * entry + rod) : m->placed + 3 * order[2];
+        memmove(m->placed + 3 * (m->p * entry + rod), start, 3 * sizeof *start);
+        for (int k = entry; k < m->first[rod + 1] + entry - m->first[rod]; k++) {
+            const int forward = k < m->first[rod + 1], e = forward ? k : m->first[rod + 1] - 1 - k + entry;
+            double *at = m->placed + 3 * (m->p * e + rod), whole[3], within[3];
+            for (int i = 0; i < 3; i++) {
+                whole[i] = 0;
+                for (int g = 0; g < m->points; g++)
+                    whole[i] += m->from_slopes[m->p * m->points + g] * m->gauss[9 * (e * m->points + g) + 6 + i];
+                whole[i] *= m->sizes[e];
+            }
+            if (!forward)
+                for (int i = 0; i < 3; i++) at[i] = at[3 * m->p + i] - whole[i];
+            for (int j = 1; j < n - !forward; j++) {
+                for (int i = 0; i < 3; i++) {
+                    within[i] = 0;
+                    for (int g = 0; g < m->points; g++)
+                        within[i] += m->from_slopes[j * m->points + g] * m->gauss[9 * (e * m->points + g) + 6 + i];
+                    at[3 * j + i] = at[i] + within[i] * m->sizes[e];
+                }
+            }
+        }
+    }
+}
+
+/* n and m at the nodes of all elements, see `element_contact`. */
+static void recover(const mesh *m)
+{
+    const int n = m->p + 1;
+    double density[6], *at = m->contact;
+    for (int e = 0; e < m->elements; e++, at += 6 * n) {
+        memset(at, 0, 6 * n * sizeof *at);
+        for (int g = 0; g < m->points; g++) {
+            const double *f = m->gauss + 9 * (e * m->points + g), *r_s = f + 6;
+            for (int k = 0; k < 6; k++) density[k] = m->density ? m->density[6 * (e * m->points + g) + k] : 0;
+            density[3] += r_s[1] * f[2] - r_s[2] * f[1], density[4] += r_s[2] * f[0] - r_s[0] * f[2];
+            density[5] += r_s[0] * f[1] - r_s[1] * f[0];
+            for (int j = 0; j < n; j++) {
+                const double by_field = m->by_fields[j * m->points + g];
+                const double by_density = m->by_densities[j * m->points + g] * m->sizes[e];
+                for (int k = 0; k < 6; k++) at[6 * j + k] += by_field * f[k] + by_density * density[k];
+            }
+        }
+    }
+}
+
+/* The state of all nodes and Gauss points in space from the unknowns x and the fields, at a load factor. */
+static void expand(const mesh *m, const double *x, const double *fields, double load_factor)
+{
+    const int n = m->p + 1, c = m->components, plane = m->kind == IN_PLANE || m->kind == PLANAR;
+    const int known = m->kind == IN_PLANE || m->kind == IN_SPACE, each = plane ? 5 : 9;
+    double values[9];
+    for (int i = 0; i < m->nodes * c; i++) m->nodal[i] = m->from[i] < 0 ? m->rest[i] : x[m->from[i]];
+    for (int rod = 0; rod < m->rods; rod++)
+        for (int e = m->first[rod]; e < m->first[rod + 1]; e++)
+            for (int g = 0; g < m->points; g++) {
+                double *out = m->gauss + 9 * (e * m->points + g);
+                const double *nodes = m->nodal + c * (m->p * e + rod);
+                if (m->kind == IN_PLANE) plane_point(m, e, g, nodes, load_factor, values);
+                else if (m->kind == IN_SPACE) space_point(m, e, g, nodes, load_factor, out);
+                else
+                    for (int k = 0; k < each; k++)
+                        (plane ? values : out)[k] = fields[m->field_from[each * (e * m->points + g) + k]];
+                if (plane) in_space(m->axes, values, out);
+            }
+    if (known) place_nodes(m);
+    for (int i = 0; i < m->nodes; i++) {
+        const double *w = m->nodal + c * i;
+        double *moved = m->motion + 7 * i;
+        for (int k = 0; k < 3; k++) {
+            if (known) moved[k] = m->placed[3 * i + k] - m->reference[3 * i + k];
+            else if (!plane) moved[k] = w[k] - m->rest[c * i + k];
+            else
+                moved[k] = (w[0] - m->rest[c * i]) * m->axes[k] + (w[1] - m->rest[c * i + 1]) * m->axes[3 + k];
+        }
+        if (plane) {
+            const double half = w[c - 1] / 2, s = sin(half);
+            moved[3] = cos(half);
+            for (int k = 0; k < 3; k++) moved[4 + k] = s * m->axes[6 + k];
+        } else {
+            memcpy(moved + 3, w + (known ? 0 : 3), 4 * sizeof *w);
+        }
+    }
+    recover(m);
+}
+
+/* ---- two meshes -------------------------------------------------------------------------------------------------- */
+
+/* The numbers of a point on the fine mesh from the state on the coarse one, which is expanded. */
+static void transfer(const comparison *p, double *start)
+{
+    const mesh *m = p->coarse;
+    const int nodal = m->nodes * m->components;
+    memcpy(start, p->start, p->numbers * sizeof *start);
+    for (int i = 0; i < p->moves; i++) {
+        const int from = p->move_from[i];
+        double value;
+        if (from < nodal) {
+            value = m->nodal[from] - m->rest[from];
+        } else {
+            const int at = (from - nodal) / m->forces, axis = (from - nodal) % m->forces;
+            value = 0;
+            for (int k = 0; k < 3; k++) value += m->axes[3 * axis + k] * m->gauss[9 * at + k];
+        }
+        start[p->move_to[i]] += p->move_weight[i] * value;
+    }
+}
+
+/* The sizes that errors are relative to, see `sizes_of`; whether that of positions is a rotation. */
+static int find_sizes(const comparison *p, const mesh *m, double *sizes)
+{
+    double moved = 0, turned = 0, rotation = 0, force = 0, moment = 0;
+    for (int rod = 0; rod < m->rods; rod++) {
+        double half = 0;
+        for (int i = m->p * m->first[rod] + rod; i <= m->p * m->first[rod + 1] + rod; i++) {
+            moved = fmax(moved, square(m->motion + 7 * i, 3));
+            half = fmax(half, square(m->motion + 7 * i + 4, 3));
+        }
+        half = sqrt(half), rotation = fmax(rotation, 2 * half), turned = fmax(turned, sqrt(8) * half * m->gyrations[rod]);
+    }
+    for (int i = 0; i < m->elements * m->points; i++) {
+        force = fmax(force, square(m->gauss + 9 * i, 3)), moment = fmax(moment, square(m->gauss + 9 * i + 3, 3));
+    }
+    moved = fmax(sqrt(moved), p->nothing), force = fmax(sqrt(force), p->least_moment * p->held[0]);
+    moment = fmax(sqrt(moment), p->held[1]);
+    force = fmax(fmax(force, moment / p->length), p->nothing);
+    const double least = moment <= p->vanishing * m->limits[1] ? 1.0 : p->least_moment;
+    sizes[0] = fmax(moved, turned), sizes[1] = fmax(rotation, moved / p->length), sizes[2] = force;
+    sizes[3] = fmax(fmax(moment, least * p->length * force), p->nothing);
+    return turned > moved;
+}
+
+/* The values of both meshes at a place, of n weights each: displacement, q, n, m. */
+static void at_place(const mesh *m, int rod, int e, const double *w, double *out)
+{
+    weigh(w, m->p + 1, m->motion + 7 * (m->p * e + rod), 7, 1, out);
+    weigh(w, m->p + 1, m->contact + 6 * (m->p + 1) * e, 6, 1, out + 7);
+}
+
+/* The largest differences of the four quantities at all places, and at ends of coarse elements, see `differences`. */
+static void find_differences(const comparison *p, int turning, double *everywhere, double *at_ends)
+{
+    const mesh *coarse = p->coarse, *fine = p->fine;
+    const int n = fine->p + 1;
+    int place = 0;
+    for (int k = 0; k < 4; k++) everywhere[k] = at_ends[k] = 0;
+    for (int rod = 0; rod < fine->rods; rod++)
+        for (int e = coarse->first[rod]; e < coarse->first[rod + 1]; e++)
+            for (int i = 0; i < p->places; i++, place++) {
+                double here[13], off[13], apart[4];
+                at_place(fine, rod, p->cells[place], p->weights + place * n, here);
+                at_place(coarse, rod, e, p->inside + i * n, off);
+                double along = 0;
+                for (int k = 0; k < 13; k++) off[k] -= here[k];
+                for (int k = 3; k < 7; k++) along += off[k] * here[k];
+                apart[0] = sqrt(square(off, 3)), apart[1] = 2 * sqrt(fmax(square(off + 3, 4) - along * along, 0));
+                apart[2] = sqrt(square(off + 7, 3)), apart[3] = sqrt(square(off + 10, 3));
+                if (turning) apart[0] = fmax(apart[0], fine->gyrations[rod] * apart[1]);
+                for (int k = 0; k < 4; k++) {
+                    everywhere[k] = fmax(everywhere[k], apart[k]);
+                    if (i == 0 || i == p->places - 1) at_ends[k] = fmax(at_ends[k], apart[k]);
+                    if (!isfinite(apart[k])) everywhere[k] = INFINITY;
+                }
+            }
+    for (int k = 0; k < 4; k++)
+        if (everywhere[k] <= fmax(p->rounding, k < 2 ? 0 : p->noise * fine->limits[k - 2])) everywhere[k] = 0;
+}
+
+/* The relative differences and the errors by the meshes of the four quantities, see `estimate_error`. */
+static void estimate(const comparison *p, const double *sizes, int turning, double *relative, double *errors)
+{
+    double apart[4], at_ends[4];
+    int ahead[4], far[4], sure = p->equal;
+    const double half = pow(2, p->fine->p + 1);
+    find_differences(p, turning, apart, at_ends);
+    for (int k = 0; k < 4; k++) {
+        relative[k] = apart[k] / sizes[k];
+        ahead[k] = apart[k] > p->ahead * at_ends[k], far[k] = apart[k] > p->far * at_ends[k];
+    }
+    far[2] |= far[0] && far[1] && apart[2] <= p->of_ends * at_ends[2];
+    for (int k = 0; k < 4; k++) sure &= far[k] || relative[k] == 0;
+    for (int k = 0; k < 4; k++) {
+        const double part = 1 / (sure && relative[k] < p->asymptotic ? p->safety_below : p->safety);
+        double gain = far[k] ? part * half : ahead[k] ? fmax(1, half / 16) : 1;
+        if (relative[k] == 0) gain = half / p->safety_below;
+        errors[k] = fmax(relative[k] / gain, p->fine->limits[4]);
+    }
+}
+
+/* Whether a mesh surely resolves the state, see `surely_resolved`. */
+static int resolves(const comparison *p, const mesh *m)
+{
+    double force = 0, moment = 0;
+    for (int i = 0; i < m->elements * m->points; i++) {
+        force = fmax(force, square(m->gauss + 9 * i, 3)), moment = fmax(moment, square(m->gauss + 9 * i + 3, 3));
+    }
+    const double layer = m->longest / p->in_layer;
+    return sqrt(force) * layer * layer <= m->limits[3] && sqrt(moment) * m->longest <= p->turned * m->limits[2];
+}
+
+/* Values and estimated errors of all queries; 0 where the two meshes suffice. */
+static int answer(const comparison *p, double *values, double *errors)
+{
+    const mesh *fine = p->fine;
+    double sizes[4], relative[4], by_mesh[4];
+    const int turning = find_sizes(p, fine, sizes);
+    estimate(p, sizes, turning, relative, by_mesh);
+    int enough = relative[0] <= p->resolved && fine->limits[4] <= p->tol && p->coarse->limits[4] <= p->tol;
+    for (int k = 0; k < 4; k++) enough &= by_mesh[k] <= p->tol;
+    if (!enough || !resolves(p, p->coarse) || !resolves(p, fine)) return 1;
+    for (const query *q = p->query; q < p->query + p->queries; q++) {
+        double at[13];
+        at_place(fine, q->rod, q->cell, q->weights, at);
+        const double own = q->kind == 1 ? 2 * atan2(sqrt(square(at + 4, 3)), at[3]) : at[q->place];
+        const double error = fmax(by_mesh[q->kind], q->kind < 2 ? 0 : fine->limits[q->kind - 2] / sizes[q->kind]);
+        *values++ = q->offset + q->unit * own, *errors++ = error * sizes[q->kind] * q->unit;
+    }
+    return 0;
+}
