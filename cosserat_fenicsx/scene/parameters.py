@@ -4,6 +4,7 @@ Scenes are immutable: every object that holds the number, directly or not, is ma
 checks. An object that several others share, such as a material, is changed for all of them.
 """
 
+import copy
 import dataclasses
 import math
 import numbers
@@ -185,6 +186,25 @@ def laws_with(scene, parameters, values):
                 row[i] = *k.shear, k.axial, *k.bending, k.torsion
         except SceneError:
             row[:] = np.nan
+    return found[..., :3], found[..., 3:]
+
+
+def admitted_laws(scene, parameters, values):
+    """`laws_with` for values that the constructors admit, of all cases at once.
+
+    Raises:
+        Exception: of any kind, where the formulas of a section take no arrays.
+    """
+    known = {}
+    for parameter, column in zip(parameters, values.T, strict=True):
+        _, field, *keys = parameter.place
+        owner = known[id(parameter.owner)] = known.get(id(parameter.owner)) or copy.copy(parameter.owner)
+        parts = getattr(owner, field)
+        object.__setattr__(owner, field, _put(tuple(parts) if keys else parts, keys, column))
+    rebuilding, found = _Rebuilding(known), np.empty((len(values), len(scene.rods), 6))
+    for i, rod in enumerate(scene.rods):
+        for k, modulus in enumerate(rebuilding.of(rod.section).moduli(rebuilding.of(rod.material))):
+            found[:, i, k] = modulus
     return found[..., :3], found[..., 3:]
 
 

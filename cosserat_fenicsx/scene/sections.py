@@ -191,6 +191,11 @@ class PerDirector(parts.Items):
 class Section(parts.Part, family="section"):
     """Base of cross-sections."""
 
+    def moduli(self, material: Material | None) -> tuple:
+        """(GA1, GA2, EA, EI1, EI2, GJ) in a material, N and N m^2: numbers, or arrays where fields of either are."""
+        k = self.stiffness(material)
+        return *k.shear, k.axial, *k.bending, k.torsion
+
 
 @dataclass(frozen=True)
 class Stiffness(Section):
@@ -337,12 +342,19 @@ class _Round(Section):
 
     def stiffness(self, material: Material) -> Stiffness:
         """The section's `Stiffness` in a material."""
-        (D, d), nu = self._diameters, material.nu
+        return isotropic(material, *self._shape(material.nu), _circle(self._diameters[0] / 2))
+
+    def moduli(self, material):
+        """See `Section`."""
+        return moduli_of(material, *self._shape(material.nu))
+
+    def _shape(self, nu):
+        D, d = self._diameters
         A, I = math.pi * (D**2 - d**2) / 4, math.pi * (D**4 - d**4) / 64
         m2 = (d / D) ** 2
         cowper = 6 * (1 + nu) * (1 + m2) ** 2 / ((7 + 6 * nu) * (1 + m2) ** 2 + (20 + 12 * nu) * m2)
-        area = (self.shear_factor or cowper) * A
-        return isotropic(material, A, (I, I), 2 * I, (area, area), _circle(D / 2))
+        area = (cowper if self.shear_factor is None else self.shear_factor) * A
+        return A, (I, I), 2 * I, (area, area)
 
     def stresses(self, material, force, moment):
         """The `Stress` for contact forces and moments (..., 3), N and N m, along d_1, d_2, d_3."""
@@ -411,11 +423,18 @@ class Rectangle(Section):
 
     def stiffness(self, material: Material) -> Stiffness:
         """The section's `Stiffness` in a material."""
-        b, h, nu = self.width, self.height, material.nu
-        area = (self.shear_factor or 10 * (1 + nu) / (12 + 11 * nu)) * (b * h)
+        b, h = self.width, self.height
         corners = ((b / 2, h / 2), (-b / 2, h / 2), (-b / 2, -h / 2), (b / 2, -h / 2))
-        moments = b * h**3 / 12, h * b**3 / 12
-        return isotropic(material, b * h, moments, _rectangle_torsion(b, h), (area, area), corners)
+        return isotropic(material, *self._shape(material.nu), corners)
+
+    def moduli(self, material):
+        """See `Section`."""
+        return moduli_of(material, *self._shape(material.nu))
+
+    def _shape(self, nu):
+        b, h = self.width, self.height
+        area = (10 * (1 + nu) / (12 + 11 * nu) if self.shear_factor is None else self.shear_factor) * (b * h)
+        return b * h, (b * h**3 / 12, h * b**3 / 12), _rectangle_torsion(b, h), (area, area)
 
     def stresses(self, material, force, moment):
         """The `Stress` for contact forces and moments (..., 3), N and N m, along d_1, d_2, d_3."""
@@ -467,14 +486,20 @@ def _circle(radius, corners=24):
     return tuple((radius * math.cos(a), radius * math.sin(a)) for a in angles)
 
 
+def moduli_of(material, A, I, J, shear_areas):
+    """`Section.moduli` of a shape in a material, from its properties (m^2, m^4)."""
+    E, G = material.E, material.G
+    return G * shear_areas[0], G * shear_areas[1], E * A, E * I[0], E * I[1], G * J
+
+
 def isotropic(material, A, I, J, shear_areas, outline):
     """The `Stiffness` of a shape in a material, from its properties (m^2, m^4)."""
-    rho = material.density
+    rho, (*shear, axial, EI1, EI2, torsion) = material.density, moduli_of(material, A, I, J, shear_areas)
     return Stiffness(
-        shear=tuple(material.G * area for area in shear_areas),
-        axial=material.E * A,
-        bending=(material.E * I[0], material.E * I[1]),
-        torsion=material.G * J,
+        shear=tuple(shear),
+        axial=axial,
+        bending=(EI1, EI2),
+        torsion=torsion,
         mass=None if rho is None else rho * A,
         outline=outline,
         inertia=None if rho is None else (rho * I[0], rho * I[1], rho * (I[0] + I[1])),
@@ -486,7 +511,7 @@ def _rectangle_torsion(b, h):
 
     The series of tanh(n x)/n^5 over odd n is the exact sum of 1/n^5 minus the fast series of (1 - tanh(n x))/n^5.
     """
-    long, short = max(b, h), min(b, h)
+    long, short = np.maximum(b, h), np.minimum(b, h)
     x = math.pi * long / (2 * short)
-    series = 31 / 32 * _ZETA_5 - sum((1 - math.tanh(n * x)) / n**5 for n in range(1, 15, 2))
+    series = 31 / 32 * _ZETA_5 - sum((1 - np.tanh(n * x)) / n**5 for n in range(1, 15, 2))
     return long * short**3 / 3 * (1 - 192 * short / (math.pi**5 * long) * series)

@@ -7,6 +7,7 @@ several scenes; those of the law follow from the sections and materials of the c
 exactly, each case is loaded by itself. What cannot be decided this way goes to `solve`.
 """
 
+import itertools
 import threading
 import weakref
 from collections.abc import Sequence
@@ -24,7 +25,7 @@ from cosserat_fenicsx.models.signature import Signature
 from cosserat_fenicsx.ranks import communicator
 from cosserat_fenicsx.results.compared import NAMES
 from cosserat_fenicsx.scene.action import path_dependent
-from cosserat_fenicsx.scene.parameters import check_once, laws_with, parameter_of, scene_with
+from cosserat_fenicsx.scene.parameters import admitted_laws, check_once, laws_with, parameter_of, scene_with
 from cosserat_fenicsx.scene.scene import Scene
 from cosserat_fenicsx.statics.loaded import Loaded
 from cosserat_fenicsx.statics.meshes import meshes_for, resolving_turns, turning_in_law
@@ -40,6 +41,9 @@ _DEGREE, _FORMULATION = 4, "mixed"  # the defaults of `solve`
 # Changes of the parameters, over their sizes, of the scenes by which the dependence of the data is found and checked.
 _BESIDE, _APART, _CHECK = 0.043, 0.25, -0.117
 _BLOCK = 256  # cases that are solved at once
+# Most numbers of sections and materials of which all corners of a box are looked at, and largest relative difference of
+# stiffnesses by formulas for many cases.
+_MOST_CORNERS, _SAME = 6, 1e-14
 
 
 @dataclass(frozen=True, eq=False)
@@ -232,6 +236,7 @@ class CompiledScene:
             return "loads act that the load factor does not scale"
         self._pair = Pair(meshes, reference, self._queries, self._tol, self._load_factor, near=NEAR)
         self._reference, self._layout, self._of_law = reference, layout, np.zeros(len(base), dtype=bool)
+        self._box = self._at, self._at
         if all(x.profile.constant for x in scene.rods) and not signatures[0].coupled:
             self._find_dependence(parameters, steps, _APART * sizes, checked, other)
         how = "a linear map and the laws of the sections" if self._linear else "loading every case"
@@ -244,6 +249,7 @@ class CompiledScene:
         self._of_law = np.array(self._find_laws(steps))
         self._law = [x for x, of_law in zip(parameters, self._of_law, strict=True) if of_law]
         laws = laws_with(self._scene, self._law, checked[None, self._of_law]) if self._law else None
+        self._at_once = self._law and self._takes_arrays(np.stack([self._at, checked])[:, self._of_law])
         if self._fits(other) and (laws is None or np.isfinite(laws[0]).all()):
             others = [(j, changes[j], steps[j]) for j in np.flatnonzero(~self._of_law)]
             self._linear = self._pair.depend(self._at, others, (checked, other, laws))
@@ -271,6 +277,14 @@ class CompiledScene:
             and (usual is None) == (known[1] is None)
             and all(map(np.array_equal, layout.breaks, known[0].breaks))
         )  # fmt: skip
+
+    def _takes_arrays(self, values):
+        """Whether the formulas of all sections take arrays."""
+        try:
+            known, found = (f(self._scene, self._law, values) for f in (laws_with, admitted_laws))
+        except Exception:  # noqa: BLE001  of any section, by whoever defined it
+            return False
+        return all((np.abs(a - b) <= _SAME * a).all() for a, b in zip(known, found, strict=True))
 
     def _find_laws(self, steps):
         """Which parameters change the stiffnesses of rods."""
@@ -323,29 +337,44 @@ class CompiledScene:
                 return nothing
             self._pair.load(scene)
             return self._pair.run(1)
-        K = J = None
-        admitted = self._admitted(array)
-        if self._law:
-            K, J = laws_with(self._scene, self._law, array[:, self._of_law])
-            admitted = admitted & np.isfinite(J).all(axis=(1, 2))
+        admitted, laws = self._admitted(array)
         if not admitted.any():
             return nothing
         if not admitted.all():  # others stand for cases that are refused
             which = np.where(admitted, np.arange(len(array)), np.argmax(admitted))
-            array, K, J = (x if x is None else x[which] for x in (array, K, J))
-        decided, values, errors = self._pair.run(len(array), self._pair.numbers(array, K, J))
+            array, laws = array[which], [x[which] for x in laws]
+        decided, values, errors = self._pair.run(len(array), self._pair.numbers(array, *laws))
         return decided & admitted, values, errors
 
     def _admitted(self, array):
-        """Which cases the constructors of the scene admit, but for numbers of sections and materials that `laws_with`
-        checks. A range of numbers is admitted where its ends are; else each case is looked at."""
-        columns = np.flatnonzero(~self._of_law)
-        if len(array) > 2 * len(columns):
-            ends = [(self.names[j], end(array[:, j])) for j in columns for end in (np.min, np.max)]
-            if all(self._admits([name], [value]) for name, value in ends):
-                return np.ones(len(array), dtype=bool)
-        names = [self.names[j] for j in columns]
-        return np.array([not names or self._admits(names, row) for row in array[:, columns]], dtype=bool)
+        """(which cases the constructors of the scene admit, their K and J, or none of these where they do not change).
+
+        A box of numbers is admitted where its ends are, of sections and materials its corners; else each case is looked
+        at."""
+        low, high = (f(array, axis=0) for f in (np.min, np.max))
+        if (low < self._box[0]).any() or (high > self._box[1]).any():
+            box = np.minimum(low, self._box[0]), np.maximum(high, self._box[1])
+            if not self._admits_box(box):
+                columns = np.flatnonzero(~self._of_law)
+                names = [self.names[j] for j in columns]
+                admitted = np.array([not names or self._admits(names, row) for row in array[:, columns]], dtype=bool)
+                laws = laws_with(self._scene, self._law, array[:, self._of_law]) if self._law else ()
+                return admitted & (np.isfinite(laws[1]).all(axis=(1, 2)) if laws else True), laws
+            self._box = box
+        laws = admitted_laws if self._at_once else laws_with
+        laws = laws(self._scene, self._law, array[:, self._of_law]) if self._law else ()
+        return np.ones(len(array), dtype=bool), laws
+
+    def _admits_box(self, box):
+        ends = [(self.names[j], end[j]) for j in np.flatnonzero(~self._of_law) for end in box]
+        if not all(self._admits([name], [value]) for name, value in ends):
+            return False
+        if not self._law:
+            return True
+        if len(self._law) > _MOST_CORNERS:
+            return False
+        corners = np.array([*itertools.product(*np.array(box)[:, self._of_law].T)])
+        return bool(np.isfinite(laws_with(self._scene, self._law, corners)[1]).all())
 
     def _admits(self, names, values):
         try:
