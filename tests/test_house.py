@@ -89,6 +89,7 @@ FITTERS = {
         "problem",
         "cases",
         "loaded",
+        "pair",
         "path/recorder",
     },
     "dynamics": {
