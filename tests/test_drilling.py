@@ -160,9 +160,8 @@ def test_a_small_torque_that_follows_from_the_weight_is_no_mistake_in_units():
     given = scene(
         bit=cf.drilling.BitOnRock(cf.drilling.Stribeck(5.0, 5.0), weight=6e3), hole=hole(BENT), mud=MUD, depth=2000.0
     )
-    with pytest.warns(
-        cf.SceneWarning, match=r"The torque of Stribeck\(...\) = 5 N m is hardly a torque on bit"
-    ) as said:
+    hardly = r"The torque of Stribeck\(...\) = 5 N m is hardly a torque on bit"
+    with pytest.warns(cf.SceneWarning, match=hardly) as said:
         chosen(given)
     assert len(said) == 1 and str(said[0].message).endswith("; coefficients of friction need radius= (m)")
     with pytest.warns(cf.SceneWarning, match="BitOnRock.weight = 60 N is hardly a weight on bit") as said:
@@ -682,11 +681,8 @@ def test_explain_tells_what_may_be_mistaken(tmp_path, capsys):
     assert not re.search(r"\d (k?N|N m|m|m/s|N s/m|N m s/rad|kg m\^2|rad/s)\b", told), told
     assert main(["explain", str(ROOT / "demos" / "strings" / "stopped_block.toml")]) == 0
     told = capsys.readouterr().out
-    assert (
-        "N/m in air, impedance" in told
-        and "Hole: none, no walls" in told
-        and "friction at the wall" not in told.lower()
-    )
+    assert "N/m in air, impedance" in told and "Hole: none, no walls" in told
+    assert "friction at the wall" not in told.lower()
 
 
 @pytest.mark.parametrize(("speeds", "starts"), [
