@@ -268,6 +268,7 @@ int reject_step(step_control *c, double taken);
 
 int negative_modes(second_variation *v, int *sideways);
 int run(sweep *s);
+int correct(sweep *s, const double *starts, const int *expected, double near);
 int run_cases(cases *c);
 
 #if 0

@@ -182,16 +182,21 @@ static int jumped(const sweep *s, const double *here, const double *found, doubl
     return slopes * change * change >= moves ? ACCEPTED : REJECTED; /* also what is not a number */
 }
 
-static int record(sweep *s)
+/* Record a point whose state is the present one. */
+static int record(sweep *s, const double *here, double load_factor)
 {
-    const double *here = s->points + (size_t)(s->known - 1) * s->numbers;
     const int k = s->records++;
-    s->recorded_load_factors[k] = s->known_load_factors[s->known - 1];
+    s->recorded_load_factors[k] = load_factor;
     s->recorded_iterations[k] = s->iterations, s->recorded_steps[k] = s->steps;
     s->iterations = 0;
     memcpy(s->recorded + (size_t)k * s->newton->problem->size, here, s->newton->problem->size * sizeof *here);
     if (s->fields) tabulate_all(s->fields, s->recorded_fields + (size_t)k * s->fields->elements * s->fields->size);
     return s->records == s->room;
+}
+
+static int record_here(sweep *s)
+{
+    return record(s, s->points + (size_t)(s->known - 1) * s->numbers, s->known_load_factors[s->known - 1]);
 }
 
 /* A step to a load factor. */
@@ -237,7 +242,7 @@ int run(sweep *s)
         const double here = s->known_load_factors[s->known - 1], wanted = s->load_factors[s->next];
         if (here == wanted) {
             s->next++, s->control->rejections = s->control->accepted = 0;
-            if (!s->every && record(s)) return FULL;
+            if (!s->every && record_here(s)) return FULL;
             continue;
         }
         const double goal = step_goal(s->control, here, wanted);
@@ -251,7 +256,33 @@ int run(sweep *s)
             if (reject_step(s->control, fabs(goal - here))) return LEFT;
             continue;
         }
-        if (s->every && record(s)) return FULL;
+        if (s->every && record_here(s)) return FULL;
+        if (now() - began > s->patience) return LATER;
+    }
+    return DONE;
+}
+
+/* Newton's method at the load factors in turn, each from its start (count, numbers). DONE; LATER or FULL where some are
+   left; LEFT where one is not found, farther than `near` from its start, or with another number of negative modes than
+   expected (count,). */
+int correct(sweep *s, const double *starts, const int *expected, double near)
+{
+    const double began = now();
+    newton *n = s->newton;
+    double *found = s->work;
+    int sideways;
+    while (s->next < s->count) {
+        const int k = s->next;
+        const double *start = starts + (size_t)k * s->numbers, load_factor = s->load_factors[k];
+        if (put(s, start, load_factor)) return LEFT;
+        n->loads = fabs(load_factor) * s->loads;
+        if (equilibrate(n, s->x)) return LEFT;
+        s->iterations += n->iterations;
+        if (n->verdict != CONVERGED) return LEFT;
+        take(s, found);
+        if (!(largest(s, found, start) <= near) || negative_modes(s->stability, &sideways) != expected[k]) return LEFT;
+        s->next++, s->steps++;
+        if (record(s, found, load_factor)) return FULL;
         if (now() - began > s->patience) return LATER;
     }
     return DONE;

@@ -36,9 +36,10 @@ class Problem(Equations):
         begins: whether permanent loads are still being applied, with a factor from 0 to 1, before all other loads.
         fields: the `PackedExpression` of `CompiledForms.fields`; None where there is none, or with several ranks.
         load_norm: Euclidean norm of the dead loads at load factor 1, dimensionless.
+        sweep: the `Sweep` that finds points in C, once it was asked for.
     """
 
-    ties_class = TieRows
+    ties_class, sweep = TieRows, None
 
     def __init__(self, model):
         self._refreshes, self._remembers = bool(model.actions.refreshed), bool(model.actions.memory)
@@ -140,6 +141,14 @@ class Problem(Equations):
         if self.ties:
             self.ties.put(self.x, multipliers)
         self.set_state(self.x)
+
+    def starts(self, values, n, multipliers):
+        """(k, n) `numbers`, one after another, of several states as of `begin_at`."""
+        found = []
+        for state in zip(values, n, multipliers, strict=True):
+            self.begin_at(*state)
+            found.append(np.concatenate(self.numbers()))
+        return np.array(found)
 
     def rates(self, slope):
         """The first-order changes of all arrays of `numbers` along a change of the unknowns per unit of load factor

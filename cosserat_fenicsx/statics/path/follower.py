@@ -52,7 +52,6 @@ class Follower:
         self._load = Continuation(self.track, steps, self._watch)
         self._auto = control == "auto" and steps.adaptive
         self.fork, self.left, self.used = None, False, "load"
-        self._sweep = None
 
     @cached_property
     def locator(self):
@@ -118,22 +117,32 @@ class Follower:
         return done
 
     @property
+    def in_c(self):
+        """Whether points may be found in C (`Sweep`): by one process, without Python code between them."""
+        model = self.track.model
+        return model.comm.size == 1 and not (model.actions.memory or model.signature.lives_along_rods)
+
+    @property
     def sweeps(self):
-        """Whether the next steps may be taken in C (`Sweep`): load control of one process, without Python code in
-        accepted steps."""
-        track, model = self.track, self.track.model
+        """Whether the next steps may be taken in C: load control alone."""
+        track = self.track
         unsure = track.here.negative_modes and track.without_potential
         return (
-            self._steps.adaptive and self._control != "arc" and model.comm.size == 1 and track.neutral is None
-            and not (unsure or model.actions.memory or model.signature.lives_along_rods)
+            self.in_c and self._steps.adaptive and self._control != "arc" and track.neutral is None and not unsure
         )  # fmt: skip
 
-    def sweep(self, load_factors, fields, *, every, counted):
+    def sweep(self, load_factors, *, every, counted):
         """`Sweep.along` from the last point, after `begin`."""
         self._load.begin()
-        if self._sweep is None:
-            self._sweep = Sweep(self.track, fields)
-        return self._sweep.along(load_factors, self._load, _PATIENCE, every=every, counted=counted)
+        return self.points.along(self.track, load_factors, self._load, _PATIENCE, every=every, counted=counted)
+
+    @property
+    def points(self):
+        """The `Sweep` of the problem, which keeps it."""
+        problem = self.track.problem
+        if problem.sweep is None:
+            problem.sweep = Sweep(self.track, problem.fields)
+        return problem.sweep
 
     def to_fork(self, load_factor):
         """Advance towards a load factor up to the first bifurcation; whether one was found."""

@@ -233,12 +233,17 @@ Swept = namedtuple("Swept", "load_factors x fields iterations steps")
 
 
 class Sweep(Pointers):
-    """The continuation in C of a `Track` of one process; fields: the recorded `PackedExpression`, or None."""
+    """Points of a path in C, of one process: by continuation, or corrected from a coarser mesh.
+
+    Args:
+        track: a `Track` of the problem, which may serve other tracks later; fields: the recorded `PackedExpression`, or
+            None.
+    """
 
     def __init__(self, track, fields):
         super().__init__()
-        self._track, self._fields = track, fields
         problem, model, ffi = track.problem, track.model, self._ffi
+        self._problem, self._stability = problem, track.stability
         self.c = sweep = ffi.new("sweep *")
         sweep.newton, sweep.stability = track.newton.c, track.stability.c
         sweep.x, sweep.load_factor = self.doubles(problem.x.array_w), self.doubles(problem.load_factor_array)
@@ -259,10 +264,11 @@ class Sweep(Pointers):
         for name in ("iterations", "steps"):
             setattr(sweep, f"recorded_{name}", self.integers(getattr(self._recorded, name)))
 
-    def along(self, load_factors, control, patience, *, every, counted):
+    def along(self, track, load_factors, control, patience, *, every, counted):
         """Advance to load factors in turn while C can decide on steps by accepting or halving them.
 
         Args:
+            track: the `Track`, of this problem.
             load_factors: to reach, in this order.
             control: the `Continuation`, whose step control is shared.
             patience: see `Continuation.to`.
@@ -275,38 +281,69 @@ class Sweep(Pointers):
         Returns:
             (number of load factors reached, iterations since the last record).
         """
-        track, sweep = self._track, self.c
-        load_factors = np.array(load_factors, dtype=float)
-        known = track.history
+        sweep, known = self.c, track.history
         for at, point in zip(self._points, known, strict=False):
             at[:] = np.concatenate(point.numbers)
         for k, point in enumerate(known):
             sweep.known_load_factors[k] = point.load_factor
-        sweep.known, sweep.negative, sweep.loads = len(known), track.here.negative_modes, track.problem.load_norm
+        sweep.known, sweep.negative = len(known), track.here.negative_modes
         sweep.control, control.c.rejections, control.c.accepted = control.c, 0, False
         control.c.patience = min(patience, _FIRST_REJECTIONS if len(known) == 1 else patience) - 1
-        sweep.load_factors, sweep.count, sweep.next = self.doubles(load_factors), len(load_factors), 0
-        sweep.every, sweep.iterations, sweep.steps, sweep.records = every, counted, track.steps, 0
-        track.newton.allow(track.max_iterations)
-        track.newton.c.rounding = track.model.round_off
-        while True:
-            before = sweep.iterations
-            why = self._lib.run(sweep)
-            k = sweep.records
-            track.iterations += int(self._recorded.iterations[:k].sum()) + sweep.iterations - before
-            sweep.records = 0
-            self._follow()
-            if k:
-                yield Swept(*(array[:k] if array.size else None for array in self._recorded))
-            track.problem.raise_failure()
-            track.stability.raise_failure()
-            obey()
+        sweep.every = every
+        for why, swept in self._calls(track, load_factors, counted, lambda: self._lib.run(sweep)):
+            self._follow(track)
+            if swept:
+                yield swept
+            self._check()
             if why in (self._lib.DONE, self._lib.LEFT):
                 return sweep.next, sweep.iterations
 
-    def _follow(self):
+    def corrected(self, track, starts, load_factors, negative_modes, near):
+        """The points at load factors, each by Newton's method from its start on this mesh.
+
+        Args:
+            track: the `Track`, of this problem.
+            starts: (n, numbers) see `Problem.numbers`; negative_modes: (n,) that each point must have; near: the
+                largest motion between start and point (lengths, rad).
+
+        Yields:
+            `Swept`; None where a point is not found, and nothing more.
+        """
+        starts, expected = np.ascontiguousarray(starts), np.array(negative_modes, dtype=np.int32)
+        pointers = self._ffi.from_buffer("double[]", starts), self._ffi.from_buffer("int[]", expected)
+        for why, swept in self._calls(track, load_factors, 0, lambda: self._lib.correct(self.c, *pointers, near)):
+            track.steps = self.c.steps
+            self._check()
+            if swept:
+                yield swept
+            if why == self._lib.LEFT:
+                yield None
+            if why in (self._lib.DONE, self._lib.LEFT):
+                return
+
+    def _calls(self, track, load_factors, counted, call):
+        """Call C without end; yields why it has returned, and a `Swept` or None."""
+        load_factors, sweep = np.array(load_factors, dtype=float), self.c
+        sweep.load_factors = self._ffi.from_buffer("double[]", load_factors)
+        sweep.count, sweep.next, sweep.records = len(load_factors), 0, 0
+        sweep.loads, sweep.iterations, sweep.steps = track.problem.load_norm, counted, track.steps
+        track.newton.allow(track.max_iterations)
+        track.newton.c.rounding = track.model.round_off
+        while True:
+            before, why = sweep.iterations, call()
+            k = sweep.records
+            track.iterations += int(self._recorded.iterations[:k].sum()) + sweep.iterations - before
+            sweep.records = 0
+            yield why, Swept(*(array[:k] if array.size else None for array in self._recorded)) if k else None
+
+    def _check(self):
+        self._problem.raise_failure()
+        self._stability.raise_failure()
+        obey()
+
+    def _follow(self, track):
         """Take C's last points, number of steps and load factor over to the track."""
-        track, sweep = self._track, self.c
+        sweep = self.c
         parts = np.cumsum([track.problem.numbering.size, *(len(x) for x in track.here.numbers[1:])])[:-1]
         if sweep.steps == track.steps:
             track.problem.set_load_factor(track.here.load_factor)

@@ -165,18 +165,18 @@ class Tracing:
         if k == len(load_factors) or watched or (between and until) or not self._follower.sweeps:
             return k
         wanted = load_factors[k:] if not free or between else load_factors[:1]
-        sweep = self._follower.sweep(wanted, self.problem.fields, every=between,
-                                     counted=self.track.iterations - self._counted)  # fmt: skip
+        sweep = self._follower.sweep(wanted, every=between, counted=self.track.iterations - self._counted)
         try:
             while True:
-                self._record_all(next(sweep))
+                swept = next(sweep)
+                self._record_all(swept, self.track.here.negative_modes)
         except StopIteration as end:
             done, left = end.value
         self._counted, self._stable_at = self.track.iterations - left, self.track.here.load_factor
         return self._swept_from(1, load_factors, free, until) if free and k < done else k + done
 
-    def _record_all(self, swept):
-        self._bar.at(self.track.here)
+    def _record_all(self, swept, negative_modes):
+        self._bar.reached(float(swept.load_factors[-1]))
         count, model, problem = len(swept.load_factors), self.model, self.problem
         nodal, fields = model.snapshots(swept.x, swept.fields)
         ties = [problem.at_ties(x, load_factor) for x, load_factor in zip(swept.x, swept.load_factors, strict=True)]
@@ -184,7 +184,7 @@ class Tracing:
             "load_factor": swept.load_factors.copy(),
             "rq": nodal,
             "gauss_fields": fields,
-            "negative_modes": np.full(count, self.track.here.negative_modes),
+            "negative_modes": np.full(count, negative_modes),
             "iterations": swept.iterations.astype(int),
             "reactions": np.array([multipliers for multipliers, _ in ties]),
             "neutral": np.zeros(count, dtype=bool),
@@ -228,6 +228,8 @@ class Tracing:
             problem.end_beginning()
         track.max_iterations = CORRECTIONS
         try:
+            if self._follower.in_c:
+                return path if self._corrected_in_c(coarse) else None
             for point, values, n in self._starts(coarse):
                 obey()
                 problem.begin_at(values, n, point.reactions)
@@ -244,6 +246,19 @@ class Tracing:
         except KeyboardInterrupt:
             raise Interrupted(path) from None
         return path
+
+    def _corrected_in_c(self, coarse):
+        """`corrected` by C; whether all points were found."""
+        rq, n = on_mesh(coarse, self.path.layout)
+        starts, done = self.problem.starts(self.model.unknowns_of(rq), n, coarse._stacked("reactions")), 0
+        negative_modes = coarse.negative_modes
+        points = self._follower.points.corrected(self.track, starts, coarse.load_factors, negative_modes, NEAR)
+        for swept in points:
+            if swept is None:
+                return False
+            first, done = done, done + len(swept.load_factors)
+            self._record_all(swept, negative_modes[first:done])
+        return True
 
     def _starts(self, coarse):
         """(point, values, n) for each point of a path on a coarser mesh: the arguments of `Problem.begin_at`."""
