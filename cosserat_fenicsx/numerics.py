@@ -121,11 +121,6 @@ class ElementRule:
         local = (x - breaks[cells]) / np.diff(breaks)[cells]
         return cells, (basis or self.basis)(np.clip(local, 0.0, 1.0))
 
-    def locate(self, breaks, x):
-        """`locate_all` for one point."""
-        cells, basis = self.locate_all(breaks, np.array([x]))
-        return cells[0], basis[0]
-
 
 def once_each(keys, make):
     """[make(i) of the i-th of these keys], made once for equal keys: most rods of a frame are alike."""

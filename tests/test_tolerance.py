@@ -173,7 +173,7 @@ def test_a_smooth_rod_does_not_hide_another():
 
 
 def test_an_interrupted_search_hands_over_what_is_complete(monkeypatch):
-    from cosserat_fenicsx.statics.path import recorder
+    from cosserat_fenicsx.statics.path import load_control, recorder
 
     def stop():
         raise KeyboardInterrupt
@@ -183,7 +183,7 @@ def test_an_interrupted_search_hands_over_what_is_complete(monkeypatch):
     monkeypatch.setattr(
         recorder.Tracing,
         "corrected",
-        lambda *arguments: monkeypatch.setattr(recorder, "obey", stop) or corrected(*arguments),
+        lambda *arguments: monkeypatch.setattr(load_control, "obey", stop) or corrected(*arguments),
     )
     with pytest.raises(cf.Interrupted) as stopped:
         cf.solve(scene, np.linspace(0.1, 0.9, 8).tolist())

@@ -257,12 +257,16 @@ class Equations(Called):
         stations, on all ranks; zero for the ground."""
         return self.ties.forces(self.tie_load_factor) if self.ties else np.empty((0, 2, 6))
 
-    def at_ties(self, x, load_factor):
-        """(multipliers, `tie_forces`) at unknowns x (this rank's part) and a load factor; the ties stay there."""
+    def at_ties(self, x, load_factors):
+        """(multipliers (n, ties), `tie_forces` (n, ties, 2, 6)) at unknowns x (n, this rank's part) and load factors (n,);
+        the ties stay at the last one."""
         if not self.ties:
-            return np.empty(0), np.empty((0, 2, 6))
-        self.ties.see(x)
-        return self.ties.everywhere(), self.ties.forces(load_factor)
+            return np.empty((len(x), 0)), np.empty((len(x), 0, 2, 6))
+        found = []
+        for here, load_factor in zip(x, load_factors.tolist(), strict=True):
+            self.ties.see(here)
+            found.append((self.ties.everywhere(), self.ties.forces(load_factor)))
+        return [np.array(part) for part in zip(*found, strict=True)]
 
     def multipliers(self):
         """Multipliers (reactions) of the constraint equations, on all ranks."""

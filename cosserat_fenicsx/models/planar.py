@@ -41,6 +41,8 @@ class PlaneModel(RodModel):
     def _angles(self, rq):
         """(.., N) theta of (r, q), (.., N, 7): continuous along each rod, beyond full turns too."""
         half = np.arctan2(rq[..., 4:] @ self.axes[2], rq[..., 3])
+        if (np.abs(half[..., 1:] - half[..., :-1]) < np.pi).all():
+            return 2 * half
         ends = self.rods.first_nodes(self.signature.degree)
         return 2 * np.concatenate([np.unwrap(half[..., a:b]) for a, b in itertools.pairwise(ends)], axis=-1)
 

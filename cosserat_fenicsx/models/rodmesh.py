@@ -140,7 +140,7 @@ class Layout:
 
     def sizes(self, scene):
         """Length of every element, m, rods one after another."""
-        return self.shares * np.repeat([rod.length for rod in scene.rods], self.counts)
+        return self.shares * np.repeat(scene.lengths, self.counts)
 
     @cached_property
     def shares(self):

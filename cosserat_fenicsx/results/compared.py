@@ -39,6 +39,13 @@ def all_cell_nodes(layout, degree):
     return (degree * np.arange(len(rods)) + rods)[:, None] + np.arange(degree + 1)
 
 
+@lru_cache(maxsize=256)
+def located(layout, rule, i, x):
+    """The element of the i-th rod and the basis functions (degree + 1,) of an `ElementRule` at x in [0, 1]."""
+    cells, basis = rule.locate_all(layout.breaks[i], np.array([x]))
+    return int(cells[0]), basis[0]
+
+
 class Compared(NamedTuple):
     """Where two meshes are compared: at the nodes of every element of the coarse one and half way between them.
 
@@ -240,18 +247,16 @@ def sizes_of(path):
     without stress, m is at least the moment, and n 1e-9 of the force, that would hold the rods as in the reference.
     """
     gyrations, length, noise = path._of_sections
-    squares = np.add.reduceat(np.square(path._motion), (0, 3, 4), axis=2)
-    moved = np.maximum(np.sqrt(squares[..., 0].max(axis=1)), NOTHING)
-    half = np.sqrt(np.maximum.reduceat(squares[..., 2], _first_nodes(path.layout, path.degree), axis=1))
+    motion, fields = path._motion, path._stacked("gauss_fields")
+    moved = np.maximum(np.sqrt(_squares(motion[..., :3]).max(axis=1)), NOTHING)
+    half = np.sqrt(np.maximum.reduceat(_squares(motion[..., 4:]), _first_nodes(path.layout, path.degree), axis=1))
     turned = np.sqrt(8) * (half * gyrations).max(axis=1)  # |R - 1| = sqrt(8) |sin(angle/2)|
     rotation = np.maximum(2 * half.max(axis=1), moved / length)
-    squares = np.add.reduceat(np.square(path._stacked("gauss_fields")[..., :6]), (0, 3), axis=3)
-    force, moment = np.sqrt(squares.max(axis=(1, 2))).T
+    force, moment = (np.sqrt(_squares(fields[..., i : i + 3]).reshape(len(path), -1).max(axis=1)) for i in (0, 3))
     if path.scene.acts_in_law:
         held = held_by_law(path.scene, path.layout, path.rule, path.scales, path._array("load_factor"))
         force, moment = np.maximum(force, LEAST_MOMENT * held[0]), np.maximum(moment, held[1])
     force = np.maximum(np.maximum(force, moment / length), NOTHING)
-    noise = np.pad(noise, ((2, 0), (0, 0)))
     vanishing = moment <= VANISHING * noise[3]
     least = 1.0 if vanishing.all() else LEAST_MOMENT
     moment = np.maximum(np.maximum(moment, least * length * force), NOTHING)
@@ -261,6 +266,11 @@ def sizes_of(path):
         own = np.maximum(criterion.sizes(path), 1e-300)
         sizes, noise = np.vstack([sizes, own]), np.vstack([noise, np.zeros((1, noise.shape[1]))])
     return Sizes(sizes, turned > moved, np.broadcast_to(noise, sizes.shape))
+
+
+def _squares(vectors):
+    """(..) squares of the sizes of vectors (.., n)."""
+    return np.einsum("...i,...i->...", vectors, vectors)
 
 
 def held_by_law(scene, layout, rule, scales, load_factors):
@@ -284,11 +294,11 @@ def _first_nodes(layout, degree):
 
 @per_scene
 def of_sections(scene, scales, layout, p, by_statics):
-    """The radii of gyration of the rods, the longest length, and errors of n and of m by rounding, (2, 1),
+    """The radii of gyration of the rods, the longest length, and errors by rounding, (4, 1), of n and of m,
     dimensionless."""
     (least, _), (K, J) = ((x.K / scales.force, x.J / (scales.force * scales.length**2)) for x in scene.extremes)
     gyrations, noise = rounding_of(least, K, J, shortest_of(scene, scales, layout), p, by_statics)
-    return gyrations, scene.lengths.max() / scales.length, noise[:, None]
+    return gyrations, scene.lengths.max() / scales.length, np.pad(noise[:, None], ((2, 0), (0, 0)))
 
 
 def shortest_of(scene, scales, layout):
@@ -326,7 +336,7 @@ def differences(fine, coarse):
     """
     sizes = fine._reference
     places = compared(coarse.layout, fine.layout, coarse.rule)
-    here = np.einsum("xj,kxjc->kxc", places.weights, fine._in_elements[:, places.cells])
+    here = (places.weights[:, None] @ fine._in_elements[:, places.cells])[:, :, 0]
     off = np.matmul(places.inside, coarse._in_elements).reshape(here.shape) - here
     squares = np.add.reduceat(np.square(off), (0, 3, 7, 10), axis=2)
     # without the part along q, since interpolated q are no unit quaternions

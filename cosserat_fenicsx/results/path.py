@@ -89,7 +89,7 @@ class Path(RodResult):
         self.events: list[Event] = []
         self.control, self.left = "load", False
         self.rounding, self.bounded, self.criteria = 0.0, NAMES, ()
-        self._errors = self.by_mesh = None
+        self._known_errors = self.by_mesh = None
 
     @property
     def quantities(self) -> dict[str, Quantity]:
@@ -135,9 +135,8 @@ class Path(RodResult):
         """
         part = super().at_points(which)
         part.events = []
-        for name in ("_errors", "by_mesh"):
-            values = getattr(self, name)
-            setattr(part, name, None if values is None else values[:, which])
+        if self.by_mesh is not None:
+            part._known_errors, part.by_mesh = self._errors[:, which], self.by_mesh[:, which]
         return part
 
     def with_points(self, others, which):
@@ -322,8 +321,14 @@ class Path(RodResult):
 
     def set_errors(self, errors):
         """Set the estimated errors (4, n) of the mesh, with those of rounding as a lower bound."""
-        self.by_mesh = np.maximum(errors, self.rounding)
-        self._errors = np.maximum(self.by_mesh, self.rounding_errors)
+        self.by_mesh, self._known_errors = np.maximum(errors, self.rounding), None
+
+    @property
+    def _errors(self):
+        """(4, n) the estimated errors, those of rounding included; None where they are unknown."""
+        if self._known_errors is None and self.by_mesh is not None:
+            self._known_errors = np.maximum(self.by_mesh, self.rounding_errors)
+        return self._known_errors
 
     @property
     def rounding_errors(self):

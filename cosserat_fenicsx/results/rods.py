@@ -14,7 +14,7 @@ from cosserat_fenicsx.quantities import Quantity, Units
 from cosserat_fenicsx.ranks import on_first
 from cosserat_fenicsx.remember import per_scene
 from cosserat_fenicsx.results import screen
-from cosserat_fenicsx.results.compared import cells_of
+from cosserat_fenicsx.results.compared import cells_of, located
 from cosserat_fenicsx.results.queries import Extremes, Reactions, Stresses, largest_in_words, reactions_in_words
 from cosserat_fenicsx.results.recovery import at_nodes
 from cosserat_fenicsx.results.result import (
@@ -261,7 +261,7 @@ class RodResult(Result, Extremes, Reactions, Stresses, States):
         station = self.station(station)
         i, _ = self._rows(station.rod)
         x = station.s / station.rod.length + (_BEYOND if side == "right" else 0.0)
-        cell, weights = self.rule.locate(self.layout.breaks[i], x)
+        cell, weights = located(self.layout, self.rule, i, x)
         return np.einsum("j,njk->nk", weights, self._contact_in(self._cells(i).start + cell))
 
     def _viscous(self, which, rod):
@@ -276,7 +276,7 @@ class RodResult(Result, Extremes, Reactions, Stresses, States):
         """Values (points, nodes, k), minus those at rest (nodes, k), interpolated to a station."""
         station = self.station(station)
         i, rows = self._rows(station.rod)
-        cell, weights = self.rule.locate(self.layout.breaks[i], station.s / station.rod.length)
+        cell, weights = located(self.layout, self.rule, i, station.s / station.rod.length)
         first = rows.start + cell * self.degree
         nodes = slice(first, first + self.degree + 1)
         return np.einsum("j,njk->nk", weights, values[:, nodes] if rest is None else values[:, nodes] - rest[nodes])

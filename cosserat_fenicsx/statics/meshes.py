@@ -61,6 +61,7 @@ class FirstMesh:
 _FIRST = FirstMesh()
 
 
+@per_scene
 def meshes_for(scene, degree, tol, many):
     """The first mesh for a tolerance; and, where it is coarser than usual, the usual one, else None.
 
@@ -83,6 +84,7 @@ def meshes_for(scene, degree, tol, many):
     return layout, usual if coarser else None
 
 
+@per_scene
 def resolving_turns(scene, layout, largest):
     """A mesh with elements that turn by little where prescribed rotations or moments turn a rod by many radians, at
     the largest load factor in size; None where `layout` is one.
@@ -313,13 +315,27 @@ def surely_resolved(scene, layout, degree):
         (longest element l, m; most): |n| (l/LONGEST_IN_LAYER)^2 is at most the least EI, and |m| l at most `most` times
         the least of EI and GJ.
     """
-    longest = max(np.diff(breaks).max() * rod.length for rod, breaks in zip(scene.rods, layout.breaks, strict=True))
+    longest = layout.sizes(scene).max()
     most = min(_GRADING.turned, degree / 2)
     applied = 2 * sum(hasattr(load, "moment") for load in scene.loads)
     if applied:
-        lengths = max(rod.length for rod in scene.rods) / longest
-        most = min(most, _SURELY * _FIRST.many_turns / (applied * lengths))
+        most = min(most, _SURELY * _FIRST.many_turns / (applied * scene.lengths.max() / longest))
     return longest, most
+
+
+def plainly_resolved(path):
+    """Whether the mesh of a path surely resolves boundary layers, half-waves of buckling and turns in all its points, by
+    bounds that need no look at its elements."""
+    fields, scene, scales = path._stacked("gauss_fields"), path.scene, path.scales
+    force, moment = (unit * np.sqrt(np.einsum("kcgi,kcgi->kcg", x, x))
+                     for x, unit in ((fields[..., :3], scales.force), (fields[..., 3:6], scales.moment)))  # fmt: skip
+    J, longest = scene.extremes[0].J, path.layout.sizes(scene).max()
+    least, bending = J.min(), J[:, :2].min()
+    flat = path.model != "spatial" and scene.plane is not None and not any(rod.profile.coupled for rod in scene.rods)
+    turn = (moment @ path.rule.weights).max() * longest / (bending if flat else least)
+    layers = force.max() * (longest / LONGEST_IN_LAYER) ** 2 <= bending
+    twisted = moment.max() * longest <= LONGEST_IN_LAYER * least
+    return layers and twisted and turn <= min(_GRADING.turned, path.degree / 2)
 
 
 def with_edges(scene, path):

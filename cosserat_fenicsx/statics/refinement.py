@@ -30,6 +30,7 @@ from cosserat_fenicsx.statics.meshes import (
     balanced,
     halved,
     loose_edges,
+    plainly_resolved,
     resolving,
     with_edges,
     with_layers,
@@ -114,7 +115,7 @@ class _Search:
         self.whole = self._few = self._which = None  # `_few`: sample points on the last mesh; `_which`: their indices
         self._apart, self._apart_of_whole = None, None  # their differences to the mesh before, and those of all points
         self._level, self._level_of_whole = -1, -2
-        self._plain = False  # see `_plain`, of the complete path
+        self._plain = False  # whether the complete path is, see `_plain`, and its mesh resolves it
         # Assumed orders of the errors in h; refinement factor over the mesh before, None where meshes are not nested.
         self._order, self._factor = np.ones(len(NAMES) + len(bound)), 2.0
         self._failed, self._promoted, self._best = False, None, math.inf
@@ -143,12 +144,15 @@ class _Search:
         self._failed = False
         if found is self.whole and self._level_of_whole < self._level:
             return self.confirmed(found)
-        layers = of_path(found)
+        resolved = plainly_resolved(found)
+        layers = None if resolved else of_path(found)
         if found is self.whole:
-            self._plain = _plain(found, layers)
+            self._plain = _plain(found) and (resolved or _resolves(found, layers))
             if self._usual is not None and not self._plain:
                 raise _TooCoarse
-        self._layered = with_layers(self._scene, found.layout, layers) or with_turns(self._scene, found)
+        self._layered = None
+        if not resolved:
+            self._layered = with_layers(self._scene, found.layout, layers) or with_turns(self._scene, found)
         if self._layered is None and self._presses and self._moved < _REFINEMENT.most_moves:
             self._layered = with_edges(self._scene, found)
             self._moved += self._layered is not None
@@ -295,11 +299,14 @@ class _Search:
         return self._keep(whole, None)
 
 
-def _plain(path, layers):
-    """Whether a coarse mesh suffices: load control, no events, no negative modes, and elements shorter than boundary
-    layers and half-waves of buckling."""
-    followed = path.control == "load" and not path.events and not path.negative_modes.any()
-    return followed and resolves(path.layout, layers) and resolves(path.layout, winding_lengths(path))
+def _plain(path):
+    """Whether a coarse mesh suffices where it resolves the solution: load control, no events, no negative modes."""
+    return path.control == "load" and not path.events and not path.negative_modes.any()
+
+
+def _resolves(path, layers):
+    """Whether elements are shorter than boundary layers and half-waves of buckling."""
+    return resolves(path.layout, layers) and resolves(path.layout, winding_lengths(path))
 
 
 def _rounding_leaves(tol, name, path):

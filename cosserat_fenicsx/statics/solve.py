@@ -256,6 +256,8 @@ def _requested(load_factors):
     if not values:
         raise SceneError("load_factors is empty: expected at least one number")
     for value in values:
+        if type(value) is float and math.isfinite(value):
+            continue
         if isinstance(value, bool) or not isinstance(value, numbers.Real) or not math.isfinite(value):
             raise SceneError(f"load_factors holds {value!r}: expected finite numbers")
     return [float(value) for value in values], free

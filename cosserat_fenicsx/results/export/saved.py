@@ -240,7 +240,7 @@ def _restored(kind, scene, settings, numbers, assemble, comm):
         for name in _OF_PATH:
             setattr(result, name, settings[name])
         result.criteria = stored_criteria(settings.get("judged", NAMES)[len(NAMES) :])
-        result._errors, result.events = _errors(numbers, len(result.judged), states), _events(numbers)
+        result._known_errors, result.events = _errors(numbers, len(result.judged), states), _events(numbers)
         result.bounded = tuple(settings.get("bounded", NAMES[:1]))
     return result
 

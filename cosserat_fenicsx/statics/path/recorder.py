@@ -179,18 +179,20 @@ class Tracing:
         self._bar.reached(float(swept.load_factors[-1]))
         count, model, problem = len(swept.load_factors), self.model, self.problem
         nodal, fields = model.snapshots(swept.x, swept.fields)
-        ties = [problem.at_ties(x, load_factor) for x, load_factor in zip(swept.x, swept.load_factors, strict=True)]
+        multipliers, forces = problem.at_ties(swept.x, swept.load_factors)
         columns = {
             "load_factor": swept.load_factors.copy(),
             "rq": nodal,
             "gauss_fields": fields,
             "negative_modes": np.full(count, negative_modes),
             "iterations": swept.iterations.astype(int),
-            "reactions": np.array([multipliers for multipliers, _ in ties]),
+            "reactions": multipliers,
             "neutral": np.zeros(count, dtype=bool),
             "densities": model.densities.at(swept.load_factors),
-            "tie_forces": np.array([forces for _, forces in ties]),
-            "clamp_loads": np.array([model.clamps.loads(load_factor) for load_factor in swept.load_factors.tolist()]),
+            "tie_forces": forces,
+            "clamp_loads": np.broadcast_to(
+                model.clamps.loads(swept.load_factors[:, None, None]), (count, model.clamps.count, 6)
+            ),
             "steps": swept.steps.astype(int),
         }
         self.path.extend(Records(Record, columns))
