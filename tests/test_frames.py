@@ -100,6 +100,14 @@ def test_meshes_of_other_programs_give_the_same_frame(written, tmp_path):
     np.testing.assert_array_equal(frame.points[frame.edges], given.points[given.edges])
     assert [rod.section for rod in frame.rods] == [rod.section for rod in given.rods]
     assert [x.station.full_name for x in frame.supports] == [x.station.full_name for x in given.supports]
+    assert frame.points_in(feet) == [0, 3]
+    assert [[rod.name for rod in frame.rods_in(group)] for group in sections] == [["rod0", "rod2"], ["rod1"]]
+    pinned = cf.frame_from(file, sections, STEEL, pinned=feet)
+    assert [type(x) for x in pinned.supports] == [cf.Pin] * 2 and "2 pinned" in repr(pinned)
+    with pytest.raises(cf.SceneError, match=f"no points are named 'foot': .*{feet}"):
+        frame.points_in("foot")
+    with pytest.raises(cf.SceneError, match="no rods are in the group 'leg'"):
+        frame.rods_in("leg")
     with pytest.raises(cf.SceneError, match="no lines are in the group 'leg'"):
         cf.frame_from(file, {"leg": THICK}, STEEL)
     with pytest.raises(cf.SceneError, match=f"no points are named 'foot': .*{feet}"):

@@ -1,5 +1,6 @@
 """Frames: straight rods between points, joined where they meet, from arrays or from a file with a mesh of lines."""
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 from os import PathLike
@@ -13,7 +14,7 @@ from cosserat_fenicsx.scene.profiles import Section
 from cosserat_fenicsx.scene.rod import Rod, Station
 from cosserat_fenicsx.scene.scene import Scene
 from cosserat_fenicsx.scene.sections import Material, Stiffness
-from cosserat_fenicsx.scene.supports import Clamp, Joint
+from cosserat_fenicsx.scene.supports import Clamp, Joint, Pin
 
 # Arrays of a mesh that may number the groups of its lines, in the order in which they are looked for.
 _GROUPS = ("section", "gmsh:physical", "medit:ref", "cell_tags")
@@ -27,12 +28,13 @@ class Frame:
         edges: (rods, 2) numbers of the points at the start and at the end of each rod.
         rods: the rods, "rod0", "rod1" and so on where they have no other names.
         joints: of the rods that meet at a point, each to the first one there.
-        supports: a `Clamp` at each clamped point.
+        supports: a `Clamp` at each clamped point, then a `Pin` at each pinned one.
     """
 
-    def __init__(self, points, edges, rods, clamped, hinged):
+    def __init__(self, points, edges, rods, held, hinged):
         self.points, self.edges, self.rods, self._hinged = points, edges, rods, frozenset(hinged)
-        self.supports = tuple(Clamp(self.at(point)) for point in clamped)
+        self.supports = tuple(kind(self.at(point)) for kind, numbers in held.items() for point in numbers)
+        self._points_of, self._rods_of = {}, {}  # {name or number in a mesh: numbers of points; (rods,) of bool}
 
     def at(self, point: int) -> Station:
         """The station at a point, to put loads and supports there and to ask for results: an end of the first rod
@@ -56,6 +58,24 @@ class Frame:
         met = np.array(sorted(self._ends))
         return int(met[np.argmin(np.linalg.norm(self.points[met] - place, axis=1))])
 
+    def points_in(self, name: str) -> list[int]:
+        """The numbers of the points that a mesh gives a name, as in `clamped` of `frame_from`, in ascending order.
+
+        Raises:
+            SceneError: no points have it; names those that are known.
+        """
+        return _points_named("Frame.points_in", name, self._points_of).tolist()
+
+    def rods_in(self, group: str | int) -> tuple[Rod, ...]:
+        """The rods of a group of a mesh, by its name or number, as in `section` of `frame_from`.
+
+        Raises:
+            SceneError: no such group; names those that are known.
+        """
+        if group not in self._rods_of:
+            raise SceneError(f"Frame.rods_in: no rods are in the group {group!r}: {_known(group, self._rods_of)}")
+        return tuple(rod for rod, belongs in zip(self.rods, self._rods_of[group], strict=True) if belongs)
+
     @cached_property
     def _ends(self):
         """{point: the ends of rods there}."""
@@ -74,7 +94,7 @@ class Frame:
         return tuple(found)
 
     def scene(self, loads: Sequence = (), supports: Sequence = (), **more) -> Scene:
-        """The `Scene` of this frame: with these loads, and with supports beside the clamped points.
+        """The `Scene` of this frame: with these loads, and with supports beside those of the frame.
 
         Args:
             more: further arguments of `Scene`, such as velocities.
@@ -88,7 +108,9 @@ class Frame:
         return len(self.rods)
 
     def __repr__(self):
-        held = f"{len(self.supports)} clamped" if self.supports else "none clamped"
+        counts = Counter(type(support) for support in self.supports)
+        words = [f"{counts[kind]} {word}" for kind, word in ((Clamp, "clamped"), (Pin, "pinned")) if counts[kind]]
+        held = " and ".join(words) or "none clamped"
         return f"<Frame: {len(self.rods)} rods between {len(self.points)} points, {held}>"
 
 
@@ -99,6 +121,7 @@ def frame(
     material: Material | Sequence | None = None,
     *,
     clamped: Sequence[int] = (),
+    pinned: Sequence[int] = (),
     hinged: Sequence[int] = (),
     d1: Numbers | None = None,
     names: Sequence[str] | None = None,
@@ -109,7 +132,7 @@ def frame(
         points: (n, 3) m.
         edges: (rods, 2) numbers of the points that each rod connects, from 0.
         section, material: of all rods; or one for every edge. Without a material each section is a `Stiffness`.
-        clamped: numbers of points that are clamped.
+        clamped, pinned: numbers of points that are clamped, or held by a `Pin`.
         hinged: numbers of points at which rods meet in ball joints.
         d1: see `Line`, of all rods.
         names: of the rods.
@@ -141,12 +164,13 @@ def frame(
         Rod(Line(places[a], places[b], d1=d1), sections[i], materials[i], name=names[i])
         for i, (a, b) in enumerate(ends.tolist())
     )
-    held, loose = _numbers("clamped", clamped, len(points)), _numbers("hinged", hinged, len(points))
+    given = {"clamped": clamped, "pinned": pinned, "hinged": hinged}
+    held, pins, loose = (_numbers(field, value, len(points)) for field, value in given.items())
     meet = np.bincount(ends.ravel(), minlength=len(points))
     alone = next((k for k in loose if meet[k] < 2), None)
     if alone is not None:
         raise SceneError(f"frame.hinged: {meet[alone]} rods meet point {alone}: expected points where two or more do")
-    return Frame(points, ends, rods, held, loose)
+    return Frame(points, ends, rods, {Clamp: held, Pin: pins}, loose)
 
 
 def _one_each(field, value, count):
@@ -175,6 +199,7 @@ def frame_from(
     material: Material | Mapping | None = None,
     *,
     clamped: str | Sequence[str] = (),
+    pinned: str | Sequence[str] = (),
     hinged: str | Sequence[str] = (),
     scale: float = 1.0,
     d1: Numbers | None = None,
@@ -185,13 +210,15 @@ def frame_from(
         mesh: a file that meshio reads, or a `meshio.Mesh`.
         section, material: of all rods; or {group: section}, a group being the name or the number that the mesh gives
             to its lines: an element set (Abaqus), a physical group (gmsh), or the integers of the cell data "section".
-        clamped, hinged: names of the points that are clamped, or at which rods meet in ball joints: node sets (Abaqus),
-            physical groups of points (gmsh), or point data that are 1 there and 0 elsewhere (VTK).
+        clamped, pinned, hinged: names of the points that are clamped, held by a `Pin`, or at which rods meet in ball
+            joints: node sets (Abaqus), physical groups of points (gmsh), or point data that are 1 there and 0
+            elsewhere (VTK).
         scale: m per unit of the mesh.
         d1: see `frame`.
 
     Returns:
-        A `Frame`, whose points have the numbers of the mesh.
+        A `Frame`, whose points have the numbers of the mesh; `Frame.points_in` and `Frame.rods_in` know the names of
+        the mesh, to put loads and supports there.
 
     Raises:
         SceneError: it cannot be read, has no straight lines, or a group or name is not in it, which lists those that
@@ -220,8 +247,11 @@ def frame_from(
     chosen = [_by_group(field, value, groups, len(edges))
               for field, value in (("section", section), ("material", material))]  # fmt: skip
     sets = _point_sets(mesh)
-    held, loose = (_points_named(field, names, sets) for field, names in (("clamped", clamped), ("hinged", hinged)))
-    return frame(points, edges, *chosen, clamped=held, hinged=loose, d1=d1)
+    given = {"clamped": clamped, "pinned": pinned, "hinged": hinged}
+    held = {field: _points_named(f"frame_from.{field}", names, sets) for field, names in given.items()}
+    found = frame(points, edges, *chosen, **held, d1=d1)
+    found._points_of, found._rods_of = sets, groups
+    return found
 
 
 def _groups(mesh, blocks, count):
@@ -285,12 +315,12 @@ def _point_sets(mesh):
     return {name: numbers for name, numbers in sets.items() if len(numbers)}
 
 
-def _points_named(field, names, sets):
-    """Numbers of the points of these names."""
+def _points_named(where, names, sets):
+    """Numbers of the points of these names; `where`: what asks for them, in messages."""
     names = [names] if isinstance(names, str) else list(names)
     for name in names:
         if name not in sets:
-            raise SceneError(f"frame_from.{field}: no points are named {name!r}: {_known(name, sets)}")
+            raise SceneError(f"{where}: no points are named {name!r}: {_known(name, sets)}")
     return np.unique(np.concatenate([*(sets[name] for name in names), np.empty(0, dtype=int)])).astype(int)
 
 
