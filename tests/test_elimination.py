@@ -7,11 +7,13 @@ import pytest
 import scipy.sparse
 from conftest import COMM
 from dense import tangent
+from frame_scenes import grid_shell
 from mpi4py import MPI
 from scipy.linalg import eigvalsh_tridiagonal
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.algebra import eigen, elimination
+from cosserat_fenicsx.algebra.pool import ProblemPool
 from cosserat_fenicsx.models.rodmesh import Layout
 from cosserat_fenicsx.statics.problem import solvers_of
 
@@ -324,6 +326,26 @@ def sparse_system(seed, change):
     matrix.sort_indices()
     matrix.data *= 1 + change * rng.standard_normal(matrix.nnz)
     return matrix.indptr, matrix.indices, matrix.data, matrix.toarray()
+
+
+def test_newton_takes_the_factors_that_counted_signs(monkeypatch):
+    """No others are made of the equations where rods meet; where these do not serve, the path is the same."""
+    scene = cf.Scene(*grid_shell(7))
+
+    def displacements(kept):
+        monkeypatch.setattr(eigen, "_KEPT", kept)
+        monkeypatch.setattr("cosserat_fenicsx.statics.problem.PROBLEMS", ProblemPool())
+        path = cf.solve(scene, [20.0], elements=1)
+        return np.array([path.displacement(rod.end) for rod in scene.rods])
+
+    expected, made, renewed = displacements(10**9), [], eigen.RepeatedFactors._renewed
+    assert np.abs(expected).max() > 0.01
+    monkeypatch.setattr(eigen.RepeatedFactors, "_renewed", lambda factors: made.append(1) or renewed(factors))
+    np.testing.assert_allclose(displacements(100), expected, rtol=0, atol=1e-10)
+    assert not made
+    monkeypatch.setattr(elimination._Near, "apply", lambda near, pc, b, x: x.set(1.0))
+    np.testing.assert_allclose(displacements(100), expected, rtol=0, atol=1e-10)
+    assert made
 
 
 def test_factors_of_an_earlier_matrix_serve(monkeypatch):

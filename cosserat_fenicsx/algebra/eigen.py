@@ -272,71 +272,100 @@ def reference_blas():
 
 class RepeatedInertia:
     """Eigenvalues' signs of symmetric matrices of one pattern on this rank, by factors with pivots of two rows too; the
-    symbolic analysis is made once. Arguments: see `RepeatedFactors` and `constrained_factors`."""
+    symbolic analysis is made once.
+
+    Arguments: see `RepeatedFactors` and `constrained_factors`.
+
+    Attributes:
+        regular: whether there are factors, of a matrix without null pivots.
+    """
 
     def __init__(self, starts, columns, null):
+        self.regular = False
         self._pattern = starts.astype(PETSc.IntType), columns.astype(PETSc.IntType)
         size, entries = len(starts) - 1, np.ones(len(columns))
         self._matrix = PETSc.Mat().createAIJ((size, size), csr=(*self._pattern, entries), comm=PETSc.COMM_SELF)
+        self._b, self._x = self._matrix.createVecs()
         self._matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
         self._pc = PETSc.PC().create(PETSc.COMM_SELF)
         _factor_constrained(self._pc, self._matrix, null)
 
-    def of(self, values):
+    def of(self, values, scale):
         """(negative, zero) numbers of eigenvalues of the matrix of these entries, and the logarithm of the absolute
-        value of its determinant, NaN where it is singular."""
+        value of its determinant, NaN where it is singular; scale: (rows,) what its rows and columns were multiplied by,
+        for `solve`."""
+        self.regular, self._scale = False, scale
         self._matrix.setValuesCSR(*self._pattern, values)
         self._matrix.assemble()
         self._pc.setOperators(self._matrix)
         self._pc.setUp()
         factor = self._pc.getFactorMatrix()
         negative, zero, _ = factor.getInertia()
+        self.regular = factor.getMumpsInfog(1) >= 0 and not zero
         part, power = abs(factor.getMumpsRinfog(12)), factor.getMumpsInfog(34)  # the determinant: part times 2^power
         return negative, zero, math.log(part) + power * math.log(2) if part and not zero else math.nan
+
+    def solve(self, b):
+        """The solution (rows,) of the last matrix, before it was scaled; only where it is `regular`."""
+        self._b.array_w[:] = b * self._scale
+        self._pc.apply(self._b, self._x)
+        return self._x.array_r * self._scale
 
 
 class RepeatedFactors:
     """Solves with sparse matrices of one pattern on this rank, by LU factors; its symbolic analysis is made once.
 
     Factors of a large matrix are kept while the matrices change little: they precondition GMRES, until it needs so many
-    iterations that new factors are cheaper.
+    iterations that new factors are cheaper. Instead of the first ones an inverse that is known already is taken.
 
     Args:
         starts: (rows + 1,) where each row starts among the entries; columns: (entries,) theirs, ascending in a row.
+        near: None, or what nearly is the inverse: `take(values)` the entries of a matrix, whether it is known;
+            `apply(pc, b, x)` of PETSc's vectors; and `leave()`, called where GMRES does not converge with it.
     """
 
-    def __init__(self, starts, columns):
+    def __init__(self, starts, columns, near=None):
         size = len(starts) - 1
         self._pattern = starts.astype(PETSc.IntType), columns.astype(PETSc.IntType)
         entries = *self._pattern, np.ones(len(columns))
         self._matrix = PETSc.Mat().createAIJ((size, size), csr=entries, comm=PETSc.COMM_SELF)
         self._b, self._x = self._matrix.createVecs()
         self._keeps, self._old, self._ksp = size >= _KEPT, None, None  # `_old`: are the factors of an earlier matrix?
-        self._begin()
+        self._near, self._by_near = near if self._keeps else None, None
+        if self._near:
+            self._by_near = self._gmres()
+            self._by_near.getPC().setType("python")
+            self._by_near.getPC().setPythonContext(near)
 
     def _begin(self):
         """A solver without factors; one that failed keeps its error."""
         if self._ksp is not None:
             self._ksp.destroy()
-        self._ksp = PETSc.KSP().create(PETSc.COMM_SELF)
-        self._ksp.setType("gmres")
-        self._ksp.setPCSide(PETSc.PC.Side.RIGHT)
-        self._ksp.setTolerances(rtol=_REUSED, atol=0.0, max_it=_MOST_REUSES)
-        self._ksp.setOperators(self._matrix)
+        self._ksp = self._gmres()
         self._pc = self._ksp.getPC()
         self._pc.setType("lu")
         self._factor = _mumps(self._pc, self._matrix)
+
+    def _gmres(self):
+        ksp = PETSc.KSP().create(PETSc.COMM_SELF)
+        ksp.setType("gmres")
+        ksp.setPCSide(PETSc.PC.Side.RIGHT)
+        ksp.setTolerances(rtol=_REUSED, atol=0.0, max_it=_MOST_REUSES)
+        ksp.setOperators(self._matrix)
+        return ksp
 
     def factor(self, values):
         """Take the matrix of these entries (entries,); False where it is found to be singular."""
         self._matrix.setValuesCSR(*self._pattern, values)
         self._matrix.assemble()
-        if self._keeps and self._old is not None:
+        if self._old is not None:
             self._old = True
-            return True
-        return self._renewed()
+        self._taken = bool(self._near) and self._near.take(values)
+        return self._taken or (self._keeps and bool(self._old)) or self._renewed()
 
     def _renewed(self):
+        if self._ksp is None:  # made at first use, with the memory for factors
+            self._begin()
         self._pc.setReusePreconditioner(False)
         self._pc.setOperators(self._matrix)
         self._pc.setUp()
@@ -352,6 +381,14 @@ class RepeatedFactors:
     def solve(self, b):
         """The solution (rows,) for a right-hand side; not a number where the matrix is singular after all."""
         self._b.array_w[:] = b
+        if self._taken:
+            self._by_near.solve(self._b, self._x)
+            if self._by_near.getConvergedReason() > 0:
+                return self._x.array_r
+            self._near.leave()
+            self._taken = False
+            if self._old is None and not self._renewed():
+                return np.full(len(b), np.nan)
         if self._old:
             self._ksp.solve(self._b, self._x)
             if self._ksp.getConvergedReason() > 0:

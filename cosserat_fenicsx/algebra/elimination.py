@@ -236,6 +236,19 @@ class Interface:
         self._kept = self._values(*derivatives)
         return self._solver.factor(self._kept, self._elimination.c.zero_pivot)
 
+    def begin_with(self, other, maps, count):
+        """Let solutions begin with the factors of another interface, which counts signs; only where both have the same
+        nodes and no constraint equations.
+
+        Args:
+            maps: see `RodModel.small_motion_maps`; count: counts the other's signs at the state.
+        """
+        ours, theirs = (x._elimination.numbering.block for x in (self, other))
+        known = [x._elimination.interface // x._elimination.numbering.block for x in (self, other)]
+        alike = len(known[0]) * theirs == len(known[1]) * ours and np.array_equal(known[0][::ours], known[1][::theirs])
+        if alike and not self._dense and not other._dense and self._size == len(known[0]) and not len(self.nodes):
+            self._solver.near = _Near(self._solver, other._solver, ours, maps, count)
+
     def memory(self):
         """The entries of the last matrix."""
         return self._kept
@@ -292,11 +305,56 @@ class _Dense(Pointers):
         return int((values[~zero] < 0).sum()), int(zero.sum()), logarithm
 
 
+class _Near:
+    """Nearly the inverse of a system: that of the second variation, whose factors counted signs last.
+
+    Args:
+        system, variation: the `_Sparse` systems; block: unknowns of a node in the first; maps, count: see
+            `Interface.begin_with`.
+    """
+
+    def __init__(self, system, variation, block, maps, count):
+        self._variation, self._maps, self._block, self._count = variation, maps, block, count
+        self._own, self._left = system.diagonal_blocks(block), 0
+
+    def leave(self):
+        """Leave it aside until signs are counted again."""
+        self._left = self._variation.counts
+
+    def take(self, values):
+        """Take the entries of the system; False where there are no factors that serve."""
+        if not self._variation.counts:
+            self._count()
+        if self._variation.inverse is None or self._variation.counts == self._left:
+            return False
+        self._of_rows, self._of_motion, self._rest = self._maps(values[self._own])
+        return True
+
+    def apply(self, pc, b, x):
+        """PETSc calls this as a preconditioner."""
+        rows = b.array_r.reshape(-1, self._block, 1)
+        motion = self._variation.inverse((self._of_rows @ rows).ravel())
+        x.array_w[:] = (self._of_motion @ motion.reshape(len(rows), -1, 1) + self._rest @ rows).ravel()
+
+
 class _Sparse:
-    """A system by its rows, with factors by MUMPS."""
+    """A system by its rows, with factors by MUMPS.
+
+    Attributes:
+        near: None, or a `_Near`, set before the first factors.
+        counts: how often signs were counted.
+    """
+
+    near, counts = None, 0
 
     def __init__(self, size):
         self._size = size
+
+    def diagonal_blocks(self, block):
+        """(nodes, block, block) which entries the blocks of the diagonal are."""
+        rows = np.arange(self._size).reshape(-1, block)
+        keys = np.repeat(np.arange(self._size), np.diff(self._starts)) * self._size + self._columns
+        return np.searchsorted(keys, rows[:, :, None] * self._size + rows[:, None, :])
 
     def entries(self, rows, columns):
         """Where the entries at rows and columns are added."""
@@ -309,7 +367,7 @@ class _Sparse:
     @functools.cached_property
     def _factors(self):
         """Made when they are first asked for: many systems only count signs."""
-        return eigen.RepeatedFactors(self._starts, self._columns)
+        return eigen.RepeatedFactors(self._starts, self._columns, self.near)
 
     def factor(self, values, zero):
         return bool(np.isfinite(values).all()) and self._factors.factor(values)
@@ -321,10 +379,17 @@ class _Sparse:
     def _symmetric(self):
         return eigen.RepeatedInertia(self._starts, self._columns, _ROUNDING)
 
+    @property
+    def inverse(self):
+        """A function (unknowns,) -> (unknowns,): the inverse of the last matrix whose signs were counted; None where
+        there is none, or where it is singular."""
+        return self._symmetric.solve if self._symmetric.regular else None
+
     def signs(self, values):
+        self.counts += 1
         rows = np.repeat(np.arange(self._size), np.diff(self._starts))
         scale = _scale(values[rows == self._columns])
-        negative, zero, logarithm = self._symmetric.of(values * scale[rows] * scale[self._columns])
+        negative, zero, logarithm = self._symmetric.of(values * scale[rows] * scale[self._columns], scale)
         return negative, zero, logarithm - 2 * float(np.log(scale).sum())
 
 

@@ -184,6 +184,19 @@ class RodModel:
         (force, moment) to the node's rows, (nodes, components, 6); only one where all nodes have the same."""
         raise NotImplementedError
 
+    def small_motion_maps(self, tangent):
+        """How the inverse of the tangent nearly follows from that of the second variation; of models in space whose
+        nodes have no multipliers.
+
+        Args:
+            tangent: (nodes, components, components) its blocks on the diagonal.
+
+        Returns:
+            Matrices from the rows of a node to (force, moment); from its (displacement, rotation) to its unknowns; and
+            from its rows to its unknowns for what is no motion.
+        """
+        raise NotImplementedError
+
     def held_forces(self, forces):
         """Forces and moments (.., 6), inertial, with zero for components that the model's equations do not contain."""
         return forces

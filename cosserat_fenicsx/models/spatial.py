@@ -82,6 +82,18 @@ class SpatialModel(RodModel):
         trial[:, 3:, 3:7] = small_rotations(q)
         return trial, test
 
+    def small_motion_maps(self, tangent):
+        """See `RodModel`: the row of the scalar component of q is |q|^2 = 1, whose derivative is along q."""
+        along, rows = tangent[:, 3, 3:7], np.zeros((6, 7))
+        squared = np.square(along).sum(axis=1)[:, None, None]
+        rows[:3, :3], rows[3:, 4:] = _EYE, _EYE
+        motion, rest = np.zeros((len(tangent), 7, 6)), np.zeros((len(tangent), 7, 7))
+        motion[:, :3, :3] = _EYE
+        q = along / np.sqrt(squared[:, :, 0])
+        motion[:, 3:, 3:] = spun(q[:, None], _EYE).swapaxes(1, 2)
+        rest[:, 3:, 3] = along / squared[:, :, 0]
+        return rows, motion, rest
+
     def turned_reactions(self, values, reactions):
         turned = self.signature.formulation.turned_rows(values[:, 3:7], reactions[:, 3:])
         return np.pad(turned, ((0, 0), (3, 0), (3, 0)))
