@@ -399,6 +399,55 @@ void backward(chain *s, const double *interface, double *x)
     }
 }
 
+/* ---- a sparse system ---------------------------------------------------------------------------------------------- */
+
+/* Rows and columns of the entries of square matrices one after another; sizes: (count,); where: their unknowns. */
+void spread(int count, const int *sizes, const int *where, int *rows, int *columns)
+{
+    for (int k = 0; k < count; where += sizes[k++])
+        for (int i = 0; i < sizes[k]; i++)
+            for (int j = 0; j < sizes[k]; j++) *rows++ = where[i], *columns++ = where[j];
+}
+
+/* Sort numbers by keys below `size`, where these are equal as they are in `from` (or ascending, without it). starts:
+   (size + 1,) work space. */
+static void sort_by(const int *key, int size, int count, const int *from, int *to, int *starts)
+{
+    memset(starts, 0, (size + 1) * sizeof *starts);
+    for (int i = 0; i < count; i++) starts[key[i]]++;
+    for (int i = 0, sum = 0; i <= size; i++) {
+        const int own = starts[i];
+        starts[i] = sum;
+        sum += own;
+    }
+    for (int i = 0; i < count; i++) {
+        const int k = from ? from[i] : i;
+        to[starts[key[k]]++] = k;
+    }
+}
+
+/* Number the distinct entries of a matrix row by row, columns ascending: starts (size + 1,) of the rows, the `distinct`
+   columns, and of every entry its number; order: (count,) work space, as is `distinct`, of that size. Returns how many
+   there are. */
+int number_entries(int size, int count, const int *rows, const int *columns, int *starts, int *distinct, int *entry,
+                   int *order)
+{
+    int found = 0;
+    sort_by(columns, size, count, 0, distinct, starts);
+    sort_by(rows, size, count, distinct, order, starts);
+    memset(starts, 0, (size + 1) * sizeof *starts);
+    for (int i = 0; i < count; i++) {
+        const int k = order[i], before = i ? order[i - 1] : -1;
+        if (before < 0 || rows[k] != rows[before] || columns[k] != columns[before]) {
+            distinct[found++] = columns[k];
+            starts[rows[k] + 1]++;
+        }
+        entry[k] = found - 1;
+    }
+    for (int i = 0; i < size; i++) starts[i + 1] += starts[i];
+    return found;
+}
+
 /* ---- a small system as a whole ----------------------------------------------------------------------------------- */
 
 /* LU factors of F (n, n), whose rows are scaled first: those of thick and of thin rods and of constraint equations then

@@ -242,6 +242,9 @@ void count(chain *s, kernel *k);
 void forward(chain *s, const double *b, double *interface);
 void backward(chain *s, const double *interface, double *x);
 int factor_dense(double *F, int n, int *row, int *column, double zero, double *scale, double *work);
+void spread(int count, const int *sizes, const int *where, int *rows, int *columns);
+int number_entries(int size, int count, const int *rows, const int *columns, int *starts, int *distinct, int *entry,
+                   int *order);
 void solve_dense(const double *F, int n, const int *row, const int *column, const double *scale, double *b,
                  double *work);
 

@@ -11,7 +11,7 @@ import functools
 import numpy as np
 
 from cosserat_fenicsx.algebra import eigen
-from cosserat_fenicsx.algebra.building import Pointers
+from cosserat_fenicsx.algebra.building import Pointers, module
 
 #: Relative to the largest number in its column, smaller pivots are zero to rounding.
 ZERO_PIVOT = 2e-15
@@ -136,12 +136,12 @@ class Elimination(Pointers):
 
     def _find_places(self, at, ends, rows, slots):
         numbering, first, kept = self.numbering, self._shape[at, :2].sum(axis=1), self._shape[at, 2:].sum(axis=1)
-        starts, here = np.cumsum((slots[at] + kept) ** 2), np.empty((2, len(self.condensed)), dtype=np.int64)
-        for a, b, c in set(zip(first.tolist(), kept.tolist(), slots[at].tolist(), strict=True)):  # most are alike
-            alike = np.flatnonzero((first == a) & (kept == b) & (slots[at] == c))
-            where = np.hstack([ends[at[alike], None] + np.arange(c), rows[at[alike], a : a + b] - numbering.size])
-            block = (starts[alike] - (b + c) ** 2)[:, None] + np.arange((b + c) ** 2)
-            here[0, block], here[1, block] = np.repeat(where, b + c, axis=1), np.tile(where, b + c)
+        slot, column = np.arange(slots.max(initial=0)), np.arange(rows.shape[1]) - first[:, None]
+        places = np.hstack([ends[at, None] + slot, rows[at] - numbering.size])
+        where = places[np.hstack([slot < slots[at, None], (column >= 0) & (column < kept[:, None])])]
+        here = np.empty((2, len(self.condensed)), dtype=np.int32)
+        sizes, where = self.integers(slots[at] + kept), self.integers(where)
+        self._lib.spread(len(at), sizes, where, *(self._ffi.from_buffer("int[]", part) for part in here))
         comm = numbering.comm
         everywhere = comm.allgather(here) if comm.size > 1 else [here]
         self.places, self._counts = np.concatenate(everywhere, axis=1), [part.shape[1] for part in everywhere]
@@ -215,6 +215,7 @@ class Interface:
         added = [np.stack(pair) for pair in ((ends, multipliers), (multipliers, ends))]
         rows, columns = np.concatenate([elimination.places, of_nodes, *added], axis=1)
         self._here = (rows >= 0) & (columns >= 0)
+        self._everywhere = bool(self._here.all())
         self._dense = self._size <= _DENSE
         self._solver = _Dense(self._size) if self._dense else _Sparse(self._size)
         self._entry = self._solver.entries(rows[self._here], columns[self._here])
@@ -227,9 +228,9 @@ class Interface:
                 as `TieRows.tangent_blocks` returns them; the last two only where multipliers belong to the system.
         """
         values = np.concatenate([self._elimination.all_condensed(), *(part.ravel() for part in (of_nodes, *others))])
-        here = self._here[: len(values)]
-        entries = self._entry[: np.count_nonzero(here)]
-        return np.bincount(entries, values[here], minlength=self._solver.room)
+        if not self._everywhere:
+            values = values[self._here[: len(values)]]
+        return np.bincount(self._entry[: len(values)], values, minlength=self._solver.room)
 
     def factor(self, *derivatives):
         """Factors of the system, see `_values`; False where it is singular."""
@@ -359,10 +360,13 @@ class _Sparse:
     def entries(self, rows, columns):
         """Where the entries at rows and columns are added."""
         each = np.arange(self._size)  # a diagonal of zeros is part of the pattern
-        keys, entry = np.unique(np.append(rows, each) * self._size + np.append(columns, each), return_inverse=True)
-        self._columns, self.room = keys % self._size, len(keys)
-        self._starts = np.searchsorted(keys // self._size, np.arange(self._size + 1))
-        return entry[: len(rows)]
+        rows, columns = (np.append(x, each).astype(np.int32) for x in (rows, columns))
+        self._starts, found = np.empty(self._size + 1, dtype=np.int32), np.empty((3, len(rows)), dtype=np.int32)
+        ffi, lib = module()
+        arrays = (ffi.from_buffer("int[]", x) for x in (rows, columns, self._starts, *found))
+        self.room = lib.number_entries(self._size, len(rows), *arrays)
+        self._columns = found[0, : self.room].copy()
+        return found[1, : len(rows) - self._size].copy()
 
     @functools.cached_property
     def _factors(self):

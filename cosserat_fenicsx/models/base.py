@@ -263,6 +263,7 @@ class RodModel:
         cells = sum(rods.counts)
         self._gather_nodes = Gather(self.comm, slots[: self.owned_nodes], cells * p + len(rods.counts))
         self._gather_cells = Gather(self.comm, rods.cells[:owned_cells], cells)
+        self._first_nodes = rods.first_nodes(p).tolist()
         slot = self.slot
         self._held = slots, {slot(x) for x in links.clamped}, {slot(a): slot(b) for a, b in links.leaders}
         self.tied_slots = np.array([slot(x) for x in links.tied], dtype=np.int64)
@@ -274,7 +275,7 @@ class RodModel:
     def slot(self, vertex):
         """The scene's number of the node at a vertex (rod index, element end)."""
         rod, end = vertex
-        return int(self.rods.first_nodes(self.signature.degree)[rod] + end * self.signature.degree)
+        return self._first_nodes[rod] + int(end) * self.signature.degree
 
     def _prepare_variations(self, spaces):
         self._variations = []

@@ -163,12 +163,13 @@ def start_frame(owner, d3, default):
     d1 = across / np.linalg.norm(across)
     d1 = d1 - np.dot(d1, d3) * d3  # twice, against cancellation where `given` is almost along the tangent
     d1 /= np.linalg.norm(d1)
-    return np.column_stack([d1, np.cross(d3, d1), d3])
+    (x, y, z), (a, b, c) = d3.tolist(), d1.tolist()  # np.cross takes most of the time of a frame's lines
+    return np.array([[a, y * c - z * b, x], [b, z * a - x * c, y], [c, x * b - y * a, z]])
 
 
 def level_axis(t):
     """The horizontal direction d1 normal to t such that t x d1 points upwards (along z); x for a vertical t."""
-    across = np.cross([0.0, 0.0, 1.0], t)
+    across = np.array([0.0 - t[1], t[0], 0.0])
     return across if np.linalg.norm(across) > 1e-6 else np.array([1.0, 0.0, 0.0])
 
 

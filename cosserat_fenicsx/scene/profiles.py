@@ -3,7 +3,7 @@
 from collections import namedtuple
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Annotated
 
 import numpy as np
@@ -360,7 +360,16 @@ class Sections:
     def _stiffness(self, section):
         if self.material is None and not isinstance(section, Stiffness):
             refuse("Rod", "material", None, f"a Material, which a {type(section).__name__} section needs")
-        return section.stiffness(self.material)
+        try:
+            return _stiffness_of(section, self.material)
+        except TypeError:  # a section of the user's that cannot be hashed
+            return section.stiffness(self.material)
+
+
+@lru_cache(maxsize=16)
+def _stiffness_of(section, material):
+    """The `Stiffness` of a section, made once for many rods."""
+    return section.stiffness(material)
 
 
 def _is_law(section):

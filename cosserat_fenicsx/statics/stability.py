@@ -41,7 +41,7 @@ class NegativeModes(Called):
         for k, part in enumerate(self.parts):
             variation.form[k], variation.chain[k] = part.form.c, part.elimination.c
             variation.sideways[k] = part.variation.sideways
-        if problem.interface and not problem.model.multipliers and problem.model.name == "spatial":
+        if problem.interface and problem.model.name == "spatial" and not problem.model.rows_turn:
             problem.interface.begin_with(self.whole.interface, problem.model.small_motion_maps, self.count)
 
     def _answer(self, what, a, b):
