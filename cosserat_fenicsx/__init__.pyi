@@ -72,6 +72,7 @@ from cosserat_fenicsx.scene.sections import Material as Material
 from cosserat_fenicsx.scene.sections import Rectangle as Rectangle
 from cosserat_fenicsx.scene.sections import Stiffness as Stiffness
 from cosserat_fenicsx.scene.sections import Tube as Tube
+from cosserat_fenicsx.scene.stages import Stage as Stage
 from cosserat_fenicsx.scene.supports import Clamp as Clamp
 from cosserat_fenicsx.scene.supports import Hinge as Hinge
 from cosserat_fenicsx.scene.supports import InitialVelocity as InitialVelocity

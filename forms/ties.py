@@ -5,8 +5,9 @@ One equation serves all kinds; the data that a kind does not need are zero:
     c = n . (r_a - r_b - place) - eta rate + (R_a t) . (R_b w) + 2 axis . vec(q_a conj(p))
 
 Along the direction n, a stays at `place` from b, or moves away in proportion to the load factor eta. t and w are fixed
-to the sections at a and b and stay normal to each other. p is the quaternion of the rotation by eta `angle` about the
-unit vector `about`; about `axis`, the rotation of a equals it. q need not have unit length: the mean of two has not.
+to the sections at a and b and stay normal to each other. p is the quaternion of the rotation by `start` and then by eta
+`angle` about the unit vector `about`; about `axis`, the rotation of a equals it. q need not have unit length: the
+mean of two has not.
 """
 
 from collections import namedtuple
@@ -17,7 +18,7 @@ from cosserat_fenicsx.forms.rotation import product_conjugate, rotation_matrix
 #: Arguments of an equation and their sizes; `multiplier` is the reaction.
 SIZES = {
     "r_a": 3, "q_a": 4, "r_b": 3, "q_b": 4,
-    "n": 3, "place": 3, "rate": 1, "t": 3, "w": 3, "axis": 3, "about": 3, "angle": 1,
+    "n": 3, "place": 3, "rate": 1, "t": 3, "w": 3, "axis": 3, "about": 3, "angle": 1, "start": 4,
     "load_factor": 1, "multiplier": 1,
 }  # fmt: skip
 _SIZES = tuple(SIZES.values())
@@ -30,7 +31,10 @@ _Given = namedtuple("_Given", SIZES)
 def constraint(given):
     """c, from a namedtuple of UFL vectors with the fields `SIZES`."""
     half = given.load_factor[0] * given.angle[0] / 2
-    p = ufl.as_vector([ufl.cos(half), *(ufl.sin(half) * x for x in given.about)])
+    c, about, (first, *others) = ufl.cos(half), ufl.sin(half) * given.about, given.start
+    before = ufl.as_vector(others)
+    ahead = c * before + first * about + ufl.cross(about, before)
+    p = ufl.as_vector([c * first - ufl.dot(about, before), *ahead])
     held = ufl.dot(given.n, given.r_a - given.r_b - given.place) - given.load_factor[0] * given.rate[0]
     inclined = ufl.dot(rotation_matrix(given.q_a) * given.t, rotation_matrix(given.q_b) * given.w)
     return held + inclined + 2 * ufl.dot(given.axis, product_conjugate(given.q_a, p))

@@ -82,6 +82,7 @@ FITTERS = {
         "circulatory",
         "critical",
         "meshes",
+        "legs",
         "linear_buckling",
         "refinement",
         "sensitivity",

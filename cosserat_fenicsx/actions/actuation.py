@@ -41,7 +41,8 @@ class InLaw(Load, LineAction):
 
     def data(self, rod, s):
         frames = rod.curve.frame(np.asarray(s, dtype=float))
-        k, e = (np.einsum("...ij,...j->...i", frames, np.asarray(a)) for a in self.without_stress(rod, s))
+        found = (self.amplitude * np.asarray(a) for a in self.without_stress(rod, s))
+        k, e = (np.einsum("...ij,...j->...i", frames, a) for a in found)
         return action.vector(k, "rad/m"), action.vector(e, "1")
 
 

@@ -42,7 +42,7 @@ def _asked(options, found):
         replaced = {"dt": "tol", "tol": "dt"}
         return True, {**{name: x for name, x in motion.items() if replaced.get(name) not in asked}, **asked}
     if "load_factors" in asked:
-        from cosserat_fenicsx.files.rods import load_factors_in
+        from cosserat_fenicsx.scene.stages import load_factors_in
 
         asked["load_factors"] = load_factors_in(asked["load_factors"])
     return False, {"load_factors": (0.0, 1.0), **found.settings, **asked}

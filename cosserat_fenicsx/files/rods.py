@@ -29,6 +29,11 @@ angular = [0, 0, 6.28]
 first = "column.end"
 second = "beam.start"
 
+[[stages]]                        # optional, after the loads above: ramped one after another, each stays
+name = "wind"
+loads = [{ type = "LineForce", rod = "column", force = [30, 0, 0] }]
+# supports = [...], release = ["column.end", "loads[0]"], load_factors = "0:1"
+
 [solve]                           # optional: arguments of `solve`
 load_factors = [0.5, 1.0]
 
@@ -45,11 +50,11 @@ from dataclasses import dataclass
 from typing import Annotated, Any
 
 from cosserat_fenicsx.checks import refuse, store
-from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.parts import Items, Object, Part, Time, positive
 from cosserat_fenicsx.scene.action import Action
 from cosserat_fenicsx.scene.rod import Rod
 from cosserat_fenicsx.scene.scene import Scene
+from cosserat_fenicsx.scene.stages import Stage, load_factors_in
 from cosserat_fenicsx.scene.supports import InitialVelocity, Joint, Support
 
 
@@ -120,7 +125,7 @@ class RodScene(Part):
     """A scene of rods and what is to be computed of it, from `read`.
 
     Args:
-        rods, supports, loads, joints, velocities, title: those of the `Scene`.
+        rods, supports, loads, joints, velocities, stages, title: those of the `Scene`.
         solve: arguments of `solve`; None for its defaults.
         simulate: arguments of `simulate`, for a motion; None for an equilibrium path.
 
@@ -137,6 +142,7 @@ class RodScene(Part):
     joints: Sequence[Joint] = ()
     title: str = ""
     velocities: Sequence[InitialVelocity] = ()
+    stages: Sequence[Stage] = ()
     solve: Solve | None = None
     simulate: Simulate | None = None
 
@@ -176,15 +182,3 @@ class RodScene(Part):
         from cosserat_fenicsx.statics.solve import solve
 
         return solve(self.scene, **{**self.settings, **changed})
-
-
-def load_factors_in(text):
-    """The load factors of a text: "0:1" is a tuple (0.0, 1.0), "0.5,1" a list [0.5, 1.0], see `solve`."""
-    separator = ":" if ":" in text else ","
-    try:
-        values = [float(part) for part in text.split(separator)]
-    except ValueError:
-        values = []
-    if not values or (separator == ":" and len(values) != 2):
-        raise SceneError(f"load factors '{text}': expected A:B (in steps of the solver) or A,B,... (reached exactly)")
-    return tuple(values) if separator == ":" else values

@@ -274,7 +274,7 @@ class Term:
                 value = 2 * model.scales.length / size[first[rod] + inner]
             i, points = np.nonzero(here)
             at_points, mine = (mine[i], points), mine[here.any(axis=1)]
-            weight[numbers[at_points]] = value
+            weight[numbers[at_points]] = value * action.amplitude
             elements = starts[mine], sizes[mine]
             self._where.append((action, scene.rods[rod], numbers[at_points], s[at_points], at_points, elements))
         self.weight.x.array[:] = weight

@@ -199,12 +199,15 @@ class Ties:
         rest = np.append(reference, [_GROUND[:3]], axis=0)
         # what the kernels take, see forms/ties.py; motions, load factor and multipliers are of the last evaluation
         self._rows, self._motion = np.zeros((len(ties), eq.COUNT)), np.tile(_GROUND, (len(rest), 1))
-        self._rows[:, eq.PLACES["place"]] = np.subtract(*rest[self._nodes.T])
+        self._at_rest = np.subtract(*rest[self._nodes.T])
         self._take(ties)
         self._turning = np.array([i for i, tie in enumerate(ties) if not isinstance(tie, PositionTie)], dtype=np.intp)
 
     def _take(self, ties):
+        self._rows[:, eq.PLACES["place"]] = self._at_rest
         for row, tie in zip(self._rows, ties, strict=True):
+            if isinstance(tie, PositionTie):
+                row[eq.PLACES["place"]] += tie.offset / self._length * np.asarray(tie.direction)
             for name, value in _numbers(tie, self._length).items():
                 row[eq.PLACES[name]] = value
 
@@ -253,7 +256,8 @@ def _numbers(tie, length):
     if isinstance(tie, AngleTie):
         return {"t": tie.t, "w": tie.w}
     angle = float(np.linalg.norm(tie.rotation))
-    return {"axis": tie.axis, "angle": angle, "about": np.divide(tie.rotation, angle or 1.0)}
+    about = np.divide(tie.rotation, angle or 1.0)
+    return {"axis": tie.axis, "angle": angle, "about": about, "start": tie.start}
 
 
 class Clamps:

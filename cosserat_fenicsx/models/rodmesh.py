@@ -126,6 +126,11 @@ class Layout:
 
         return cls(tuple(once_each(zip(keys, fixed, strict=True), breaks)))
 
+    def fits(self, scene):
+        """Whether elements end where supports, loads, joints and kinks of a scene need it."""
+        places = zip(_fixed_ends(scene), self.breaks, strict=True)
+        return all(np.abs(np.subtract.outer(ends, breaks)).min(axis=1).max() <= 1e-9 for ends, breaks in places)
+
     @cached_property
     def counts(self):
         """Elements of each rod."""

@@ -99,7 +99,7 @@ def resultant_at_rest(action, scene, t):
              "R": np.eye(3), "frame": frame}  # fmt: skip
     numbers = [np.reshape(value, (-1, datum.size))[0] for value, datum in zip(values, data, strict=True)]
     found = _resultant(work, tuple(datum.size for datum in data))
-    return found.at(state, [a if len(a) == 3 else a[0] for a in numbers])
+    return action.amplitude * found.at(state, [a if len(a) == 3 else a[0] for a in numbers])
 
 
 @lru_cache(maxsize=256)

@@ -11,7 +11,6 @@ import numpy as np
 from cosserat_fenicsx.errors import SceneError, nearest
 from cosserat_fenicsx.numerics import once_each
 from cosserat_fenicsx.remember import per_scene
-from cosserat_fenicsx.scene.action import without_stress
 
 
 def in_turn(sizes):
@@ -254,7 +253,10 @@ def sizes_of(path):
     rotation = np.maximum(2 * half.max(axis=1), moved / length)
     force, moment = (np.sqrt(_squares(fields[..., i : i + 3]).reshape(len(path), -1).max(axis=1)) for i in (0, 3))
     if path.scene.acts_in_law:
-        held = held_by_law(path.scene, path.layout, path.rule, path.scales, path._array("load_factor"))
+        def without(rod, s):
+            return path._without_stress(range(len(path)), rod, s)
+
+        held = held_by_law(path.scene, path.layout, path.rule, path.scales, without, len(path))
         force, moment = np.maximum(force, LEAST_MOMENT * held[0]), np.maximum(moment, held[1])
     force = np.maximum(np.maximum(force, moment / length), NOTHING)
     vanishing = moment <= VANISHING * noise[3]
@@ -273,14 +275,18 @@ def _squares(vectors):
     return np.einsum("...i,...i->...", vectors, vectors)
 
 
-def held_by_law(scene, layout, rule, scales, load_factors):
-    """(2, points) the largest force and moment, dimensionless, that would hold sections to their strains in the
-    reference, against `action.without_stress`; without infinite stiffnesses."""
-    sizes = np.zeros((2, len(load_factors)))
+def held_by_law(scene, layout, rule, scales, without, count):
+    """(2, count) the largest force and moment, dimensionless, that would hold sections to their strains in the
+    reference in so many states; without infinite stiffnesses.
+
+    Args:
+        without: function of a rod and arc lengths s (n,), m, that gives what `action.without_stress` adds in every
+            state, curvature and strain (count, 2, n, 3).
+    """
+    sizes = np.zeros((2, count))
     for rod, x in zip(scene.rods, layout.node_s(rule.nodes), strict=True):
-        along, (full, scaled) = rod.stiffness_at(x * rod.length), without_stress(scene, rod, x * rod.length)
-        for k, load_factor in enumerate(load_factors):
-            strains = full + load_factor * scaled
+        along = rod.stiffness_at(x * rod.length)
+        for k, strains in enumerate(without(rod, x * rod.length)):
             held = [np.linalg.norm(a, axis=1).max() for a in along.contact(strains[1], strains[0])]
             sizes[:, k] = np.maximum(sizes[:, k], np.array(held) / (scales.force, scales.moment))
     return sizes

@@ -33,6 +33,7 @@ def _of_events(name):
 # Quantities of every point, and of every event.
 _QUANTITIES = by_name(
     Quantity("load_factor", getter="load_factors"),
+    Quantity("stage", getter=lambda path: path.stage if path.scene.stages else None),
     Quantity("steps"),
     Quantity("negative_modes"),
     Quantity("stable"),
@@ -43,6 +44,8 @@ _QUANTITIES = by_name(
     Quantity("error_force", "estimated error of contact forces", getter="errors.force", digits=2),
     Quantity("error_moment", "estimated error of contact moments", getter="errors.moment", digits=2),
     Quantity("event_kind", "kind", axes=("event",), getter=_of_events("kind")),
+    Quantity("event_stage", "stage", axes=("event",),
+             getter=lambda path: _of_events("stage")(path) if path.scene.stages else None),
     Quantity("event_load_factor", "load factor", axes=("event",), getter=_of_events("load_factor")),
     Quantity("event_after", "index of the point before it", axes=("event",), getter=_of_events("after")),
     Quantity("event_residual", "residual", axes=("event",), getter=_of_events("residual")),
@@ -58,7 +61,8 @@ class Path(RodResult):
     Beside those of `RodResult` it has these attributes.
 
     Attributes:
-        load_factors: (n,).
+        load_factors: (n,); those of its stage, of a scene with stages.
+        stage: (n,) index of the scene's `Stage`; -1 for the scene's own loads.
         steps: (n,) number of steps of the continuation since the start, on the mesh of the path: those to points in
             between, which are not kept, count; where the points were corrected from a coarser mesh each is one step.
         negative_modes: (n,) number of negative eigenvalues of the second variation; 0 at a stable point, -1 where it is
@@ -206,6 +210,11 @@ class Path(RodResult):
             f"{actions_in_words(self.scene)}",
             which,
         )
+
+    @property
+    def stage(self) -> np.ndarray:
+        """(n,) whole numbers, see the class."""
+        return np.full(len(self), -1)
 
     @property
     def load_factors(self) -> np.ndarray:

@@ -213,7 +213,7 @@ def reactions_in_words(result):
     m = np.linalg.norm(contact[..., 3:], axis=-1).max() * result.scales.moment
     at = result.along_axis[-1]
     when = f"at the {result.axis} {at:.6g}" if result.axis != "time" else f"in the step that ends at t = {at:.6g} s"
-    for support in result.scene.supports:
+    for support in result.scene.all_supports:
         try:
             force, moment = (values[-1] for values in result.reaction(support))
         except SceneError as unknown:

@@ -147,6 +147,7 @@ class Event:
             of the load factor.
         error: relative difference of the load factor from the same event on the previous mesh; NaN where the
             mesh was given.
+        stage: see `Path`.
     """
 
     kind: str
@@ -155,6 +156,7 @@ class Event:
     after: int
     residual: float = np.nan
     error: float = np.nan
+    stage: int = -1
 
 
 # Largest relative difference of the load factors of corresponding events on two meshes.
@@ -176,7 +178,8 @@ def find_again(fine, coarse):
         return abs(event.load_factor - other.load_factor) / max(abs(event.load_factor), least)
 
     for k, event in enumerate(fine.events):
-        near = min((x for x in left if x.kind == event.kind), key=lambda other: apart(event, other), default=None)
+        alike = (x for x in left if (x.kind, x.stage) == (event.kind, event.stage))
+        near = min(alike, key=lambda other: apart(event, other), default=None)
         error = np.nan
         if near is not None and apart(event, near) < _SAME:
             left.remove(near)

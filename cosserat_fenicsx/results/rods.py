@@ -50,7 +50,7 @@ def _of_supports(k):
 
     def exerted(result):
         found = []
-        for support in result.scene.supports:
+        for support in result.scene.all_supports:
             try:
                 found.append(result.reaction(support)[k])
             except SceneError:  # of an action with memory at the same point
@@ -61,7 +61,8 @@ def _of_supports(k):
 
 
 def _supports(result):
-    return np.array([describe(support) for support in result.scene.supports]) if result.scene.supports else None
+    found = result.scene.all_supports
+    return np.array([describe(support) for support in found]) if found else None
 
 
 _ALONG = ("point", "s")
@@ -213,10 +214,8 @@ class RodResult(Result, Extremes, Reactions, Stresses, States):
         viscous = self._viscous(which, rod)
         strain, curvature = rod.stiffness_at(s, "left").strains(n_material - viscous[0], m_material - viscous[1])
         if self.scene.acts_in_law:
-            records = [self._records[k] for k in which]
-            parts = [without_stress(self.scene, rod, s, getattr(record, "time", 0.0)) for record in records]
-            free = [full + r.load_factor * scaled for r, (full, scaled) in zip(records, parts, strict=True)]
-            curvature, strain = (a + b for a, b in zip((curvature, strain), np.moveaxis(free, 1, 0), strict=True))
+            free = np.moveaxis(self._without_stress(which, rod, s), 1, 0)
+            curvature, strain = (a + b for a, b in zip((curvature, strain), free, strict=True))
         found = {
             "s": s,
             "position": rod.curve.position(s) + displacement,
@@ -234,6 +233,13 @@ class RodResult(Result, Extremes, Reactions, Stresses, States):
         if self.knows_stresses:
             found |= rod.profile.stresses(s, "left", n_material, m_material)._asdict()
         return found
+
+    def _without_stress(self, which, rod, s):
+        """(k, 2, n, 3) curvature, 1/m, and strain without stress beyond the reference, material, at arc lengths s (n,)
+        of a rod in several states: see `action.without_stress`."""
+        records = [self._records[k] for k in which]
+        parts = [without_stress(self.scene, rod, s, getattr(record, "time", 0.0)) for record in records]
+        return np.array([full + r.load_factor * scaled for r, (full, scaled) in zip(records, parts, strict=True)])
 
     def largest_displacement(self) -> np.ndarray:
         """(n,) the largest displacement of any node, m."""

@@ -85,6 +85,7 @@ class Action(Part, family="load or action", homes=("cosserat_fenicsx.scene.loads
         scaled: whether it is multiplied by the load factor; otherwise it acts in full.
         permanent: for an action that is not scaled: whether it is applied in steps, from zero, before the scaled ones,
             such as a weight.
+        amplitude: a factor on all of it, of a load that a stage before has applied in part, or that a stage releases.
         follows: whether it depends on the rotation and has no potential.
         work: a static method ``(point, virtual motion, *data)`` -> UFL, or the name of a function in `forms.loads`: the
             virtual work at a point, per reference length of a distributed action. None for an action with inertia
@@ -115,6 +116,7 @@ class Action(Part, family="load or action", homes=("cosserat_fenicsx.scene.loads
 
     at_nodes, scaled, permanent, follows, memory, evolve, traits = False, True, False, False, (), None, None
     delayed, resists, touches, presses, in_law, is_thread = None, None, False, False, False, False
+    amplitude = 1.0
 
     def acts_on(self, rod):
         """Whether it acts along a rod."""

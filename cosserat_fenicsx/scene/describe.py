@@ -2,13 +2,11 @@
 
 import pickle
 
-from cosserat_fenicsx.scene.supports import Prescribed
-
 
 def describe(item):
     """A support or a load as text: its class and its station."""
     if item.station is not None:
-        return f"{type(item).__name__} at {item.station}"
+        return f"{item.called or type(item).__name__} at {item.station}"
     return f"{type(item).__name__} on {item.rod.name}" if item.rod is not None else type(item).__name__
 
 
@@ -21,7 +19,7 @@ def actions_in_words(scene):
     """Sentences that list the actions and prescribed motions of a scene, by whether the load factor multiplies them."""
     groups = (
         ("Loads, times the load factor", [x for x in scene.loads if x.scaled]),
-        ("Prescribed motions, times the load factor", [x for x in scene.supports if isinstance(x, Prescribed)]),
+        ("Prescribed motions, times the load factor", [x for x in scene.supports if x.moves]),
         ("Permanent loads, applied in full before", [x for x in scene.loads if x.permanent]),
         ("Not multiplied by the load factor", [x for x in scene.loads if not x.scaled and not x.permanent]),
     )

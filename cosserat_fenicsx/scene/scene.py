@@ -23,6 +23,7 @@ from cosserat_fenicsx.scene.rod import Rod, Station, StationOrName, station_name
 from cosserat_fenicsx.scene.rolled import Profile
 from cosserat_fenicsx.scene.sections import Circle, Rectangle
 from cosserat_fenicsx.scene.signals import at, sample_times, signals_of
+from cosserat_fenicsx.scene.stages import Places, Stage, legs_of, named_stages, scene_of
 from cosserat_fenicsx.scene.statical import Groups, check_held_once, touching
 from cosserat_fenicsx.scene.supports import InitialVelocity, Joint, Support
 
@@ -78,7 +79,7 @@ def _force(load, scene, length):
             if force:
                 values = np.linalg.norm(np.atleast_2d(datum.value), axis=-1)
                 size = max(size, float(values.max()) / length**lengths)
-    return size
+    return abs(load.amplitude) * size
 
 
 def check_magnitudes(scene, load_factor):
@@ -127,6 +128,8 @@ class Scene(Part):
             your own.
         joints: each a `Joint` between stations that touch; rods without a joint are independent of each other.
         velocities: each an `InitialVelocity`, at most one per rod; rods without one start at rest. For motions only.
+        stages: each a `Stage`, which goes on from where the scene's own loads and the stages before have led. For
+            `solve` only.
         title: for tables and pictures.
 
     Raises:
@@ -140,14 +143,17 @@ class Scene(Part):
     joints: Sequence[Joint] = ()
     title: str = dataclasses.field(default="", compare=False)
     velocities: Sequence[InitialVelocity] = ()
+    stages: Sequence[Stage] = ()
 
     #: time (s) up to which functions of time are sampled, see `over`
     horizon = 1.0
     #: {name: Material} of the scene file it was read from
     materials = {}
+    #: of the scene of one stage: the scene with all
+    _whole = None
 
     def __post_init__(self):
-        for field in ("rods", "supports", "loads", "joints", "velocities"):
+        for field in ("rods", "supports", "loads", "joints", "velocities", "stages"):
             value = getattr(self, field)
             if not isinstance(value, list | tuple):
                 raise SceneError(f"Scene.{field} = {value!r}: expected a list")
@@ -160,7 +166,7 @@ class Scene(Part):
             if count > 1:
                 raise SceneError(f"Scene.rods: {count} rods are named '{name}': expected one each")
         by_name, numbers = {rod.name: rod for rod in self.rods}, {rod: i for i, rod in enumerate(self.rods)}
-        store(self, _by_name=by_name, _numbers=numbers, _given=self.supports)
+        store(self, _by_name=by_name, _numbers=numbers, _given=self.supports, _given_loads=self.loads)
         for field in _PARTS:
             items = []
             for i, x in enumerate(getattr(self, field)):
@@ -179,6 +185,10 @@ class Scene(Part):
                 )
         check_held_once(self)
         store(self, _leaders=self._find_leaders())
+        if self.stages:
+            store(self, _places=Places(self))
+            store(self, stages=named_stages(self, self._places))
+            store(self, _of_legs={leg.stage: scene_of(self, leg) for leg in self.legs})
 
     def __repr__(self):
         counts = (f"{len(getattr(self, part))} {part}" for part in ("supports", "loads", "joints"))
@@ -285,11 +295,42 @@ class Scene(Part):
     @cached_property
     def actions(self):
         """The loads, and the actions that they add (`Action.companions`)."""
-        return (*self.loads, *(other for load in self.loads for other in load.companions(self)))
+        companions = []
+        for load in self.loads:
+            for other in load.companions(self):
+                if load.amplitude != other.amplitude:
+                    store(other, amplitude=load.amplitude)
+                companions.append(other)
+        return (*self.loads, *companions)
+
+    @cached_property
+    def legs(self):
+        """See `stages.legs_of`."""
+        return legs_of(self)
+
+    @property
+    def whole(self):
+        """The scene with all stages, of the scene of one."""
+        return self._whole or self
+
+    def of_leg(self, leg, end=None):
+        """See `stages.scene_of`; without a state the same scene for every call."""
+        return self._of_legs[leg.stage] if end is None or not leg.depends_on_state else scene_of(self, leg, end)
+
+    @property
+    def all_supports(self):
+        """Its own supports, then those of its stages."""
+        return (*self.supports, *(support for stage in self.stages for support in stage.supports))
+
+    @property
+    def all_loads(self):
+        """Its own loads, then those of its stages."""
+        return (*self.loads, *(load for stage in self.stages for load in stage.loads))
 
     def stations(self, rod):
-        """All stations of a rod that supports, loads and joints refer to, and those where its loads are not smooth."""
-        named, along = self._named
+        """All stations of a rod that supports, loads and joints refer to, and those where its loads are not smooth, in
+        any stage."""
+        named, along = self.whole._named
         breaks = {s for load in along.get(rod, ()) for s in load.breaks(rod)}
         return [*named.get(rod, ()), *(rod.at(s) for s in sorted(breaks) if 0 < s < rod.length)]
 
@@ -297,10 +338,10 @@ class Scene(Part):
     def _named(self):
         """{rod: its stations that supports, loads and joints refer to}, and {rod: the loads along it}."""
         named, along = {}, {}
-        stations = [x.station for x in (*self.supports, *self.loads) if x.station is not None]
+        stations = [x.station for x in (*self.all_supports, *self.all_loads) if x.station is not None]
         for station in (*stations, *(end for joint in self.joints for end in (joint.first, joint.second))):
             named.setdefault(station.rod, []).append(station)
-        for load in self.loads:
+        for load in self.all_loads:
             for rod in self.rods_of(load) if load.station is None else ():
                 along.setdefault(rod, []).append(load)
         return named, along
@@ -328,7 +369,7 @@ class Scene(Part):
     @cached_property
     def acts_in_law(self):
         """Whether an action is part of the law, see `Action.in_law`."""
-        return any(action.in_law for action in self.actions)
+        return any(action.in_law for action in self.all_loads)
 
     @property
     def follows(self):
@@ -337,7 +378,7 @@ class Scene(Part):
 
     @property
     def _followers(self):
-        return [load for load in self.loads if load.follows]
+        return [load for load in self.all_loads if load.follows]
 
     def _softness(self):
         """Warnings about Young's moduli that may be in wrong units."""
@@ -411,6 +452,10 @@ class Scene(Part):
             SceneError: there is none of that name.
         """
         return station_named("station", name, self._by_name)
+
+    def places_of(self, item):
+        """The places, such as "stages[0].supports[1]", of a load or a support of a scene with stages."""
+        return self._places.of_item(item)
 
     def supports_of(self, which: Support | StationOrName) -> list[int]:
         """Indices of the supports meant by `which`.

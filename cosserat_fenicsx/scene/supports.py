@@ -7,7 +7,7 @@ or solver refers to a support by name.
 from collections import namedtuple
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Literal
 
 import numpy as np
 
@@ -17,12 +17,13 @@ from cosserat_fenicsx.parts import Part, Several, UnitVector
 from cosserat_fenicsx.scene.rod import RodOrName, Station, StationOrName
 from cosserat_fenicsx.scene.signals import VectorInTime, at, vector_at
 
-#: direction . (r_a - r_b) = its value in the reference + rate times the load factor (m).
-PositionTie = namedtuple("PositionTie", "a b direction rate")
+#: direction . (r_a - r_b) = its value in the reference + offset + rate times the load factor (m).
+PositionTie = namedtuple("PositionTie", "a b direction rate offset", defaults=(0.0,))
 #: The direction t, fixed to the section at a, stays normal to w, fixed to the section at b.
 AngleTie = namedtuple("AngleTie", "a b t w")
-#: The rotation of the section at a is the load factor times `rotation` (rad, a rotation vector), about one `axis`.
-TurnTie = namedtuple("TurnTie", "a b axis rotation")
+#: The rotation of the section at a is the load factor times `rotation` (rad, a rotation vector), after that by the
+#: quaternion `start`, about one `axis`.
+TurnTie = namedtuple("TurnTie", "a b axis rotation start", defaults=((1.0, 0.0, 0.0, 0.0),))
 
 AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
@@ -54,9 +55,9 @@ def _unit(a):
 
 
 class Support(Part, family="support"):
-    """Base of supports."""
+    """Base of supports; `moves`: whether it moves its station with the load factor."""
 
-    clamps = False
+    clamps, moves = False, False
 
 
 @dataclass(frozen=True)
@@ -140,7 +141,9 @@ class Prescribed(Support):
     Args:
         station: where.
         displacement: at load factor 1, m, inertial.
-        rotation: rotation vector at load factor 1, rad, inertial; the section is rotated by the load factor times it.
+        rotation: rotation vector at load factor 1, rad; the section is rotated by the load factor times it.
+        frame: of `rotation`: "inertial"; or "section", about d_1, d_2, d_3 of the section as it is in the reference or,
+            in a `Stage`, at the begin of it.
 
     Raises:
         SceneError: not a station, numbers that are not finite, or neither of the two.
@@ -150,6 +153,9 @@ class Prescribed(Support):
     displacement: Annotated[NumbersInTime, VectorInTime(Several("length"))] | None = None
     rotation: Annotated[NumbersInTime, VectorInTime(Several("angle"))] | None = None
     jumps: Numbers = ()
+    frame: Literal["inertial", "section"] = "inertial"
+
+    moves = True
 
     def validate(self):
         if self.displacement is None and self.rotation is None:
@@ -159,7 +165,12 @@ class Prescribed(Support):
         """The scalar constraints; at the time 0 where the motion depends on time."""
         now = at(self, 0.0)
         moved = () if now.displacement is None else same_place(self.station, None, now.displacement)
-        return moved if now.rotation is None else (*moved, *turned(self.station, now.rotation))
+        if now.rotation is None:
+            return moved
+        if self.frame == "section":
+            place = self.station
+            return (*moved, *turned(place, place.rod.curve.frame(place.s) @ np.asarray(now.rotation)))
+        return (*moved, *turned(self.station, now.rotation))
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,7 @@ from cosserat_fenicsx.parts import FunctionAlong
 from cosserat_fenicsx.progress import MeshProgress
 from cosserat_fenicsx.remember import per_scene
 from cosserat_fenicsx.results.accuracy import (
+    LONGEST_IN_LAYER,
     contact_edges,
     element_differences,
     expected_differences,

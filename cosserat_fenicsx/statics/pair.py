@@ -11,6 +11,7 @@ from cosserat_fenicsx.interrupts import obey
 from cosserat_fenicsx.results import accuracy, compared
 from cosserat_fenicsx.results.accuracy import LONGEST_IN_LAYER, equal_elements
 from cosserat_fenicsx.results.compared import NAMES, cells_of, held_by_law, transferred
+from cosserat_fenicsx.scene.action import without_stress
 from cosserat_fenicsx.statics.refinement import RESOLVED
 
 # Seconds after which C returns, so that Ctrl-C is obeyed.
@@ -130,7 +131,12 @@ class Pair(Pointers):
         scales, rule = fine.model.scales, fine.model.rule
         p.length, p.turned = scene.lengths.max() / scales.length, fine.turned
         if scene.acts_in_law:
-            held = held_by_law(scene, fine.layout, rule, scales, np.array([self._load_factor]))
+
+            def without(rod, s):
+                full, scaled = without_stress(scene, rod, s)
+                return [full + self._load_factor * scaled]
+
+            held = held_by_law(scene, fine.layout, rule, scales, without, 1)
             p.held[0], p.held[1] = held[:, 0]
         units = scales.length, 1.0, scales.force, scales.moment
         for told, query in zip(self._told, self._queries, strict=True):

@@ -2,7 +2,6 @@
 
 import cosserat_fenicsx.compat  # noqa: F401, I001  first: it explains what is missing of dolfinx
 
-import contextlib
 import itertools
 import math
 import numbers
@@ -14,7 +13,7 @@ from mpi4py import MPI
 
 from cosserat_fenicsx.algebra.eigen import reference_blas
 from cosserat_fenicsx.checks import instance, tolerance, whole
-from cosserat_fenicsx.errors import NotConverged, SceneError, nearest
+from cosserat_fenicsx.errors import SceneError, nearest
 from cosserat_fenicsx.models.choose import choose
 from cosserat_fenicsx.models.formulation import formulation_of
 from cosserat_fenicsx.models.rodmesh import Layout
@@ -27,13 +26,12 @@ from cosserat_fenicsx.results.path import Path
 from cosserat_fenicsx.scene.action import path_dependent
 from cosserat_fenicsx.scene.scene import Scene, check_magnitudes
 from cosserat_fenicsx.scene.statical import check_no_mechanism
-from cosserat_fenicsx.scene.supports import Prescribed
-from cosserat_fenicsx.statics.meshes import first_layout, meshes_for, resolving_turns, turning_in_law
+from cosserat_fenicsx.statics.legs import Followed, Legs
+from cosserat_fenicsx.statics.meshes import first_layout, meshes_for, resolving, resolving_turns, turning_in_law
 from cosserat_fenicsx.statics.path.follower import CONTROLS
 from cosserat_fenicsx.statics.path.load_control import StepControl
-from cosserat_fenicsx.statics.path.recorder import Tracing
 from cosserat_fenicsx.statics.refinement import refine
-from cosserat_fenicsx.statics.problem import Promoted, solvers_of
+from cosserat_fenicsx.statics.problem import Promoted
 
 # Rods of a frame from which on the BLAS decides on the time that the equations where rods meet take.
 _MANY = 1000
@@ -61,16 +59,17 @@ def solve(
     control: str = "auto",
     branch: int | None = None,
     until: Callable[[Path], object] | None = None,
+    start: Path | None = None,
     progress: bool | None = None,
     comm: MPI.Comm | None = None,
 ) -> Path:
-    """Equilibrium path of a scene from its unloaded reference over the load factors.
+    """Equilibrium path of a scene from its unloaded reference over the load factors, and through its stages.
 
     Args:
         scene: a `Scene`.
         load_factors: a list or array, whose values are reached exactly and in this order; or a tuple (a, b), between
             which the solver chooses its steps, by default from 0 to 1; or one number. (A tuple of any other length is
-            refused.)
+            refused.) They are those of the scene's own loads; a `Stage` has its own.
         model: "determinate", "planar" or "spatial"; or "auto", the cheapest one that suffices, which changes to
             "spatial" where a planar solution buckles sideways. `Path.why` gives the reasons.
         formulation: "mixed" (default), "displacement" or "multiplier": see docs/models.md.
@@ -93,6 +92,7 @@ def solve(
             a double bifurcation the first mode); None to stay on it, stable or not.
         until: called with the Path after every recorded point; the path ends where it returns True. Only with a tuple
             (a, b) of load factors.
+        start: a Path of the same scene with fewer stages, or none, to go on from; it is not followed again.
         progress: True, False, or None for a progress bar on long runs in a terminal.
         comm: MPI communicator; default all ranks. Every rank calls, every rank gets the same Path.
 
@@ -109,72 +109,76 @@ def solve(
     formulation = formulation_of(formulation)
     degree = formulation.default_degree if degree is None else degree
     check_arguments(scene, tol, elements, bound)
-    largest = max(map(abs, load_factors))
-    check_magnitudes(scene, largest)
     if comm.rank == 0:
         scene.warn()
     discretised = {"formulation": formulation, "degree": degree, "points": gauss_points}
-    choice = choose(scene, model=model, follows=branch is not None or control == "arc", **discretised)
     steps = _STEPS if steps is None else instance("solve", "steps", steps, StepControl, "a StepControl")
     follow = _follow_options(steps, control, branch)
     if until is not None and not (callable(until) and free):
         raise SceneError("until: expected a function of the Path, with a pair of load factors (a, b)")
-    if not steps.adaptive:
-        _check_jumps(scene, load_factors)
-    elif _turn(scene):
-        follow["steps"] = replace(steps, largest=min(steps.largest or math.inf, _LARGEST_TURN / _turn(scene)))
 
+    def followed(leg):
+        """What is to be followed of a scene without stages (None), or of a `Leg`."""
+        part, factors, any_between = (scene if leg is None else scene.of_leg(leg)), load_factors, free
+        if leg is not None and leg.load_factors is not None:
+            factors, any_between = _requested(leg.load_factors)
+        _check_static(part)
+        check_magnitudes(part, max(map(abs, factors)))
+        options = follow
+        if not steps.adaptive:
+            _check_jumps(part, factors)
+        elif _turn(part):
+            most = min(steps.largest or math.inf, _LARGEST_TURN / _turn(part))
+            options = {**follow, "steps": replace(steps, largest=most)}
+        choice = choose(part, model=model, follows=branch is not None or control == "arc", **discretised)
+        return Followed(leg, part, factors, any_between, choice, options)
+
+    legs = [followed(leg) for leg in scene.legs] if scene.stages else [followed(None)]
+    _keep_in_space(legs)
+    known = _followed_before(scene, start, legs, degree)
     oscillates = elements is None and gauss_points is not None and gauss_points > degree
     if oscillates:
         bound = [name for name in bound if name in _MOTION] or _MOTION
     bounded, in_order = criteria_of(bound), _in_order(scene)
     simple = not (branch or control == "arc" or until or in_order) and steps.adaptive
 
-    def take(choice, bar):
-        strayed = []
+    def prepare(path):
+        if elements is None:
+            path.bounded, path.criteria = bounded
 
-        @contextlib.contextmanager
-        def tracing(layout):
-            with solvers_of(scene, layout, model=choice.model, comm=comm, **discretised) as solvers:
-                tracer = Tracing(solvers, follow, choice, bar)
-                if elements is None:
-                    tracer.path.bounded, tracer.path.criteria = bounded
-                yield tracer
-
-        def trace(layout, like=None):
-            """Follow the path; `like`: a path on a coarser mesh whose points are reused where the solver chose them."""
-            with tracing(layout) as tracer:
-                if like is None or not free or like in strayed:
-                    return tracer.along(load_factors, free, until)
-                if like.control == "load" or in_order:
-                    return tracer.along(like.load_factors.tolist(), False)
-                try:  # a load factor may occur several times along the path, so that it does not identify a point
-                    return tracer.again(like)
-                except NotConverged:
-                    strayed.append(like)
-                    raise
-
-        def correct(layout, coarse):
-            if coarse.events or coarse.control == "arc" or not simple:
-                return None
-            with tracing(layout) as tracer:
-                return tracer.corrected(coarse)
-
+    def take(legs, bar):
+        along = Legs(scene, legs, {**discretised, "comm": comm}, bar, prepare, until=until, in_order=in_order,
+                     simple=simple, known=known)  # fmt: skip
         if elements is not None:
-            return trace(turning_in_law(scene, Layout.of(scene, elements), load_factors, elements))
-        many = free or len(load_factors) > FEW
-        layout, usual = meshes_for(scene, degree, tol, many) if simple else (first_layout(scene, degree), None)
-        turning = resolving_turns(scene, layout, largest)
-        layout, usual = (layout, usual) if turning is None else (turning, None)
-        layout, usual = (x and turning_in_law(scene, x, load_factors) for x in (layout, usual))
-        return refine(trace, correct, scene, layout, tol, bounded[1], degree, usual)
+            layout = Layout.of(scene, elements)
+            for leg in legs:
+                layout = turning_in_law(leg.scene, layout, leg.load_factors, elements)
+            return along.trace(layout)
+        many = legs[0].free or len(legs[0].load_factors) > FEW
+        layout, usual = first_layout(legs[0].scene, degree), None
+        if simple and len(legs) == 1:
+            layout, usual = meshes_for(scene, degree, tol, many)
+        elif known:
+            given = next(iter(known.values())).layout
+            layout = given if given.fits(scene) else layout
+        for leg in legs:
+            layout = layout if leg is legs[0] else resolving(leg.scene, layout, degree)
+            turning = resolving_turns(leg.scene, layout, max(map(abs, leg.load_factors)))
+            layout, usual = (layout, usual) if turning is None else (turning, None)
+            layout, usual = (x and turning_in_law(leg.scene, x, leg.load_factors) for x in (layout, usual))
+        return refine(along.trace, along.correct, scene, layout, tol, bounded[1], degree, usual)
 
     with Progress(load_factors, progress, comm) as bar:
-        try:
-            path = take(choice, bar)
-        except Promoted as found:
-            path = take(choice.in_space(found.reason), bar)
-    path.why.extend(_not_located(path))
+        while True:
+            try:
+                path = take(legs, bar)
+                break
+            except Promoted as found:
+                for k, leg in enumerate(legs):
+                    if k >= found.leg and leg.choice.model != "spatial":
+                        leg.choice = leg.choice.in_space(found.reason)
+    for part in path.parts.values() if scene.stages else [path]:
+        path.why.extend(_not_located(part))
     if len(scene.rods) >= _MANY and reference_blas():
         path.why.append(
             "netlib's reference BLAS solves the equations where rods meet: OpenBLAS takes about a third of the time "
@@ -188,12 +192,55 @@ def solve(
     return path
 
 
+def _keep_in_space(legs):
+    """Follow in space what goes on from a state in space, or in another plane."""
+    for before, leg in itertools.pairwise(legs):
+        models, planes = (before.choice.model, leg.choice.model), (before.scene.plane, leg.scene.plane)
+        if leg.choice.promoted and ("spatial" in models or planes[0] != planes[1]):
+            leg.choice = leg.choice.in_space("the stage before is followed in space, or in another plane")
+
+
+def _followed_before(scene, start, legs, degree):
+    """{stage: its `Path`} of the path that is to go on."""
+    for leg, following in itertools.pairwise(legs):
+        if leg.leg.stage == -1 and leg.load_factors[-1] != 1:
+            raise SceneError(
+                f"load_factors end at {leg.load_factors[-1]:g}, and{following.leg.words} goes on from there: expected "
+                "1 at the end; another share of the scene's own loads is a Stage with its own load_factors"
+            )
+    if start is None:
+        return {}
+    instance("solve", "start", start, Path, "a Path")
+    parts = start.parts if start.scene.stages else {-1: start}
+    stages = start.scene.stages
+    same = all(
+        len(a) <= len(b) and all(x is y for x, y in zip(a, b, strict=False))
+        for a, b in (
+            *((getattr(start.scene, name), getattr(scene, name)) for name in ("rods", "supports", "loads", "joints")),
+            *((getattr(x, name), getattr(y, name)) for x, y in zip(stages, scene.stages, strict=False)
+              for name in ("loads", "supports")),
+        )
+    )  # fmt: skip
+    if not same or not parts.keys() <= {leg.leg and leg.leg.stage for leg in legs} or not len(start):
+        raise SceneError(
+            "start: expected a Path of this scene with fewer stages: "
+            "dataclasses.replace(path.scene, stages=[*path.scene.stages, Stage(...)])"
+        )
+    ends = {leg.leg.stage: leg.load_factors[-1] for leg in legs}
+    if start.degree != degree or any(part.load_factors[-1] != ends[stage] for stage, part in parts.items()):
+        raise SceneError(
+            f"start: expected a Path of degree {degree} that has come to the last load factor of its stages"
+        )
+    return dict(parts)
+
+
 def _not_located(path):
     """Sentences on changes of the number of negative modes that the events do not explain."""
     # Planar models locate no events; under loads without a potential the number need not change at an event.
     if path.model != "spatial" or path.scene.follows:
         return
-    counts = [0, *path.negative_modes.tolist()]
+    counts = path.negative_modes.tolist()
+    counts = [0 if path.scene.whole is path.scene else counts[0], *counts]
     left_after = path.events[-1].after if path.left and path.events else None
     for k, (before, after) in enumerate(itertools.pairwise(counts)):
         located = sum(event.after == k - 1 for event in path.events)
@@ -272,7 +319,10 @@ def check_arguments(scene, tol, elements, bound=NAMES, *, owner="solve"):
     if not isinstance(scene, Scene):
         hint = ", as in read(file).scene" if hasattr(scene, "scene") else ""
         raise SceneError(f"scene is a {type(scene).__name__}: expected a Scene{hint}")
-    _check_static(scene)
+    if not scene.stages:
+        _check_static(scene)
+    elif owner != "solve":
+        raise SceneError(f"Scene.stages: {owner} knows no stages: expected `solve`, or a scene without stages")
     tolerance(owner, tol)
     criteria_of(bound)
     if elements is not None:
@@ -282,7 +332,8 @@ def check_arguments(scene, tol, elements, bound=NAMES, *, owner="solve"):
 @per_scene
 def _check_static(scene):
     """Refuse a scene without loads, or with parts that act in motions alone."""
-    if not scene.loads and not any(isinstance(support, Prescribed) for support in scene.supports):
+    acts = scene.loads or any(support.moves for support in scene.supports)
+    if not acts and scene.whole is scene:
         raise SceneError(
             "Scene.loads is empty: expected at least one load, such as Force(rod.end, (0, 0, -1)), or a Prescribed "
             "motion"

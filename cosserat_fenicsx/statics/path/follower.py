@@ -8,7 +8,7 @@ from cosserat_fenicsx.statics.path.arclength import ArcLength
 from cosserat_fenicsx.statics.path.chord import Chord
 from cosserat_fenicsx.statics.path.events import UNEXPLAINED, Locator, Lost
 from cosserat_fenicsx.statics.path.load_control import Continuation, StepControl, Sweep
-from cosserat_fenicsx.statics.path.track import LIMITS, Track
+from cosserat_fenicsx.statics.path.track import LIMITS, NEAR, Track
 
 #: Control parameters of the continuation, see `solve`.
 CONTROLS = ("auto", "load", "arc")
@@ -66,14 +66,19 @@ class Follower:
         """The smallest step of the load factor that was allowed."""
         return self._load.c.smallest
 
-    def begin(self, load_factors):
+    def begin(self, load_factors, start=None):
         """Begin the path over these load factors: apply the permanent loads in steps, and solve at load factor 0.
+
+        Args:
+            start: arguments of `Problem.begin_at`, of the state at the load factor 0; None for the reference.
 
         Raises:
             NotConverged: no equilibrium was found.
         """
         problem, track = self.track.problem, self.track
         self._load.reach = float(max(map(abs, load_factors))) or 1.0
+        if start is not None:
+            return self._begin_at(start)
         track.begin_here()
         if problem.begins:
             steps = replace(self._steps, first=None, largest=None, adaptive=True)
@@ -89,6 +94,22 @@ class Follower:
             if not track.at_load(track.here.numbers, 0.0).converged:
                 raise NotConverged(f"no equilibrium was found at the load factor 0: {track.failure}")
             track.begin_here()
+
+    def _begin_at(self, start):
+        """Begin at a state under all permanent loads, at the load factor 0."""
+        problem, track = self.track.problem, self.track
+        if problem.begins:
+            problem.end_beginning()
+        problem.begin_at(*start)
+        numbers = problem.numbers()
+        solved = track.at_load(numbers, 0.0)
+        if not solved.converged or track.distance(problem.numbers(), numbers) > NEAR:
+            reason = "the nearest equilibrium is another one" if solved.converged else track.failure
+            raise NotConverged(
+                f"no equilibrium was found next to the last one of the stage before: {reason}. Where that one may turn "
+                "or move freely, as a buckled round column may about its axis, a support or a small load decides"
+            )
+        track.begin_here()
 
     def to(self, load_factor, *, on_step=None, once=False):
         """Advance to a load factor, which is reached exactly; the path has begun.

@@ -23,7 +23,7 @@ from cosserat_fenicsx.statics.critical import derivatives_of
 from cosserat_fenicsx.statics.path.chord import Chord
 from cosserat_fenicsx.statics.path.events import Lost
 from cosserat_fenicsx.statics.path.follower import Follower
-from cosserat_fenicsx.statics.path.track import NOTHING
+from cosserat_fenicsx.statics.path.track import NEAR, NOTHING
 from cosserat_fenicsx.statics.problem import Promoted, record_of
 
 # Loads over EA (about the axial strain) above which messages ask for the units.
@@ -32,8 +32,8 @@ _ENORMOUS = 1.0
 _SHORTER = 1e-3
 # Largest |n| h^2/EI at which an element of length h resolves boundary layers, of length sqrt(EI/|n|).
 _RESOLVED = 100.0
-#: Bounds for a point corrected from a coarser mesh: Newton iterations, and motion (lengths, rad).
-CORRECTIONS, NEAR = 6, 0.1
+#: Newton iterations allowed for a point corrected from a coarser mesh.
+CORRECTIONS = 6
 # Largest distance of a point from the same one on a coarser mesh, over the distance of the latter's neighbours.
 _ASIDE = 0.3
 
@@ -53,9 +53,10 @@ class Tracing:
 
     Args:
         solvers: see `solvers_of`; follow: arguments of `Follower`; choice: of the model; bar: a `Progress`.
+        start: a path whose last point is the state at the load factor 0, on any mesh; None for the reference.
     """
 
-    def __init__(self, solvers, follow, choice, bar):
+    def __init__(self, solvers, follow, choice, bar, start=None):
         self.problem, _, self.stability = solvers
         self.model, self._options, self._choice, self._bar = self.problem.model, follow, choice, bar
         why = [*choice.why, self.model.signature.formulation.words]
@@ -64,7 +65,7 @@ class Tracing:
             self._follower = Follower(*solvers, on_event=self._meet, **follow)
         else:  # planar models: load control without events; the spatial model takes over where more is needed
             self._follower = Follower(*solvers, **{**follow, "control": "load"})
-        self.track = self._follower.track
+        self.track, self._start = self._follower.track, start
         self._counted, self._until, self._stable_at = 0, None, 0.0
         bar.start(f"{self.path.model}, {self.model.unknowns} unknowns")
 
@@ -126,7 +127,7 @@ class Tracing:
         """
         track = self.track
         try:
-            self._follower.begin(load_factors)
+            self._begin(load_factors)
             k = 0
             while (k := self._swept_from(k, load_factors, free, until)) < len(load_factors):
                 load_factor, between = load_factors[k], free and k == 1
@@ -157,6 +158,14 @@ class Tracing:
         finally:
             self.path.control, self.path.left = self._follower.used, self._follower.left
         return self.path
+
+    def _begin(self, load_factors):
+        if self._start is None:
+            self._follower.begin(load_factors)
+            return
+        ((point, values, n),) = self._starts(self._start.at_points([len(self._start) - 1]))
+        multipliers = np.zeros_like(self.problem.multipliers())  # the equations are linear in these
+        self._follower.begin(load_factors, (values, n, multipliers))
 
     def _swept_from(self, k, load_factors, free, until):
         """Advance from the k-th load factor on in C while steps are accepted; the index of the next load factor."""
@@ -274,7 +283,7 @@ class Tracing:
         Raises:
             NotConverged: one of them was not found.
         """
-        self._follower.begin(coarse.load_factors)
+        self._begin(coarse.load_factors)
         problem, track, last = self.problem, self.track, len(coarse) - 1
         guesses = []
         for point, values, n in self._starts(coarse):

@@ -13,6 +13,8 @@ from cosserat_fenicsx.statics.stability import NegativeModes
 
 # Smallest cosine of the angle between the negative modes of two neighbouring points.
 _SAME_MODE = 0.5
+#: Largest motion of a point that is corrected from another mesh or stage (rad, rod lengths).
+NEAR = 0.1
 #: Motions below this are rounding (rad, rod lengths).
 NOTHING = 1e-8
 

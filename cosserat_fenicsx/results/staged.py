@@ -1,0 +1,135 @@
+"""The path of a scene with stages: the paths of all stages on one mesh, as one."""
+
+import dataclasses
+from collections.abc import Mapping
+from functools import cached_property
+
+import numpy as np
+
+from cosserat_fenicsx.results.path import Path
+from cosserat_fenicsx.results.records import Record, Records
+from cosserat_fenicsx.scene.rod import Station
+
+# Columns of `Records` that depend on the supports and loads of a stage.
+_OF_STAGE = ("reactions", "tie_forces", "clamp_loads", "densities")
+# The models by their generality.
+_MODELS = ("determinate", "planar", "spatial")
+
+
+class StagedPath(Path):
+    """A `Path` whose points belong to stages, `stage` (n,) their indices; -1 for the scene's own loads.
+
+    Attributes:
+        parts: {stage: its whole `Path`}, each with the scene of that stage.
+    """
+
+    def __init__(self, scene, parts: Mapping[int, Path]):
+        first, *_ = found = list(parts.values())
+        general = max(found, key=lambda part: _MODELS.index(part.model))
+        why = [f"stage {stage}: {sentence}" for stage, part in parts.items() for sentence in part.why]
+        super().__init__(
+            scene, first.layout, first.scales, first.rule, comm=first.comm, model=general.model,
+            formulation=general.formulation, degree=first.degree, unknowns=max(part.unknowns for part in found),
+            why=why, connections=None, expand=None,
+        )  # fmt: skip
+        self.parts, self.galerkin = dict(parts), general.galerkin
+        self.bounded, self.criteria = first.bounded, first.criteria
+        self.rounding = max(part.rounding for part in found)
+        self.control = "arc" if any(part.control == "arc" for part in found) else "load"
+        self.left = any(part.left for part in found)
+        sizes = [len(part) for part in found]
+        self._stage = np.repeat(list(parts), sizes)
+        self._place = np.concatenate([np.arange(size) for size in sizes])
+        columns = [part._all.columns | dict.fromkeys(_OF_STAGE) for part in found if len(part)]
+        if columns:
+            self._expanded = Records.joined([Records(Record, x) for x in columns])
+        self.events = [
+            dataclasses.replace(event, stage=stage, after=event.after + sum(sizes[:k]))
+            for k, (stage, part) in enumerate(parts.items())
+            for event in part.events
+        ]
+
+    @property
+    def stage(self):
+        return self._stage
+
+    def part(self, stage):
+        """The points of a stage, a `Path` with the scene of that stage; None where there is none."""
+        if stage not in self.parts:
+            return None
+        whole, places = self.parts[stage], self._place[self._stage == stage]
+        return whole if len(places) == len(whole) else whole.at_points(places)
+
+    def at_points(self, which):
+        found = super().at_points(which)
+        which = np.asarray(which, dtype=int)
+        found._stage, found._place = self._stage[which], self._place[which]
+        return found
+
+    def with_points(self, others, which):
+        """See `Path`; both hold the points of each stage in order."""
+        stage = np.empty(len(which), dtype=int)
+        stage[which], stage[~which] = others.stage, self.stage
+        parts = {}
+        for k in self.parts:
+            mine, theirs, mask = self.part(k), others.part(k), which[stage == k]
+            parts[k] = (
+                mine.with_points(theirs, mask) if mask.any() and not mask.all() else theirs if mask.any() else mine
+            )
+        return StagedPath(self.scene, parts)
+
+    def _by_stages(self, of_part):
+        """An array over the points from the same function of the paths of the stages."""
+        found = None
+        for k in self.parts:
+            here = self._stage == k
+            if here.any():
+                values = of_part(k, self.parts[k].at_points(self._place[here]))
+                found = np.zeros((len(self), *values.shape[1:])) if found is None else found
+                found[here] = values
+        return found
+
+    @cached_property
+    def _contact(self):
+        return self._by_stages(lambda _, part: part._contact)
+
+    def _stacked(self, name):
+        if name != "densities":
+            return super()._stacked(name)
+        return tuple(self._by_stages(lambda _, part, i=i: part._stacked(name)[i]) for i in range(2))
+
+    def _without_stress(self, which, rod, s):
+        return self.at_points(which)._by_stages(lambda _, part: part._without_stress(range(len(part)), rod, s))
+
+    @property
+    def conservative(self):
+        return all(part.conservative for part in self.parts.values())
+
+    def reaction(self, support):
+        """See `Result.reaction`: of a support of the scene or of a stage, zero where it does not hold; one that is
+        released still exerts what is left of its reaction then."""
+        wanted = None
+        if not isinstance(support, str | Station):
+            wanted = set(self.scene.places_of(support))
+        station = self.scene.station(support) if isinstance(support, str) else support
+        if wanted == set() or (wanted is None and all(x.station != station for x in self.scene.all_supports)):
+            self.scene.supports_of(support)  # refuses it
+        legs = {leg.stage: leg for leg in self.scene.legs}
+        order = list(legs)
+
+        def exerted(stage, part):
+            total = np.zeros((len(part), 6))
+            for i, held in enumerate(legs[stage].supports):
+                if held.place in wanted if wanted else held.item.station == station:
+                    total += np.hstack(part.reaction(part.scene.supports[i]))
+            before = order[order.index(stage) - 1] if legs[stage].released else None
+            for i in legs[stage].released:
+                held, end = legs[before].supports[i], self.parts[before]
+                if held.place in wanted if wanted else held.item.station == station:
+                    last = end.at_points([len(end) - 1])
+                    force = np.hstack(last.reaction(last.scene.supports[i]))
+                    total += (1 - part.load_factors)[:, None] * force
+            return total
+
+        found = self._by_stages(exerted)
+        return tuple(np.split(found if found is not None else np.zeros((0, 6)), 2, axis=1))
