@@ -253,6 +253,7 @@ def sizes_of(path):
     rotation = np.maximum(2 * half.max(axis=1), moved / length)
     force, moment = (np.sqrt(_squares(fields[..., i : i + 3]).reshape(len(path), -1).max(axis=1)) for i in (0, 3))
     if path.scene.acts_in_law:
+
         def without(rod, s):
             return path._without_stress(range(len(path)), rod, s)
 

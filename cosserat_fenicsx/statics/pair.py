@@ -53,7 +53,7 @@ class Pair(Pointers):
         self._told = self._ffi.new("query[]", len(queries))
         p.query, p.queries = self._told, len(queries)
         for told, query in zip(self._told, queries, strict=True):
-            cell, weights = rule.locate(fine.layout.breaks[query.rod], query.share)
+            cell, weights = compared.located(fine.layout, rule, query.rod, query.share)
             told.kind, told.rod = NAMES.index(query.kind), query.rod
             told.place = _PLACES[query.name] + (query.component or 0)
             told.cell, told.weights = cells_of(fine.layout)[query.rod].start + cell, self.doubles(np.array(weights))
