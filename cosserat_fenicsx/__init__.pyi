@@ -20,7 +20,7 @@ from cosserat_fenicsx.actions.springs import Spring as Spring
 from cosserat_fenicsx.actions.tendons import Helical as Helical
 from cosserat_fenicsx.actions.tendons import Tendon as Tendon
 from cosserat_fenicsx.actions.walls import Wall as Wall
-from cosserat_fenicsx.dynamics.natural_modes import modes as modes
+from cosserat_fenicsx.statics.natural_modes import modes as modes
 from cosserat_fenicsx.dynamics.resuming import read_history as read_history
 from cosserat_fenicsx.dynamics.simulate import simulate as simulate
 from cosserat_fenicsx.errors import CosseratError as CosseratError

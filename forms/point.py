@@ -84,6 +84,17 @@ def variation(work, point, test, direction):
     return change + sum(slope[i, j] * turned[j][i] for i in range(3) for j in range(3))
 
 
+def slowed(work, point, test, velocity):
+    """The change of a virtual work `work(point, test)`, at rest, by a small velocity: the factors of phi_r and phi of
+    a `VirtualMotion` are velocity and angular velocity."""
+    r_t, omega = ufl.variable(NONE), ufl.variable(NONE)
+    point = Point(
+        point.r, point.r_s, point.R, point.theta, rest=point._rest, frame=point._frame, r_t=r_t, omega=omega
+    )
+    value = work(point, test)
+    return ufl.dot(ufl.diff(value, r_t), velocity.phi_r) + ufl.dot(ufl.diff(value, omega), velocity.phi)
+
+
 def resultants(work, point):
     """Force and moment of a virtual work, inertial: the factors of phi_r and phi in it."""
     force = [work(point, VirtualMotion(axis, NONE, NONE, NONE)) for axis in AXES]

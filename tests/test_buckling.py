@@ -346,7 +346,7 @@ def test_paths_and_vibrations_say_so_too():
     twisted = held(clamped, lambda rod: [cf.Force(rod.end, (0.5, 0, 0)), cf.Moment(rod.end, ALONG, permanent=True)])
     assert not cf.solve(twisted, [0.0], elements=4).conservative
     assert cf.modes(follower, elements=4).conservative
-    found = cf.modes(follower, load_factor=1.0, elements=4)
+    found = cf.modes(follower, load_factor=1.0, elements=4, damped=False)
     assert not found.conservative and "may flutter" in repr(found)
     assert "potential" not in repr(cf.modes(arm, load_factor=1.0, elements=4))
 

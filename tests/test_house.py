@@ -84,6 +84,8 @@ FITTERS = {
         "meshes",
         "legs",
         "linear_buckling",
+        "natural_modes",
+        "small_motions",
         "refinement",
         "sensitivity",
         "solve",
@@ -95,7 +97,6 @@ FITTERS = {
     },
     "dynamics": {
         "time_loop",
-        "natural_modes",
         "resuming",
         "simulate",
         "start",

@@ -267,9 +267,8 @@ def test_what_is_refused():
     collar = Collar()
     turning = Centrifugal((0, 0, 3.0))
     scene = cf.Scene([collar.rod], [cf.Clamp(collar.rod.start)], [turning])
-    for asked in (lambda: cf.simulate(scene, 1.0, dt=0.1), lambda: cf.modes(scene)):
-        with pytest.raises(cf.SceneError, match=r"loads\[0\] \(Centrifugal\) stands for the inertia of a motion"):
-            asked()
+    with pytest.raises(cf.SceneError, match=r"loads\[0\] \(Centrifugal\) stands for the inertia of a motion"):
+        cf.simulate(scene, 1.0, dt=0.1)
     tilted = cf.Scene([collar.rod], [cf.Clamp(collar.rod.start)],
                       [Centrifugal((1.0, 0, 3.0)), AddedMass(collar.rod, 1.0)])  # fmt: skip
     with pytest.raises(cf.SceneError, match=r"expected one along rod 'collar', or AddedMass\(axial=True\)"):

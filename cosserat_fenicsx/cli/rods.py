@@ -87,7 +87,7 @@ def eigenvalues(options, found, tables):
     if options.command == "buckling":
         from cosserat_fenicsx.statics.linear_buckling import buckling as compute
     else:
-        from cosserat_fenicsx.dynamics.natural_modes import modes as compute
+        from cosserat_fenicsx.statics.natural_modes import modes as compute
     for caution in found.scene.doubts:
         say(f"cosserat: warning: {caution}")
     name, settings = options.command, given(options, ("tol", "elements", "degree"))

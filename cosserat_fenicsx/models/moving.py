@@ -1,7 +1,7 @@
 """Models with inertia, between the two ends of a time step."""
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
@@ -28,19 +28,15 @@ from cosserat_fenicsx.models.compiled import (
     section_of,
 )
 from cosserat_fenicsx.models.connections import ties_of
+from cosserat_fenicsx.models.damped import Damped
 from cosserat_fenicsx.models.rod_data import (
     check_inertia,
     element_function,
-    gauss_function,
-    joined,
-    law_data,
     law_of,
     nodal_inertia,
-    viscous_values,
 )
 from cosserat_fenicsx.models.spatial import SpatialModel, spun
 from cosserat_fenicsx.numerics import cross, small_rotations
-from cosserat_fenicsx.scene.rod import Damping
 from cosserat_fenicsx.scene.signals import signals_of
 
 
@@ -259,7 +255,7 @@ class SpatialStep(StepForms):
         return eccentric.kinetic_energy(r_t, eccentric.arm_rate(q, q_t, body) if z_t is None else z_t, Om, body)
 
 
-class Moving:
+class Moving(Damped):
     """Mixin that adds inertia to a `RodModel`; it must come first among the bases.
 
     Inertia is integrated with the nodes as points, as |q| = 1 is: the order of convergence is that of the elements,
@@ -269,11 +265,9 @@ class Moving:
         state: unknowns of the nodes at the end of a step; start, velocity: unknowns and their rates at its beginning.
         h: the Constant h, the length of the step.
         time: unit of time, s.
-        damped: whether any rod has damping.
         offset: Function, the mass centre from the axis, along the inertial axes at rest; None in a scene without
             eccentric rods.
         lateral: Function, see `rod_data.NodalInertia`; None in a scene without such masses.
-        viscosity: the Functions of the law of the strain rates, as `rod_data.law_of` takes them.
         delays: the `Delays` of its actions.
     """
 
@@ -289,7 +283,7 @@ class Moving:
 
     def _motion_fields(self):
         """Make the Functions that the forms need in addition to those of a `RodModel`."""
-        mesh, points, coupled = self.mesh, self.signature.points, self.signature.coupled
+        mesh = self.mesh
         self.start, self.velocity = fem.Function(self.space), fem.Function(self.space)
         # dolfinx makes a new array at every access to `x.array`
         self._arrays = self.state.x.array, self.start.x.array, self.velocity.x.array
@@ -298,8 +292,7 @@ class Moving:
         self.mass, self.drag, self.inertia = (at_nodes(size) for size in (1, 1, self.inertia_size))
         self.offset = at_nodes(3) if self.signature.eccentric else None
         self.lateral = at_nodes(self.moves) if self.signature.lateral else None
-        Kt, Jt = (gauss_function(mesh, points, 9 if coupled else 3) for _ in range(2))
-        self.viscosity = Kt, None, Jt, gauss_function(mesh, points, 9) if coupled else None
+        self._viscous_fields()
 
     def load(self, scene, layout):
         """See `RodModel`; mass and inertia too.
@@ -331,21 +324,6 @@ class Moving:
         self.velocity.x.array[:] = 0.0
         self._damp()
         self.delays = Delays(self)
-
-    def _damp(self):
-        """Fill in the viscosity of the rods."""
-        scene, layout, coupled = self.scene, self.layout, self.signature.coupled
-        damped = [rod.damping or Damping() for rod in scene.rods]
-        units = replace(self.scales, force=self.scales.force * self.time)
-        given = joined([
-            law_data(damping.viscosity(rod.stiffness_at(x * rod.length)), units, coupled=coupled)
-            for rod, damping, x in zip(scene.rods, damped, layout.inside(self.rule.gauss), strict=True)
-        ])  # fmt: skip
-        data = self._section_data(self._in_space._replace(**given._asdict()))
-        for function, values in zip(self.viscosity, viscous_values(data), strict=True):
-            if function is not None:
-                self.rods.fill(function, values)
-        self.damped = damped != [Damping()] * len(damped)
 
     # -- for subclasses to define ------------------------------------------------------------------------------------
 

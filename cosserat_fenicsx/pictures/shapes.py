@@ -32,6 +32,8 @@ _WIDTH, _HEIGHTS, _TITLE, _LINE = 640, (560, 680), 90, 38
 _STEEPEST = 1.0
 # Memory for frames of a film, which are drawn once, bytes.
 _MEMORY = 200_000_000
+# Phases, as exp(i phase), that a picture has to hold.
+_EXTREMES = (1, -1, 1j, -1j)
 # Pieces along a rod; mean width of a letter of the titles, pixels.
 _PIECES, _LETTER = 200, 15
 
@@ -61,7 +63,10 @@ def film(found, file, k, *, fps, seconds, cycles, amplitude, size, progress):
     frames = 2 * max(2, round(fps * seconds / 2))  # even: the frame in the middle is the opposite of the first
     if frames * cycles > MOST_FRAMES:
         refuse("animate", "cycles", cycles, f"fewer: at most {MOST_FRAMES} frames, not {frames * cycles}")
-    shares = np.round(np.cos(2 * math.pi * np.arange(frames * cycles) / frames), 12)  # equal ones are drawn once
+    shares = np.exp(2j * math.pi * np.arange(frames * cycles) / frames)
+    if not np.iscomplexobj(found.shapes):  # it swings to and fro
+        shares = shares.real
+    shares = np.round(shares, 12)  # equal ones are drawn once
     on_first(found.comm, lambda: record(lambda: _Stage(found, k, amplitude, size), file, shares, fps, progress))
 
 
@@ -93,22 +98,23 @@ class Drawn:
             self.note = f"largest displacement drawn as {share:.2g} % of the structure's size"
 
     def bodies(self, share=1.0):
-        """The `Body` of every rod, displaced by `share` of the amplitude, from -1 to 1. Its values, in the place of the
-        bending moment, are displacements (rotations, where nothing is displaced), 1 at most."""
+        """The `Body` of every rod, displaced by `share` of the amplitude, from -1 to 1, or exp(i phase) of a complex
+        mode. Its values, in the place of the bending moment, are displacements (rotations, where nothing is displaced),
+        1 at most."""
         equilibrium, shape, made = self._found.equilibrium, self._found.shapes[self._k], []
         x = np.linspace(0, 1, _PIECES + 1)
         for rod in self._found.scene.rods:
             line, frames = equilibrium.sample(rod, x)
-            motion = equilibrium.between(rod, x, shape)
+            motion = np.real(share * equilibrium.between(rod, x, shape))
             moved, turned = motion[:, :3], motion[:, 3:]
-            values = np.abs(share) * np.linalg.norm(turned if self._by_turning else moved, axis=1) / self._peak
-            directors = _turned(frames, share * self.factor * turned)
-            made.append(body_of(rod, x, line + share * self.factor * moved, directors, values))
+            values = np.linalg.norm(turned if self._by_turning else moved, axis=1) / self._peak
+            directors = _turned(frames, self.factor * turned)
+            made.append(body_of(rod, x, line + self.factor * moved, directors, values))
         return made
 
     def everywhere(self):
         """(n, 3) points of the equilibrium and of the shape on both sides."""
-        return np.concatenate([*self.lines, *(body.line for share in (1, -1) for body in self.bodies(share))])
+        return np.concatenate([*self.lines, *(body.line for share in _EXTREMES for body in self.bodies(share))])
 
 
 def _turned(frames, slopes):
@@ -186,7 +192,7 @@ def _add(plotter, pyvista, shape, bodies, everywhere):
 
 
 class _Stage:
-    """The scene of a film: `at(share)` is the picture (height, width, 3) at a share of the amplitude, from -1 to 1."""
+    """The scene of a film: `at(share)` is the picture (height, width, 3) at a share of the amplitude, see `Drawn.bodies`."""
 
     def __init__(self, found, k, amplitude, size):
         pyvista = load_pyvista()

@@ -146,6 +146,8 @@ class Buckling(Shapes):
 
 # Largest number of things that are left out to name in a sentence.
 _NAMED = 6
+# Growth rates below this, over the size of the eigenvalue, are none; and areas of ellipses over those of circles.
+_NO_GROWTH, _NO_WHIRL = 1e-9, 1e-3
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -154,65 +156,80 @@ class Modes(Shapes):
 
     Attributes:
         see `Shapes`;
-        squares: (n,) omega^2, rad^2/s^2, ascending; below zero the state is unstable; zero for free rigid motions.
-        error: (n,) estimated relative error of the squares; NaN where the mesh was given.
+        eigenvalues: (n,) lambda of motions exp(lambda t), 1/s, of the upper half plane, ascending by size (or by the
+            distance from `near`); undamped ones by the square omega^2 = -lambda^2. In a steady rotation they are those
+            seen in the rotating frame. Zero for free rigid motions.
+        error: (n,) estimated relative error: of the squares of undamped modes, of the complex eigenvalues over their
+            sizes; NaN where the mesh was given.
+        shapes: see `Shapes`; complex where the modes are: the motion is Re(shape exp(lambda t)).
         negative_modes: number of negative eigenvalues of the second variation at that state, as `Path.negative_modes`.
         elements: number of elements of each rod; degree: of the elements.
         conservative: whether the loads have a potential near that state, for all motions that the supports allow. Where
-            they have none, `squares` are those of the symmetric part of K: the smallest is a lower bound of the real
-            parts of omega^2, but the vibrations differ, and flutter is not detected.
-        left_out: what resists or follows velocities, in words: the vibrations are those without it. () where the scene
-            has nothing of the kind.
+            they have none, undamped modes are those of the symmetric part of K: the smallest square is a lower bound of
+            the real parts of omega^2, but the vibrations differ, and flutter is not detected.
+        left_out: what resists or follows velocities and is not in the modes, in words; () where nothing is left out.
+        rate: (3,) the steady rotation, rad/s, inertial, or None.
     """
 
-    squares: np.ndarray
+    eigenvalues: np.ndarray
     negative_modes: int
     left_out: tuple[str, ...] = ()
+    rate: np.ndarray | None = None
 
     title = "Natural vibrations"
-    _on_screen = ("k", "frequency", "period", "growth", "error", "place", "direction")
+    _on_screen = ("k", "frequency", "damping_ratio", "growth_rate", "motion", "error", "place", "direction")
     _quantities = by_name(
         Quantity("frequency", unit="Hz", axes=("mode",), getter="frequencies", digits=7),
         Quantity("period", unit="s", axes=("mode",), getter="periods", digits=5),
-        Quantity("growth", unit="1/s", axes=("mode",), digits=4),
-        Quantity(
-            "error", "estimated relative error of the squared frequency", axes=("mode",), digits=2, short="est. error"
-        ),
+        Quantity("growth_rate", unit="1/s", axes=("mode",), getter="growth_rates", digits=5, noise=1e-300),
+        Quantity("damping_ratio", unit="1", axes=("mode",), getter="damping_ratios", digits=4),
+        Quantity("motion", axes=("mode",), getter="kind"),
+        Quantity("error", "estimated relative error", axes=("mode",), digits=2, short="est. error"),
         Quantity("squares", "squared angular frequency", "rad^2/s^2", axes=("mode",)),
-    )
-    _caption = (
-        "est. error: relative, of the square of the frequency.\n"
-        "0 Hz: a free motion, or one that grows as exp(growth t)."
     )
 
     @property
+    def complex(self) -> bool:
+        """Whether they are complex modes, of what resists velocities, follows the rods or rotates."""
+        return np.iscomplexobj(self.shapes)
+
+    @property
     def caution(self):
-        """The limits of the result, in sentences; "" where the loads have a potential and nothing is left out."""
+        """The limits of the result, in sentences; "" where all of the scene is in the modes."""
         told = []
         if self.left_out:
             more = len(self.left_out) - _NAMED
             names = ", ".join(self.left_out[:_NAMED]) + (f" and {more} more" if more > 0 else "")
             told.append(
-                f"Left out: {names}. These are the vibrations without what depends on velocities; how they decay or "
-                "grow with it, a motion shows (`simulate`)."
+                f"Left out: {names}. How the vibrations decay or grow with it, a motion shows (`simulate`)"
+                f"{'' if self.complex else ', or `damped=True` where it is smooth'}."
             )
-        if not self.conservative:
+        if not self.conservative and not self.complex:
             told.append(
                 "The loads have no potential: these are the vibrations of the symmetric part of the stiffness alone, "
-                "and the structure may flutter, which a motion shows (`simulate`)."
+                "and the structure may flutter, which `damped=True` shows."
             )
         return " ".join(told)
 
     def __repr__(self):
-        text = f"{in_words(self.frequencies, 'Hz')}, squares with {largest_error(self.error)}"
+        text = f"{self._in_words()}"
         text += f", {self.negative_modes} negative" if self.negative_modes else ""
         text += f", at the load factor {self.load_factor:g}" if self.load_factor else ""
         return f"<Modes: {text}. {self.caution}>" if self.caution else f"<Modes: {text}>"
 
+    def _in_words(self):
+        what = "eigenvalues" if self.complex else "squares"
+        return f"{in_words(self.frequencies, 'Hz')}, {what} with {largest_error(self.error)}"
+
+    @property
+    def squares(self):
+        """(n,) rad^2/s^2: omega^2, below zero where the state is unstable; of complex modes |lambda|^2."""
+        return np.abs(self.eigenvalues) ** 2 if self.complex else -np.square(self.eigenvalues).real
+
     @property
     def frequencies(self):
-        """(n,) Hz; 0 for unstable modes and free rigid motions."""
-        return np.sqrt(np.maximum(self.squares, 0.0)) / (2 * math.pi)
+        """(n,) Hz; 0 where the motion does not oscillate."""
+        return self.eigenvalues.imag / (2 * math.pi)
 
     @property
     def periods(self):
@@ -220,22 +237,93 @@ class Modes(Shapes):
         return np.divide(1.0, self.frequencies, out=np.full(len(self), math.inf), where=self.frequencies > 0)
 
     @property
-    def growth(self):
-        """(n,) rates 1/s: unstable modes grow as exp(growth t); 0 for stable ones. Damping that is `left_out` would
-        change them."""
-        return np.sqrt(np.maximum(-self.squares, 0.0))
+    def growth_rates(self):
+        """(n,) 1/s: modes grow as exp(growth_rate t), and decay where it is negative."""
+        return self.eigenvalues.real
+
+    @property
+    def damping_ratios(self):
+        """(n,) -Re lambda/|lambda|: 1 and more for critical damping, negative where the motion grows; 0 for free ones.
+
+        A real eigenvalue has the ratio 1 (or -1)."""
+        sizes = np.abs(self.eigenvalues)
+        return np.divide(-self.growth_rates, sizes, out=np.zeros(len(self)), where=sizes > 0) + 0.0
+
+    @property
+    def rounding(self):
+        """(n,) 1/s: growth rates below this are none: the estimated error of the eigenvalues, at least 1e-9 of them."""
+        error = self.error if self.complex else self.error / 2
+        return np.abs(self.eigenvalues) * np.maximum(np.nan_to_num(error), _NO_GROWTH)
+
+    @property
+    def kind(self):
+        """(n,) "oscillates" (and decays, or neither), "flutter" (oscillates and grows), "divergence" (grows without an
+        oscillation), "overdamped" (decays without one), "free"."""
+        turns, grows = self.eigenvalues.imag > 0, self.growth_rates > self.rounding
+        still = np.where(self.eigenvalues == 0, "free", np.where(grows, "divergence", "overdamped"))
+        return np.where(turns, np.where(grows, "flutter", "oscillates"), still)
+
+    @property
+    def stable(self) -> bool:
+        """Whether no mode grows among those found; without complex modes, whether no mode is negative."""
+        grows = bool(np.isin(self.kind, ("flutter", "divergence")).any())
+        return not grows and (self.complex or self.negative_modes == 0)
+
+    def whirl(self, k: int, rod=None) -> int:
+        """The sense in which mode k turns the axis of a rod (default the first), as seen by an inertial observer.
+
+        The sections move along ellipses across the axis of the steady rotation, or, without one, across the rod at its
+        middle. What is counted is the mean of the enclosed areas.
+
+        Returns:
+            1 forward (right-handed about that axis, so with the rotation), -1 backward, 0 where no section moves along
+            more than a line.
+        """
+        k, moved = self.number(k), self.shapes[self.number(k), self._rows(rod)[1], :3]
+        rod = self.rod(rod)
+        axis = rod.curve.frame(rod.length / 2)[:, 2] if self.rate is None else self.rate / np.linalg.norm(self.rate)
+        # d/dt of the angle: the position is Re(x exp(i omega t))
+        areas = np.imag(np.cross(moved, moved.conj()) @ axis).sum() / 2
+        across = moved - np.multiply.outer(moved @ axis, axis)
+        share = areas / max(np.sum(np.abs(across) ** 2) / 2, 1e-300)
+        if abs(share) < _NO_WHIRL:
+            return 0
+        spin = 0.0 if self.rate is None else np.linalg.norm(self.rate)
+        return int(np.sign(np.sign(share) * self.eigenvalues[k].imag + spin))
 
     def label(self, k):
-        if self.squares[k] < 0:
-            return f"unstable, growth {self.growth[k]:.4g} 1/s"
-        return f"{self.frequencies[k]:.4g} Hz" if self.squares[k] else "0 Hz, free motion"
+        value, kind = self.eigenvalues[k], self.kind[k]
+        if kind == "divergence":
+            return f"unstable, growth {value.real:.4g} 1/s"
+        if kind == "overdamped":
+            return f"overdamped, decay {-value.real:.4g} 1/s"
+        if kind == "free":
+            return "0 Hz, free motion"
+        grows = f", flutter: growth {value.real:.4g} 1/s" if kind == "flutter" else ""
+        damping = f", damping ratio {self.damping_ratios[k]:.3g}" if value.real and not grows else ""
+        return f"{self.frequencies[k]:.4g} Hz{grows}{damping}"
 
     def _answer(self, units):
         title = f"{self.scene.title}: " if self.scene.title else ""
-        told = f"{in_words(self.frequencies, 'Hz')}, squares with {largest_error(self.error)}"
-        yield f"{title}Natural frequencies {told}."
-        verdict = {0: f"no negative mode{' (stable)' if self.conservative else ''}", -1: "a singular stiffness"}
-        counted = verdict.get(self.negative_modes, f"{self.negative_modes} negative mode(s) (unstable)")
-        yield f"The equilibrium at the load factor {self.load_factor:g} has {counted}."
+        yield f"{title}Natural frequencies {self._in_words()}."
+        state = f"The equilibrium at the load factor {self.load_factor:g}"
+        if self.rate is not None:
+            state = (
+                f"The steady rotation by {np.linalg.norm(self.rate):g} rad/s at the load factor {self.load_factor:g}"
+            )
+        if self.complex:
+            growing = [self.label(k) for k in range(len(self)) if self.kind[k] in ("flutter", "divergence")]
+            verdict = f"grows ({'; '.join(growing)})" if growing else "is stable as far as these modes show"
+            yield f"{state} {verdict}."
+        else:
+            verdict = {0: f"no negative mode{' (stable)' if self.conservative else ''}", -1: "a singular stiffness"}
+            counted = verdict.get(self.negative_modes, f"{self.negative_modes} negative mode(s) (unstable)")
+            yield f"{state} has {counted}."
         if self.caution:
             yield self.caution
+
+    @property
+    def _caption(self):
+        of = "the eigenvalue" if self.complex else "the square of the frequency"
+        frame = " Frequencies are those seen in the rotating frame." if self.rate is not None else ""
+        return f"est. error: relative, of {of}. Modes grow as exp(growth_rate t).{frame}"

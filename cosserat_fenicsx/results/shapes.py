@@ -86,9 +86,13 @@ _QUANTITIES = by_name(
     Quantity("place", "moves most at", axes=("mode",), getter=_farthest),
     Quantity("direction", "direction there", "1", "xyz", "inertial", ("mode",), _directions, digits=3, short="along "),
     Quantity("displacement", unit="m", parts="xyz", frame="inertial", axes=_ON_NODES,
-             getter=lambda found: found.shapes[:, :, :3]),
+             getter=lambda found: found.at_phase()[:, :, :3]),
     Quantity("rotation", unit="rad", parts="xyz", frame="inertial", axes=_ON_NODES,
-             getter=lambda found: found.shapes[:, :, 3:]),
+             getter=lambda found: found.at_phase()[:, :, 3:]),
+    *(Quantity(f"{name}_after", f"{name} a quarter of a period later", unit=unit, parts="xyz", frame="inertial",
+               axes=_ON_NODES, getter=lambda found, part=part: found.at_phase(math.pi / 2)[:, :, part]
+               if np.iscomplexobj(found.shapes) else None)
+      for name, unit, part in (("displacement", "m", slice(0, 3)), ("rotation", "rad", slice(3, 6)))),
     Quantity("rod", axes=("node",), getter=lambda found: np.concatenate(
         [np.full(len(found.equilibrium.s(rod)), i) for i, rod in enumerate(found.scene.rods)])),
     Quantity("s", unit="m", axes=("node",), getter=lambda found: np.concatenate(
@@ -138,13 +142,19 @@ class Shapes(Result, OnNodes):
     def __len__(self):
         return len(self.error)
 
-    def mode(self, k, rod=None):
-        """(nodes, 3) displacements of mode k at the nodes of a rod (default the first), m, inertial."""
-        return self.shapes[self.number(k), self._rows(rod)[1], :3]
+    def at_phase(self, phase: float = 0.0) -> np.ndarray:
+        """(n, N, 6) the shapes at a phase of their oscillation, rad, real: Re(shape exp(i phase))."""
+        return np.real(self.shapes * np.exp(1j * phase)) if np.iscomplexobj(self.shapes) else self.shapes
 
-    def turns(self, k, rod=None):
-        """(nodes, 3) small rotations of mode k at the nodes of a rod (default the first), rad, inertial."""
-        return self.shapes[self.number(k), self._rows(rod)[1], 3:]
+    def mode(self, k, rod=None, phase=0.0):
+        """(nodes, 3) displacements of mode k at the nodes of a rod (default the first), m, inertial; of a complex mode
+        at a phase of its oscillation, rad."""
+        return self.at_phase(phase)[self.number(k), self._rows(rod)[1], :3]
+
+    def turns(self, k, rod=None, phase=0.0):
+        """(nodes, 3) small rotations of mode k at the nodes of a rod (default the first), rad, inertial; phase: see
+        `mode`."""
+        return self.at_phase(phase)[self.number(k), self._rows(rod)[1], 3:]
 
     def number(self, k):
         """The number of a mode from 0 on; negative ones count from the last.

@@ -49,12 +49,12 @@ class CirculatoryPart:
 
     def skew(self, rq, load_factor):
         """The skew-symmetric part of the second variation, a PETSc matrix, dimensionless; rq: (N, 7) of all nodes."""
-        skew = self._assembled(rq, load_factor)
+        skew = self.matrix(rq, load_factor)
         skew.axpy(-1.0, skew.copy().transpose(), PETSc.Mat.Structure.DIFFERENT)
         skew.scale(-0.5)
         return skew
 
-    def _assembled(self, rq, load_factor):
+    def matrix(self, rq, load_factor):
         """The matrix of the bilinear form h of `models.circulatory`: d omega(w, psi) = h(w, psi) - h(psi, w)."""
         model, variation = self._model, self._variation
         model.take(rq, load_factor)
@@ -72,7 +72,7 @@ class CirculatoryPart:
             return False
         if not self._form:
             return True
-        h, tied = on_every_rank(self._assembled(rq, load_factor)), self._variation.tied
+        h, tied = on_every_rank(self.matrix(rq, load_factor)), self._variation.tied
         total = h.shape[0]
         held = sparse.csr_matrix(constraint_rows(self._model.held(rq, load_factor), tied, total))
         solve = sparse.csr_matrix(np.linalg.pinv((held @ held.T).toarray(), rcond=_ROUNDING))

@@ -428,20 +428,21 @@ def _round_up(number):
     return step * math.ceil(number / step - 1e-9)
 
 
-def until_two_meshes_agree(owner, scene, on_mesh, tol, *, most, elements, degree, advice, progress, comm, gains=False):
+def until_two_meshes_agree(owner, scene, on_mesh, tol, *, most, elements, degree, advice, progress, comm, gains=None):
     """Solve an eigenproblem on successively halved meshes until the results of two of them agree.
 
     Args:
         owner: name of the computation.
         scene: the scene.
-        on_mesh: a function of a layout that returns a tuple: the numbers to compare (n,), the lengths of boundary
-            layers (see `layers_of`) or None, and further results.
+        on_mesh: a function of a layout that returns a tuple: the numbers to compare (n,), which may be complex, the lengths
+            of boundary layers (see `layers_of`) or None, and further results.
         tol: largest relative difference.
         most: elements per rod of the last mesh; elements: those of a given mesh, or None.
         degree, advice: for error messages.
         progress, comm: see `MeshProgress`.
-        gains: whether the error is estimated by the gain of a halving, of order 2 p, instead of by the difference of
-            two meshes, which is larger; only for numbers without rounding errors.
+        gains: where the error is estimated by the gain of a halving, of order 2 p, instead of by the difference of two
+            meshes, which is larger: a function of what `on_mesh` returned to the largest gain that is assumed, as a
+            power of 2; else None.
 
     Returns:
         (what `on_mesh` returned, estimated relative errors (n,) or NaN).
@@ -491,9 +492,9 @@ def until_two_meshes_agree(owner, scene, on_mesh, tol, *, most, elements, degree
                     )
                 best = min(best, reached)
             if best <= tol:
-                if gains and before is None:
+                if gains is not None and before is None:
                     before = _difference_before(scene, on_mesh, coarse, coarse_layout)
-                return found, error / _gain(before, error, degree) if gains and before is not None else error
+                return found, error if gains is None or before is None else error / _gain(before, error, gains(found))
             before = error if comparable and len(error) else None
             coarse, coarse_layout, layout = numbers, layout, layout.finer(scene, 2)
 
@@ -513,7 +514,7 @@ def _difference_before(scene, on_mesh, numbers, layout):
     return _apart(numbers, coarse) if len(coarse) == len(numbers) else None
 
 
-def _gain(before, error, degree):
+def _gain(before, error, most):
     """(n,) the assumed gain in accuracy of a halving: a part of the gain observed in two halvings, and less than the
-    2^(2 p) of the order of eigenvalues."""
-    return np.clip((before / np.maximum(error, 1e-300) - 1) / 4, 1, 2.0 ** (2 * degree - 2))
+    2^(2 p) of the order of eigenvalues, 2^most."""
+    return np.clip((before / np.maximum(error, 1e-300) - 1) / 4, 1, max(1.0, 2.0**most))

@@ -227,31 +227,32 @@ def oriented(model, vectors):
 
 
 def orienting(shapes):
-    """An orthogonal matrix (m, m) that makes the shapes (m, N, 3) of one eigenvalue independent of the eigensolver.
+    """A unitary matrix (m, m) that makes the shapes (m, N, 3) of one eigenvalue independent of the eigensolver.
 
     The node with the largest displacement then moves along the first inertial axis possible, in the positive
     direction, in the first shape alone; likewise for the remaining shapes. This fixes the sign of a single shape.
     """
     whole = np.eye(len(shapes))
     for k in range(len(shapes)):
-        moved = np.einsum("mni,mni->n", shapes[k:], shapes[k:])
+        moved = np.einsum("mni,mni->n", shapes[k:], shapes[k:].conj()).real
         node = np.flatnonzero(moved >= (1 - 1e-6) * moved.max())[0]
         by = shapes[k:, node, :]  # (modes, axes)
         sizes = np.linalg.norm(by, axis=0)
         axis = np.flatnonzero(sizes >= 0.1 * sizes.max())[0]
-        turn = np.eye(len(shapes))
+        turn = np.eye(len(shapes), dtype=shapes.dtype)
         turn[k:, k:] = _towards(by[:, axis])
         whole, shapes = turn @ whole, np.tensordot(turn, shapes, 1)
     return whole
 
 
 def _towards(a):
-    """An orthogonal matrix whose first row is a/|a|."""
+    """A unitary matrix whose first row is that of the conjugate of a/|a|."""
     size = np.linalg.norm(a)
     if not size:
         return np.eye(len(a))
     q, r = np.linalg.qr(np.column_stack([a / size, np.eye(len(a))]))
-    return (q * np.sign(np.where(np.diag(r) == 0, 1, np.diag(r)))).T
+    d = np.where(np.diag(r) == 0, 1, np.diag(r))
+    return (q * (d / np.abs(d))).conj().T
 
 
 # Eigenvalues that differ by less than this, relative, are one multiple eigenvalue.

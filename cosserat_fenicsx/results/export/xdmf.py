@@ -208,7 +208,7 @@ def write_shapes(found, file, k=0):
     k = found.number(k)
     positions = [found.equilibrium.position(rod) for rod in found.scene.rods]
     points, lines = np.concatenate(positions), lines_of([len(x) for x in positions])
-    moved, turned = np.split(found.shapes, 2, axis=2)
+    moved, turned = np.split(found.at_phase(), 2, axis=2)
     fields = {"displacement": moved, "rotation": turned, "position": np.broadcast_to(points, moved.shape)}
 
     def written():

@@ -1,0 +1,286 @@
+"""Modes of small vibrations about a static state or a steady rotation, damped or not."""
+
+import contextlib
+import math
+from collections import namedtuple
+
+import numpy as np
+from mpi4py import MPI
+from scipy.optimize import linear_sum_assignment
+
+from cosserat_fenicsx.algebra.pencil import Pencil, on_every_rank
+from cosserat_fenicsx.algebra.quadratic import QuadraticPencil
+from cosserat_fenicsx.checks import instance, number, refuse, tolerance, whole
+from cosserat_fenicsx.errors import NotConverged, SceneError
+from cosserat_fenicsx.models.traits import traits_of
+from cosserat_fenicsx.ranks import communicator
+from cosserat_fenicsx.results.modes import Modes
+from cosserat_fenicsx.results.shapes import Equilibrium
+from cosserat_fenicsx.scene.action import has_permanent
+from cosserat_fenicsx.scene.describe import describe
+from cosserat_fenicsx.scene.loads import Load
+from cosserat_fenicsx.scene.rod import require_inertia
+from cosserat_fenicsx.scene.scene import Scene, check_magnitudes
+from cosserat_fenicsx.scene.signals import at
+from cosserat_fenicsx.scene.statical import without_mechanism
+from cosserat_fenicsx.statics.circulatory import circulatory_part
+from cosserat_fenicsx.statics.meshes import layers_of, until_two_meshes_agree
+from cosserat_fenicsx.statics.path.follower import standing
+from cosserat_fenicsx.statics.problem import solvers_of
+from cosserat_fenicsx.statics.small_motions import Bodies, resisting, stiffness
+from cosserat_fenicsx.statics.solve import check_arguments
+from cosserat_fenicsx.statics.stability import shapes_of
+
+_MOST_ELEMENTS = 128
+_CORRECTIONS = 10  # Newton iterations after the added constraints of a mechanism are removed
+# By how much the largest gain of a halving that is assumed, as a power of 2, is below twice the degree: of squares, and
+# of complex eigenvalues, whose errors are not of one sign.
+_OF_SQUARES, _OF_EIGENVALUES = 2, 4
+# Sine of the angle between a vector and the axis of a rotation below which it has the axis's direction; arc lengths, as
+# shares of a rod, where that is tried.
+_ALONG, _TRIED = 1e-9, np.array([0.0, 0.31, 0.73, 1.0])
+
+
+def modes(
+    scene: Scene,
+    count: int = 1,
+    *,
+    load_factor: float = 0.0,
+    damped: bool | None = None,
+    near: complex | None = None,
+    tol: float = 1e-6,
+    elements: int | None = None,
+    degree: int = 4,
+    comm: MPI.Comm | None = None,
+    progress: bool | None = None,
+) -> Modes:
+    """Eigenvalues and shapes of small vibrations about a static state, or about a steady rotation.
+
+    Undamped: K x = omega^2 M x under the constraints of supports and joints, with K the second variation in (r, theta)
+    and M the inertia of the sections. Complex: lambda^2 M x + lambda (D + G) x + K x = 0. D holds the `Damping` of rods
+    and what every action loses or gains by small velocities, G the gyroscopic terms of a steady rotation, and K also
+    the part of loads without a potential, which may make the state flutter.
+
+    With a `Centrifugal` in the scene the state is its steady rotation. Eigenvalues and shapes are those seen in the
+    rotating frame, where supports and springs are at rest.
+
+    Args:
+        scene: a `Scene`; every rod needs a mass and inertia. Without a load factor it may be free to move.
+        count: number of modes, from the smallest square or the smallest |lambda| on.
+        load_factor: eta of the state, a point of the path of load control from the unloaded reference. The reference
+            of a mechanism, such as a rod that hangs on a hinge, must be its equilibrium position but for strains.
+        damped: whether to compute complex modes: None where something resists velocities, the scene rotates, or its
+            loads have no potential. With False, what depends on velocities is left out and named in
+            `Modes.left_out`, and where the loads have no potential the symmetric part of K is used.
+        near: 1/s, complex: the complex modes nearest that point, such as 2j pi f for those about the frequency f.
+        tol: relative accuracy of the squares, or of complex eigenvalues: elements are doubled until two meshes agree to
+            it, unless `elements` is given.
+        elements: elements per rod; fixes the mesh.
+        degree: 1 to 4, of r and q.
+        comm: MPI communicator; default all ranks. Every rank calls; each solves the whole eigenproblem.
+        progress: True, False, or None to show it in runs of more than two seconds.
+
+    Returns:
+        Modes. It holds fewer than `count` where the mesh has fewer degrees of freedom.
+
+    Raises:
+        SceneError: an argument outside its range, or a rod without inertia; in a steady rotation, a load or what
+            resists velocities that is not the same in all its positions.
+        NotConverged: the load factor or the accuracy is not reached.
+    """
+    instance("modes", "scene", scene, Scene, "a Scene")
+    for rod in scene.rods:
+        require_inertia(rod, "a motion")
+    for action in scene.actions:
+        if action.delayed is not None:
+            raise SceneError(
+                f"modes: {describe(action)}: expected no actions whose forces come from earlier motion: rods in "
+                "its place, or the spectrum of a simulated motion, show the modes"
+            )
+    number("modes", "load_factor", load_factor, "a finite number", math.isfinite)
+    whole("modes", "count", count)
+    whole("modes", "elements", 1 if elements is None else elements)
+    tolerance("modes", tol)
+    rotation = _rotation(scene)
+    if near is not None:
+        if isinstance(near, bool) or not isinstance(near, int | float | complex) or not np.isfinite(near):
+            refuse("modes", "near", near, "a finite complex number (1/s)")
+        if near.imag < 0:
+            refuse("modes", "near", near, "a number of the upper half plane, whose eigenvalues stand for their pairs")
+    if damped is False and (near is not None or rotation is not None):
+        raise SceneError("modes: damped = False: expected None or True with `near` or a `Centrifugal`")
+    if load_factor or has_permanent(scene):
+        check_arguments(without_mechanism(scene), tol, elements, owner="modes")
+        check_magnitudes(scene, load_factor)
+    comm, slowed = communicator(comm), _slowed(scene)
+    if damped is None and (near is not None or rotation is not None or slowed):
+        damped = True
+    following = _Following()
+
+    def on_mesh(layout):
+        found = _on_mesh(scene, layout, count, load_factor, degree, comm, damped, near, rotation)
+        return following.in_turn(found) if found.complex else found
+
+    found, error = until_two_meshes_agree(
+        "modes", scene, on_mesh, tol, most=_MOST_ELEMENTS, elements=elements, degree=degree,
+        advice="a larger tol or fewer modes", progress=progress, comm=comm,
+        gains=lambda found: 2 * degree - (_OF_EIGENVALUES if found.complex else _OF_SQUARES),
+    )  # fmt: skip
+    error = np.maximum(error, found.rounding)  # NaN stays
+    if (error > tol).any():
+        raise NotConverged(
+            f"the accuracy tol = {tol:g} is out of reach: rounding alone may change the squares by {error.max():.2g} "
+            "of themselves, since the rods are so slender. Ask for a larger tol."
+        )
+    left_out = (*_at_kinks(scene), *(() if found.complex else slowed))
+    values, shapes = found.numbers, found.shapes
+    if found.complex:
+        order = np.argsort(np.abs(values - (near or 0.0)), kind="stable")
+        values, shapes, error = values[order], shapes[order], error[order]
+    else:
+        values = np.sqrt(np.maximum(-values, 0.0)) + 1j * np.sqrt(np.maximum(values, 0.0))
+    return Modes(
+        found.state, shapes, error, found.conservative, comm, values, found.negative, left_out,
+        None if rotation is None else np.array(rotation.rate),
+    )  # fmt: skip
+
+
+def _slowed(scene):
+    """What resists or follows velocities smoothly, in words."""
+    damped = [rod for rod in scene.rods if rod.damping is not None and np.any(rod.damping.sizes)]
+    acting = [x for x in scene.actions if not (x.touches or x.resists) and traits_of(x, scene.rods).rates]
+    return (*(f"Damping of {rod.name}" for rod in damped), *map(describe, acting))
+
+
+def _at_kinks(scene):
+    """What resists velocities with a kink at rest, so that no linear theory has it, in words."""
+    return tuple(describe(x) for x in scene.actions if x.touches or x.resists)
+
+
+def _rotation(scene):
+    """The `Centrifugal` of a scene, or None.
+
+    Raises:
+        SceneError: several; a load, or what resists velocities, with a vector across the axis.
+    """
+    found = [x for x in scene.loads if x.of_inertia]
+    if not found:
+        return None
+    if len(found) > 1:
+        raise SceneError(f"modes: the scene has {len(found)} steady rotations (Centrifugal): expected one")
+    axis = np.array(found[0].rate) / np.linalg.norm(found[0].rate)
+    for action in scene.loads:
+        if action.in_law or not (
+            (isinstance(action, Load) and not action.follows) or traits_of(action, scene.rods).rates
+        ):
+            continue
+        for rod in [action.station.rod] if action.station is not None else scene.rods_of(action):
+            for datum in at(action, 0.0).data(rod, _TRIED * rod.length):
+                if datum.size == 3 and datum.unit != "m from origin":
+                    across = np.linalg.norm(np.cross(datum.value, axis), axis=-1)
+                    if (across > _ALONG * np.linalg.norm(datum.value, axis=-1)).any():
+                        raise SceneError(
+                            f"modes: {describe(action)} is not the same in all positions of the rotation about "
+                            f"{tuple(axis.tolist())}: expected vectors along that axis, or a load that turns with the "
+                            "rod (FollowerForce)"
+                        )
+    return found[0]
+
+
+#: What is computed on one mesh: squares, or complex eigenvalues (1/s), (n,); the lengths of boundary layers or None;
+#: their relative rounding errors (n,); shapes (n, N, 6); the number of negative modes; the `Equilibrium`; whether the
+#: loads have a potential; and whether the numbers are complex eigenvalues.
+_OnMesh = namedtuple("_OnMesh", "numbers layers rounding shapes negative state conservative complex")
+
+
+class _Following:
+    """Puts eigenvalues in the order of those that they come from on another mesh."""
+
+    def __init__(self):
+        self._before = None
+
+    def in_turn(self, found):
+        """An `_OnMesh` in the order of the one before, by the assignment with the least relative distances."""
+        if self._before is not None and len(self._before) == len(found.numbers):
+            order = assigned(self._before, found.numbers)
+            found = found._replace(
+                numbers=found.numbers[order], rounding=found.rounding[order], shapes=found.shapes[order]
+            )
+        self._before = found.numbers
+        return found
+
+
+def assigned(before, values):
+    """Indices of complex `values` (n,) that continue `before` (n,): the least sum of relative distances."""
+    sizes = np.maximum(np.abs(before), np.finfo(float).tiny)
+    return linear_sum_assignment(np.abs(values[None, :] - before[:, None]) / sizes[:, None])[1]
+
+
+def _on_mesh(scene, layout, count, load_factor, degree, comm, damped, near, rotation):
+    """The `_OnMesh` on one mesh."""
+    loaded = load_factor or has_permanent(scene) or rotation is not None
+    with _loaded(scene, layout, load_factor, degree, comm, loaded) as (problem, stability):
+        model, scales = problem.model, problem.model.scales
+        negative = stability.count() if loaded else 0
+        K, rows, held = stiffness(problem)
+        unit = max(float(rod.profile.range[1].mass) for rod in scene.rods)
+        bodies, time = Bodies(model, unit), math.sqrt(unit * scales.length**2 / scales.force)
+        layers = layers_of(model) if loaded else None
+        state, rq = Equilibrium.of(model, load_factor), model.snapshot()[0]
+    with circulatory_part(scene, layout, degree, comm) as circulatory:
+        conservative = circulatory.vanishes(rq, load_factor)
+        if damped is None:
+            damped = not conservative
+        if damped and not conservative:
+            K = K + on_every_rank(circulatory.skew(rq, load_factor))
+    if not damped:
+        squares, vectors, rounding = Pencil(K, bodies.mass(), held).lowest(count)
+        if (squares == 0).any():  # `stability` counts these by the sign of their rounding; all below are known here
+            negative = np.count_nonzero(squares < 0)
+        shapes = shapes_of(vectors.T, squares, rows, scales.length)
+        rounding = np.where(squares == 0, 0.0, rounding / np.abs(np.where(squares == 0, 1.0, squares)))
+        return _OnMesh(squares / time**2, layers, rounding, shapes, negative, state, conservative, False)
+    turning = None
+    if rotation is not None:
+        w = np.array(rotation.rate) * time
+        places = np.concatenate([state.position(rod) for rod in scene.rods])
+        turning = w, (places - np.array(rotation.through)) / scales.length
+    C, more = resisting(scene, layout, degree, comm, rq, load_factor, time, bodies, turning)
+    if rotation is not None:
+        C = C + bodies.gyroscopic(w)
+    pencil = QuadraticPencil(K + more, C, bodies.mass(), held)
+    found = pencil.lowest(count) if near is None else pencil.nearest(near * time, count)
+    values = found.values
+    shapes = shapes_of(found.vectors.T, values, rows, scales.length)
+    rounding = np.where(values == 0, 0.0, found.rounding / np.abs(np.where(values == 0, 1.0, values)))
+    return _OnMesh(values / time, layers, rounding, shapes, negative, state, conservative, True)
+
+
+@contextlib.contextmanager
+def _loaded(scene, layout, load_factor, degree, comm, loaded):
+    """Context manager that gives the problem, in equilibrium at a load factor, and its `NegativeModes`.
+
+    A mechanism that its loads stabilise has no path from the unloaded state: its equilibrium is computed with added
+    constraints (`without_mechanism`), then corrected without them.
+    """
+    held = without_mechanism(scene) if loaded else scene
+    with solvers_of(held, layout, degree=degree, comm=comm) as (problem, newton, stability):
+        if loaded:
+            standing(problem, newton, stability, load_factor)
+        if held is scene:
+            yield problem, stability
+            return
+        # the initial guess of the problem without added constraints, on the same mesh
+        rq, n = problem.model.snapshot()
+    with solvers_of(scene, layout, degree=degree, comm=comm) as (problem, newton, stability):
+        problem.end_beginning()
+        problem.set_load_factor(load_factor)
+        problem.begin_at(problem.model.unknowns_of(rq), n[..., :3], np.zeros(len(problem.multipliers())))
+        newton.allow(_CORRECTIONS)
+        solved = newton.solve()
+        if not solved.converged:
+            raise NotConverged(
+                f"no equilibrium was found at the load factor {load_factor:g}: {solved.reason} next to the reference, "
+                "where the scene is a mechanism"
+            )
+        yield problem, stability

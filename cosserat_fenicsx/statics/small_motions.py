@@ -1,0 +1,156 @@
+"""The matrices of small motions about an equilibrium or a steady rotation, and the gradients of their constraints.
+
+lambda^2 M + lambda C + K, dimensionless, in displacements and inertial rotations of the nodes, in the numbering of the
+second variation. About a steady rotation they are those in the rotating frame.
+"""
+
+import numpy as np
+from scipy import sparse
+
+from cosserat_fenicsx.algebra.packed import Packed
+from cosserat_fenicsx.algebra.pencil import constraint_rows, on_every_rank
+from cosserat_fenicsx.algebra.pool import PROBLEMS
+from cosserat_fenicsx.errors import NotConverged, SceneError
+from cosserat_fenicsx.models.damped import ResistingModel
+from cosserat_fenicsx.models.rod_data import nodal_inertia
+from cosserat_fenicsx.models.signature import Signature
+from cosserat_fenicsx.numerics import directors, lobatto_weights
+from cosserat_fenicsx.statics.circulatory import CirculatoryPart
+
+# Largest force, over EI/L^2, with which what resists velocities may act on the rods in a steady rotation.
+_DRIVEN = 1e-6
+
+
+def stiffness(problem):
+    """K (sparse), the row numbers of all nodes (N, 6), -1 where clamped, and the gradients (equations, size) of the
+    constraints of supports and joints."""
+    model = problem.model
+    (variation,) = model.second_variations
+    tied = variation.tied
+    K = variation.numbering.matrix(variation.cell_dofs, tied, model.signature.connections.pattern)
+    true = model.section.K
+    model.stiffen(np.where(np.isfinite(true), true, model.bounded_K))  # stability counts bound finite ones as well
+    Packed(variation.form, (), ()).add_to_matrix(K)
+    model.stiffen(model.bounded_K)
+    if problem.ties:
+        of_ties = problem.ties.second_variation(variation.axes, problem.tie_load_factor)
+        if model.comm.rank == 0:
+            problem.ties.add_to_matrix(K, tied, of_ties)
+    K.assemble()
+    K = on_every_rank(K)
+    gradients = problem.ties.gradients() if problem.ties else np.empty((0, *tied.shape))
+    return (K + K.T) / 2, model.rows_of_nodes, constraint_rows(gradients, tied, K.shape[0])
+
+
+class Bodies:
+    """The masses of the nodes, by Lobatto quadrature with the nodes as points.
+
+    Args:
+        model: a spatial model at the state; unit: of mass per length, kg/m.
+
+    Attributes:
+        size: of the matrices, which have one diagonal 6 x 6 block per node.
+    """
+
+    def __init__(self, model, unit):
+        scene, layout, scales, p = model.scene, model.layout, model.scales, model.signature.degree
+        q, self._rows = model.snapshot()[0][:, 3:], model.rows_of_nodes
+        self.size = self._rows.max(initial=-1) + 1
+        weights, sizes = lobatto_weights(model.nodes), layout.sizes(scene) / scales.length
+        first = p * np.arange(sum(layout.counts)) + np.repeat(np.arange(len(layout.counts)), layout.counts)
+        self._slots = slots = first[:, None] + np.arange(p + 1)
+        at_nodes = nodal_inertia(scene, layout, model.nodes)
+        R = directors(q[slots.ravel()]).reshape(at_nodes.frames.shape)
+        w = sizes[:, None] * weights / unit
+        T, of_arms = R @ at_nodes.frames, (w / scales.length**2)[..., None]
+        self._mass = (w * at_nodes.mass)[..., None, None]
+        self._J = np.einsum("...ik,...k,...jk->...ij", T, at_nodes.J * of_arms, T)
+        self._arm = None
+        if model.signature.eccentric:
+            self._arm = hat(np.einsum("...ij,...j->...i", R, at_nodes.offset) / scales.length)
+            self._J = self._J + R @ at_nodes.apart @ R.swapaxes(2, 3) * of_arms[..., None]
+        lateral = at_nodes.lateral * np.sqrt(w)[..., None]
+        self._lateral = lateral[..., :, None] * lateral[..., None, :]
+        drags = [rod.damping.drag if rod.damping else 0.0 for rod in scene.rods]
+        #: of the elements, 1/s
+        self._drag = np.repeat(drags, layout.counts)[:, None, None, None]
+
+    def mass(self):
+        """M, a bsr_matrix."""
+        return self._assembled(self._mass_blocks()).tobsr((6, 6))
+
+    def gyroscopic(self, w):
+        """G of a steady rotation w (3,), rad per unit of time."""
+        of_spin = np.trace(self._J, axis1=-2, axis2=-1)[..., None, None] * hat(w) - 2 * hat(self._J @ w)
+        return self._assembled(self._blocks(2 * self._mass * hat(w), of_spin))
+
+    def dragged(self, w, time):
+        """(C, K) of `Damping.drag`, which acts on the inertial velocities; time: the unit, s."""
+        drag = self._drag * time
+        C = self._assembled(drag * self._mass_blocks())
+        return C, self._assembled(drag * self._blocks(self._mass * hat(w), self._J @ hat(w) - hat(self._J @ w)))
+
+    def _mass_blocks(self):
+        block = self._blocks(self._mass * np.eye(3), self._J)
+        block[..., :3, :3] -= self._lateral
+        return block
+
+    def _blocks(self, of_centre, of_spin):
+        """(elements, nodes, 6, 6) from matrices for the displacement of the mass centre u + rotation x arm, and for the
+        rotation."""
+        block = np.zeros((*self._slots.shape, 6, 6))
+        block[..., :3, :3], block[..., 3:, 3:] = of_centre, of_spin
+        if self._arm is not None:
+            z = self._arm
+            block[..., :3, 3:], block[..., 3:, :3] = -of_centre @ z, z @ of_centre
+            block[..., 3:, 3:] -= z @ of_centre @ z
+        return block
+
+    def _assembled(self, block):
+        of_node = self._rows[self._slots]
+        i, j = (np.broadcast_to(x, block.shape).ravel() for x in (of_node[..., :, None], of_node[..., None, :]))
+        free = (i >= 0) & (j >= 0)
+        return sparse.csr_matrix((block.ravel()[free], (i[free], j[free])), shape=(self.size, self.size))
+
+
+def hat(a):
+    """(..., 3, 3) the matrices of a x, (..., 3)."""
+    return np.cross(np.eye(3), np.asarray(a)[..., None, :])
+
+
+def resisting(scene, layout, degree, comm, rq, load_factor, time, bodies, rotation=None):
+    """(C, K): what resists velocities, and what it adds to K in the frame of a rotation.
+
+    Args:
+        rq: (N, 7) state of all nodes, dimensionless; time: the unit, s; bodies: the `Bodies`.
+        rotation: (w (3,), rad per unit of time; positions (N, 3) from a point of its axis, dimensionless), or None.
+
+    Raises:
+        SceneError: it drives the rods in a steady rotation, whose equilibrium is another one then.
+    """
+    signature = Signature.of(scene, layout, formulation="mixed", degree=degree)
+    with PROBLEMS.lend(("resisting", signature), comm, lambda: ResistingModel(comm, signature), NotConverged) as model:
+        model.load(scene, layout, time)
+        part = CirculatoryPart(model)
+        C = on_every_rank(part.matrix(rq, load_factor))
+        if rotation is not None:
+            for function in filter(None, model.viscosity):  # no rotation strains a rod
+                function.x.array[:] = 0.0
+            acting, rows = on_every_rank(part.matrix(rq, load_factor)), model.rows_of_nodes
+    w, from_axis = rotation or (np.zeros(3), None)
+    dragged, K = bodies.dragged(w, time)
+    if rotation is None:
+        return C + dragged, K
+    rigid, free = np.zeros(bodies.size), rows >= 0
+    rigid[rows[free]] = np.concatenate([np.cross(w, from_axis), np.tile(w, (len(rows), 1))], axis=1)[free]
+    driven = abs((acting + dragged) @ rigid).max(initial=0.0)
+    if driven > _DRIVEN:
+        raise SceneError(
+            f"modes: what resists velocities acts on the rods in the steady rotation, by {driven:.1g} of their "
+            "stiffness EI/L^2 at a node, and `Centrifugal` has no drive: expected Damping.drag, dashpots and drag on "
+            "the axis alone, or Damping.time, which resists strains"
+        )
+    moved = (rows[:, :3] >= 0).all(axis=1)
+    i, j = (np.broadcast_to(x, (moved.sum(), 3, 3)).ravel() for x in (rows[moved, :3, None], rows[moved, None, :3]))
+    turned = sparse.csr_matrix((np.tile(hat(w).ravel(), moved.sum()), (i, j)), shape=acting.shape)
+    return C + dragged, K + acting @ turned

@@ -1,0 +1,79 @@
+"""Complex modes: dampers, loads without a potential, steady rotations. Truths of other methods: closed forms, and 40
+digits of the determinants of boundary value problems (EI = m = L = 1)."""
+
+import numpy as np
+import pytest
+
+import cosserat_fenicsx as cf
+
+
+def cantilever(EI=(1.0, 1.0), stiff=1e5, J=1e-6, start=(0, 0, 0), **more):
+    """A clamped rod along x, and its clamp; d1 = y."""
+    section = cf.Stiffness((stiff, stiff), stiff, EI, 1.0, mass=1.0, inertia=(J, J, 2 * J))
+    line = cf.Line(start, (start[0] + 1, 0, 0), d1=(0, 1, 0))
+    rod = cf.Rod(line, section, name="beam", **more)
+    return rod, cf.Clamp(rod.start)
+
+
+def off(found, exact):
+    return np.abs(found.eigenvalues / np.array(exact) - 1)
+
+
+def test_a_dashpot_at_the_end_may_overdamp():
+    """Roots of Euler's beam with a dashpot c = 2 and Kelvin-Voigt's damping; shear changes them by about 4e-6 of the third."""
+    rod, clamp = cantilever(stiff=1e7, J=1e-9)
+    found = cf.modes(cf.Scene([rod], [clamp], [cf.Dashpot(rod.end, 2.0)]), 8, elements=8)
+    exact = [-1.93970800974, -3.649734575226 + 20.34901540283j, -3.873655659255 + 60.72439620323j]
+    for root in exact:  # in both directions across the rod
+        assert np.sort(np.abs(found.eigenvalues / root - 1))[1] < 6e-6
+    assert found.kind.tolist() == ["overdamped"] * 4 + ["oscillates"] * 4 and found.stable and found.left_out == ()
+    assert found.damping_ratios[4] == pytest.approx(3.649734575 / abs(exact[1]), rel=1e-5)
+    near = cf.modes(cf.Scene([rod], [clamp], [cf.Dashpot(rod.end, 2.0)]), 2, elements=8, near=60j)
+    assert found.damping_ratios[0] == 1 and off(near, exact[2]).max() < 6e-6
+
+
+def test_kelvin_voigt_and_drag_of_the_rod_and_as_an_action():
+    """l^2 + (drag + tau w^2) l + w^2 = 0; linear drag along the rod is the same as drag times a mass of 1 kg/m."""
+    w = np.repeat([3.5160152685, 22.0344915647, 61.6972144134], 2)
+    ratio = 0.4 / 2 / w + 0.01 * w / 2
+    exact = w * (-ratio + 1j * np.sqrt(1 - ratio**2))
+    rod, clamp = cantilever(stiff=1e7, J=1e-9, damping=cf.Damping(time=0.01, drag=0.4))
+    found = cf.modes(cf.Scene([rod], [clamp]), 6, elements=8)
+    assert off(found, exact).max() < 6e-6
+    rod, clamp = cantilever(stiff=1e7, J=1e-9, damping=cf.Damping(time=0.01))
+    again = cf.modes(cf.Scene([rod], [clamp], [cf.LinearDrag(rod, 0.4, 0.4)]), 6, elements=8)
+    np.testing.assert_allclose(again.eigenvalues, found.eigenvalues, rtol=1e-6)
+
+
+BECK = {
+    10.0: [5.17578505732j, 18.5865406058j, 57.8508704062j],
+    21.0: [-2.12520036617 + 10.9373182007j, 2.12520036617 + 10.9373182007j, 53.297504332j],
+}
+
+
+@pytest.mark.parametrize("load", BECK)
+def test_a_column_under_a_follower_load_flutters(load):
+    rod, clamp = cantilever(stiff=1e6, J=1e-7)
+    found = cf.modes(cf.Scene([rod], [clamp], [cf.FollowerForce(rod.end, (0, 0, -load))]), 6, load_factor=1.0)
+    exact = np.repeat(BECK[load], 2)
+    at = np.lexsort((found.eigenvalues.real.round(3), found.eigenvalues.imag.round(3)))
+    error = np.abs(found.eigenvalues[at] / exact - 1)
+    assert error.max() < 1e-7 and (found.error[at] > 0.8 * error).all()
+    assert found.kind.tolist().count("flutter") == 2 * (load > 20.05) and found.stable == (load < 20.05)
+    assert not found.conservative and found.caution == "" and found.complex
+
+
+@pytest.mark.parametrize(
+    "EI, hub, rate, tau, exact",
+    [
+        ((1.0, 4.0), 0.5, 6.0, 0.0,
+         [9.0375380489j, 9.1625678979j, 29.5362303346j, 47.8635852903j, 69.8845089356j]),
+        ((1.0, 1.0), 0.0, 3.0, 0.004,
+         [-0.0248853921108 + 3.74295004637j, -0.0248849191573 + 4.79703169747j, -0.970623415118 + 23.1013819027j]),
+    ],
+)  # fmt: skip
+def test_a_rotating_blade(EI, hub, rate, tau, exact):
+    """About a hub; flap and lag, damped or not."""
+    rod, clamp = cantilever(EI, start=(hub, 0, 0), damping=cf.Damping(time=tau))
+    found = cf.modes(cf.Scene([rod], [clamp], [cf.Centrifugal((0, 0, rate))]), len(exact), elements=8)
+    assert off(found, exact).max() < 1e-7 and found.stable
