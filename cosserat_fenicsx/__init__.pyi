@@ -20,7 +20,6 @@ from cosserat_fenicsx.actions.springs import Spring as Spring
 from cosserat_fenicsx.actions.tendons import Helical as Helical
 from cosserat_fenicsx.actions.tendons import Tendon as Tendon
 from cosserat_fenicsx.actions.walls import Wall as Wall
-from cosserat_fenicsx.statics.natural_modes import modes as modes
 from cosserat_fenicsx.dynamics.resuming import read_history as read_history
 from cosserat_fenicsx.dynamics.simulate import simulate as simulate
 from cosserat_fenicsx.errors import CosseratError as CosseratError
@@ -37,6 +36,7 @@ from cosserat_fenicsx.quantities import Quantity as Quantity
 from cosserat_fenicsx.results.history import History as History
 from cosserat_fenicsx.results.modes import Buckling as Buckling
 from cosserat_fenicsx.results.modes import Modes as Modes
+from cosserat_fenicsx.results.modes_along import ModesAlong as ModesAlong
 from cosserat_fenicsx.results.path import Path as Path
 from cosserat_fenicsx.results.records import Event as Event
 from cosserat_fenicsx.results.sensitivity import Sensitivity as Sensitivity
@@ -84,9 +84,11 @@ from cosserat_fenicsx.statics.cases import Cases as Cases
 from cosserat_fenicsx.statics.cases import CompiledScene as CompiledScene
 from cosserat_fenicsx.statics.cases import compile as compile
 from cosserat_fenicsx.statics.linear_buckling import buckling as buckling
+from cosserat_fenicsx.statics.natural_modes import modes as modes
 from cosserat_fenicsx.statics.path.load_control import StepControl as StepControl
 from cosserat_fenicsx.statics.path.recorder import read_path as read_path
 from cosserat_fenicsx.statics.solve import solve as solve
+from cosserat_fenicsx.statics.vibrating import campbell as campbell
 from cosserat_fenicsx.storage.store import resume as resume
 from cosserat_fenicsx.studies.outcome import Study as Study
 from cosserat_fenicsx.studies.study import study as study

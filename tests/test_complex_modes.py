@@ -77,3 +77,71 @@ def test_a_rotating_blade(EI, hub, rate, tau, exact):
     rod, clamp = cantilever(EI, start=(hub, 0, 0), damping=cf.Damping(time=tau))
     found = cf.modes(cf.Scene([rod], [clamp], [cf.Centrifugal((0, 0, rate))]), len(exact), elements=8)
     assert off(found, exact).max() < 1e-7 and found.stable
+
+
+def test_flutter_is_an_event_of_a_path(tmp_path):
+    """Beck's column; with a little Kelvin-Voigt damping at about half the load (Ziegler's paradox). The exact loads are
+    20.0509536 and 10.9391220 without shear, whose effect is 1.2e-5 and 6e-6 here."""
+    for time, exact in ((0.0, 20.0507172), (1e-3, 10.9390562)):
+        rod, clamp = cantilever(stiff=1e6, J=1e-7, damping=cf.Damping(time=time))
+        scene = cf.Scene([rod], [clamp], [cf.FollowerForce(rod.end, (0, 0, -1))])
+        path = cf.solve(scene, [5.0, 10.0, 19.0, 21.0], elements=8, model="spatial")
+        along = path.modes(4)
+        (event,) = path.events
+        assert event.kind == "flutter" and event.after == (2 if time == 0 else 1)
+        assert event.load_factor == pytest.approx(exact, rel=1e-6) and event.error < 2e-6
+        assert [x.stable for x in along.modes] == [True, True, time == 0, False]
+    path.save(tmp_path / "path.h5")
+    assert cf.read_path(tmp_path / "path.h5").events[0].kind == "flutter" and "Flutter at" in str(path)
+    with pytest.raises(cf.SceneError, match="the onset of flutter: expected a limit point or a bifurcation"):
+        path.sensitivity(event, ["rods.beam.length"])
+
+
+def test_whirl_of_a_shaft_between_bearings(tmp_path):
+    """Timoshenko's shaft, whirl rates in space at 300 rad/s (closed form); forward and backward; Campbell diagram."""
+    E, d, nu, rho, spin = 210e9, 0.1, 0.3, 7850.0, 300.0
+    A, I = np.pi * d**2 / 4, np.pi * d**4 / 64
+    section = cf.Stiffness((570924049.5466067,) * 2, E * A, (E * I,) * 2, E * I / (1 + nu), mass=rho * A,
+                           inertia=(rho * I, rho * I, 2 * rho * I))  # fmt: skip
+    shaft = cf.Rod(cf.Line((0, 0, 0), (0, 0, 1)), section)
+    bearings = [cf.Pin(shaft.start), cf.Roller(shaft.end, (1, 0, 0)), cf.Roller(shaft.end, (0, 1, 0))]
+    held = [cf.Spring(shaft.start, rotational=1e-3), cf.Centrifugal((0, 0, 1.0))]
+    found = cf.campbell(cf.Scene([shaft], bearings, held), [0.0, spin], 6, elements=8)
+    rates = {1: [], -1: [], 0: []}
+    for k, f in enumerate(found[1].inertial_frequencies):
+        rates[found[1].whirl(k)].append(2 * np.pi * f)
+    np.testing.assert_allclose(rates[1], [1262.994162319, 4886.078979331], rtol=2e-8)
+    np.testing.assert_allclose(rates[-1], [1259.441927398, 4873.4134679], rtol=2e-8)
+    assert found[1].eigenvalues.imag[1] == pytest.approx(1262.994162319 - spin, rel=1e-7)
+    found.plot(tmp_path / "campbell.png", seen="inertial", width=400)
+    assert (tmp_path / "campbell.png").stat().st_size > 3000 and found.rates.tolist() == [0, spin]
+
+
+def test_a_rotor_with_damping_inside_and_outside():
+    """s^2 + c s + w1^2 tau (s - i W) + w1^2 = 0 in the inertial frame: stable below 30.13 rad/s, at 60 it grows."""
+    W, J = 60.0, 1e-9
+    section = cf.Stiffness((1e7, 1e7), 1e7, (1.0, 1.0), 1.0, mass=1.0, inertia=(J, J, 2 * J))
+    shaft = cf.Rod(cf.Line((0, 0, 0), (0, 0, 1)), section, damping=cf.Damping(time=0.002, drag=0.4))
+    bearings = [cf.Pin(shaft.start), cf.Roller(shaft.end, (1, 0, 0)), cf.Roller(shaft.end, (0, 1, 0))]
+    held = [cf.Spring(shaft.start, rotational=1e-6), cf.Centrifugal((0, 0, W))]
+    found = cf.modes(cf.Scene([shaft], bearings, held), 1, elements=4, near=0.3 + 50.1j)
+    assert found.eigenvalues[0] == pytest.approx(0.293974563757 + 1j * (W - 9.88283226073), rel=1e-6)
+    assert found.kind.tolist() == ["flutter"] and not found.stable and found.whirl(0) == 1
+
+
+def test_what_modes_refuse():
+    rod, clamp = cantilever()
+    for loads, more, words in (
+        ([cf.Centrifugal((0, 0, 1.0))] * 2, {}, "2 steady rotations"),
+        ([cf.Centrifugal((0, 0, 1.0)), cf.Weight((0, -9.81, 0))], {}, "Weight is not the same in all positions"),
+        ([cf.Centrifugal((0, 0, 1.0)), cf.LinearDrag(rod, 1.0)], {}, "acts on the rods in the steady rotation"),
+        ([], {"near": complex("nan")}, "near = .*expected a finite complex number"),
+        ([], {"near": -1j}, "near = .*upper half plane"),
+        ([cf.Centrifugal((0, 0, 1.0))], {"damped": False}, "damped = False: expected None or True"),
+    ):
+        with pytest.raises(cf.SceneError, match=words):
+            cf.modes(cf.Scene([rod], [clamp], loads), elements=2, **more)
+    with pytest.raises(cf.SceneError, match="0 steady rotations"):
+        cf.campbell(cf.Scene([rod], [clamp]), [1.0])
+    with pytest.raises(cf.SceneError, match="rates from 0 on"):
+        cf.campbell(cf.Scene([rod], [clamp], [cf.Centrifugal((0, 0, 1.0))]), [-1.0])

@@ -86,6 +86,8 @@ FITTERS = {
         "linear_buckling",
         "natural_modes",
         "small_motions",
+        "arguments",
+        "vibrating",
         "refinement",
         "sensitivity",
         "solve",

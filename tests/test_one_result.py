@@ -60,6 +60,8 @@ RESULTS = {
     "Path": (path, "load_factor", "1", "1"),
     "History": (history, "kinetic_energy", "J", "ft-lbf"),
     "Modes": (lambda: cf.modes(column()[1], 3), "frequency", "Hz", "Hz"),
+    "ModesAlong": (lambda: cf.solve(column()[1], np.linspace(0.1, 0.6, 6).tolist(), elements=2).modes(2),
+                   "lowest_frequency", "Hz", "Hz"),
     "Buckling": (lambda: cf.buckling(column()[1], 2), "critical_load_factor", "1", "1"),
     "TorqueAndDrag": (answer, "tension", "N", "klbf"),
     "DepthSweep": (sweep, "depth", "m", "ft"),

@@ -22,6 +22,8 @@ _LOW, _NOTHING = 1e-3, 1e-4
 _SHIFT, _BOUNDS = 0.5, (0.02, 5.0)
 # Eigenvalues with a smaller relative difference are treated as one multiple eigenvalue.
 _TOGETHER = 1e-5
+# Relative difference of eigenvalues that is rounding; and of vectors of real ones.
+_EQUAL, _NO_PART = 1e-8, 1e-6
 # Imaginary parts below this times the size of an eigenvalue are rounding.
 _REAL = 1e-9
 # Singular values of the vectors of free motions, relative, that are not rounding.
@@ -196,7 +198,7 @@ class QuadraticPencil:
     def _of_group(self, values, X):
         """[(value, vector, rounding error)] of one (multiple) eigenvalue."""
         middle = values.mean()
-        X = X / np.linalg.norm(X, axis=0)
+        X = _real_basis(X / np.linalg.norm(X, axis=0))
         Y = X.conj() if self._symmetric else self._left(middle, X)
         m, c, k = (Y.conj().T @ (a @ X) for a in (self.M, self.C, self.K))
         size, none = len(m), np.zeros_like(m)
@@ -207,6 +209,8 @@ class QuadraticPencil:
             roots, turns = linalg.eig(np.block([[none, eye], [-k, -c]]), np.block([[eye, none], [none, m]]))
             turns = turns[:size]
         near = np.argsort(np.abs(roots - middle))[:size]
+        if size > 1 and not np.iscomplexobj(X) and np.ptp(np.abs(roots[near])) <= _EQUAL * abs(middle):
+            turns[:, near] = eye  # real vectors rather than any combinations of them
         weights = np.linalg.pinv(2 * middle * m + c)  # of left vectors, for unit slopes
         bound, found = np.abs(Y) @ np.abs(weights).T, []
         for j in near:
@@ -225,3 +229,12 @@ class QuadraticPencil:
         for _ in range(2):
             Y, _ = np.linalg.qr(self._solved(factors, Y.astype(complex), "H"))
         return Y
+
+
+def _real_basis(X):
+    """A real basis of the space of several vectors (size, m), where there is one; else the vectors."""
+    if X.shape[1] == 1:
+        return X
+    U, sizes, _ = np.linalg.svd(np.column_stack([X.real, X.imag]), full_matrices=False)
+    m = X.shape[1]
+    return U[:, :m] if sizes[m] <= _NO_PART * sizes[0] else X

@@ -146,8 +146,10 @@ class Buckling(Shapes):
 
 # Largest number of things that are left out to name in a sentence.
 _NAMED = 6
-# Growth rates below this, over the size of the eigenvalue, are none; and areas of ellipses over those of circles.
-_NO_GROWTH, _NO_WHIRL = 1e-9, 1e-3
+# Growth rates below this many estimated errors, or below this over the size of the eigenvalue, are none; and areas of ellipses over those of circles.
+_UNSURE, _NO_GROWTH, _NO_WHIRL = 3.0, 1e-9, 1e-3
+# Share of the area of a circle above which a motion is one.
+_ROUND = 0.99
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -169,12 +171,14 @@ class Modes(Shapes):
             the real parts of omega^2, but the vibrations differ, and flutter is not detected.
         left_out: what resists or follows velocities and is not in the modes, in words; () where nothing is left out.
         rate: (3,) the steady rotation, rad/s, inertial, or None.
+        rounding: (n,) estimated relative errors by rounding alone, as of `error`.
     """
 
     eigenvalues: np.ndarray
     negative_modes: int
     left_out: tuple[str, ...] = ()
     rate: np.ndarray | None = None
+    rounding: np.ndarray | float = 0.0
 
     title = "Natural vibrations"
     _on_screen = ("k", "frequency", "damping_ratio", "growth_rate", "motion", "error", "place", "direction")
@@ -238,8 +242,9 @@ class Modes(Shapes):
 
     @property
     def growth_rates(self):
-        """(n,) 1/s: modes grow as exp(growth_rate t), and decay where it is negative."""
-        return self.eigenvalues.real
+        """(n,) 1/s: modes grow as exp(growth_rate t), and decay where it is negative; 0 where it is within rounding."""
+        rates = self.eigenvalues.real
+        return np.where(np.abs(rates) > np.abs(self.eigenvalues) * self.rounding, rates, 0.0)
 
     @property
     def damping_ratios(self):
@@ -250,16 +255,16 @@ class Modes(Shapes):
         return np.divide(-self.growth_rates, sizes, out=np.zeros(len(self)), where=sizes > 0) + 0.0
 
     @property
-    def rounding(self):
-        """(n,) 1/s: growth rates below this are none: the estimated error of the eigenvalues, at least 1e-9 of them."""
-        error = self.error if self.complex else self.error / 2
-        return np.abs(self.eigenvalues) * np.maximum(np.nan_to_num(error), _NO_GROWTH)
+    def unsure(self):
+        """(n,) 1/s: growth rates below this are none: three estimated errors, at least 1e-9 of the eigenvalue."""
+        share = np.maximum(_UNSURE * np.fmax(self.error, self.rounding), _NO_GROWTH)
+        return np.abs(self.eigenvalues) * share / (1 if self.complex else 2)
 
     @property
     def kind(self):
-        """(n,) "oscillates" (and decays, or neither), "flutter" (oscillates and grows), "divergence" (grows without an
-        oscillation), "overdamped" (decays without one), "free"."""
-        turns, grows = self.eigenvalues.imag > 0, self.growth_rates > self.rounding
+        """(n,) "oscillates" (and decays, or neither), "flutter" (oscillates and grows, by more than the estimated
+        error), "divergence" (grows without an oscillation), "overdamped" (decays without one), "free"."""
+        turns, grows = self.eigenvalues.imag > 0, self.growth_rates > self.unsure
         still = np.where(self.eigenvalues == 0, "free", np.where(grows, "divergence", "overdamped"))
         return np.where(turns, np.where(grows, "flutter", "oscillates"), still)
 
@@ -279,17 +284,34 @@ class Modes(Shapes):
             1 forward (right-handed about that axis, so with the rotation), -1 backward, 0 where no section moves along
             more than a line.
         """
-        k, moved = self.number(k), self.shapes[self.number(k), self._rows(rod)[1], :3]
-        rod = self.rod(rod)
+        share = self._roundness(k, self._rows(rod)[1], self.rod(rod))
+        return int(np.sign(self._seen_at_rest(k, share))) if abs(share) > _NO_WHIRL else 0
+
+    def _roundness(self, k, rows, rod):
+        """The areas of the ellipses of nodes over those of circles: from -1, backward, to 1, in the rotating frame."""
+        if self.twists(k):
+            return 0.0
+        moved = self.shapes[self.number(k), rows, :3]
         axis = rod.curve.frame(rod.length / 2)[:, 2] if self.rate is None else self.rate / np.linalg.norm(self.rate)
-        # d/dt of the angle: the position is Re(x exp(i omega t))
-        areas = np.imag(np.cross(moved, moved.conj()) @ axis).sum() / 2
+        areas = np.imag(np.cross(moved, np.conj(moved)) @ axis).sum()
         across = moved - np.multiply.outer(moved @ axis, axis)
-        share = areas / max(np.sum(np.abs(across) ** 2) / 2, 1e-300)
-        if abs(share) < _NO_WHIRL:
-            return 0
+        size = np.sum(np.abs(across) ** 2)
+        return areas / size if size > _NO_WHIRL**2 * np.sum(np.abs(moved) ** 2) else 0.0
+
+    def _seen_at_rest(self, k, share):
+        """rad/s, forward positive: of a motion along circles in the rotating frame."""
         spin = 0.0 if self.rate is None else np.linalg.norm(self.rate)
-        return int(np.sign(np.sign(share) * self.eigenvalues[k].imag + spin))
+        return np.sign(share) * self.eigenvalues[self.number(k)].imag + spin
+
+    @property
+    def inertial_frequencies(self):
+        """(n,) Hz, as seen by an inertial observer: of whirl along circles in a steady rotation its rate in space; NaN
+        of other motions in a rotation, which have several frequencies there."""
+        if self.rate is None:
+            return self.frequencies
+        shares = [self._roundness(k, slice(None), self.rod()) for k in range(len(self))]
+        rates = [self._seen_at_rest(k, share) if abs(share) > _ROUND else np.nan for k, share in enumerate(shares)]
+        return np.abs(rates) / (2 * math.pi)
 
     def label(self, k):
         value, kind = self.eigenvalues[k], self.kind[k]

@@ -11,6 +11,7 @@ from cosserat_fenicsx.quantities import Quantity
 from cosserat_fenicsx.results import screen
 from cosserat_fenicsx.results.accuracy import leading_of
 from cosserat_fenicsx.results.compared import NAMES, Errors, all_cell_nodes, of_sections, sizes_of, words_of
+from cosserat_fenicsx.results.modes_along import ModesAlong
 from cosserat_fenicsx.results.records import Event, Records
 from cosserat_fenicsx.results.recovery import element_contact
 from cosserat_fenicsx.results.threads import Threads
@@ -21,7 +22,7 @@ from cosserat_fenicsx.scene.describe import actions_in_words
 from cosserat_fenicsx.scene.parameters import Parameter, check_once
 from cosserat_fenicsx.scene.rod import RodOrName
 
-_KINDS = {"limit": "Limit point", "bifurcation": "Bifurcation"}
+_KINDS = {"limit": "Limit point", "bifurcation": "Bifurcation", "flutter": "Flutter"}
 # The state of a point by the sign of its number of negative modes.
 _STATES = {0: "stable", 1: "unstable", -1: "critical"}
 
@@ -74,7 +75,7 @@ class Path(RodResult):
         error: (n,) the largest of those that `tol` bounds; NaN where not estimated.
         bounded: names of those that `tol` bounds.
         rounding: the error of positions and rotations that the rounding of the residual alone may cause, relative.
-        events: every `Event` of the path in order: limit points and bifurcations.
+        events: every `Event` of the path in order: limit points and bifurcations, and flutter after `modes`.
         left: whether the path continues on a branch from its first bifurcation.
         control: "load", or "arc" where the path, or a part of it, was followed in arc length.
     """
@@ -86,7 +87,7 @@ class Path(RodResult):
     galerkin = False
     _computed = (*RodResult._computed, "_contact", "_cut", "conservative", "_reference", "_roughness", "_in_elements")
     # functions of a path that compute its `conservative` and its `sensitivity`
-    _potential = _differentiated = None
+    _potential = _differentiated = _vibrating = None
 
     def __init__(self, *args, **more):
         super().__init__(*args, **more)
@@ -104,13 +105,14 @@ class Path(RodResult):
         )
 
     @classmethod
-    def of(cls, model, why=(), potential=None, differentiated=None):
+    def of(cls, model, why=(), potential=None, differentiated=None, vibrating=None):
         """See `Result`; `potential`: a function of the path that computes its `conservative`; `differentiated`: one of
-        the path, a query and parameters that computes its `sensitivity`."""
+        the path, a query and parameters that computes its `sensitivity`; `vibrating`: one of the path, a number and
+        `damped` that computes its `modes`."""
         formulation = model.signature.formulation
         path = super().of(model, formulation.name, why)
         path.rounding, path.galerkin = formulation.force.rounding * model.round_off, formulation.galerkin
-        path._potential, path._differentiated = potential, differentiated
+        path._potential, path._differentiated, path._vibrating = potential, differentiated, vibrating
         return path
 
     @cached_property
@@ -345,6 +347,22 @@ class Path(RodResult):
         `rounding`."""
         sizes = self._reference.sizes
         return self._reference.rounding / sizes.max(axis=1, initial=1e-300)[:, None]
+
+    def modes(self, count: int = 6, *, damped: bool | None = None) -> ModesAlong:
+        """The modes at every point of the path, on its mesh, followed from point to point.
+
+        Where a vibration begins to grow between two points, the load factor is located by bisection on the growth rate,
+        to a relative 1e-9, and joins `events` as "flutter". Its error is the difference from elements twice as long,
+        where load control leads there.
+
+        Args:
+            count: how many at each point, see `modes` of the package; flutter of a higher mode is not seen.
+            damped: see there.
+
+        Raises:
+            SceneError, NotConverged: as of `modes`; an empty path; more Gauss points than the degree.
+        """
+        return self._vibrating(self, count, damped)
 
     def mode(self, event: Event, rod: RodOrName | None = None) -> np.ndarray:
         """(nodes, 3) the mode of an event at the nodes of a rod (default the first), see `Event`."""

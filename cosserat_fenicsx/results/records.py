@@ -132,19 +132,21 @@ def _like(values, parts):
 
 @dataclass(frozen=True, eq=False)
 class Event:
-    """A limit point or a bifurcation of a path.
+    """A limit point, a bifurcation, or the onset of flutter on a path.
 
     Attributes:
-        kind: "limit", where the load factor turns, or "bifurcation", where another path crosses.
+        kind: "limit", where the load factor turns, "bifurcation", where another path crosses, or "flutter" (of
+            `Path.modes`), where a vibration begins to grow.
         load_factor: located to a relative 1e-6.
         mode: (N, 3) displacements, inertial, of all nodes of all rods in the scene's order, the largest of length 1:
-            the path's own direction at a limit point, the buckling mode at a bifurcation. `Path.mode` picks a rod.
+            the path's own direction at a limit point, the buckling mode at a bifurcation, the mode that grows in flutter.
+            `Path.mode` picks a rod.
         after: index of the path's last point before it; -1 where there is none.
         residual: how nearly the tangent is singular: the stiffness against the mode at the event over that in the
             unloaded state; events with more than 1e-5 are not listed. The stiffness against a motion v is
             1/(v S^-1 v), with S the tangent in displacements and rotations. The ratio hardly depends on the mesh; where
             the stiffness decreases linearly with the load, as of a straight column, it is the relative error
-            of the load factor.
+            of the load factor. Of flutter: the growth rate over the size of the eigenvalue.
         error: relative difference of the load factor from the same event on the previous mesh; NaN where the
             mesh was given.
         stage: see `Path`.
@@ -162,6 +164,8 @@ class Event:
 # Largest relative difference of the load factors of corresponding events on two meshes.
 _SAME = 1e-2
 _KINDS = {"limit": "a limit point", "bifurcation": "a bifurcation"}
+#: All kinds of events, as files number them.
+KINDS = ("bifurcation", "limit", "flutter")
 # Differences are relative to the event's load factor, or to this times the largest one of the path if that is larger.
 _LEAST = 1e-3
 

@@ -177,6 +177,8 @@ def derivatives_of(path, query, parameters):
 def _of_event(path, event, parameters):
     if not any(event is known for known in path.events):
         raise SceneError("sensitivity: the event does not belong to this path: expected one of path.events")
+    if event.kind == "flutter":
+        raise SceneError("sensitivity: the event is the onset of flutter: expected a limit point or a bifurcation")
     if event.kind == "bifurcation" and not path.conservative:
         raise SceneError("sensitivity: derivatives of bifurcations are known for loads with a potential alone")
     found = parameters_of(path.scene, parameters, critical=True)

@@ -23,12 +23,12 @@ from cosserat_fenicsx.scene.rod import require_inertia
 from cosserat_fenicsx.scene.scene import Scene, check_magnitudes
 from cosserat_fenicsx.scene.signals import at
 from cosserat_fenicsx.scene.statical import without_mechanism
+from cosserat_fenicsx.statics.arguments import check_arguments
 from cosserat_fenicsx.statics.circulatory import circulatory_part
 from cosserat_fenicsx.statics.meshes import layers_of, until_two_meshes_agree
 from cosserat_fenicsx.statics.path.follower import standing
 from cosserat_fenicsx.statics.problem import solvers_of
 from cosserat_fenicsx.statics.small_motions import Bodies, resisting, stiffness
-from cosserat_fenicsx.statics.solve import check_arguments
 from cosserat_fenicsx.statics.stability import shapes_of
 
 _MOST_ELEMENTS = 128
@@ -132,17 +132,34 @@ def modes(
             f"the accuracy tol = {tol:g} is out of reach: rounding alone may change the squares by {error.max():.2g} "
             "of themselves, since the rods are so slender. Ask for a larger tol."
         )
-    left_out = (*_at_kinks(scene), *(() if found.complex else slowed))
-    values, shapes = found.numbers, found.shapes
+    return _result(scene, found, error, comm, near or 0.0)
+
+
+def at_state(scene, layout, degree, count, load_factor, damped, start):
+    """The `Modes` at one state on one mesh, on this rank alone, and the state for another start.
+
+    Args:
+        start: see `_loaded`; others: see `modes`.
+    """
+    rotation = _rotation(scene)
+    if damped is None and (rotation is not None or _slowed(scene)):
+        damped = True
+    comm = MPI.COMM_SELF
+    found = _on_mesh(scene, layout, count, load_factor, degree, comm, damped, None, rotation, start)
+    return _result(scene, found, np.full(len(found.numbers), np.nan), comm), found.start
+
+
+def _result(scene, found, error, comm, point=0.0):
+    """The `Modes` of an `_OnMesh`, complex ones by the distance from a point."""
+    values, shapes, rounding, rotation = found.numbers, found.shapes, found.rounding, _rotation(scene)
     if found.complex:
-        order = np.argsort(np.abs(values - (near or 0.0)), kind="stable")
-        values, shapes, error = values[order], shapes[order], error[order]
+        order = np.argsort(np.abs(values - point), kind="stable")
+        values, shapes, error, rounding = values[order], shapes[order], error[order], rounding[order]
     else:
         values = np.sqrt(np.maximum(-values, 0.0)) + 1j * np.sqrt(np.maximum(values, 0.0))
-    return Modes(
-        found.state, shapes, error, found.conservative, comm, values, found.negative, left_out,
-        None if rotation is None else np.array(rotation.rate),
-    )  # fmt: skip
+    rate = None if rotation is None else np.array(rotation.rate)
+    left_out = (*_at_kinks(scene), *(() if found.complex else _slowed(scene)))
+    return Modes(found.state, shapes, error, found.conservative, comm, values, found.negative, left_out, rate, rounding)
 
 
 def _slowed(scene):
@@ -189,8 +206,8 @@ def _rotation(scene):
 
 #: What is computed on one mesh: squares, or complex eigenvalues (1/s), (n,); the lengths of boundary layers or None;
 #: their relative rounding errors (n,); shapes (n, N, 6); the number of negative modes; the `Equilibrium`; whether the
-#: loads have a potential; and whether the numbers are complex eigenvalues.
-_OnMesh = namedtuple("_OnMesh", "numbers layers rounding shapes negative state conservative complex")
+#: loads have a potential; whether the numbers are complex eigenvalues; and (r, q) and the contact force there.
+_OnMesh = namedtuple("_OnMesh", "numbers layers rounding shapes negative state conservative complex start")
 
 
 class _Following:
@@ -216,17 +233,17 @@ def assigned(before, values):
     return linear_sum_assignment(np.abs(values[None, :] - before[:, None]) / sizes[:, None])[1]
 
 
-def _on_mesh(scene, layout, count, load_factor, degree, comm, damped, near, rotation):
-    """The `_OnMesh` on one mesh."""
+def _on_mesh(scene, layout, count, load_factor, degree, comm, damped, near, rotation, start=None):
+    """The `_OnMesh` on one mesh; start: see `_loaded`."""
     loaded = load_factor or has_permanent(scene) or rotation is not None
-    with _loaded(scene, layout, load_factor, degree, comm, loaded) as (problem, stability):
+    with _loaded(scene, layout, load_factor, degree, comm, loaded, start) as (problem, stability):
         model, scales = problem.model, problem.model.scales
         negative = stability.count() if loaded else 0
         K, rows, held = stiffness(problem)
         unit = max(float(rod.profile.range[1].mass) for rod in scene.rods)
         bodies, time = Bodies(model, unit), math.sqrt(unit * scales.length**2 / scales.force)
         layers = layers_of(model) if loaded else None
-        state, rq = Equilibrium.of(model, load_factor), model.snapshot()[0]
+        state, (rq, n) = Equilibrium.of(model, load_factor), model.snapshot()
     with circulatory_part(scene, layout, degree, comm) as circulatory:
         conservative = circulatory.vanishes(rq, load_factor)
         if damped is None:
@@ -239,7 +256,7 @@ def _on_mesh(scene, layout, count, load_factor, degree, comm, damped, near, rota
             negative = np.count_nonzero(squares < 0)
         shapes = shapes_of(vectors.T, squares, rows, scales.length)
         rounding = np.where(squares == 0, 0.0, rounding / np.abs(np.where(squares == 0, 1.0, squares)))
-        return _OnMesh(squares / time**2, layers, rounding, shapes, negative, state, conservative, False)
+        return _OnMesh(squares / time**2, layers, rounding, shapes, negative, state, conservative, False, (rq, n))
     turning = None
     if rotation is not None:
         w = np.array(rotation.rate) * time
@@ -253,25 +270,34 @@ def _on_mesh(scene, layout, count, load_factor, degree, comm, damped, near, rota
     values = found.values
     shapes = shapes_of(found.vectors.T, values, rows, scales.length)
     rounding = np.where(values == 0, 0.0, found.rounding / np.abs(np.where(values == 0, 1.0, values)))
-    return _OnMesh(values / time, layers, rounding, shapes, negative, state, conservative, True)
+    return _OnMesh(values / time, layers, rounding, shapes, negative, state, conservative, True, (rq, n))
 
 
 @contextlib.contextmanager
-def _loaded(scene, layout, load_factor, degree, comm, loaded):
+def _loaded(scene, layout, load_factor, degree, comm, loaded, start=None):
     """Context manager that gives the problem, in equilibrium at a load factor, and its `NegativeModes`.
 
     A mechanism that its loads stabilise has no path from the unloaded state: its equilibrium is computed with added
     constraints (`without_mechanism`), then corrected without them.
+
+    Args:
+        loaded: whether the reference is no equilibrium.
+        start: (r, q) and contact force of all nodes and Gauss points next to the equilibrium, as of a `Record`, on
+            that mesh; None to follow the path of load control.
     """
-    held = without_mechanism(scene) if loaded else scene
-    with solvers_of(held, layout, degree=degree, comm=comm) as (problem, newton, stability):
-        if loaded:
-            standing(problem, newton, stability, load_factor)
-        if held is scene:
-            yield problem, stability
-            return
-        # the initial guess of the problem without added constraints, on the same mesh
-        rq, n = problem.model.snapshot()
+    where = "next to a point of the path"
+    if start is None:
+        where = "next to the reference, where the scene is a mechanism"
+        held = without_mechanism(scene) if loaded else scene
+        with solvers_of(held, layout, degree=degree, comm=comm) as (problem, newton, stability):
+            if loaded:
+                standing(problem, newton, stability, load_factor)
+            if held is scene:
+                yield problem, stability
+                return
+            # the initial guess of the problem without added constraints, on the same mesh
+            start = problem.model.snapshot()
+    rq, n = start
     with solvers_of(scene, layout, degree=degree, comm=comm) as (problem, newton, stability):
         problem.end_beginning()
         problem.set_load_factor(load_factor)
@@ -279,8 +305,5 @@ def _loaded(scene, layout, load_factor, degree, comm, loaded):
         newton.allow(_CORRECTIONS)
         solved = newton.solve()
         if not solved.converged:
-            raise NotConverged(
-                f"no equilibrium was found at the load factor {load_factor:g}: {solved.reason} next to the reference, "
-                "where the scene is a mechanism"
-            )
+            raise NotConverged(f"no equilibrium was found at the load factor {load_factor:g}: {solved.reason} {where}")
         yield problem, stability

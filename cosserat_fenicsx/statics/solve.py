@@ -12,7 +12,7 @@ import numpy as np
 from mpi4py import MPI
 
 from cosserat_fenicsx.algebra.eigen import reference_blas
-from cosserat_fenicsx.checks import instance, tolerance, whole
+from cosserat_fenicsx.checks import instance
 from cosserat_fenicsx.errors import SceneError, nearest
 from cosserat_fenicsx.models.choose import choose
 from cosserat_fenicsx.models.formulation import formulation_of
@@ -25,7 +25,7 @@ from cosserat_fenicsx.results.compared import NAMES, Criterion, criteria_of
 from cosserat_fenicsx.results.path import Path
 from cosserat_fenicsx.scene.action import path_dependent
 from cosserat_fenicsx.scene.scene import Scene, check_magnitudes
-from cosserat_fenicsx.scene.statical import check_no_mechanism
+from cosserat_fenicsx.statics.arguments import check_arguments, check_static
 from cosserat_fenicsx.statics.legs import Followed, Legs
 from cosserat_fenicsx.statics.meshes import first_layout, meshes_for, resolving, resolving_turns, turning_in_law
 from cosserat_fenicsx.statics.path.follower import CONTROLS
@@ -122,7 +122,7 @@ def solve(
         part, factors, any_between = (scene if leg is None else scene.of_leg(leg)), load_factors, free
         if leg is not None and leg.load_factors is not None:
             factors, any_between = _requested(leg.load_factors)
-        _check_static(part)
+        check_static(part)
         check_magnitudes(part, max(map(abs, factors)))
         options = follow
         if not steps.adaptive:
@@ -308,46 +308,3 @@ def _requested(load_factors):
         if isinstance(value, bool) or not isinstance(value, numbers.Real) or not math.isfinite(value):
             raise SceneError(f"load_factors holds {value!r}: expected finite numbers")
     return [float(value) for value in values], free
-
-
-def check_arguments(scene, tol, elements, bound=NAMES, *, owner="solve"):
-    """Refuse arguments of `solve`, or of another function of static scenes (`owner`), outside their range.
-
-    Raises:
-        SceneError: naming the argument, its value and what was expected.
-    """
-    if not isinstance(scene, Scene):
-        hint = ", as in read(file).scene" if hasattr(scene, "scene") else ""
-        raise SceneError(f"scene is a {type(scene).__name__}: expected a Scene{hint}")
-    if not scene.stages:
-        _check_static(scene)
-    elif owner != "solve":
-        raise SceneError(f"Scene.stages: {owner} knows no stages: expected `solve`, or a scene without stages")
-    tolerance(owner, tol)
-    criteria_of(bound)
-    if elements is not None:
-        whole(owner, "elements", elements)
-
-
-@per_scene
-def _check_static(scene):
-    """Refuse a scene without loads, or with parts that act in motions alone."""
-    acts = scene.loads or any(support.moves for support in scene.supports)
-    if not acts and scene.whole is scene:
-        raise SceneError(
-            "Scene.loads is empty: expected at least one load, such as Force(rod.end, (0, 0, -1)), or a Prescribed "
-            "motion"
-        )
-    for item in scene.moving:
-        raise SceneError(
-            f"Scene: the {type(item).__name__} depends on time, which a static analysis excludes: expected a vector, "
-            "a function of the arc length as Along(function), or a motion: cf.simulate(scene, duration) in Python, a "
-            "duration under [simulate] in a scene file, --duration on the command line"
-        )
-    for action in scene.actions:
-        if action.touches:
-            raise SceneError(
-                f"Scene: the {type(action).__name__} acts in motions alone: expected a TubeWall or a TubeRing for an "
-                "equilibrium, or a motion: cf.simulate(scene, duration)"
-            )
-    check_no_mechanism(scene)

@@ -28,7 +28,7 @@ from cosserat_fenicsx.numerics import ElementRule
 from cosserat_fenicsx.parts import NotData, from_data, to_data
 from cosserat_fenicsx.quantities import Quantity, Units
 from cosserat_fenicsx.results.compared import NAMES, stored_criteria
-from cosserat_fenicsx.results.records import Event, Instant, Ledger, Record, Records
+from cosserat_fenicsx.results.records import KINDS, Event, Instant, Ledger, Record, Records
 from cosserat_fenicsx.scene.scene import Scene
 
 #: Format of files of paths and motions; version of both formats.
@@ -149,7 +149,7 @@ def _solution(result):
             found |= {"error": result.error, "errors": result._errors}
         found |= {f"event_{name}": [getattr(event, name) for event in result.events] for name in _OF_EVENT}
         found["event_mode"] = [event.mode for event in result.events] or np.empty((0, result._rest.shape[0], 3))
-        found["event_is_limit"] = [event.kind == "limit" for event in result.events]
+        found["event_kind"] = [KINDS.index(event.kind) for event in result.events]
     return {name: np.array(values) for name, values in found.items() if values is not None}
 
 
@@ -276,7 +276,7 @@ def _record(numbers, k, moving):
 
 def _events(numbers):
     columns = zip(*(numbers[f"event_{name}"].tolist() for name in _OF_EVENT), strict=True)
-    kinds = ["limit" if limit else "bifurcation" for limit in numbers["event_is_limit"]]
+    kinds = [KINDS[k] for k in numbers["event_kind"].astype(int)]
     return [
         Event(kind, mode=mode, **dict(zip(_OF_EVENT, values, strict=True)))
         for kind, mode, values in zip(kinds, numbers["event_mode"], columns, strict=True)

@@ -44,6 +44,12 @@ def _conservative_along(path):
     return conservative_along(path)
 
 
+def _modes_along(path, count, damped):
+    from cosserat_fenicsx.statics.vibrating import modes_along  # late: it imports `solve`
+
+    return modes_along(path, count, damped)
+
+
 class _Enough(Exception):
     """Raised where the user's `until` returns True."""
 
@@ -60,7 +66,7 @@ class Tracing:
         self.problem, _, self.stability = solvers
         self.model, self._options, self._choice, self._bar = self.problem.model, follow, choice, bar
         why = [*choice.why, self.model.signature.formulation.words]
-        self.path = Path.of(self.model, why, _conservative_along, derivatives_of)
+        self.path = Path.of(self.model, why, _conservative_along, derivatives_of, _modes_along)
         if choice.model == "spatial":
             self._follower = Follower(*solvers, on_event=self._meet, **follow)
         else:  # planar models: load control without events; the spatial model takes over where more is needed
@@ -371,7 +377,7 @@ def read_path(file: File, *, comm: MPI.Comm | None = None) -> Path:
         SceneError: it cannot be read, is damaged, holds something else, or is of a newer release.
     """
     path = saved.read(file, Path, assembled, communicator(comm))
-    path._potential, path._differentiated = _conservative_along, derivatives_of
+    path._potential, path._differentiated, path._vibrating = _conservative_along, derivatives_of, _modes_along
     return path
 
 
