@@ -13,13 +13,16 @@ from cosserat_fenicsx.actions.centrifugal import Centrifugal as Centrifugal
 from cosserat_fenicsx.actions.fluids import AddedMass as AddedMass
 from cosserat_fenicsx.actions.fluids import Drag as Drag
 from cosserat_fenicsx.actions.fluids import LinearDrag as LinearDrag
+from cosserat_fenicsx.actions.obstacles import Cylinder as Cylinder
+from cosserat_fenicsx.actions.obstacles import Plane as Plane
+from cosserat_fenicsx.actions.obstacles import Sphere as Sphere
+from cosserat_fenicsx.actions.obstacles import Wall as Wall
 from cosserat_fenicsx.actions.springs import Dashpot as Dashpot
 from cosserat_fenicsx.actions.springs import Foundation as Foundation
 from cosserat_fenicsx.actions.springs import PointMass as PointMass
 from cosserat_fenicsx.actions.springs import Spring as Spring
 from cosserat_fenicsx.actions.tendons import Helical as Helical
 from cosserat_fenicsx.actions.tendons import Tendon as Tendon
-from cosserat_fenicsx.actions.walls import Wall as Wall
 from cosserat_fenicsx.dynamics.resuming import read_history as read_history
 from cosserat_fenicsx.dynamics.simulate import simulate as simulate
 from cosserat_fenicsx.errors import CosseratError as CosseratError

@@ -1,14 +1,20 @@
-"""Contact of a rod with the wall of a curved tube, with Coulomb friction in a known direction of slip.
+"""Contact of a rod with obstacles and walls: the gap of a point of its axis, pressure, and Coulomb friction.
 
-Pressure and friction act on the rod's surface, where it touches: friction has a moment about the centreline. The
-nearest point of the tube's axis, its tangent and its curvature vector are data.
+Obstacles and straight walls are gap functions: (position, *shape) -> distance of the position from the surface, negative
+beyond it, and the unit normal there, towards the free side. Curved tubes find their nearest point as data. Pressure and
+friction act on the rod's surface, where it touches: friction has a moment about the centreline.
 """
 
 import ufl
 
-# Lower bound of the distance from the axis over the tube's radius, since the radial direction is undefined on the axis.
+# Lower bound of the distance from an axis over the obstacle's radius, since the radial direction is undefined on it.
 # Only a ring without clearance, which is held there elastically, touches so close to it.
 _ON_AXIS = 1e-10
+# A gap (dimensionless) up to which a point touches: a rod that lies on an obstacle at rest is held by it from the first
+# Newton iteration on.
+_TOUCHES = 1e-14
+# A lower bound of the square of a friction force, dimensionless.
+_NO_FORCE = 1e-60
 
 
 def linear(depth, stiffness):
@@ -16,8 +22,104 @@ def linear(depth, stiffness):
     return stiffness * depth
 
 
+# -- gap functions -------------------------------------------------------------------------------------------------------
+
+
+def plane(r, point, normal):
+    """The gap function of a plane."""
+    return ufl.dot(r - point, normal), normal
+
+
+def sphere(r, point, radius):
+    """The gap function of a sphere, outside."""
+    return _round(r - point, radius)
+
+
+def cylinder(r, point, axis, radius):
+    """The gap function of a cylinder, outside."""
+    d = r - point
+    return _round(d - ufl.dot(d, axis) * axis, radius)
+
+
+def hole(r, point, axis, radius):
+    """The gap function of a cylinder, inside."""
+    gap, normal = cylinder(r, point, axis, radius)
+    return -gap, -normal
+
+
+def _round(away, radius):
+    size = ufl.sqrt(ufl.max_value(ufl.dot(away, away), (_ON_AXIS * radius) ** 2))
+    return size - radius, away / size
+
+
+# -- virtual work ------------------------------------------------------------------------------------------------------
+
+
+def at_surface(test, normal, pressure, friction, arm):
+    """Virtual work of a pressure along the normal and of a friction force at the distance `arm` from the axis."""
+    return ufl.dot(pressure * normal + friction, test.phi_r) - ufl.dot(arm * ufl.cross(normal, friction), test.phi)
+
+
+def pressed(gap, stiffness, *law, pressure=linear):
+    """The pressure, per length, of what is stiff at a gap."""
+    return pressure(ufl.conditional(ufl.le(gap, _TOUCHES), -gap, 0), stiffness, *law)
+
+
+def obstacle_work(point, test, surface, shape, arm, stiffness, *law, pressure=linear):
+    """Virtual work of an obstacle without friction, per length of the rod.
+
+    Args:
+        point: a `Point`; test: a `VirtualMotion`.
+        surface, shape: a gap function and its data.
+        arm: radius of the rod's surface. stiffness: force per area.
+        law: numbers of the function `pressure` after the penetration and the stiffness.
+    """
+    gap, normal = surface(point.r, *shape)
+    return pressed(gap - arm, stiffness, *law, pressure=pressure) * ufl.dot(normal, test.phi_r)
+
+
+def friction_force(point, surface, shape, arm, stiffness, friction, stick, moved, turned, held):
+    """The normal, the pressure and the friction force of an obstacle, per length of the rod, with Coulomb's law.
+
+    The surface sticks elastically: the force changes by -stick times the slip since the last accepted state, and is
+    returned to friction times the pressure where it is larger (return mapping; Simo & Hughes, Computational
+    Inelasticity, 1998, ch. 1). Slip is that of the material point that touched in
+    that state, so a rod that rolls does not slip. It begins where the point touches: a rod that is laid down has no
+    friction from its way there. In the second variation the limit is fixed: where a rod slips, friction is a dead force.
+
+    Args:
+        see `obstacle_work`; friction: the coefficient; stick: force per area.
+        moved, turned, held: of the last accepted state: the displacement; the normal there, turned back by the rotation
+            from the reference, minus the normal at rest; the friction force.
+    """
+    gap, normal = surface(point.r, *shape)
+    gap_before, before = surface(point.rest + moved, *shape)
+    touched = surface(point.rest, *shape)[1] + turned
+    slip = point.u - moved - arm * (point.R * touched - before)
+    trial = held - stick * slip
+    trial = trial - ufl.dot(trial, normal) * normal
+    pressure = pressed(gap - arm, stiffness)
+    limit = pressed(surface(point.fixed.r, *shape)[0] - arm, stiffness)
+    size, most = ufl.sqrt(ufl.max_value(ufl.dot(trial, trial), _NO_FORCE)), friction * ufl.max_value(limit, 0)
+    share = ufl.conditional(ufl.le(size, most), 1, most / size)
+    touches = ufl.And(ufl.le(gap - arm, _TOUCHES), ufl.le(gap_before - arm, _TOUCHES))
+    return normal, pressure, ufl.conditional(touches, share, 0) * trial
+
+
+def rough_work(point, test, surface, shape, arm, stiffness, *data):
+    """Virtual work of an obstacle with friction, see `friction_force`."""
+    return at_surface(test, *friction_force(point, surface, shape, arm, stiffness, *data), arm)
+
+
+def remembered(point, surface, shape, arm, stiffness, *data):
+    """What `friction_force` remembers of an accepted state: `moved`, `turned`, `held`."""
+    normal, _, force = friction_force(point, surface, shape, arm, stiffness, *data)
+    return [point.u, ufl.transpose(point.R) * normal - surface(point.rest, *shape)[1], force]
+
+
 def wall_work(point, test, c0, t0, k0, clearance, stiffness, spring, anchor, along, across, arm, *law, pressure=linear):
-    """Virtual work of the wall, per length of the rod.
+    """Virtual work of the wall of a curved tube, with Coulomb friction in a known direction of slip, per length of the
+    rod.
 
     With d0 = r - c0 the nearest point moves by sigma = t0 . d0/(1 - k0 . d0) along the axis, which is zero in value and
     gives the derivative of the projection: c = c0 + t0 sigma, t = t0 + k0 sigma. The distance from the axis is
@@ -40,8 +142,8 @@ def wall_work(point, test, c0, t0, k0, clearance, stiffness, spring, anchor, alo
     rho = d - ufl.dot(t, d) * t
     a = ufl.sqrt(ufl.max_value(ufl.dot(rho, rho), (_ON_AXIS * (clearance + arm)) ** 2))
     e = rho / a
-    p = pressure(ufl.max_value(a - clearance, 0), stiffness, *law)
+    p = pressed(clearance - a, stiffness, *law, pressure=pressure)
     friction = p * ufl.dot(e, e) * (along * t - across * ufl.cross(t, e))
     held = point.r - anchor
-    force = friction - p * e - spring * (held - ufl.dot(t, held) * t)
-    return ufl.dot(force, test.phi_r) + ufl.dot(arm * ufl.cross(e, friction), test.phi)
+    bed = spring * (held - ufl.dot(t, held) * t)
+    return at_surface(test, -e, p, friction, arm) - ufl.dot(bed, test.phi_r)

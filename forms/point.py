@@ -19,13 +19,15 @@ class Point:
         theta: rotation vector from the reference; in space for angles below a full turn, in a plane for any angle.
         curvature: axial vector of R^T R', `equilibrium.Motion.curvature`; None in the determinate models.
         r_t, omega: velocity and angular velocity; zero at rest.
+        fixed: the same point with values that `variation` does not differentiate, such as the limit of friction; by
+            default the point itself.
         rest, frame: functions that give the position at rest, from the same origin, and [d_1R d_2R d_3R], the directors
             at rest as columns. They are called only where a virtual work needs them.
     """
 
-    def __init__(self, r, r_s, R, theta, *, rest, frame, curvature=None, r_t=NONE, omega=NONE):
+    def __init__(self, r, r_s, R, theta, *, rest, frame, curvature=None, r_t=NONE, omega=NONE, fixed=None):
         self.r, self.r_s, self.R, self.theta, self.curvature = r, r_s, R, theta, curvature
-        self.r_t, self.omega = r_t, omega
+        self.r_t, self.omega, self.fixed = r_t, omega, fixed or self
         self._rest, self._frame = rest, frame
 
     @cached_property
@@ -51,8 +53,8 @@ class Point:
             ufl.as_vector([turned[2, 1] - turned[1, 2], turned[0, 2] - turned[2, 0], turned[1, 0] - turned[0, 1]]) / 2
         )
         theta = self.theta + _by_small_rotation(self.theta, small)
-        others = dict(rest=self._rest, frame=self._frame, r_t=self.r_t, omega=self.omega)
-        return Point(*moved, theta, curvature=curvature, **others)
+        unchanged = {"rest": self._rest, "frame": self._frame, "r_t": self.r_t, "omega": self.omega}
+        return Point(*moved, theta, curvature=curvature, **unchanged, fixed=self)
 
 
 def _by_small_rotation(theta, phi):

@@ -11,7 +11,7 @@ import ufl
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.actions.fluids import AddedMass, LinearDrag
-from cosserat_fenicsx.actions.walls import straight_wall
+from cosserat_fenicsx.forms import contact
 from cosserat_fenicsx.models.traits import traits_of
 from cosserat_fenicsx.scene import action
 
@@ -108,7 +108,7 @@ def test_a_rod_outside_its_wall_is_refused():
     for point, along, words in (
         ((0, 0, 0), (0, 0, 1), "at s = 1 m by 0.95 m"), ((0, 0, 0.2), (1, 0, 0), "at s = 0 m by 0.15 m"),
     ):  # fmt: skip
-        with pytest.raises(cf.SceneError, match=f"lies outside it at rest, {words}: expected a point"):
+        with pytest.raises(cf.SceneError, match=f"lies beyond its surface at rest, {words}: expected a point"):
             cf.Wall(ROD, point, along, 0.05)
 
 
@@ -438,7 +438,9 @@ class RoundWall(cf.LineAction):
             action.scalar(np.full(len(r), self.stiffness), "N/m^2"),
         )
 
-    work = staticmethod(straight_wall)
+    @staticmethod
+    def work(point, test, axis, direction, clearance, stiffness):
+        return contact.obstacle_work(point, test, contact.hole, (axis, direction, clearance), 0, stiffness)
 
 
 @dataclass(frozen=True)
@@ -661,7 +663,15 @@ def test_a_load_from_a_file_beside_its_scene(tmp_path):
 
 def test_units_of_data_are_what_their_names_say():
     """Powers of force, length and time: kg is N s^2/m."""
-    base = {"1": (0, 0, 0), "rad": (0, 0, 0), "N": (1, 0, 0), "m": (0, 1, 0), "s": (0, 0, 1), "kg": (1, -1, 2)}
+    base = {
+        "1": (0, 0, 0),
+        "axis": (0, 0, 0),
+        "rad": (0, 0, 0),
+        "N": (1, 0, 0),
+        "m": (0, 1, 0),
+        "s": (0, 0, 1),
+        "kg": (1, -1, 2),
+    }
     for unit, (*powers, _) in action._UNITS.items():
         over, _, under = unit.removesuffix(" from origin").partition("/")
         expected = np.zeros(3)

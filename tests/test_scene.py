@@ -424,7 +424,7 @@ REFUSED_NAMES = {
     "no station": (lambda r: cf.Scene(r, [cf.Clamp("post")]), "expected 'rod.start', 'rod.end' or 'rod@s'"),
     "an unknown rod": (lambda r: cf.Scene(r, (), [cf.Foundation("pier", 1.0)]), "Scene.loads[0].rod = 'pier'"),
     "a place inside a wall": (
-        lambda r: cf.Scene(r, (), [cf.Wall("beam", (0, 0, 0), (0, 0, 1), 0.1)]), "rod 'beam' lies outside it"),
+        lambda r: cf.Scene(r, (), [cf.Wall("beam", (0, 0, 0), (0, 0, 1), 0.1)]), "rod 'beam' lies beyond its surface"),
     "a joint apart": (lambda r: cf.Scene(r, (), (), [cf.Joint("post.start", "beam.start")]), "they are 2 m apart"),
     "a number": (lambda r: cf.Clamp(3), "Clamp.station = 3: expected a station such as rod.end, or its name"),
     "a rod for a station": (lambda r: cf.Clamp(r[0]), "Clamp.station = <Rod 'post': Line, length 2 m>: expected"),

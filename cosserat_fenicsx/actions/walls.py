@@ -1,7 +1,7 @@
-"""Walls around rods, such as the wall of a borehole.
+"""Walls of curved tubes around rods, such as the wall of a borehole.
 
-`Wall` is straight and has no friction; `TubeWall` and `TubeRing` have friction in a known direction of slip; `HoleWall`
-and `HoleRing`, in motions, set-valued friction.
+`TubeWall` and `TubeRing` have friction in a known direction of slip; `HoleWall` and `HoleRing`, in motions, set-valued
+friction. Straight walls are obstacles (actions/obstacles.py).
 """
 
 from collections import namedtuple
@@ -10,11 +10,9 @@ from functools import cache
 from typing import Annotated
 
 import numpy as np
-import ufl
 
 from cosserat_fenicsx.checks import Numbers, number, refuse, vector
-from cosserat_fenicsx.errors import SceneError
-from cosserat_fenicsx.forms.contact import linear, wall_work
+from cosserat_fenicsx.forms.contact import wall_work
 from cosserat_fenicsx.parts import (
     Items,
     Length,
@@ -24,7 +22,6 @@ from cosserat_fenicsx.parts import (
     Several,
     Speed,
     Stiffness,
-    UnitVector,
     WallStiffness,
     at_least,
     between,
@@ -35,11 +32,6 @@ from cosserat_fenicsx.scene import action
 from cosserat_fenicsx.scene.action import LineAction, PointAction
 from cosserat_fenicsx.scene.rod import Rod, RodOrName, StationOrName
 
-# Samples along a rod; tolerance, relative to its length, by which it may lie outside the clearance at rest.
-_SAMPLES, _OUTSIDE = 257, 1e-9
-# Distances from the axis below this fraction of the clearance are replaced by it: the radial direction is undefined on
-# the axis, and there is no contact there.
-_ON_AXIS = 1e-6
 # Half the length of the ramp that replaces a jump of radius or friction, over the smallest radius; upper bound, over
 # the shortest piece.
 _RAMP, _OF_PIECE = 0.05, 0.25
@@ -69,7 +61,7 @@ def _with_law(work, pressure):
     return of_law
 
 
-class _Pressing:
+class Pressing:
     """A wall whose pressure may have a `law`. `wall_work`: its virtual work, a function with the keyword `pressure`."""
 
     law = None
@@ -123,69 +115,7 @@ def value_at(given, x):
     return np.array([value for _, value in given])[np.searchsorted([end for end, _ in given], x)]
 
 
-def straight_wall(point, test, a, t, clearance, kp, *law, pressure=linear):
-    """Virtual work of a straight wall without friction; a, t: a point and the direction of its axis."""
-    d = point.r - a
-    away = d - ufl.dot(d, t) * t
-    rho = ufl.sqrt(ufl.max_value(ufl.dot(away, away), (_ON_AXIS * clearance) ** 2))
-    return -pressure(ufl.max_value(rho - clearance, 0), kp, *law) / rho * ufl.dot(away, test.phi_r)
-
-
-@dataclass(frozen=True)
-class Wall(_Pressing, LineAction):
-    """A frictionless cylindrical wall that confines a rod's centreline by a penalty: a force kp max(rho - clearance, 0)
-    per unit of reference length towards the straight axis, rho the distance from it.
-
-    It is integrated with the nodes as quadrature points, which resolves contact pressures best. It is not multiplied by
-    the load factor. The pressure has a kink where contact begins: meshes that `solve` refines have element ends there,
-    for up to a dozen places in all points of a path; more of them take many elements. A softer wall is easier to solve.
-
-    Args:
-        rod: the rod.
-        point: a point of the axis, m, inertial; direction: of the axis.
-        clearance: radius of the hole minus that of the rod, m.
-        stiffness: kp, N/m^2. The penetration is the force per unit length over kp; rock and steel have 1e9 and more.
-        law: None, or a `ContactLaw` in place of the pressure in proportion to the penetration.
-
-    Raises:
-        SceneError: not a rod, no direction, numbers that are not positive, or a rod that lies outside the wall at rest.
-    """
-
-    rod: RodOrName
-    point: Annotated[Numbers, Several("length")]
-    direction: UnitVector
-    clearance: Length
-    stiffness: WallStiffness = 1e9
-    law: ContactLaw | None = None
-
-    scaled, at_nodes, presses, wall_work = False, True, True, staticmethod(straight_wall)
-
-    def validate(self):
-        if isinstance(self.rod, Rod):
-            self._check_inside()
-
-    def _check_inside(self):
-        s = np.linspace(0.0, self.rod.length, _SAMPLES)
-        away = self.rod.curve.position(s) - self.point
-        rho = np.linalg.norm(away - np.outer(away @ self.direction, self.direction), axis=1)
-        worst = int(np.argmax(rho))
-        if rho[worst] > self.clearance + _OUTSIDE * self.rod.length:
-            raise SceneError(
-                f"Wall: rod '{self.rod.name}' lies outside it at rest, at s = {s[worst]:.6g} m by "
-                f"{rho[worst] - self.clearance:.4g} m: expected a point and a direction of the axis, and a clearance, "
-                "such that all of the rod is inside"
-            )
-
-    def data(self, rod, s):
-        axis = action.vector(self.point, "m from origin"), action.vector(self.direction, "1")
-        sizes = action.scalar(self.clearance, "m"), action.scalar(self.stiffness, "N/m^2")
-        return *axis, *sizes, *self._law_data()
-
-    def holds(self, scene):
-        return _held_across(self.rod.start, self.direction) + _held_across(self.rod.end, self.direction)
-
-
-def _held_across(station, axis):
+def held_across(station, axis):
     """See `Action.holds`: a wall confines a rod across the axis (3,) of the wall."""
     return [(station, np.r_[row, 0, 0, 0]) for row in np.linalg.svd(np.reshape(axis, (1, 3)))[2][1:]]
 
@@ -208,7 +138,7 @@ class Stage:
         self.anchor = self.last.copy()
 
 
-class _Confined(_Pressing):
+class _Confined(Pressing):
     """Shared by walls along rods and at stations."""
 
     scaled, wall_work = False, staticmethod(wall_work)
@@ -340,7 +270,7 @@ class TubeWall(_Confined, LineAction):
     def holds(self, scene):
         ends = self.rod.start, self.rod.end
         tangents = self.path.nearest(None, np.array([end.s for end in ends]) + self.begins).tangent
-        return [row for end, tangent in zip(ends, tangents, strict=True) for row in _held_across(end, tangent)]
+        return [row for end, tangent in zip(ends, tangents, strict=True) for row in held_across(end, tangent)]
 
 
 @dataclass(frozen=True)

@@ -157,6 +157,11 @@ class ActionTerms:
             if term.kind.refreshed:
                 term.refresh()
 
+    def soften(self, share):
+        """Multiply the stiffness of all obstacles by a share, in statics; 1 restores it."""
+        for term in self.terms:
+            term.soften(share)
+
     @property
     def memory_functions(self):
         """The Functions of the actions' memory (history variables)."""
@@ -325,6 +330,17 @@ class Term:
             rough = self.kind.at_gauss and len(now.kinks(rod))
             self._take(nearest_polynomials(now, rod, s, *elements) if rough else now.data(rod, s), rod, rows)
         return True
+
+    def soften(self, share):
+        """See `ActionTerms`; walls whose data are refreshed have stages of their own."""
+        action, rod = self._where[0][:2]
+        if not action.presses or self.kind.refreshed:
+            return
+        self._values = None
+        self.put(0.0)
+        for array, datum in zip(self._arrays, action.data(rod, np.zeros(1)), strict=True):
+            if datum.unit == "N/m^2":
+                array *= share
 
     def _take(self, data, rod, rows):
         adds = self.kind.place == "law"

@@ -11,6 +11,7 @@ from cosserat_fenicsx.quantities import Quantity
 from cosserat_fenicsx.results import screen
 from cosserat_fenicsx.results.accuracy import leading_of
 from cosserat_fenicsx.results.compared import NAMES, Errors, all_cell_nodes, of_sections, sizes_of, words_of
+from cosserat_fenicsx.results.contacts import Contacts, contacts_of
 from cosserat_fenicsx.results.modes_along import ModesAlong
 from cosserat_fenicsx.results.records import Event, Records
 from cosserat_fenicsx.results.recovery import element_contact
@@ -18,6 +19,7 @@ from cosserat_fenicsx.results.threads import Threads
 from cosserat_fenicsx.results.result import by_name
 from cosserat_fenicsx.results.rods import RodResult
 from cosserat_fenicsx.results.sensitivity import Sensitivity, Uncertainty
+from cosserat_fenicsx.scene.action import Action
 from cosserat_fenicsx.scene.describe import actions_in_words
 from cosserat_fenicsx.scene.parameters import Parameter, check_once
 from cosserat_fenicsx.scene.rod import RodOrName
@@ -285,6 +287,17 @@ class Path(RodResult):
         """
         check_once(self.scene, standard_deviations)
         return self.sensitivity(query, standard_deviations).uncertainty(standard_deviations, correlation)
+
+    def contacts(self, obstacle: Action) -> Contacts:
+        """Where rods touch an obstacle, and the forces there; `print` shows a table of the last state.
+
+        Args:
+            obstacle: of the scene, such as a `Plane`.
+
+        Raises:
+            SceneError: something else.
+        """
+        return contacts_of(self, obstacle)
 
     @property
     def along_axis(self) -> np.ndarray:

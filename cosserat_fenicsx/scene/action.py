@@ -17,9 +17,11 @@ from cosserat_fenicsx.scene.signals import at
 Datum = namedtuple("Datum", "value unit size")
 
 # Powers of force, length and time of each unit; whether a vector with this unit is axial, like a moment: in a plane
-# motion it is normal to the plane. "m from origin" marks positions, which models measure from `Scene.origin`.
+# motion it is normal to the plane. "m from origin" marks positions, which models measure from `Scene.origin`; "axis" unit
+# vectors along axes that are normal to the plane.
 _UNITS = {
     "1": (0, 0, 0, False),
+    "axis": (0, 0, 0, True),
     "m": (0, 1, 0, False),
     "1/m": (0, -1, 0, False),
     "rad/m": (0, -1, 0, True),
@@ -106,6 +108,10 @@ class Action(Part, family="load or action", homes=("cosserat_fenicsx.scene.loads
             `actions.walls.Around` of the points.
         presses: whether it is a wall with a force on the parts of rods that touch it alone, which has a kink where
             contact begins.
+        gaps: None; or, of an obstacle, a method (rod, arc lengths s (n,), its points there (n, 3)) -> gaps (n,) between
+            the rod's surface and the obstacle, m, and unit normals (n, 3) towards the free side. It then has
+            `stiffness` (N/m^2), `friction`, `law` and `largest_step`, how far (m) a rod may move at once without passing
+            through it unseen.
         in_law: whether it is no load but a part of the law along a rod. Its `data` are then what sections have without
             stress beyond the reference, inertial in the reference: curvature and twist, rad/m, and strain, 1.
         is_thread: whether it is the tension of a thread along a rod, which is no part of the rod's contact force. Its
@@ -115,7 +121,7 @@ class Action(Part, family="load or action", homes=("cosserat_fenicsx.scene.loads
     """
 
     at_nodes, scaled, permanent, follows, memory, evolve, traits = False, True, False, False, (), None, None
-    delayed, resists, touches, presses, in_law, is_thread = None, None, False, False, False, False
+    delayed, resists, touches, presses, gaps, in_law, is_thread = None, None, False, False, None, False, False
     amplitude = 1.0
 
     def acts_on(self, rod):

@@ -189,7 +189,13 @@ class PerDirector(parts.Items):
 
 
 class Section(parts.Part, family="section"):
-    """Base of cross-sections."""
+    """Base of cross-sections.
+
+    Attributes:
+        round_radius: of the surface, m; None where the section is not round.
+    """
+
+    round_radius = None
 
     def moduli(self, material: Material | None) -> tuple:
         """(GA1, GA2, EA, EI1, EI2, GJ) in a material, N and N m^2: numbers, or arrays where fields of either are."""
@@ -355,6 +361,10 @@ class _Round(Section):
         cowper = 6 * (1 + nu) * (1 + m2) ** 2 / ((7 + 6 * nu) * (1 + m2) ** 2 + (20 + 12 * nu) * m2)
         area = (cowper if self.shear_factor is None else self.shear_factor) * A
         return A, (I, I), 2 * I, (area, area)
+
+    @property
+    def round_radius(self):
+        return self._diameters[0] / 2
 
     def stresses(self, material, force, moment):
         """The `Stress` for contact forces and moments (..., 3), N and N m, along d_1, d_2, d_3."""

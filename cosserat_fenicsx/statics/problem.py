@@ -112,6 +112,12 @@ class Problem(Equations):
         else:
             self.load_factor_array[...] = load_factor
 
+    def soften(self, share):
+        """Multiply the stiffness of all obstacles by a share; 1 restores it."""
+        self.model.actions.soften(share)
+        self._residual.refresh()
+        self.tangent_form.refresh()
+
     def end_beginning(self):
         """Set the factor of permanent loads to 1 and the load factor to 0."""
         self.begins = False

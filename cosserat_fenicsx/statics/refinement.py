@@ -25,6 +25,7 @@ from cosserat_fenicsx.results.accuracy import (
     winding_lengths,
 )
 from cosserat_fenicsx.results.compared import NAMES, POSITION
+from cosserat_fenicsx.results.contacts import Passes, check_passes
 from cosserat_fenicsx.results.records import find_again, keep_confirmed
 from cosserat_fenicsx.statics.meshes import (
     balanced,
@@ -131,11 +132,12 @@ class _Search:
         elements = max(layout.counts)
         try:
             found = self._found_on(layout)
+            check_passes(found, self._tol)
         except (NotConverged, Promoted) as problem:
             if self._usual is not None:
                 raise _TooCoarse from None
             promoted = isinstance(problem, Promoted)
-            again = problem.agrees(self._promoted) if promoted else self._failed
+            again = problem.agrees(self._promoted) if promoted else self._failed and not isinstance(problem, Passes)
             if again or elements >= _REFINEMENT.most_elements:
                 raise
             self._promoted, self._failed = (problem, self._failed) if promoted else (self._promoted, True)

@@ -105,20 +105,35 @@ def settle(problem, walls, clearance, rounding, stages, careful=(), on_stage=Non
 
 
 def _solve_stage(newton, enough, name, walls, hold):
+    failure = converge(newton, enough, (lambda: _fasten(newton, walls, hold)) if hold else None)
+    if failure:
+        raise NotConverged(f"{failure} in {name}")
+
+
+def converge(newton, enough, before=None):
+    """Take Newton steps, and shares of them where the contact alternates between two states.
+
+    Args:
+        newton: a `LimitedNewton`; enough: size of a full step that ends it, in the model's unit of length.
+        before: called before every step.
+
+    Returns:
+        str: why it failed, "" where it converged.
+    """
     moved, stalled = math.inf, 0
     for _ in range(_MOST):
         obey()
-        if hold:
-            _fasten(newton, walls, hold)
+        if before:
+            before()
         share = _SHARES[stalled // _STALLED % len(_SHARES)] if stalled and stalled % _STALLED == 0 else 1.0
         step = newton.step(share)
         if step is None:
-            raise NotConverged(f"the tangent is singular in {name}")
+            return "the tangent is singular"
         if step.share == 1.0 and step.moved <= enough:
-            return
+            return ""
         stalled = stalled + 1 if step.moved > _SLOW * moved else 0
         moved = step.moved
-    raise NotConverged(f"Newton's method has not converged after {_MOST} steps in {name}")
+    return f"Newton's method has not converged after {_MOST} steps"
 
 
 def _fasten(newton, walls, stiffness):

@@ -22,6 +22,7 @@ from cosserat_fenicsx.ranks import communicator
 from cosserat_fenicsx.remember import per_scene
 from cosserat_fenicsx.results.accuracy import FEW
 from cosserat_fenicsx.results.compared import NAMES, Criterion, criteria_of
+from cosserat_fenicsx.results.contacts import check_passes
 from cosserat_fenicsx.results.path import Path
 from cosserat_fenicsx.scene.action import path_dependent
 from cosserat_fenicsx.scene.scene import Scene, check_magnitudes
@@ -153,7 +154,9 @@ def solve(
             layout = Layout.of(scene, elements)
             for leg in legs:
                 layout = turning_in_law(leg.scene, layout, leg.load_factors, elements)
-            return along.trace(layout)
+            found = along.trace(layout)
+            check_passes(found)
+            return found
         many = legs[0].free or len(legs[0].load_factors) > FEW
         layout, usual = first_layout(legs[0].scene, degree), None
         if simple and len(legs) == 1:

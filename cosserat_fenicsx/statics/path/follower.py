@@ -149,7 +149,8 @@ class Follower:
         track = self.track
         unsure = track.here.negative_modes and track.without_potential
         return (
-            self.in_c and self._steps.adaptive and self._control != "arc" and track.neutral is None and not unsure
+            self.in_c and self._steps.adaptive and self._control != "arc" and track.neutral is None
+            and not (unsure or track.watches_steps)
         )  # fmt: skip
 
     def sweep(self, load_factors, *, every, counted):

@@ -16,6 +16,7 @@ from cosserat_fenicsx.models.connections import Connections
 from cosserat_fenicsx.models.rodmesh import Layout
 from cosserat_fenicsx.ranks import communicator
 from cosserat_fenicsx.results.accuracy import on_mesh
+from cosserat_fenicsx.results.contacts import check_passes
 from cosserat_fenicsx.results.export import saved
 from cosserat_fenicsx.results.path import Path
 from cosserat_fenicsx.results.records import Event, Record, Records
@@ -85,6 +86,10 @@ class Tracing:
 
     def _watch(self, point):
         self._bar.at(point)
+        if self.track.watches_steps:  # a rod that is beyond an obstacle in a later state has passed through it in one
+            here = Path.of(self.model, ())
+            here.append(record_of(self.problem, point.load_factor, 0, 0, 0))
+            check_passes(here, whole=self.path)
         if self._choice.promoted and point.negative_modes:
             where = f"before the load factor {point.load_factor:.4g}"
             if self.problem.model.scene.follows:

@@ -1,20 +1,25 @@
 """The points of a continuation on an equilibrium path, and the correctors that find the next one."""
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import ClassVar
 
 import numpy as np
 
 from cosserat_fenicsx.algebra.building import module
-from cosserat_fenicsx.algebra.newton import Newton
+from cosserat_fenicsx.algebra.newton import LimitedNewton, Newton
 from cosserat_fenicsx.numerics import lagrange
+from cosserat_fenicsx.statics.settling import converge
 from cosserat_fenicsx.statics.stability import NegativeModes
 
 # Smallest cosine of the angle between the negative modes of two neighbouring points.
 _SAME_MODE = 0.5
 #: Largest motion of a point that is corrected from another mesh or stage (rad, rod lengths).
 NEAR = 0.1
+# Step (rod lengths) below which Newton's full steps take over from shares of them.
+_SETTLED = 1e-10
+# Stiffness of obstacles over their own, in turn; tried where Newton's method does not converge.
+_STAGES = ((1.0,), (1e-4, 1e-3, 1e-2, 1e-1, 1.0))
 #: Motions below this are rounding (rad, rod lengths).
 NOTHING = 1e-8
 
@@ -85,11 +90,20 @@ class Track:
         self.newton, self.stability, self.max_iterations = newton, stability, max_iterations
         self.iterations, self.steps, self.failure, self.neutral = 0, 0, "", None
         self.origin, self.history = None, []
+        actions = self.model.scene.actions
+        self._touches = any(action.presses for action in actions)
+        longest = min((action.largest_step for action in actions if action.gaps is not None), default=math.inf)
+        self._longest = longest / self.model.scales.length
 
     def begin_here(self):
         """Begin the path at the problem's state and load factor."""
         self.origin = PathPoint(self.problem.load_factor, self.problem.numbers(), self.stability.count(), 0)
         self.history = [self.origin]
+
+    @property
+    def watches_steps(self):
+        """Whether steps must be so short that no rod passes through an obstacle unseen."""
+        return self._longest < math.inf
 
     @property
     def here(self):
@@ -118,7 +132,28 @@ class Track:
         if self.neutral is not None:
             return self.on_plane(numbers, load_factor, None, 0.0)
         self.put(numbers, load_factor)
-        return self._solve(self.newton)
+        solved = self._solve(self.newton)
+        return solved if solved.converged or not self._touches else self._by_shares(numbers, load_factor, solved)
+
+    def _by_shares(self, numbers, load_factor, failed):
+        """Newton's method again where rods touch obstacles, with shares of steps where it alternates between contacts,
+        and with softer obstacles first where it still does; its end is confirmed by full steps."""
+        limited, unsolved = LimitedNewton(self.problem, LIMITS.far, LIMITS.far), ""
+        for stages in _STAGES:
+            self.put(numbers, load_factor)
+            for share in stages:
+                self.problem.soften(share)
+                unsolved = converge(limited, _SETTLED)
+                if unsolved:
+                    break
+            else:
+                break
+        self.problem.soften(1.0)
+        self.iterations += limited.iterations
+        if unsolved:
+            return failed
+        solved = self._solve(self.newton)
+        return replace(solved, iterations=solved.iterations + limited.iterations)
 
     def on_plane(self, numbers, load_factor, normal, weight):
         """Newton's method for x and eta from (numbers, eta) in the plane <normal, dx> + weight d eta = 0 through them;
@@ -134,6 +169,10 @@ class Track:
         newton.allow(self.max_iterations)
         solved = newton.solve()
         self.iterations += solved.iterations
+        if solved.converged and self.watches_steps and self.history:
+            moved, _ = self.model.sizes(self.problem.numbers()[0] - self.here.numbers[0])
+            if moved > self._longest:
+                solved = replace(solved, converged=False, reason="a rod moved farther at once than an obstacle is wide")
         if not solved.converged:
             self.failure = solved.reason
         return solved

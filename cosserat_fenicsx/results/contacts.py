@@ -1,0 +1,162 @@
+"""Contact of rods with obstacles: gaps and forces at the nodes, and what passes through between them."""
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from cosserat_fenicsx.checks import refuse
+from cosserat_fenicsx.errors import NotConverged
+from cosserat_fenicsx.quantities import Quantity, Units
+from cosserat_fenicsx.results import screen
+from cosserat_fenicsx.scene.describe import describe
+
+# Least number of places in an interval between two nodes where a rod may pass through an obstacle.
+_BETWEEN = 3
+# Depth between two nodes over that at the deeper one of them up to which the mesh resolves the penetration.
+_DEEPER = 2.0
+# A friction force below this times the limit of friction is one at which the surface sticks.
+_STICKS = 1 - 1e-9
+
+
+class Passes(NotConverged):
+    """A rod passes into an obstacle between two nodes: the mesh is too coarse."""
+
+
+@dataclass(frozen=True, eq=False)
+class Contacts:
+    """Contact of rods with one obstacle at m nodes of the mesh, in n states. `print` shows where rods touch in the last.
+
+    Attributes:
+        rod: (m,) names of the rods. s: (m,) arc lengths, m.
+        gap: (n, m) between the rod's surface and the obstacle, m; negative where it presses.
+        normal: (n, m, 3) unit normals, towards the free side, inertial.
+        pressure: (n, m) along the normal, N/m.
+        friction: (n, m, 3) on the rod's surface, inertial, N/m; NaN where another obstacle touches the same node.
+        sticks: (n, m) whether the rod touches and friction is below its limit.
+        force: (n, 3) the sum of pressure and friction on all rods, inertial, N.
+    """
+
+    rod: np.ndarray
+    s: np.ndarray
+    gap: np.ndarray
+    normal: np.ndarray
+    pressure: np.ndarray
+    friction: np.ndarray
+    sticks: np.ndarray
+    force: np.ndarray
+    _title: str = field(default="", repr=False)
+
+    def __str__(self):
+        touches, rows = self.pressure[-1] > 0, []
+        edges = np.flatnonzero(np.diff(touches, prepend=False) | (self.rod != np.roll(self.rod, 1)))
+        for first, end in zip(edges, [*edges[1:], len(touches)], strict=True):
+            if touches[first]:
+                part = slice(first, end)
+                rows.append((self.rod[first], self.s[first], self.s[end - 1], self.pressure[-1, part].max(),
+                             np.linalg.norm(self.friction[-1, part], axis=1).max()))  # fmt: skip
+        if not rows:
+            return f"{self._title}: no contact in the last state"
+        given = list(zip(_COLUMNS, map(np.array, zip(*rows, strict=True)), strict=True))
+        return screen.as_text(screen.table(given, Units(), screen.ROWS, self._title))
+
+
+_COLUMNS = (
+    Quantity("rod"),
+    Quantity("touches_from", "touches from", "m"),
+    Quantity("touches_to", "to", "m"),
+    Quantity("pressure", "largest pressure", "N/m"),
+    Quantity("friction", "largest friction", "N/m"),
+)
+
+
+def contacts_of(path, obstacle):
+    """See `Path.contacts`."""
+    obstacles = [action for action in path.scene.actions if action.gaps is not None]
+    if not any(obstacle is one for one in obstacles):
+        refuse("contacts", "obstacle", obstacle, "an obstacle of the scene, such as a Plane")
+    parts = [_of_rod(path, obstacle, i) for i, rod in enumerate(path.scene.rods) if obstacle.acts_on(rod)]
+    rod, s, gap, normal, pressure, friction, sticks, weight = (
+        np.concatenate(arrays, axis=min(arrays[0].ndim - 1, 1)) for arrays in zip(*parts, strict=True)
+    )
+    force = np.einsum("m,nmi->ni", weight, pressure[..., None] * normal + friction)
+    return Contacts(rod, s, gap, normal, pressure, friction, sticks, force, describe(obstacle))
+
+
+def _of_rod(path, obstacle, i):
+    rod, x = path.scene.rods[i], path.layout.node_s(path.rule.nodes)[i]
+    acting = [one for one in path.scene.actions if one.gaps is not None and one.acts_on(rod)]
+    found = {id(one): _gaps(path, one, rod, x) for one in acting}
+    gap, normal = found[id(obstacle)]
+    pressure = obstacle.stiffness * np.maximum(-gap, 0.0) if obstacle.law is None else _at_nodes(path, i, normal)
+    friction = np.zeros_like(normal)
+    if obstacle.friction:
+        total = _density(path, i)
+        friction = np.where((gap < 0)[..., None], total - np.sum(total * normal, axis=2, keepdims=True) * normal, 0.0)
+        others = [one for one in acting if one is not obstacle]
+        also = sum(((found[id(one)][0] < 0) for one in others), np.zeros(gap.shape, dtype=bool))
+        friction[also & (gap < 0)] = np.nan
+    limit = obstacle.friction * pressure
+    sticks = (gap < 0) & (np.linalg.norm(friction, axis=2) < _STICKS * limit)
+    return np.full(len(x), rod.name), x * rod.length, gap, normal, pressure, friction, sticks, _shares(path, i)
+
+
+def _gaps(path, obstacle, rod, x):
+    """(states, n) gaps, m, and (states, n, 3) normals at arc lengths x (n,) over the rod's length."""
+    s, rest = x * rod.length, rod.curve.position(x * rod.length)
+    moved = path.motion(rod, x)[..., :3] * path.scales.length
+    found = [obstacle.gaps(rod, s, rest + u) for u in moved]
+    return tuple(np.array(part).reshape(len(moved), len(x), *tail) for part, tail in zip(
+        zip(*found, strict=True) if found else ((), ()), ((), (3,)), strict=True))  # fmt: skip
+
+
+def _at_nodes(path, i, normal):
+    return np.sum(_density(path, i) * normal, axis=2)
+
+
+def _density(path, i):
+    """(states, nodes, 3) force per length of all that acts at the nodes of a rod, N/m."""
+    density = path._stacked("densities")[1][:, path._cells(i), :, :3]
+    nodal = np.concatenate([density[:, :, :-1].reshape(len(path), -1, 3), density[:, -1:, -1]], axis=1)
+    return nodal * path.scales.force / path.scales.length
+
+
+def _shares(path, i):
+    """(nodes,) the length that belongs to each node of a rod in the quadrature with the nodes as points, m."""
+    sizes = np.diff(path.layout.breaks[i]) * path.scene.rods[i].length
+    p, shares = path.degree, np.zeros(len(sizes) * path.degree + 1)
+    np.add.at(shares, np.arange(len(sizes))[:, None] * p + np.arange(p + 1), sizes[:, None] * path.rule.lobatto)
+    return shares
+
+
+def check_passes(path, share=1e-2, whole=None):
+    """Refuse a path where a rod passes into an obstacle between two nodes far deeper than at these nodes, and by more than
+    a share of the largest displacement of that state.
+
+    Raises:
+        Passes: naming rod, place and depth; with the path `whole`, or with this one.
+    """
+    if path.scene.stages:
+        for part in path.parts.values():
+            check_passes(part, share, whole=path)
+        return
+    obstacles = [action for action in path.scene.actions if action.gaps is not None]
+    allowed = share * path.largest_displacement() if obstacles else None
+    for obstacle in obstacles:
+        for rod, x in zip(path.scene.rods, path.layout.node_s(path.rule.nodes), strict=True):
+            if not obstacle.acts_on(rod):
+                continue
+            depth = np.maximum(-_gaps(path, obstacle, rod, x)[0], 0.0)
+            places = max(_BETWEEN, math.ceil(np.diff(x).max() * rod.length / obstacle.largest_step))
+            between = x[:-1, None] + np.diff(x)[:, None] * np.arange(1, places + 1) / (places + 1)
+            inside = -_gaps(path, obstacle, rod, between.ravel())[0].reshape(len(depth), *between.shape)
+            beside = np.maximum(depth[:, 1:], depth[:, :-1])[..., None]
+            excess = inside - _DEEPER * beside - allowed[:, None, None]
+            if excess.size and excess.max() > 0:
+                k, *where = np.unravel_index(np.argmax(excess), excess.shape)
+                raise Passes(
+                    f"rod '{rod.name}' passes into {describe(obstacle)} by {inside[(k, *where)]:.3g} m between two "
+                    f"nodes, at s = {between[tuple(where)] * rod.length:.6g} m, at the load factor "
+                    f"{path.load_factors[k]:.6g}: expected more elements there",
+                    path if whole is None else whole,
+                )

@@ -1,0 +1,151 @@
+"""Rods that touch planes, cylinders and spheres, without and with friction: closed forms and solutions of boundary value
+problems by another program."""
+
+import math
+
+import numpy as np
+import pytest
+
+import cosserat_fenicsx as cf
+
+pytestmark = pytest.mark.serial
+RIGID = (math.inf, math.inf)
+
+
+def rope(EI):
+    """A section that only bends and twists."""
+    return cf.Stiffness(shear=RIGID, axial=math.inf, bending=(EI, EI), torsion=EI)
+
+
+def test_a_heavy_rod_is_lifted_from_a_plane():
+    """Its end is raised and held level: M^2 = 2 w EI h; the other numbers are those of a collocation in the suspended
+    length."""
+    w, EI, h, a = 10.0, 2.0, 0.5, 0.01
+    rod = cf.Rod(cf.Line((0, 0, a), (3.0, 0, a)), rope(EI))
+    floor = cf.Plane((0, 0, 0), (0, 0, 1), contact_radius=a)
+    lifted = cf.Prescribed(rod.start, displacement=(0, 0, h), rotation=(0, 0, 0))
+    path = cf.solve(cf.Scene([rod], [lifted], [floor, cf.LineForce(rod, (0, 0, -w), permanent=True)]), 1.0, tol=1e-4)
+    assert np.linalg.norm(path.moment(rod.start)[-1]) == pytest.approx(math.sqrt(2 * w * EI * h), rel=1e-6)
+    touch = path.contacts(floor)
+    np.testing.assert_allclose(touch.force[-1], (0, 0, 3.0 * w - 11.378592833499974), atol=1e-5)
+    lift_off = touch.s[np.argmax(touch.pressure[-1])]  # the reaction that is concentrated there
+    assert lift_off == pytest.approx(1.679164392759859, abs=np.diff(touch.s).max())
+    assert -1e-5 * h < touch.gap.min() < 0
+    assert "Plane" in str(touch) and "touches from" in str(touch)
+
+
+@pytest.mark.parametrize("obstacle", [cf.Sphere, cf.Cylinder])
+def test_a_cantilever_on_a_post(obstacle):
+    """Lowered by d, it is held up by a force 3 EI d/a^3; nodes beside the post alone do not see it."""
+    a, d = 0.7, 1e-4
+    rod = cf.Rod(cf.Line((0, 0, 0.07), (1, 0, 0.07)), rope(1.0))
+    axis = {"direction": (0, 1, 0)} if obstacle is cf.Cylinder else {}
+    post = obstacle((a, 0, 0), radius=0.05, contact_radius=0.02, **axis)
+    scene = cf.Scene([rod], [cf.Prescribed(rod.start, displacement=(0, 0, -d), rotation=(0, 0, 0))], [post])
+    path = cf.solve(scene, 1.0, elements=40)
+    assert path.model == "planar" and path.force(rod.start)[-1, 2] == pytest.approx(3 * d / a**3, rel=1e-4)
+    assert path.contacts(post).force[-1, 2] == pytest.approx(3 * d / a**3, rel=1e-4)
+
+
+class TestNothingPassesUnseen:
+    """A rod that swings onto a thin post between two nodes."""
+
+    rod = cf.Rod(cf.Line((0, 0, 0), (1, 0, 0)), rope(1.0), name="arm")
+    post = cf.Cylinder((0.53, 0, -0.05), (0, 1, 0), 0.002, contact_radius=0.002)
+    scene = cf.Scene([rod], [cf.Clamp(rod.start)], [post, cf.Force(rod.end, (0, 0, -0.6))])
+
+    def test_on_a_mesh_that_is_given(self, monkeypatch):
+        monkeypatch.setattr(cf.Cylinder, "breaks", lambda self, rod: ())
+        with pytest.raises(cf.NotConverged, match="rod 'arm' passes into Cylinder by .* expected more elements there"):
+            cf.solve(self.scene, 1.0, elements=2)
+
+    def test_on_a_mesh_that_is_chosen(self):
+        path = cf.solve(self.scene, 1.0, tol=1e-2)
+        touch = path.contacts(self.post)
+        assert touch.force[-1, 2] > 0.3 and touch.gap[-1].min() > -2e-5
+
+
+def test_a_bar_is_pulled_and_released():
+    """An elastic bar on a rough plane under F, then 0: it slides over F/(mu w), its end moves by F^2/(2 EA mu w), and half
+    of that remains; the elastic slip adds its half."""
+    w, mu, EA, F = 10.0, 0.5, 2e4, 20.0
+    rod = cf.Rod(cf.Line((0, 0, 0), (8.0, 0, 0)), cf.Stiffness((1e4, 1e4), EA, (2.0, 2.0), 2.0))
+    floor = cf.Plane((0, 0, 0), (0, 0, 1), friction=mu, contact_radius=0.0)
+    loads = [floor, cf.LineForce(rod, (0, 0, -w), permanent=True), cf.Force(rod.end, (F, 0, 0))]
+    scene = cf.Scene([rod], [cf.Prescribed(rod.start, rotation=(0, 0, 0))], loads)
+    path = cf.solve(scene, [0.5, 1.0, 0.0], elements=40, model="planar")
+    moved = F**2 / (2 * EA * mu * w)
+    slip = mu * w / (floor.stiffness / 100) / 2
+    np.testing.assert_allclose(path.displacement(rod.end)[:, 0], [moved / 4 + slip, moved + slip, moved / 2 - slip],
+                               atol=2e-7)  # fmt: skip
+    touch = path.contacts(floor)
+    np.testing.assert_allclose(touch.force[:, 0], [-F / 2, -F, 0], atol=1e-8)
+    assert touch.sticks[1, touch.s < 3.9].all() and not touch.sticks[1, touch.s > 4.1].any()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("a", "ratio"), [(0.0, 1.834657811985932), (0.01, 1.7383388423482828)])
+def test_a_stiff_rope_on_a_bollard(a, ratio):
+    """Half a turn around a cylinder: it slips at T_2/T_1, less than exp(pi mu), because it is stiff and because friction
+    acts on its surface (shooting, with the stiff parts at both ends)."""
+    mu, R, EI, half, tail = 0.2, 0.1, 0.001, math.pi / 2, 0.4
+    ends = [np.array((s * (R + a), 0, 0)) for s in (-1, 1)]
+    down = np.array((0, 0, -tail))
+    arc = cf.Rod(cf.Arc((0, 0, 0), ends[0], 2 * half, (0, 1, 0)), rope(EI))
+    one, two = cf.Rod(cf.Line(ends[0] + down, ends[0]), rope(EI)), cf.Rod(cf.Line(ends[1], ends[1] + down), rope(EI))
+    straight = cf.Actuation(arc, curvature=arc.curve.frame(0.0).T @ (0, -1 / (R + a), 0), permanent=True)
+    pulls = [cf.Force(at, (0, 0, -1.0), permanent=True) for at in (one.start, two.end)]
+    bollard = cf.Cylinder((0, 0, 0), (0, 1, 0), R, friction=mu, contact_radius=a)
+    joints = [cf.Joint(one.end, arc.start), cf.Joint(arc.end, two.start)]
+    scene = cf.Scene([one, arc, two], [], [bollard, straight, *pulls, cf.Force(two.end, (0, 0, -1.0))], joints)
+    path = cf.solve(scene, [ratio * (1 - 1e-3) - 1], elements=20, model="planar")
+    touch = path.contacts(bollard)
+    assert touch.force[-1, 2] == pytest.approx(ratio * (1 - 1e-3) + 1, rel=1e-6)
+    with pytest.raises(cf.NotConverged):
+        cf.solve(scene, [ratio * (1 + 1e-3) - 1], elements=20, model="planar", control="load")
+
+
+def test_a_rod_slides_to_rest():
+    """With the speed v on a rough plane: it stops after v/(mu g) on the way v^2/(2 mu g)."""
+    mu, g, v = 0.3, 9.81, 2.0
+    section = cf.Stiffness((1e5, 1e5), 1e5, (50.0, 50.0), 50.0, mass=1.0, inertia=(1e-3, 1e-3, 2e-3))
+    rod = cf.Rod(cf.Line((0, 0, 0), (1, 0, 0)), section)
+    floor = cf.Plane((0, 0, 0), (0, 0, 1), friction=mu, contact_radius=0.0)
+    moving = [cf.InitialVelocity(rod, linear=(0.6 * v, 0.8 * v, 0))]
+    scene = cf.Scene([rod], [], [floor, cf.Weight((0, 0, -g))], velocities=moving)
+    moved = cf.simulate(scene, 0.8, dt=5e-3, elements=2, degree=2).displacement(rod.at(0.5))[-1]
+    assert np.hypot(*moved[:2]) == pytest.approx(v**2 / (2 * mu * g), rel=1e-4)
+
+
+ROD = cf.Rod(cf.Line((0, 0, 0.01), (1, 0, 0.01)), cf.Circle(0.02), cf.Material(1e9, 0.3), name="rope")
+BEAM = cf.Rod(cf.Line((0, 0, 1), (1, 0, 1)), cf.Rectangle(0.02, 0.03), cf.Material(1e9, 0.3), name="beam")
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (lambda: cf.Plane((0, 0, 0), (0, 0, 0)), "Plane.normal = .*expected a direction"),
+        (lambda: cf.Plane((0, 0, 0), (0, 0, 1), friction=-0.1), "Plane.friction = -0.1: expected"),
+        (lambda: cf.Sphere((0, 0, 0), 0.0), "Sphere.radius = 0.0: expected"),
+        (lambda: cf.Scene([BEAM], [], [cf.Plane((0, 0, 0), (0, 0, 1))]), "contact_radius is missing.*rod 'beam'"),
+        (
+            lambda: cf.Scene([ROD], [], [cf.Plane((0, 0, 0.004), (0, 0, 1))]),
+            "Plane: rod 'rope' lies beyond its surface at rest, at s = .* m by 0.004 m",
+        ),
+        (
+            lambda: cf.Scene([ROD], [], [cf.Cylinder((0.5, 0, -0.03), (0, 1, 0), 0.032)]),
+            "Cylinder: rod 'rope' lies beyond its surface at rest, at s = 0.5 m by 0.002 m",
+        ),
+    ],
+)
+def test_refusals(make, words):
+    with pytest.raises(cf.SceneError, match=words):
+        make()
+
+
+def test_obstacles_in_a_scene_file(tmp_path):
+    """Written and read again they are the same."""
+    floor, post = cf.Plane((0, 0, 0), (0, 0, 2), friction=0.4), cf.Cylinder((0, 0, -1), (0, 1, 0), 0.5, inside=False)
+    scene = cf.Scene([ROD], [cf.Clamp(ROD.start)], [floor, post])
+    cf.write(scene, tmp_path / "scene.toml")
+    assert cf.read(tmp_path / "scene.toml").loads == scene.loads
