@@ -70,6 +70,7 @@ def test_a_ring_that_is_bent_and_then_twisted():
 
 
 SOFT = cf.Stiffness((40.0, 60.0), 200.0, (4.0, 1.0), 2.0)
+HEAVY = dataclasses.replace(SOFT, mass=0.2, inertia=(1e-3, 1e-3, 1e-3))
 
 
 @pytest.mark.parametrize("how", [cf.Clamp, cf.Pin, lambda x: cf.Prescribed(x, displacement=(0, 0, 0))])
@@ -98,14 +99,96 @@ def test_what_a_stage_has_reached_stays():
     def loads():
         return (cf.Weight((1.0, 0, -2)), cf.FollowerForce("rod.end", (0, 0.4, 0)), cf.Actuation("rod", (0, 0.5, 0.2)))
 
-    section = dataclasses.replace(SOFT, mass=0.2, inertia=(1e-3, 1e-3, 1e-3))
     weight, follower, muscle = loads()
     stages = [cf.Stage([follower], load_factors=(0, 0.5)), cf.Stage([muscle], load_factors=[0.25])]
-    path = cf.solve(column([weight], stages, section=section), elements=6)
+    path = cf.solve(column([weight], stages, section=HEAVY), elements=6)
     weight, follower, muscle = loads()
     at_once = [weight, dataclasses.replace(follower, force=(0, 0.2, 0)),
                dataclasses.replace(muscle, curvature=(0, 0.125, 0.05))]  # fmt: skip
-    other = cf.solve(column(at_once, section=section), [1.0], elements=6)
+    other = cf.solve(column(at_once, section=HEAVY), [1.0], elements=6)
     np.testing.assert_allclose(tip(path), tip(other), rtol=0, atol=1e-9)
     for name, values in other.fields(-1, "rod").items():
         np.testing.assert_allclose(path.fields(-1, "rod")[name], values, rtol=0, atol=1e-8, err_msg=name)
+
+
+@pytest.fixture(scope="module")
+def held():
+    """A push, a pin that takes over from it, a side force, and the pin's release."""
+    push, pin, side = cf.Force("rod.end", (0.8, 0.3, -0.5)), cf.Pin("rod@0.5"), cf.Force("rod@0.7", (0.1, 0.2, 0))
+    stages = [
+        cf.Stage(supports=[pin], release=[push], name="hold"),
+        cf.Stage([side]),
+        cf.Stage(release=["rod@0.5"]),
+    ]
+    return cf.solve(column([push], stages, section=SOFT))
+
+
+def test_errors_of_stages_are_those_of_the_whole_history(held):
+    """Against the same path on a mesh four times as fine."""
+    fine = cf.solve(held.scene, elements=4 * max(held.elements))
+    assert fine.stage.tolist() == held.stage.tolist() and held.error.max() <= 1e-6
+    off = np.abs(held.displacement("rod.end") - fine.displacement("rod.end")).max(axis=1)
+    assert (off[1:] <= held.errors.position[1:] * held.largest_displacement()[1:]).all()
+
+
+def test_a_saved_path_has_its_stages(held, tmp_path):
+    held[3:14].save(tmp_path / "path.h5")
+    back = cf.read_path(tmp_path / "path.h5")
+    np.testing.assert_array_equal(back.stage, held.stage[3:14])
+    for a, b in zip(back.reaction("rod@0.5"), held.reaction("rod@0.5"), strict=True):
+        np.testing.assert_array_equal(a, b[3:14])
+    np.testing.assert_array_equal(back.force("rod@0.3"), held.force("rod@0.3")[3:14])
+    held.write(tmp_path / "path.csv")
+    assert (tmp_path / "path.csv").read_text().startswith("load factor,stage,")
+
+
+def test_a_path_goes_on_from_another_one(held):
+    scene = held.scene
+    path = cf.solve(dataclasses.replace(scene, stages=()), elements=8)
+    for count in (1, 3):
+        path = cf.solve(dataclasses.replace(scene, stages=scene.stages[:count]), elements=8, start=path)
+    whole = cf.solve(scene, elements=8)
+    np.testing.assert_allclose(path.position("rod.end"), whole.position("rod.end"), rtol=0, atol=1e-9)
+    assert path.iterations[path.stage < 0].sum() == whole.iterations[whole.stage < 0].sum()
+    ended = cf.solve(scene, elements=8, until=lambda p: p.stage[-1] == 1 and p.load_factors[-1] > 0.5)
+    assert ended.stage[-1] == 1 and 0.5 < ended.load_factors[-1] < 1
+    with pytest.raises(cf.SceneError, match=r"start: expected a Path of this scene with fewer stages: dataclasses"):
+        cf.solve(column([], [cf.Stage([cf.Force("rod.end", (1, 0, 0))])]), start=whole)
+
+
+def test_stages_in_a_scene_file(held, tmp_path):
+    cf.write(held.scene, tmp_path / "scene.toml")
+    text = (tmp_path / "scene.toml").read_text()
+    assert 'release = ["stages[0].supports[0]"]' in text and 'load_factors = "0.0:1.0"' in text
+    path = cf.read(tmp_path / "scene.toml").run(elements=8)
+    np.testing.assert_array_equal(path.position("rod.end"), cf.solve(held.scene, elements=8).position("rod.end"))
+
+
+PUSH, SIDE = cf.Force("rod.end", (1, 0, 0)), cf.Force("rod@0.7", (0, 1, 0))
+
+
+@pytest.mark.parametrize(
+    ("refused", "words"),
+    [
+        (lambda: cf.Stage(), "expected a load, a support or a release: a stage without any changes nothing"),
+        (lambda: column([PUSH], [cf.Stage([PUSH])]), "is loads[0] already: expected each load and support in one"),
+        (lambda: column([PUSH], [cf.Stage([SIDE, SIDE])]), "loads[1], Force at rod@0.7, is stages[0].loads[0] already"),
+        (lambda: column([PUSH], [cf.Stage(release=[SIDE])]), "names Force at rod@0.7, which is not there: expected"),
+        (lambda: column([PUSH], [cf.Stage(release="rod.end")]), "names rod.end, which is not there: expected"),
+        (lambda: column([PUSH], 2 * [cf.Stage(release=[PUSH])]), "loads[0] has been released, or replaced, before"),
+        (lambda: column([PUSH], [cf.Stage(release=[PUSH, "loads[0]"])]), "names loads[0] twice: expected it once"),
+        (lambda: column([PUSH], [cf.Stage([cf.Spring("rod.end", 1.0)])]), "a Spring is not multiplied by the"),
+        (lambda: cf.solve(column([PUSH], [cf.Stage(release="rod.start")])), "stages[0]: Scene.supports: nothing holds"),
+        (lambda: column([PUSH], [cf.Stage(supports=[cf.Pin("rod.start")])]), "hold the same motion twice"),
+        (lambda: cf.solve(column([PUSH], [cf.Stage([SIDE])]), [0.5]), "load_factors end at 0.5, and stages[0] goes on"),
+        (lambda: cf.buckling(column([PUSH], [cf.Stage([SIDE])]), 1), "buckling knows no stages: expected `solve`"),
+        (lambda: cf.modes(column([PUSH], [cf.Stage([SIDE])], section=HEAVY), 1), "modes knows no stages: expected"),
+        (lambda: cf.simulate(column([PUSH], [cf.Stage([SIDE])], section=HEAVY), 1), "simulate knows no stages"),
+        (lambda: cf.solve(column([PUSH], [cf.Stage([SIDE])]), elements=2).sensitivity(tip, ["loads[0].force[0]"]),
+         "not known along a path through stages"),
+    ],
+)  # fmt: skip
+def test_what_stages_refuse(refused, words):
+    with pytest.raises(cf.SceneError) as found:
+        refused()
+    assert words in str(found.value)

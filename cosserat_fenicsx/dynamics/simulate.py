@@ -27,6 +27,7 @@ from cosserat_fenicsx.results.history import History
 from cosserat_fenicsx.results.path import Path
 from cosserat_fenicsx.scene.action import path_dependent
 from cosserat_fenicsx.scene.scene import Scene, check_magnitudes
+from cosserat_fenicsx.scene.stages import refuse_stages
 from cosserat_fenicsx.statics.meshes import turning_in_law
 from cosserat_fenicsx.storage.store import Nowhere, Store
 from cosserat_fenicsx.storage.stored_history import KIND, StoredHistory
@@ -119,6 +120,7 @@ def simulate(
             "simulate.start: actions with a memory begin a motion with their initial one: expected None, and a motion "
             "that applies the loads slowly"
         )
+    refuse_stages("simulate", scene)
     from_equilibrium = isinstance(start, numbers.Real) and not isinstance(start, bool)
     if load_factor is None:
         load_factor = start if from_equilibrium else 1.0

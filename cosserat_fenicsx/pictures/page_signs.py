@@ -4,7 +4,7 @@ import base64
 
 import numpy as np
 
-from cosserat_fenicsx.pictures.signs import joints_of, marks_of, sign_size, supports_of, without_sign
+from cosserat_fenicsx.pictures.signs import joints_of, marks_of, marks_of_supports, sign_size, without_sign
 from cosserat_fenicsx.pictures.symbols import COLOURS, GROUPS, arrows_along
 from cosserat_fenicsx.pictures.view import view_of
 from cosserat_fenicsx.scene.signals import at, signals_of
@@ -37,12 +37,12 @@ def signs(result, shown, shapes, span, place):
                 "colour": COLOURS[GROUPS[mark.kind]]}  # fmt: skip
 
     found = []
-    for mark in supports_of(scene):
+    for mark in marks_of_supports(result.supports_at(shown[-1])):
         axis = mark.vector if mark.kind in ("hinge", "roller") else None
         found.append({**held(mark), "axis": None if axis is None else np.asarray(axis, dtype=float).tolist()})
     for mark in joints_of(scene):
         found.append({**held(mark), "axis": None if mark.vector is None else _material(mark, mark.vector).tolist()})
-    loads = [pair for load in scene.loads for pair in _over_states(load, result, shown)]
+    loads = [pair for load in scene.all_loads for pair in _over_states(load, result, shown)]
     count = len(found) + sum(mark.station is not None for _, mark, _ in loads)
     size = sign_size(span, count)
     top = {}
@@ -75,6 +75,7 @@ def signs(result, shown, shapes, span, place):
     left_out, words = int((~drawn).sum()), without_sign(scene, False, threads=False)
     notes = [f"not drawn: {words}"] if words else []
     notes += [f"{left_out} supports, joints or loads not drawn"] if left_out else []
+    notes += ["supports of the last state"] if scene.stages else []
     _, right, _, up = view_of(span)
     data = {
         "size": unit * size,
@@ -100,7 +101,7 @@ def _over_states(load, result, shown):
             (type(load).__name__, marks[0], np.array([mark.vector for mark in marks]) if marks[0].unit else None)
             for marks in zip(*every, strict=False)  # a spring may be none at some time
         ]
-    factors = along if load.scaled and result.axis != "time" else np.ones(len(along))
+    factors = np.array([result.share_of(load, k) for k in shown])
     return [
         (type(load).__name__, mark, np.multiply.outer(factors, np.asarray(mark.vector)) if mark.unit else None)
         for mark in marks_of(at(load, 0.0), scene, 1.0)

@@ -177,6 +177,7 @@ def _draw_scene(scene):
     title = [scene.title or "Scene", *_thicker(factors), *([] if named else [f"({len(scene.rods)} rods, not named)"])]
     if any(load.scaled for load in scene.loads):
         title[0] += ": loads at load factor 1"
+    title += ["(with the loads of all its stages)"] if scene.stages else []
     _finish(plotter, pyvista, everywhere, symbols, at_rest(scene), title + _undrawn(scene, True),
             lambda labels: _name(labels, scene, letters(plotter)) if named else None)  # fmt: skip
     return plotter

@@ -31,10 +31,18 @@ class Resting:
         radii: {rod: the radius that it is drawn with, m}.
     """
 
-    factor, time = 1.0, None
+    time = None
 
     def __init__(self, radii):
         self._radii = radii
+
+    def share(self, load):
+        """The factor of a load."""
+        return 1.0
+
+    def supports(self, scene):
+        """The supports that hold."""
+        return scene.supports
 
     def line(self, rod):
         """(n, 3) the centreline of a rod, m."""
@@ -75,8 +83,13 @@ class Deformed(Resting):
     def __init__(self, result, k, radii, magnify, shift):
         super().__init__(radii)
         self._result, self._k, self._magnify, self._shift = result, k, magnify, shift
-        timed = result.axis == "time"
-        self.factor, self.time = (1.0, result.along_axis[k]) if timed else (result.along_axis[k], 0.0)
+        self.time = result.along_axis[k] if result.axis == "time" else 0.0
+
+    def share(self, load):
+        return self._result.share_of(load, self._k)
+
+    def supports(self, scene):
+        return self._result.supports_at(self._k)
 
     def line(self, rod):
         return self._sections(rod, np.linspace(0, 1, 101))[0]
@@ -101,7 +114,8 @@ def signs_of(pyvista, scene, shapes, everywhere, span):
         everywhere: all points of the drawing (n, 3), m.
         span: see `span_of`.
     """
-    last, supports, loads = shapes[-1], supports_of(scene), _acting(scene, shapes)
+    last, loads = shapes[-1], _acting(scene, shapes)
+    supports = marks_of_supports(last.supports(scene))
     to_camera, right, above, _ = view_of(span)
     count = len(supports) + sum(mark.station is not None for _, mark, _ in loads)
     size = sign_size(span, count)
@@ -142,7 +156,8 @@ def span_of(scene, shapes, everywhere):
     plane, but forces or the normal of a roller do not. The arguments are those of `signs_of`."""
     span = np.ptp(everywhere, axis=0)
     normal = np.abs(view_of(span)[0])
-    for mark in (*supports_of(scene), *(mark for _, mark, _ in _acting(scene, shapes))):
+    supports = marks_of_supports(shapes[-1].supports(scene))
+    for mark in (*supports, *(mark for _, mark, _ in _acting(scene, shapes))):
         if mark.vector is not None and mark.kind in ("force", "line force", "roller", "spring") and normal.max() == 1.0:
             vectors = np.atleast_2d(mark.vector)
             if (np.abs(vectors @ normal) > _OUT_OF_PLANE * np.linalg.norm(vectors, axis=1).max()).any():
@@ -162,9 +177,9 @@ def without_sign(scene, tubes, threads=True):
 def _acting(scene, shapes):
     """(load, mark, shape) of everything that acts, on the last shape where it does."""
     found = []
-    for load in scene.loads:
+    for load in scene.all_loads:
         for shape in reversed(shapes):
-            marks = loads_of(load, scene, shape.factor, shape.time)
+            marks = loads_of(load, scene, shape.share(load), shape.time)
             if marks:
                 found += [(load, mark, shape) for mark in marks]
                 break
@@ -214,9 +229,9 @@ class Mark:
     arm: np.ndarray = None
 
 
-def supports_of(scene):
-    """The `Mark`s of the supports."""
-    return [_support(support) for support in scene.supports]
+def marks_of_supports(supports):
+    """The `Mark`s of supports."""
+    return [_support(support) for support in supports]
 
 
 def _support(support):
@@ -243,16 +258,15 @@ def joints_of(scene):
     ]  # fmt: skip
 
 
-def loads_of(load, scene, factor=1.0, time=None):
+def loads_of(load, scene, factor, time=None):
     """The `Mark`s of a load or another action; none where it is zero, or where drawings know no sign for it.
 
     Args:
-        load: one of `scene.loads`.
-        factor: the load factor, which multiplies it if it is scaled.
+        load: one of `scene.loads`. factor: multiplies it.
         time: s; None for the time at which a load that depends on time is largest.
     """
     times = sample_times(load, scene.horizon) if time is None and signals_of(load) else [time or 0.0]
-    found = max((marks_of(at(load, t), scene, factor if load.scaled else 1.0) for t in times), key=_size)
+    found = max((marks_of(at(load, t), scene, factor) for t in times), key=_size)
     return [mark for mark in found if mark.kind in _DEVICES.values() or mark.kind == "mass" or _size([mark]) > 0]
 
 

@@ -7,6 +7,7 @@ from typing import Self
 
 import numpy as np
 
+from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.quantities import Quantity
 from cosserat_fenicsx.results import screen
 from cosserat_fenicsx.results.accuracy import leading_of
@@ -143,8 +144,8 @@ class Path(RodResult):
         """
         part = super().at_points(which)
         part.events = []
-        if self.by_mesh is not None:
-            part._known_errors, part.by_mesh = self._errors[:, which], self.by_mesh[:, which]
+        for name, values in (("_known_errors", self._errors), ("by_mesh", self.by_mesh)):
+            setattr(part, name, None if values is None else values[:, which])
         return part
 
     def with_points(self, others, which):
@@ -199,6 +200,7 @@ class Path(RodResult):
             left_out = f"{shown} of {len(self)} points: path.csv has all (-o DIR; path.write('path.csv') in Python).\n"
         return screen.table(
             [
+                *([(known["stage"], self.stage)] if self.scene.stages else []),
                 (known["load_factor"], self.load_factors),
                 (Quantity("displacement", unit="m", parts="xyz", short="d", digits=digits), self.displacement(station)),
                 (Quantity("rotation", unit="rad", noise=1e-12, digits=digits), self.rotation_angle(station)),
@@ -268,6 +270,10 @@ class Path(RodResult):
                 a query of another kind, an empty path, loads with memory.
             NotConverged: the tangent is singular at a point of the path.
         """
+        if self._differentiated is None:
+            raise SceneError(
+                "sensitivity: it is not known along a path through stages: expected a scene without stages"
+            )
         return self._differentiated(self, query, parameters)
 
     def uncertainty(

@@ -6,8 +6,10 @@ from functools import cached_property
 
 import numpy as np
 
+from cosserat_fenicsx.quantities import Quantity
 from cosserat_fenicsx.results.path import Path
 from cosserat_fenicsx.results.records import Record, Records
+from cosserat_fenicsx.results.result import by_name
 from cosserat_fenicsx.scene.rod import Station
 
 # Columns of `Records` that depend on the supports and loads of a stage.
@@ -16,12 +18,18 @@ _OF_STAGE = ("reactions", "tie_forces", "clamp_loads", "densities")
 _MODELS = ("determinate", "planar", "spatial")
 
 
+_QUANTITIES = by_name(Quantity("through_stages", "stage + share of its loads", getter="along_axis"))
+
+
 class StagedPath(Path):
     """A `Path` whose points belong to stages, `stage` (n,) their indices; -1 for the scene's own loads.
 
     Attributes:
-        parts: {stage: its whole `Path`}, each with the scene of that stage.
+        parts: {stage: its whole `Path`}, each with the scene of that stage; place: (n,) indices into these.
     """
+
+    axis = "stage"
+    _quantities, _over = _QUANTITIES, "through_stages"
 
     def __init__(self, scene, parts: Mapping[int, Path]):
         first, *_ = found = list(parts.values())
@@ -39,7 +47,7 @@ class StagedPath(Path):
         self.left = any(part.left for part in found)
         sizes = [len(part) for part in found]
         self._stage = np.repeat(list(parts), sizes)
-        self._place = np.concatenate([np.arange(size) for size in sizes])
+        self.place = np.concatenate([np.arange(size) for size in sizes])
         columns = [part._all.columns | dict.fromkeys(_OF_STAGE) for part in found if len(part)]
         if columns:
             self._expanded = Records.joined([Records(Record, x) for x in columns])
@@ -53,29 +61,55 @@ class StagedPath(Path):
     def stage(self):
         return self._stage
 
+    @property
+    def along_axis(self):
+        """(n,) the stage and the share of its last load factor that is reached: 1.5 is halfway through stage 1."""
+        ends = {leg.stage: leg.last or 1.0 for leg in self.scene.legs}
+        return self._stage + self.load_factors / np.array([ends[stage] for stage in self._stage.tolist()])
+
+    def label(self, k):
+        return f"{self._stage[k]}: {super().label(k)}"
+
+    def share_of(self, load, k):
+        leg = self._legs[self._stage[k]]
+        return sum(x.value for x in leg.standing if x.item is load) + self.load_factors[k] * sum(
+            x.value for x in leg.ramped if x.item is load
+        )
+
+    def supports_at(self, k):
+        return tuple(x.item for x in self._legs[self._stage[k]].supports)
+
+    @property
+    def _legs(self):
+        return {leg.stage: leg for leg in self.scene.legs}
+
     def part(self, stage):
         """The points of a stage, a `Path` with the scene of that stage; None where there is none."""
-        if stage not in self.parts:
+        places = self.place[self._stage == stage]
+        if not len(places):
             return None
-        whole, places = self.parts[stage], self._place[self._stage == stage]
+        whole = self.parts[stage]
         return whole if len(places) == len(whole) else whole.at_points(places)
 
     def at_points(self, which):
         found = super().at_points(which)
         which = np.asarray(which, dtype=int)
-        found._stage, found._place = self._stage[which], self._place[which]
+        found._stage, found.place = self._stage[which], self.place[which]
         return found
+
+    def with_places(self, stage, place):
+        """The points at these places of the stages."""
+        first = {k: np.flatnonzero(self._stage == k)[0] for k in np.unique(stage)}
+        return self.at_points([first[k] + i for k, i in zip(stage.tolist(), place.tolist(), strict=True)])
 
     def with_points(self, others, which):
         """See `Path`; both hold the points of each stage in order."""
         stage = np.empty(len(which), dtype=int)
         stage[which], stage[~which] = others.stage, self.stage
         parts = {}
-        for k in self.parts:
-            mine, theirs, mask = self.part(k), others.part(k), which[stage == k]
-            parts[k] = (
-                mine.with_points(theirs, mask) if mask.any() and not mask.all() else theirs if mask.any() else mine
-            )
+        for k in np.unique(stage).tolist():
+            mine, theirs = self.part(k), others.part(k)
+            parts[k] = mine.with_points(theirs, which[stage == k]) if mine and theirs else mine or theirs
         return StagedPath(self.scene, parts)
 
     def _by_stages(self, of_part):
@@ -84,7 +118,7 @@ class StagedPath(Path):
         for k in self.parts:
             here = self._stage == k
             if here.any():
-                values = of_part(k, self.parts[k].at_points(self._place[here]))
+                values = of_part(k, self.parts[k].at_points(self.place[here]))
                 found = np.zeros((len(self), *values.shape[1:])) if found is None else found
                 found[here] = values
         return found
@@ -114,8 +148,7 @@ class StagedPath(Path):
         station = self.scene.station(support) if isinstance(support, str) else support
         if wanted == set() or (wanted is None and all(x.station != station for x in self.scene.all_supports)):
             self.scene.supports_of(support)  # refuses it
-        legs = {leg.stage: leg for leg in self.scene.legs}
-        order = list(legs)
+        legs, order = self._legs, list(self._legs)
 
         def exerted(stage, part):
             total = np.zeros((len(part), 6))

@@ -58,6 +58,14 @@ class States(OnNodes):
             expand=model.expansion(),
         )
 
+    def share_of(self, load, k):
+        """The factor of a load in state k."""
+        return float(self.along_axis[k]) if load.scaled and self.axis != "time" else 1.0
+
+    def supports_at(self, k):
+        """The supports that hold in state k."""
+        return self.scene.supports
+
     def append(self, record):
         """Add a converged state."""
         self.extend(record)

@@ -106,7 +106,7 @@ class Leg:
         ramped: those times the load factor; released ones with the opposite of what they have in `standing`.
         supports: `Named`.
         released: the released supports, indices into `supports` of the leg before.
-        words: its name in messages, with a blank in front; "" for the scene's own.
+        words: its name in messages.
     """
 
     stage: int
@@ -115,12 +115,30 @@ class Leg:
     ramped: tuple
     supports: tuple
     released: tuple = ()
-    words: str = ""
+    words: str = "the scene's own loads"
+
+    @property
+    def last(self):
+        """The load factor at its end; `solve` sees to it that the scene's own loads end at 1."""
+        return float(np.ravel(self.load_factors if self.load_factors is not None else 1.0)[-1])
 
     @property
     def depends_on_state(self):
         """Whether its scene depends on the state at its begin."""
         return bool(self.released) or any(x.value != "fixed" for x in self.supports)
+
+
+def refuse_stages(owner, scene):
+    """Refuse a scene with stages where a function would leave them out.
+
+    Raises:
+        SceneError: naming the function.
+    """
+    if scene.stages:
+        raise SceneError(
+            f"Scene.stages: {owner} knows no stages: expected `solve`, or the scene without them, "
+            "dataclasses.replace(scene, stages=())"
+        )
 
 
 def named_stages(scene, known):
@@ -198,7 +216,7 @@ def legs_of(scene):
     if acts or changes:
         legs.append(Leg(-1, None if acts else [0.0], tuple(always), tuple(ramped), tuple(supports)))
     for i, stage in enumerate(scene.stages):
-        words = f"Scene.stages[{i}]" + (f" ('{stage.name}')" if stage.name else "")
+        words = f"stages[{i}]" + (f" ('{stage.name}')" if stage.name else "")
         if legs:
             always, supports = after(legs[-1])
         for j, load in enumerate(stage.loads):
@@ -225,15 +243,14 @@ def legs_of(scene):
         begins = "moving" if legs else "fixed"  # in the reference every support is where it is
         added = [Named(f"stages[{i}].supports[{j}]", x, begins if x.moves else "held" if legs else "fixed")
                  for j, x in enumerate(stage.supports)]  # fmt: skip
-        legs.append(Leg(i, stage.load_factors, tuple(always), tuple(ramped), (*kept, *added), released, f" of {words}"))
+        legs.append(Leg(i, stage.load_factors, tuple(always), tuple(ramped), (*kept, *added), released, words))
     return legs
 
 
 def after(leg):
     """The loads and supports, lists of `Named`, that a stage after this one finds."""
-    last = float(np.ravel(leg.load_factors if leg.load_factors is not None else 1.0)[-1])
     reached = {}
-    for x in (*leg.standing, *(x._replace(value=last * x.value) for x in leg.ramped)):
+    for x in (*leg.standing, *(x._replace(value=leg.last * x.value) for x in leg.ramped)):
         reached[x.place] = x._replace(value=x.value + reached[x.place].value if x.place in reached else x.value)
     loads = [x for x in reached.values() if x.value]
     return loads, [x._replace(value="held" if x.item.moves else x.value) for x in leg.supports]
@@ -303,7 +320,10 @@ def scene_of(scene, leg, end=None):
     supports = [_placed(x, end) for x in leg.supports]
     for i in leg.released if end else ():
         loads += _reactions(end, i)
-    found = type(scene)(scene.rods, supports, loads, scene.joints, title=scene.title)
+    try:
+        found = type(scene)(scene.rods, supports, loads, scene.joints, title=scene.title)
+    except SceneError as problem:
+        raise SceneError(f"{leg.words}: {problem}") from None
     store(found, _whole=scene)  # so that elements end at the stations of all stages
     return found
 

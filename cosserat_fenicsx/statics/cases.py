@@ -90,7 +90,7 @@ def compile(  # noqa: A001  public as cf.compile
     Raises:
         SceneError: an unknown name (the message names the nearest), or an argument outside its range.
     """
-    check_arguments(scene, tol, None)
+    check_arguments(scene, tol, None, owner="compile")
     number("compile", "load_factor", load_factor, "a finite number other than 0", lambda x: 0 < abs(x) < np.inf)
     names = [over] if isinstance(over, str) else list(over)
     for name in names:

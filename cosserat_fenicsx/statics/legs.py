@@ -66,8 +66,11 @@ class Legs:
             try:
                 yield tracer
             except (NotConverged, Interrupted) as failure:
-                if failure.path is not None and leg.leg is not None:
-                    failure.path = self._joined({**self._so_far, leg.leg.stage: failure.path})
+                if leg.leg is not None:
+                    if failure.path is not None:
+                        failure.path = self._joined({**self._so_far, leg.leg.stage: failure.path})
+                    if isinstance(failure, NotConverged):
+                        failure.args = (f"{leg.leg.words}: {failure}",)
                 raise
             except Promoted as found:
                 found.leg = k
@@ -93,13 +96,14 @@ class Legs:
 
     def trace(self, layout, like=None):
         """Follow all legs; `like`: a path on a coarser mesh whose points are reused where the solver chose them."""
-        self._so_far = {}
+        self._so_far, self._ended = {}, False
         for k, leg in enumerate(self._legs):
             stage = leg.leg and leg.leg.stage
-            path = self._traced(k, layout, like if stage is None else like and like.parts[stage])
             if stage is None:
-                return path
-            self._so_far[stage] = path
+                return self._traced(k, layout, like)
+            if self._ended or (like is not None and stage not in like.parts):
+                break
+            path = self._so_far[stage] = self._traced(k, layout, like and like.parts[stage])
             self._keep(k, layout, path)
         return self._joined(self._so_far)
 
@@ -107,7 +111,11 @@ class Legs:
         leg, until = self._legs[k], self._until
         if until is not None and leg.leg is not None:
             before = dict(self._so_far)
-            until = lambda path: self._until(self._joined({**before, leg.leg.stage: path}))  # noqa: E731
+
+            def until(path):
+                self._ended = bool(self._until(self._joined({**before, leg.leg.stage: path})))
+                return self._ended
+
         if like is None and leg.leg is not None and leg.leg.stage in self._known:
             like = self._known[leg.leg.stage]
             if like.layout.keys == layout.keys:
@@ -133,8 +141,11 @@ class Legs:
         parts = {}
         try:
             for k, leg in enumerate(self._legs):
+                points = coarse.part(leg.leg.stage)
+                if points is None:
+                    continue
                 with self._tracing(k, layout) as tracer:
-                    found = tracer.corrected(coarse.part(leg.leg.stage))
+                    found = tracer.corrected(points)
                 if found is None:
                     return None
                 parts[leg.leg.stage] = found

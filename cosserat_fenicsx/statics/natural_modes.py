@@ -22,6 +22,7 @@ from cosserat_fenicsx.scene.loads import Load
 from cosserat_fenicsx.scene.rod import require_inertia
 from cosserat_fenicsx.scene.scene import Scene, check_magnitudes
 from cosserat_fenicsx.scene.signals import at
+from cosserat_fenicsx.scene.stages import refuse_stages
 from cosserat_fenicsx.scene.statical import without_mechanism
 from cosserat_fenicsx.statics.arguments import check_arguments
 from cosserat_fenicsx.statics.circulatory import circulatory_part
@@ -97,6 +98,7 @@ def modes(
                 f"modes: {describe(action)}: expected no actions whose forces come from earlier motion: rods in "
                 "its place, or the spectrum of a simulated motion, show the modes"
             )
+    refuse_stages("modes", scene)
     number("modes", "load_factor", load_factor, "a finite number", math.isfinite)
     whole("modes", "count", count)
     whole("modes", "elements", 1 if elements is None else elements)

@@ -123,8 +123,11 @@ def solve(
         part, factors, any_between = (scene if leg is None else scene.of_leg(leg)), load_factors, free
         if leg is not None and leg.load_factors is not None:
             factors, any_between = _requested(leg.load_factors)
-        check_static(part)
-        check_magnitudes(part, max(map(abs, factors)))
+        try:
+            check_static(part)
+            check_magnitudes(part, max(map(abs, factors)))
+        except SceneError as problem:
+            raise problem if leg is None else SceneError(f"{leg.words}: {problem}") from None
         options = follow
         if not steps.adaptive:
             _check_jumps(part, factors)
@@ -208,7 +211,7 @@ def _followed_before(scene, start, legs, degree):
     for leg, following in itertools.pairwise(legs):
         if leg.leg.stage == -1 and leg.load_factors[-1] != 1:
             raise SceneError(
-                f"load_factors end at {leg.load_factors[-1]:g}, and{following.leg.words} goes on from there: expected "
+                f"load_factors end at {leg.load_factors[-1]:g}, and {following.leg.words} goes on from there: expected "
                 "1 at the end; another share of the scene's own loads is a Stage with its own load_factors"
             )
     if start is None:

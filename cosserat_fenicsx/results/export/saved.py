@@ -44,7 +44,7 @@ _OF_INSTANT = _OF_RECORD | {"time": "", "rates": "N6", "clamp_forces": "C6", "wa
 _OF_LEDGER = {name: "3" if "momentum" in name else "" for name in Ledger._fields}
 _DENSITIES = {"densities_at_gauss_points": "EG6", "densities_at_nodes": "EP6"}
 _OF_PATH = ("control", "left", "rounding", "galerkin")
-_OF_EVENT = ("load_factor", "after", "residual", "error")
+_OF_EVENT = ("load_factor", "after", "residual", "error", "stage")
 
 
 def save(result, file):
@@ -68,8 +68,17 @@ def save(result, file):
             _write_variables(group, variables)
         solution = store.create_group("solution")
         solution.attrs["units"] = "1: lengths, forces and moments over the scales of the settings, inertial components"
-        for name, values in _solution(result).items():
-            _put(solution, name, values)
+        _write_solution(solution, result)
+
+
+def _write_solution(place, result):
+    """Write what a result is made of; of a path through stages, the paths of these in groups of their own."""
+    for name, values in _solution(result).items():
+        _put(place, name, values)
+    for stage, part in result.parts.items() if result.scene.stages else ():
+        group = place.create_group(f"stage {stage}")
+        _put(group, "settings", json.dumps(_settings(part), default=lambda number: number.item()))
+        _write_solution(group, part)
 
 
 def save_quantities(result, file):
@@ -140,11 +149,15 @@ def _solution(result):
     moving, records = result.axis == "time", Records.of(list(result._records))
     rule = {name: getattr(result.rule, name) for name in ("nodes", "gauss", "weights")}
     found = {"element_ends": np.concatenate(result.layout.breaks), **rule}
-    found |= {name: records[name] for name in (_OF_INSTANT if moving else _OF_POINT)}
+    staged = not moving and result.scene.stages  # its states are those of the stages
+    if staged:
+        found |= {"stage": result.stage, "place": result.place}
+    else:
+        found |= {name: records[name] for name in (_OF_INSTANT if moving else _OF_POINT)}
     if moving:
         found |= records["ledger"]._asdict()
     else:
-        found |= dict(zip(_DENSITIES, records["densities"], strict=True))
+        found |= {} if staged else dict(zip(_DENSITIES, records["densities"], strict=True))
         if result._errors is not None:
             found |= {"error": result.error, "errors": result._errors}
         found |= {f"event_{name}": [getattr(event, name) for event in result.events] for name in _OF_EVENT}
@@ -153,7 +166,7 @@ def _solution(result):
     return {name: np.array(values) for name, values in found.items() if values is not None}
 
 
-def read(file, kind, assemble, comm):
+def read(file, kind, assemble, comm, joined=None):
     """The result that `save` wrote; every rank reads the file.
 
     Args:
@@ -162,14 +175,24 @@ def read(file, kind, assemble, comm):
         assemble: function of the scene, the element ends of every rod and the units of length, force and moment, that
             returns the layout, the scales and the connections.
         comm: the MPI communicator of the result.
+        joined: of a path: the class of one through stages, of the scene and {stage: path}.
     """
     with opened(file, kind._kind) as store:
         check_format(file, store.attrs, kind._kind, FORMAT)
         if (found := store.attrs.get("kind")) != kind._kind:
             raise SceneError(f"{file}: it holds a {found}: expected a {kind._kind}; read_result reads any result")
         settings, data = (json.loads(checked(store, name)) for name in ("settings", "scene"))
-        numbers = {name: checked(store["solution"], name) for name in store["solution"]}
-        return _restored(kind, from_data(Scene, data), settings, numbers, assemble, comm)
+        scene = from_data(Scene, data)
+        numbers = _numbers(store["solution"])
+        if not (joined and scene.stages):
+            return _restored(kind, scene, settings, numbers, assemble, comm)
+        parts = _restored_stages(kind, scene, numbers, assemble, comm)
+        return _completed(joined(scene, parts).with_places(numbers["stage"], numbers["place"]), settings, numbers)
+
+
+def _numbers(place):
+    """{name: array, text, or the same of a group}."""
+    return {name: _numbers(place[name]) if hasattr(place[name], "keys") else checked(place, name) for name in place}
 
 
 @contextmanager
@@ -217,6 +240,19 @@ def checked(place, name):
     return values
 
 
+def _restored_stages(kind, scene, numbers, assemble, comm):
+    """{stage: its path}, each on the scene that follows from the end of the one before."""
+    parts, end = {}, None
+    for leg in scene.legs:
+        found = numbers.get(f"stage {leg.stage}")
+        if found is None:
+            break
+        told = json.loads(found.pop("settings"))
+        part = parts[leg.stage] = _restored(kind, scene.of_leg(leg, end), told, found, assemble, comm)
+        end = part.at_points([len(part) - 1])
+    return parts
+
+
 def _restored(kind, scene, settings, numbers, assemble, comm):
     counts, rule = settings["elements"], ElementRule(*(numbers[name] for name in ("nodes", "gauss", "weights")))
     breaks = np.split(numbers["element_ends"], np.cumsum(np.add(counts, 1))[:-1])
@@ -236,13 +272,18 @@ def _restored(kind, scene, settings, numbers, assemble, comm):
     result._expanded = Records.of(listed) if listed else None
     if moving:
         result.scheme, result._time_unit = settings["scheme"], settings["time_unit"]
-    else:
-        for name in _OF_PATH:
-            setattr(result, name, settings[name])
-        result.criteria = stored_criteria(settings.get("judged", NAMES)[len(NAMES) :])
-        result._known_errors, result.events = _errors(numbers, len(result.judged), states), _events(numbers)
-        result.bounded = tuple(settings.get("bounded", NAMES[:1]))
-    return result
+        return result
+    return _completed(result, settings, numbers)
+
+
+def _completed(path, settings, numbers):
+    """A path with its settings, errors and events."""
+    for name in _OF_PATH:
+        setattr(path, name, settings[name])
+    path.criteria = stored_criteria(settings.get("judged", NAMES)[len(NAMES) :])
+    path._known_errors, path.events = _errors(numbers, len(path.judged), len(path)), _events(numbers)
+    path.bounded, path.why = tuple(settings.get("bounded", NAMES[:1])), settings["why"]
+    return path
 
 
 def _errors(numbers, count, states):
@@ -275,9 +316,10 @@ def _record(numbers, k, moving):
 
 
 def _events(numbers):
-    columns = zip(*(numbers[f"event_{name}"].tolist() for name in _OF_EVENT), strict=True)
+    names = [name for name in _OF_EVENT if f"event_{name}" in numbers]  # older files know no stages
+    columns = zip(*(numbers[f"event_{name}"].tolist() for name in names), strict=True)
     kinds = [KINDS[k] for k in numbers["event_kind"].astype(int)]
     return [
-        Event(kind, mode=mode, **dict(zip(_OF_EVENT, values, strict=True)))
+        Event(kind, mode=mode, **dict(zip(names, values, strict=True)))
         for kind, mode, values in zip(kinds, numbers["event_mode"], columns, strict=True)
     ]

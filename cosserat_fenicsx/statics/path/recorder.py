@@ -20,6 +20,7 @@ from cosserat_fenicsx.results.contacts import check_passes
 from cosserat_fenicsx.results.export import saved
 from cosserat_fenicsx.results.path import Path
 from cosserat_fenicsx.results.records import Event, Record, Records
+from cosserat_fenicsx.results.staged import StagedPath
 from cosserat_fenicsx.statics.critical import derivatives_of
 from cosserat_fenicsx.statics.path.chord import Chord
 from cosserat_fenicsx.statics.path.events import Lost
@@ -381,8 +382,11 @@ def read_path(file: File, *, comm: MPI.Comm | None = None) -> Path:
     Raises:
         SceneError: it cannot be read, is damaged, holds something else, or is of a newer release.
     """
-    path = saved.read(file, Path, assembled, communicator(comm))
-    path._potential, path._differentiated, path._vibrating = _conservative_along, derivatives_of, _modes_along
+    path = saved.read(file, Path, assembled, communicator(comm), StagedPath)
+    if not path.scene.stages:
+        path._potential, path._differentiated, path._vibrating = _conservative_along, derivatives_of, _modes_along
+    for part in path.parts.values() if path.scene.stages else ():
+        part._potential = _conservative_along
     return path
 
 
