@@ -7,7 +7,7 @@ from pathlib import Path
 
 _NARROW = Path(__file__).parent / "pictures" / "narrow"
 #: Pictures with so many small texts that narrow pages show them larger than the page, in a box that scrolls.
-_SCROLL = ("failures", "figure3", "work_precision_motion", "work_precision_sweep")
+_SCROLL = ("failures", "work_precision_motion", "work_precision_sweep")
 # Width of the page, pixels, up to which it is narrow.
 _UP_TO = 640
 
