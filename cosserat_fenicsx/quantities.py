@@ -27,7 +27,7 @@ _PREFIXED = {
 }
 # Numbers, also "a to b", with a unit in a sentence, and no longer unit after it.
 _NUMBER = r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?"
-_WITH_UNIT = re.compile(rf"(?<![\w.])({_NUMBER})(?: (to|and) ({_NUMBER}))? (m|k?N m|k?N|kJ)(?![\w/^]| m\b| s\b)")
+_WITH_UNIT = re.compile(rf"(?<![\w.])({_NUMBER})(?: (to|and) ({_NUMBER}))? (m|k?N m|N/m|k?N|kJ)(?![\w/^]| m\b| s\b)")
 _SI = {"kN m": ("N m", 1e3), "kN": ("N", 1e3), "kJ": ("J", 1e3)}
 # Numbers below this are written without an exponent.
 _PLAIN = 1e7
@@ -154,14 +154,14 @@ class Units:
         return f"{value / size:{form}} {shown}"
 
     def sentence(self, text: str) -> str:
-        """A sentence with its lengths, forces, moments and energies in these units, with as many digits as it has, at
-        least three."""
+        """A sentence with its lengths, forces, forces per length, moments and energies in these units, with as many
+        digits as it has, at least three."""
         return text if self.si else _WITH_UNIT.sub(self._again, text)
 
     def _again(self, found):
         first, word, second, unit = found.groups()
         si, size = _SI.get(unit, (unit, 1.0))
-        shown, other = self.of(Quantity("number", unit=si))
+        shown, other = self.of(Quantity("number", unit=si, dimension="force per length" if si == "N/m" else ""))
         if shown == si:  # none was chosen
             return found[0]
         digits = [max(3, len(re.sub(r"e.*|\D", "", x).lstrip("0"))) for x in (first, second) if x]

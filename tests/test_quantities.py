@@ -58,7 +58,8 @@ def test_prefixes_on_the_screen():
 
 @pytest.mark.parametrize(("text", "told"), [
     ("md = 304.8 to 609.6 m, 44.48 kN", "md = 1000 to 2000 ft, 10 klbf"),
-    ("5 N m s/rad, 3 m/s, 2 N/m, 4 mm, 7 modes", "5 N m s/rad, 3 m/s, 2 N/m, 4 mm, 7 modes"),
+    ("5 N m s/rad, 3 m/s, 2 N/m^2, 4 mm, 7 modes", "5 N m s/rad, 3 m/s, 2 N/m^2, 4 mm, 7 modes"),
+    ("side force to 2.92 N/m (clearance 1.63e+03 N)", "side force to 0.2 lbf/ft (clearance 0.366 klbf)"),
     ("to 0.14 N m", "to 0.103 ft-lbf"),
 ])  # fmt: skip
 def test_sentences_in_field_units(text, told):
@@ -75,7 +76,7 @@ def test_sentences_follow_the_units():
     rows[:, 1 + len(SERIES) + LEDGER.index("work_of_drive")] = 2e5 * cf.units.ft_lbf
     history = DrillingHistory(scene(), "torsion", ("torsion", "cells of 30.48 m at most"), 0.1, np.arange(2.0), rows)
     told = history.details("field")
-    for words in ("surface torque 1e+04 to 1e+04 ft-lbf", "work of the drive 200000 ft-lbf", "cells of 100 ft at most"):
+    for words in ("surface torque 10000 to 10000 ft-lbf", "work of the drive 200000 ft-lbf", "cells of 100 ft at most"):
         assert words in told
     assert history.stick_slip().summary("field") in told and "kN m" not in told and "kJ" not in told
     assert str(history.stick_slip()).endswith("surface torque 13.56 to 13.56 kN m.")

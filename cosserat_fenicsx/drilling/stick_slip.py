@@ -7,7 +7,7 @@ import numpy as np
 
 from cosserat_fenicsx.drilling.protocol import SERIES
 from cosserat_fenicsx.errors import NotConverged, SceneError
-from cosserat_fenicsx.quantities import Quantity, Units
+from cosserat_fenicsx.quantities import Quantity, Units, as_text
 
 SPEED, TORQUE = Quantity("speed", unit="rad/s", shown="rpm"), Quantity("torque", unit="N m", shown="kN m")
 WEIGHT = Quantity("weight on bit", unit="N", shown="kN")
@@ -75,8 +75,8 @@ class StickSlip:
         else:
             again = "" if np.isnan(self.period) else f"period {self.period:.5g} s, "
             what = f"stick-slip: {again}{speed}, at rest {100 * self.stuck:.3g} % of the time"
-        low, high = (x / size for x in self.torque)
-        told = f"From {self.since:g} to {self.until:g} s: {what}; surface torque {low:.4g} to {high:.4g} {moment}."
+        low, high = (as_text(x / size, 4) for x in self.torque)
+        told = f"From {self.since:g} to {self.until:g} s: {what}; surface torque {low} to {high} {moment}."
         return f"{told} {self.caution}".rstrip()
 
 
