@@ -64,8 +64,8 @@ class WellPath(Part):
         """The axis through the stations of a survey.
 
         Args:
-            md: measured depths, m, ascending from 0 (where the survey begins further down, add the station
-                (0, 0, azimuth of the next) of a vertical start).
+            md: measured depths, m or text with a unit, ascending from 0 (where the survey begins further down, add the
+                station (0, 0, azimuth of the next) of a vertical start).
             inc: inclinations from the vertical, 0 to 180 degrees; above 90 the hole climbs.
             azi: azimuths from north towards east, of any turn from -360 to 360 degrees; without meaning at a vertical
                 station.
