@@ -117,7 +117,7 @@ def test_what_is_nearly_free_is_told_from_what_is_free(monkeypatch, dense):
     monkeypatch.setattr(statical, "_DENSE", dense)
     for angle in (1e-2, 1e-5, 1e-6, 1e-7, 1e-8):
         check_no_mechanism(gate(angle))
-    with pytest.raises(cf.SceneError, match=r"rod 'gate' can turn about the axis \(0, 0, -?1\) through \(0, 0, 0\) m:"):
+    with pytest.raises(cf.SceneError, match="rod 'gate' can turn about its own axis: expected at one end"):
         check_no_mechanism(gate(0.0))
 
 
@@ -171,7 +171,7 @@ def test_the_free_motion_of_one_rod_among_a_thousand_is_named():
     for k, release in zip(ends, ("all", tuple(axis)), strict=True):
         joints[k] = cf.Joint(joints[k].first, joints[k].second, release)
     scene = cf.Scene(rods, supports, loads, joints)
-    with pytest.raises(cf.SceneError, match="mechanism: rod 'r499' can turn about the axis") as refusal:
+    with pytest.raises(cf.SceneError, match="mechanism: rod 'r499' can turn about its own axis") as refusal:
         check_no_mechanism(scene)
     assert "more motion" not in str(refusal.value)
     (found,), _ = free_motions(scene)

@@ -10,6 +10,13 @@ def describe(item):
     return f"{type(item).__name__} on {item.rod.name}" if item.rod is not None else type(item).__name__
 
 
+def some_of(texts, most=6):
+    """Texts in a row: all of them, or the first ones and how many more there are."""
+    texts = list(texts)
+    more = f" and {len(texts) - most} more" if len(texts) > most + 1 else ""
+    return ", ".join(texts[:most] if more else texts) + more
+
+
 def _name_of(item):
     """A part of a scene in messages: as `describe`, or by its name or class."""
     return describe(item) if hasattr(item, "station") else getattr(item, "name", type(item).__name__)
@@ -23,7 +30,7 @@ def actions_in_words(scene):
         ("Permanent loads, applied in full before", [x for x in scene.loads if x.permanent]),
         ("Not multiplied by the load factor", [x for x in scene.loads if not x.scaled and not x.permanent]),
     )
-    lines = [f"{title}: {', '.join(map(describe, items))}." for title, items in groups if items]
+    lines = [f"{title}: {some_of(map(describe, items))}." for title, items in groups if items]
     return "\n".join(lines) or "Loads: none."
 
 

@@ -8,7 +8,18 @@ import functools
 import numpy as np
 
 from cosserat_fenicsx.errors import SceneError
+from cosserat_fenicsx.scene.curves import Line
+from cosserat_fenicsx.scene.describe import some_of
 from cosserat_fenicsx.scene.supports import Clamp, Joint, PositionTie, TurnTie
+
+# Free motions that a message names; parts of a motion that are rounding.
+_TOLD, _FREE = 5, 1e-6
+# What rods that spin do, one or several, and what holds them.
+_SPIN = ("turn about its own axis", "each turn about its own axis")
+_HOLD_SPIN = (
+    "at one end of each rod that spins what holds it about its axis: a Clamp or a Hinge in the place of a Pin, a joint "
+    "without release or with an axis across the rod in the place of a ball joint"
+)
 
 
 class Groups:
@@ -223,15 +234,64 @@ def check_no_mechanism(scene):
             f"Scene.supports: nothing holds rod '{rod.name}', it is free to move: expected a support such as "
             f"Clamp({rod.name}.start){_or_a_joint(scene, rod)}"
         )
-    k = int(np.argmax(np.abs(free).max(axis=(0, 2))))
-    motion = free[np.argmax(np.abs(free[:, k]).max(axis=1)), k]
-    least = "" if complete else "at least "
-    others = f", and {least}{len(free) - 1} more motion(s) are free" if len(free) > 1 else ""
-    words = _words(motion, scene.rods[k].curve.position(0.0), _size(scene))
-    raise SceneError(
-        f"Scene is a mechanism: rod '{scene.rods[k].name}' can {words}{others}: "
-        "expected supports and joints that hold it, such as a Clamp or a Hinge"
+    spins = _spins(scene, free)
+    rest = _plain_motions(free, [_spin(scene, k) for k in spins])
+    told, remedies = [], []
+    if len(rest):
+        remedies.append("supports and joints that hold it, such as a Clamp or a Hinge")
+    if spins:
+        names = some_of(f"'{scene.rods[k].name}'" for k in spins)
+        told.append(f"rod{'s' if len(spins) > 1 else ''} {names} can {_SPIN[len(spins) > 1]}")
+        remedies.append(_HOLD_SPIN)
+    most = _TOLD if complete else 1
+    for motion in rest[:most]:
+        k = int(np.argmax(np.abs(motion).max(axis=1)))
+        told.append(
+            f"rod '{scene.rods[k].name}' can {_words(motion[k], scene.rods[k].curve.position(0.0), _size(scene))}"
+        )
+    if len(rest) > most:
+        told.append(f"{'' if complete else 'at least '}{len(rest) - most} more motion(s) are free")
+    raise SceneError(f"Scene is a mechanism: {', and '.join(told)}: expected {'; and '.join(remedies)}")
+
+
+def _spin(scene, k):
+    """(rods, 6) the rotation of a straight rod about its own axis, as in `free_motions`, of length 1."""
+    motion = np.zeros((len(scene.rods), 6))
+    motion[k, 3:] = scene.rods[k].curve.frame(0.0)[:, 2]
+    return motion
+
+
+def _spins(scene, free):
+    """Indices of the straight rods that may turn about their own axes while all others rest."""
+    straight = (
+        k for k, rod in enumerate(scene.rods) if isinstance(rod.curve, Line) and np.abs(free[:, k]).max() > _FREE
     )
+    along = {k: np.einsum("mi,i->m", free[:, k, 3:], scene.rods[k].curve.frame(0.0)[:, 2]) for k in straight}
+    return [k for k, parts in along.items() if np.linalg.norm(parts) > 1 - _FREE]
+
+
+def _plain_motions(free, spins):
+    """(m, rods, 6) a basis of the free motions without those of rods that spin: of the rod that moves most as many as
+    possible are displacements or rotations along one of x, y and z."""
+    if spins:
+        inside = np.linalg.qr(np.array([np.tensordot(free, spin, 2) for spin in spins]).T, mode="complete")[0]
+        free = np.tensordot(inside[:, len(spins) :].T, free, 1)
+    if not len(free):
+        return free
+    most = np.abs(free).max(axis=(0, 2)).argmax()
+    row = 0
+    for column in (3, 4, 5, 0, 1, 2):  # to reduced echelon form
+        pivot = row + int(np.abs(free[row:, most, column]).argmax())
+        if np.abs(free[pivot, most, column]) <= _FREE:
+            continue
+        free[[row, pivot]] = free[[pivot, row]]
+        free[row] /= free[row, most, column]
+        others = np.arange(len(free)) != row
+        free[others] -= free[others, most, column, None, None] * free[row]
+        row += 1
+        if row == len(free):
+            break
+    return free
 
 
 def free_motions(scene):
