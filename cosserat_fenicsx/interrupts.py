@@ -34,11 +34,13 @@ def listen():
 
 
 def renew():
-    """Take the signals of `listen` again: MPI or PETSc may have taken some of them when they started."""
+    """Take the signals of `listen` again: MPI or PETSc may have taken some of them when they started. And that of a
+    closed pipe, as in `script.py | head`, of which Python makes a BrokenPipeError and PETSc an abort of MPI."""
     if threading.current_thread() is threading.main_thread():
-        for number in _SIGNALS:
-            if signal.getsignal(number) is _ask:
-                signal.signal(number, _ask)
+        for number in (*_SIGNALS, signal.SIGPIPE):
+            known = signal.getsignal(number)
+            if known is _ask or (number == signal.SIGPIPE and known is not None):
+                signal.signal(number, known)
 
 
 def ignore():

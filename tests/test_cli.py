@@ -76,6 +76,16 @@ def test_a_reader_that_has_enough_ends_no_command(arguments):
     assert (done.returncode, done.stderr) == (0, "")
 
 
+def test_a_script_whose_reader_has_enough_ends_as_python_does():
+    """PETSC takes the signal of a closed pipe, and would abort MPI."""
+    reading, writing = os.pipe()
+    os.close(reading)
+    command = [sys.executable, "-c", "import cosserat_fenicsx.compat; print(1, flush=True)"]
+    done = subprocess.run(command, stdout=writing, stderr=subprocess.PIPE, text=True, cwd=ROOT)
+    os.close(writing)
+    assert "BrokenPipeError" in done.stderr and "PETSC" not in done.stderr
+
+
 def test_run_prints_a_table_and_writes_files(tmp_path):
     out = tmp_path / "new" / "out"
     done = cosserat("run", DEMO, "--load-factors", "0.5,0.9", "-o", out)

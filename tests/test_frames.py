@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import cosserat_fenicsx as cf
+from cosserat_fenicsx.numerics import conjugate_product
 
 pytestmark = pytest.mark.serial
 STEEL = cf.Material(E=210e9, nu=0.3, density=7850.0)
@@ -64,6 +65,20 @@ def test_rods_that_bend_most_are_cut_into_more_elements():
     largest = np.linalg.norm([truth.displacement(frame.at(k))[0] for k in top], axis=1).max()
     error = np.linalg.norm(np.subtract(*moved), axis=1).max() / largest
     assert path.errors.position[0] / 20 < error < path.errors.position[0] < 1e-6
+
+
+def test_rotations_are_no_more_wrong_than_estimated_where_one_element_a_rod_is_halved():
+    points = [(3.0 * i, 3.0 * j, 3.0 * k) for k in range(5) for j in range(2) for i in range(2)]
+    edges = [(k, k + 4) for k in range(16)]
+    edges += [(k, k + 1) for k in range(4, 20, 2)] + [(k, k + 2) for k in range(4, 20) if k % 4 < 2]
+    frame = cf.frame(points, edges, cf.Circle(0.15), STEEL, clamped=range(4))
+    scene = frame.scene([cf.Force(frame.at(k), (5e3, 2.5e3, -15e3)) for k in range(16, 20)])
+    path, truth = cf.solve(scene, [1.0]), cf.solve(scene, [1.0], elements=6)
+    places = np.linspace(0, 1, 33)
+    found, exact = (np.array([x.motion(rod, places)[0, :, 3:] for rod in frame.rods]) for x in (path, truth))
+    turned = 2 * np.linalg.norm(conjugate_product(found, exact), axis=-1).max()
+    size = max(2 * np.linalg.norm(exact[..., 1:], axis=-1).max(), np.linalg.norm(truth.displacement(frame.at(16))) / 3)
+    assert set(path.elements) == {2} and 1.2 < path.errors.rotation[0] / (turned / size) < 3
 
 
 def mesh(**more):
@@ -170,3 +185,21 @@ def test_the_demos_give_their_numbers(monkeypatch):
 
     for check in frames.main(["lattice", "net"], out=None):
         assert deviation(check) <= check.allowed, check
+
+
+def test_what_is_printed_of_many_rods_fits_a_screen():
+    from cosserat_fenicsx.cli.explain import explain
+
+    points = [(4.0 * i, 0, 3.0 * j) for j in range(11) for i in range(4)]
+    edges = [(k, k + 4) for k in range(40)] + [(k, k + 1) for k in range(4, 44) if k % 4 < 3]
+    frame = cf.frame(points, edges, THICK, STEEL, clamped=range(4))
+    scene = frame.scene([cf.Force(frame.at(k), (1e3, 0, -1e4)) for k in range(4, 44)])
+    path = cf.solve(scene, [1.0], elements=1)
+    printed = {"scene": repr(scene), "path": str(path), "buckling": str(cf.buckling(scene, 2, elements=1))}
+    for what, text in printed.items():
+        lines = text.splitlines()
+        assert len(lines) <= 30 and max(map(len, lines)) <= 100, what
+    assert "70 rods of 1 elements" in printed["path"] and "rod5.end and 34 more" in " ".join(printed["path"].split())
+    assert "rod5 and 64 more" in printed["scene"]
+    told = explain(scene, (0.0, 1.0), {})
+    assert "70 rods 'rod0'" in told and "length 3 to 4 m" in told and len(told) < 3000

@@ -266,7 +266,8 @@ static void estimate(const comparison *p, const double *sizes, int turning, doub
     far[2] |= far[0] && far[1] && apart[2] <= p->of_ends * at_ends[2];
     for (int k = 0; k < 4; k++) sure &= far[k] || relative[k] == 0;
     for (int k = 0; k < 4; k++) {
-        const double part = 1 / (sure && relative[k] < p->asymptotic ? p->safety_below : p->safety);
+        const int below = sure && relative[k] < p->asymptotic && !(k == 1 && p->single);
+        const double part = 1 / (below ? p->safety_below : p->safety);
         double gain = far[k] ? part * half : ahead[k] ? fmax(1, half / 16) : 1;
         if (relative[k] == 0) gain = half / p->safety_below;
         errors[k] = fmax(relative[k] / gain, p->fine->limits[4]);

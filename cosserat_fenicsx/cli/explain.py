@@ -13,7 +13,7 @@ from cosserat_fenicsx.models.signature import Signature
 from cosserat_fenicsx.results.accuracy import FEW
 from cosserat_fenicsx.results.compared import NAMES, words_of
 from cosserat_fenicsx.scene.curves import Line, Spline
-from cosserat_fenicsx.scene.describe import actions_in_words, describe
+from cosserat_fenicsx.scene.describe import actions_in_words, describe, some_of
 from cosserat_fenicsx.scene.rolled import Profile
 from cosserat_fenicsx.scene.scene import check_magnitudes
 from cosserat_fenicsx.scene.sections import Rectangle, Stiffness
@@ -29,6 +29,7 @@ _UNKNOWNS = {
     ("spatial", False): "centreline r and quaternion q in space",
 }
 
+_MANY = 12  # rods from which on those alike are described together
 _FREE = 8  # largest number of free ends that are named
 
 
@@ -85,19 +86,35 @@ def explain(scene, load_factors, settings):
 def of_the_scene(scene):
     """Sentences on rods, supports, loads and joints."""
     lines = [scene.title] if scene.title else []
-    for rod in scene.rods:
-        centre = rod.mass_centre
-        off = f" Its mass centre is up to {centre.largest:.4g} m off the axis." if centre else ""
+    for named, rods in _alike(scene.rods, lambda x: (_curve(x.curve), _sections(x), _stiffnesses(x), _off(x))):
+        rod, lengths = rods[0], [rod.length for rod in rods]
+        slender = np.sqrt(rod.profile.range[1].K[2] / max(rod.profile.range[0].J[:2]))
+        least, largest = min(lengths), max(lengths)
         lines.append(
-            f"Rod '{rod.name}': {_curve(rod.curve)}, length {rod.length:g} m, {_sections(rod)}; "
-            f"{_stiffnesses(rod)}. {_directions(rod)}{off}"
+            f"{named}: {_curve(rod.curve)}, length {_from_to(least, largest, 'g')} m, {_sections(rod)}; "
+            f"{_stiffnesses(rod)}; slenderness L sqrt(EA/EI) = {_from_to(least * slender, largest * slender)}. "
+            f"{'' if len(rods) == 1 else f'Of {rod.name}: '}{_directions(rod)}{_off(rod)}"
         )
+    joints = [f"{joint.first} is joined to {joint.second}{_release(joint)}" for joint in scene.joints]
     lines.append(
-        f"{len(scene.supports)} support(s): {', '.join(describe(x) for x in scene.supports) or 'none'}. "
-        f"{_free_ends(scene)}{actions_in_words(scene)}"
-        + "".join(f" {joint.first} is joined to {joint.second}{_release(joint)}." for joint in scene.joints)
+        f"{len(scene.supports)} support(s): {some_of(map(describe, scene.supports)) or 'none'}. "
+        f"{_free_ends(scene)}{actions_in_words(scene)}{f' {some_of(joints)}.' if joints else ''}"
     )
     return lines
+
+
+def _alike(rods, told):
+    """(names, [rods]) of every rod; of a large frame, of the rods of which the same is told."""
+    groups = {}
+    for rod in rods:
+        groups.setdefault(told(rod) if len(rods) > _MANY else rod.name, []).append(rod)
+    for same in groups.values():
+        names = some_of(f"'{rod.name}'" for rod in same)
+        yield f"Rod {names}" if len(same) == 1 else f"{len(same)} rods {names}", same
+
+
+def _off(rod):
+    return f" Its mass centre is up to {rod.mass_centre.largest:.4g} m off the axis." if rod.mass_centre else ""
 
 
 def _free_ends(scene):
@@ -159,11 +176,10 @@ def _stiffnesses(rod):
     def spread(name, i):
         return _from_to(getattr(low, name)[i], getattr(high, name)[i])
 
-    slender = rod.length * np.sqrt(high.K[2] / max(low.J[:2]))
     coupled = "; sections couple strains: EI about the principal axes" if rod.profile.coupled else ""
     return (
         f"EI = {spread('J', 0)}, {spread('J', 1)} N m^2, GJ = {spread('J', 2)} N m^2, EA = {spread('K', 2)} N, "
-        f"GA = {spread('K', 0)}, {spread('K', 1)} N; slenderness L sqrt(EA/EI) = {slender:.4g}{coupled}"
+        f"GA = {spread('K', 0)}, {spread('K', 1)} N{coupled}"
     )
 
 
@@ -191,7 +207,7 @@ def explain_motion(scene, settings):
     signature = Signature.of(scene, Layout.of(scene, elements), formulation="displacement", degree=degree, model=model)
     return "\n".join([
         *of_the_scene(scene),
-        *(_inertia(rod) for rod in scene.rods),
+        *(f"{named}: {_inertia(rods[0])}." for named, rods in _alike(scene.rods, _inertia)),
         *(_in_time(item) for item in scene.moving),
         _start(scene, start, settings.get("load_factor")),
         f"Motion: {duration:g} s. {_steps(settings)} {_saved(settings)}",
@@ -204,11 +220,11 @@ def explain_motion(scene, settings):
 
 def _inertia(rod):
     low, high = rod.profile.range
-    return f"Rod '{rod.name}': mass {_from_to(low.mass, high.mass)} kg/m; {_damping(rod.damping)}."
+    return f"mass {_from_to(low.mass, high.mass)} kg/m; {_damping(rod.damping)}"
 
 
-def _from_to(low, high):
-    return f"{low:.4g}" + (f" to {high:.4g}" if high > low else "")
+def _from_to(low, high, digits=".4g"):
+    return f"{low:{digits}}" + (f" to {high:{digits}}" if high > low else "")
 
 
 def _damping(damping):

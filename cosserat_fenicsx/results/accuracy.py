@@ -86,6 +86,8 @@ def estimate_error(fine, coarse, before=None, *, smooth=True):
         far[FORCE] |= far[:FORCE].all(axis=0) & (difference[FORCE] <= OF_ENDS * at_ends[FORCE])
         sure = (far | (relative == 0))[: len(NAMES)].all(axis=0) & equal_elements(fine.layout)
         part = np.where(sure, part, 1 / SAFETY)
+        if min(coarse.layout.counts) == 1:  # rotations gain less in the first halving
+            part[ROTATION] = 1 / SAFETY
         uniform = all(rod.uniform for rod in fine.scene.rods)
         gain = np.where(far & uniform, part * 2.0 ** (p + 1), np.where(ahead, max(1.0, 2.0 ** (p - 3)), 1.0))
     else:

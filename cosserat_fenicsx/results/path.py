@@ -25,6 +25,8 @@ from cosserat_fenicsx.scene.describe import actions_in_words
 from cosserat_fenicsx.scene.parameters import Parameter, check_once
 from cosserat_fenicsx.scene.rod import RodOrName
 
+# Most events that `print` names.
+_EVENTS = 6
 _KINDS = {"limit": "Limit point", "bifurcation": "Bifurcation", "flutter": "Flutter"}
 # The state of a point by the sign of its number of negative modes.
 _STATES = {0: "stable", 1: "unstable", -1: "critical"}
@@ -175,14 +177,25 @@ class Path(RodResult):
             f"{title} the load factor {self.load_factors[-1]:.6g}, {_STATES[np.sign(self.negative_modes[-1])]}, "
             f"{station} is displaced by {self._moved_in_words(station, units)} and turned by {turned:.6g} rad."
         )
-        for event in self.events:
-            yield f"{_KINDS[event.kind]} at the load factor {event.load_factor:.7g}"
+        for doubt in self.scene.doubts:
+            yield f"First check: {doubt}"
+        yield from errors_in_words(self)
+        events = self._events_in_words()
+        yield from events[:_EVENTS]
+        if len(events) > _EVENTS:
+            yield f"... and {len(events) - _EVENTS} more by `details()`"
         if not self.left and any(event.kind == "bifurcation" for event in self.events):
             yield (
                 "The path stays on its branch there; --branch 1 or -1 (branch= in Python) leaves it at the first "
                 "bifurcation."
             )
-        yield from errors_in_words(self)
+
+    def _events_in_words(self):
+        return [f"{_KINDS[event.kind]} at the load factor {event.load_factor:.7g}" for event in self.events]
+
+    def _more(self, units):
+        yield from self._events_in_words()[_EVENTS:]
+        yield from super()._more(units)
 
     def _table(self, units, rows, station=None):
         if not len(self):

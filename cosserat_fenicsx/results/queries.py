@@ -9,7 +9,7 @@ from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.numerics import directors
 from cosserat_fenicsx.results.compared import cell_nodes, in_turn
 from cosserat_fenicsx.results.result import OnNodes
-from cosserat_fenicsx.scene.describe import describe
+from cosserat_fenicsx.scene.describe import describe, some_of
 from cosserat_fenicsx.scene.rod import Station, StationOrName
 from cosserat_fenicsx.scene.stresses import Stress
 from cosserat_fenicsx.scene.supports import Support
@@ -134,7 +134,7 @@ def _unknown_in_words(path):
     for field, what in (("axial_max", "Stresses"), ("von_mises", "Von Mises stresses")):
         names = [name for name, values in fields.items() if np.isnan(values[field]).any()]
         if names:
-            yield f"{what} of {', '.join(names)} are not computed, or not everywhere: see the sections there."
+            yield f"{what} of {some_of(names)} are not computed, or not everywhere: see the sections there."
             fields = {name: values for name, values in fields.items() if name not in names}  # each is named once
 
 

@@ -281,6 +281,18 @@ class Result:
         return pandas.DataFrame(columns).rename_axis(axis)
 
 
+# Most rods whose numbers of elements are listed one by one.
+_FEW_RODS = 6
+
+
+def elements_in_words(counts):
+    """The numbers of elements of all rods as text: one by one of a few rods, else from the least to the largest."""
+    if len(counts) <= _FEW_RODS:
+        return f"{' + '.join(map(str, counts))} elements"
+    least, largest = min(counts), max(counts)
+    return f"{len(counts)} rods of {least if least == largest else f'{least} to {largest}'} elements"
+
+
 class OnNodes:
     """A result on a mesh; subclasses have the `scene`, the `layout`, the `rule` and the `degree` of the elements."""
 

@@ -24,6 +24,7 @@ from cosserat_fenicsx.results.result import (
     by_name,
     component_names,
     dataset,
+    elements_in_words,
     import_library,
     variable,
     write_columns,
@@ -497,8 +498,7 @@ class RodResult(Result, Extremes, Reactions, Stresses, States):
         return f"({', '.join(f'{x / size if abs(x) > least else 0:.6g}' for x in moved)}) {unit}"
 
     def _mesh_in_words(self):
-        elements = " + ".join(map(str, self.elements))
-        return f"degree {self.degree}, {elements} elements, {self.unknowns} unknowns"
+        return f"degree {self.degree}, {elements_in_words(self.elements)}, {self.unknowns} unknowns"
 
     def _more(self, units):
         if len(self):

@@ -12,7 +12,7 @@ from cosserat_fenicsx.checks import refuse
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.numerics import ElementRule, directors
 from cosserat_fenicsx.quantities import Quantity
-from cosserat_fenicsx.results.result import OnNodes, Result, by_name
+from cosserat_fenicsx.results.result import OnNodes, Result, by_name, elements_in_words
 
 # Largest displacement of a mode of pure twist, m (the largest displacement or rotation of a mode is 1).
 _TWIST = 1e-6
@@ -200,8 +200,7 @@ class Shapes(Result, OnNodes):
         return super()._table(units, rows) if len(self) else None
 
     def _titles(self, units):
-        elements = " + ".join(map(str, self.elements))
-        title = f"{self.scene.title or self.title}: degree {self.degree}, {elements} elements"
+        title = f"{self.scene.title or self.title}: degree {self.degree}, {elements_in_words(self.elements)}"
         return title, f"{self._caption}\nk: number of the mode in Python, in files and in pictures."
 
     # -- files and pictures ------------------------------------------------------------------------------------------

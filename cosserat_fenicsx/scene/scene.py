@@ -16,7 +16,7 @@ from cosserat_fenicsx.checks import instance, store, warn
 from cosserat_fenicsx.errors import SceneError, nearest
 from cosserat_fenicsx.parts import Items, Object, Part, concerning
 from cosserat_fenicsx.scene.action import Action, powers
-from cosserat_fenicsx.scene.describe import describe
+from cosserat_fenicsx.scene.describe import describe, some_of
 from cosserat_fenicsx.scene.planes import find_plane
 from cosserat_fenicsx.scene.profiles import Stiffnesses
 from cosserat_fenicsx.scene.rod import Rod, Station, StationOrName, station_named, with_names
@@ -192,7 +192,7 @@ class Scene(Part):
 
     def __repr__(self):
         counts = (f"{len(getattr(self, part))} {part}" for part in ("supports", "loads", "joints"))
-        rods = ", ".join(rod.name for rod in self.rods)
+        rods = some_of(rod.name for rod in self.rods)
         return f"<Scene{f' {self.title!r}' if self.title else ''}: rods {rods}; {', '.join(counts)}>"
 
     def _check_places(self, field, item):
@@ -210,7 +210,7 @@ class Scene(Part):
                     )
                 raise SceneError(
                     f"Scene.{field} acts at {place}, a station of a rod that is not in the scene: "
-                    f"expected one of {', '.join(rod.name for rod in self.rods)}"
+                    f"expected one of {some_of(rod.name for rod in self.rods)}"
                 )
         if isinstance(item, Action) and station is None:
             for rod in self.rods_of(item):

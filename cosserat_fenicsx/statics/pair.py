@@ -42,7 +42,7 @@ class Pair(Pointers):
             setattr(p, name, getattr(accuracy, name.upper()))
         for name in ("nothing", "least_moment", "vanishing", "rounding", "noise"):
             setattr(p, name, getattr(compared, name.upper()))
-        p.far, p.equal = accuracy.FAR_AHEAD, equal_elements(fine.layout)
+        p.far, p.equal, p.single = accuracy.FAR_AHEAD, equal_elements(fine.layout), min(coarse.layout.counts) == 1
         rule = fine.model.rule
         places = compared.compared(coarse.layout, fine.layout, rule)
         p.places = len(places.inside)
