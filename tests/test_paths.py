@@ -25,6 +25,7 @@ from scipy.optimize import brentq
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.algebra.pool import PROBLEMS, ProblemPool
 from cosserat_fenicsx.results.records import find_again, keep_confirmed
+from cosserat_fenicsx.statics import refinement
 from cosserat_fenicsx.statics.path.recorder import Tracing
 
 STEEL = cf.Material(E=210e9, nu=0.3, density=7850.0)
@@ -389,6 +390,27 @@ def test_events_are_found_again_on_a_finer_mesh():
     path = cf.solve(shallow_arch()[2], [45.0], tol=1e-5)
     assert len(path.events) == 4 and all(0 < event.error <= 1e-5 for event in path.events)
     assert all(np.isnan(event.error) for event in cf.solve(shallow_arch()[2], [45.0], elements=8).events)
+
+
+@pytest.mark.serial
+@pytest.mark.parametrize("few_new, finer", [(4, 1), (3, 0)])
+def test_accurate_points_are_returned_where_events_alone_depend_on_the_mesh(monkeypatch, few_new, finer):
+    """At most one finer mesh is solved for events alone where that fails; none where each mesh has other events."""
+    scene, again, failed = shallow_arch()[2], Tracing.again, []
+    accurate = cf.solve(scene, (0.0, 45.0), tol=1e-5)
+
+    def lost(self, coarse):
+        if max(self.path.elements) > max(accurate.elements):
+            failed.append(self.path.elements)
+            raise cf.NotConverged("lost", self.path)
+        return again(self, coarse)
+
+    monkeypatch.setattr(Tracing, "again", lost)
+    monkeypatch.setattr(refinement, "find_again", lambda fine, coarse: [])
+    monkeypatch.setattr(refinement, "_REFINEMENT", dataclasses.replace(refinement._REFINEMENT, few_new=few_new))
+    path = cf.solve(scene, (0.0, 45.0), tol=1e-5)
+    assert path.elements == accurate.elements and path.error.max() <= 1e-5 and len(failed) == finer
+    assert path.events == [] and sum("could not be confirmed" in why for why in path.why) == 4
 
 
 @pytest.mark.serial

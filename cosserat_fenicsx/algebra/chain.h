@@ -211,8 +211,8 @@ typedef struct {
 /* Two meshes that are compared, see compared.c; the constants are those of results/accuracy.py and compared.py. */
 typedef struct {
     mesh *coarse, *fine;
-    int places, equal, single, queries, moves, numbers; /* places of a coarse element; whether fine elements are of one length,
-                                                           and a coarse rod has one alone */
+    int places, equal, single; /* places of a coarse element; whether fine elements are of one length, and one is a rod */
+    int queries, moves, numbers;
     const double *inside, *weights; /* (places, p + 1) of a coarse element; (all places, p + 1) of the fine ones */
     const int *cells;               /* (all places,) fine elements */
     const double *start, *move_weight; /* (numbers,) a point of the fine mesh at rest; what is added to it: numbers of */

@@ -52,6 +52,7 @@ class Refinement:
     aim: float = 0.8  # the error aimed at, over the tolerance
     located: float = 1e-6  # smallest tolerance of the load factors of events on two meshes
     for_events: int = 2  # most finer meshes that are solved for events alone
+    few_new: int = 4  # events that a mesh may have in addition to those of the one before, which a finer one may clear
     most_balancings: int = 4  # times that the error is equidistributed over the elements
     most_moves: int = 3  # times that element ends are moved to the edges of contact, before elements are halved
     cheap: int = 800  # unknowns, of all points together, that are cheaper to solve than another mesh is to make
@@ -121,6 +122,8 @@ class _Search:
         self._order, self._factor = np.ones(len(NAMES) + len(bound)), 2.0
         self._failed, self._promoted, self._best = False, None, math.inf
         self.accurate, self._meshes_for_events, self._lost_events = None, _REFINEMENT.for_events, []
+        # numbers of events that were not on the mesh before: of the last mesh, and of that before
+        self._new_events = math.inf, math.inf
         self._halved = None  # sample points on this mesh and on the one before, if this one halves its elements
         self._error_before = None  # errors of the latter
         self._layered = None  # the next mesh where the last one does not resolve the boundary layers
@@ -138,7 +141,8 @@ class _Search:
                 raise _TooCoarse from None
             promoted = isinstance(problem, Promoted)
             again = problem.agrees(self._promoted) if promoted else self._failed and not isinstance(problem, Passes)
-            if again or elements >= _REFINEMENT.most_elements:
+            # a mesh for events alone need not be solved: those that two meshes agree on are known
+            if again or self.accurate is not None or elements >= _REFINEMENT.most_elements:
                 raise
             self._promoted, self._failed = (problem, self._failed) if promoted else (self._promoted, True)
             self._few = self._apart = self._halved = None
@@ -164,7 +168,9 @@ class _Search:
             reached = float(found.worst.max())
             if reached <= self._tol and found is self.whole and self._layered is None:
                 agree = all(event.error <= max(self._tol, _REFINEMENT.located) for event in found.events)
-                if agree or elements >= _REFINEMENT.most_elements or not self._meshes_for_events:
+                new, before = self._new_events
+                endless = new > max(_REFINEMENT.few_new, before / 2)  # a finer mesh would have new ones, too
+                if agree or endless or elements >= _REFINEMENT.most_elements or not self._meshes_for_events:
                     return self.confirmed(found)
                 self.accurate, self._meshes_for_events = found, self._meshes_for_events - 1
             elif elements >= _REFINEMENT.most_elements or (reached > self._best and self._best < 1e-8):
@@ -288,6 +294,7 @@ class _Search:
     def _keep(self, whole, apart):
         if self.whole is not None:
             self._lost_events = find_again(whole, self.whole)
+            self._new_events = sum(np.isnan(event.error) for event in whole.events), self._new_events[0]
         self.whole, self._apart_of_whole, self._level_of_whole = whole, apart, self._level
         return whole
 
