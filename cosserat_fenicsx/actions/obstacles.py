@@ -10,7 +10,7 @@ from typing import Annotated
 
 import numpy as np
 
-from cosserat_fenicsx.actions.walls import ContactLaw, Pressing, held_across
+from cosserat_fenicsx.actions.walls import ContactLaw, Pressing, across, held_across
 from cosserat_fenicsx.checks import Numbers, refuse
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.forms import contact
@@ -24,6 +24,9 @@ from cosserat_fenicsx.scene.rod import Rod, RodOrName
 _STICKS = 1e-2
 # Samples along a rod; tolerance of its gap at rest, relative to its length.
 _SAMPLES, _NOTHING = 257, 1e-9
+
+# Angles around a cylinder or a sphere in a picture, rad.
+_CIRCLE = np.linspace(0, 2 * np.pi, 33)
 
 _Point = Annotated[Numbers, Several("length")]
 
@@ -199,6 +202,13 @@ class Plane(Obstacle):
     def beside(self, points):
         return (points - self.point) @ self.normal, np.broadcast_to(self.normal, points.shape)
 
+    def drawn(self, low, high):
+        middle, size = (low + high) / 2, np.linalg.norm(high - low) / 2
+        middle = middle - (middle - self.point) @ self.normal * np.array(self.normal)
+        first, second = across(self.normal)
+        ends = size * np.array((-1.0, 1.0))
+        return middle + ends[:, None, None] * first + ends[:, None] * second
+
 
 class _Round(Obstacle):
     """Obstacles around a point or an axis."""
@@ -252,6 +262,12 @@ class Sphere(_Round):
     def _away(self, points):
         return points - self.point
 
+    def drawn(self, low, high):
+        polar = np.linspace(0, np.pi, len(_CIRCLE) // 2 + 1)[:, None, None]
+        first, second = across((0.0, 0.0, 1.0))
+        around = np.cos(_CIRCLE)[:, None] * first + np.sin(_CIRCLE)[:, None] * second
+        return self.point + self.radius * (np.sin(polar) * around + np.cos(polar) * np.array((0, 0, 1.0)))
+
 
 class _Cylindrical(_Round):
     """Obstacles around the straight axis through `point` along `direction`."""
@@ -265,6 +281,13 @@ class _Cylindrical(_Round):
     def _away(self, points):
         away = points - self.point
         return away - np.outer(away @ self.direction, self.direction)
+
+    def drawn(self, low, high):
+        axis, size = np.array(self.direction), np.linalg.norm(high - low) / 2
+        along = ((low + high) / 2 - self.point) @ axis + size * np.array((-1.0, 1.0))
+        first, second = across(self.direction)
+        around = np.cos(_CIRCLE)[:, None] * first + np.sin(_CIRCLE)[:, None] * second
+        return self.point + along[:, None, None] * axis + self.radius * around
 
 
 @dataclass(frozen=True)
@@ -330,6 +353,7 @@ class Wall(_Cylindrical):
     law: ContactLaw | None = None
 
     surface, inside, friction, contact_radius = staticmethod(contact.hole), True, 0.0, 0.0
+    drawn = LineAction.drawn
     radius = property(lambda self: self.clearance)
     _expected = "a point and a direction of the axis, and a clearance, such that all of the rod is inside"
 

@@ -117,7 +117,12 @@ def value_at(given, x):
 
 def held_across(station, axis):
     """See `Action.holds`: a wall confines a rod across the axis (3,) of the wall."""
-    return [(station, np.r_[row, 0, 0, 0]) for row in np.linalg.svd(np.reshape(axis, (1, 3)))[2][1:]]
+    return [(station, np.r_[row, 0, 0, 0]) for row in across(axis)]
+
+
+def across(axis):
+    """(2, 3) unit vectors normal to an axis (3,) and to each other."""
+    return np.linalg.svd(np.reshape(axis, (1, 3)))[2][1:]
 
 
 @dataclass

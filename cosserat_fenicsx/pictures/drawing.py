@@ -238,12 +238,15 @@ def move(surface, body, factor, name, values):
 
 
 def add_tubes(plotter, pyvista, scene, radii, enlarged=1.0):
-    """Draw the tubes that rods are in, translucent.
+    """Draw the tubes that rods are in, and obstacles, translucent.
 
     Args:
         radii: {rod: the radius that it is drawn with, m}; enlarged: factor of the clearances around them.
     """
+    low, high = np.reshape(plotter.bounds, (3, 2)).T
     for load in scene.loads:
+        if (points := load.drawn(low, high)) is not None:
+            plotter.add_mesh(pyvista.StructuredGrid(*np.moveaxis(points, 2, 0)), color=_WALL, opacity=0.2)
         if (tube := load.tube()) is not None:
             axis, clearance = tube
             rod = load.rod if load.station is None else load.station.rod

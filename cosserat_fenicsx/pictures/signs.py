@@ -166,11 +166,15 @@ def span_of(scene, shapes, everywhere):
 
 
 def without_sign(scene, tubes, threads=True):
-    """Words for the loads that are not drawn; tubes, threads: whether tubes around rods and threads along them are."""
-    left_out = [
-        load for load in scene.loads
-        if not has_sign(load, scene) and not (tubes and load.tube() is not None) and not (threads and load.is_thread)
-    ]  # fmt: skip
+    """Words for the loads that are not drawn; tubes, threads: whether tubes and obstacles around rods, and threads along
+    them are."""
+    corner = np.zeros(3)
+
+    def drawn(load):
+        shaped = tubes and (load.tube() is not None or load.drawn(corner, corner + 1) is not None)
+        return shaped or (threads and load.is_thread) or has_sign(load, scene)
+
+    left_out = [load for load in scene.loads if not drawn(load)]
     return ", ".join(dict.fromkeys(map(describe, left_out)))
 
 

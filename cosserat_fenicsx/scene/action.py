@@ -169,6 +169,11 @@ class Action(Part, family="load or action", homes=("cosserat_fenicsx.scene.loads
         far the rod may move from there, m; else None."""
         return None
 
+    def drawn(self, low, high):
+        """For pictures, of an obstacle: (n, m, 3) points of its surface, m, as large as the box with the corners low and
+        high (3,), m; else None."""
+        return None
+
     def companions(self, scene):
         """Actions that it adds to a scene, such as the weight of its point masses."""
         return ()
