@@ -16,6 +16,8 @@ from cosserat_fenicsx.algebra.building import begin
 
 #: Largest number of idle problems kept for each communicator; the least recently used one is dropped first.
 MOST_IDLE = 24
+# Problems given back by one process until what Python has dropped meanwhile is freed, which takes as long as a few points.
+_SOME = 8
 
 
 class ProblemPool:
@@ -34,7 +36,7 @@ class ProblemPool:
     """
 
     def __init__(self, most_idle=MOST_IDLE):
-        self._lock, self._most_idle, self.made = threading.Lock(), most_idle, 0
+        self._lock, self._most_idle, self.made, self._returns = threading.Lock(), most_idle, 0, 0
         self._idle_of_all, self._idle_of_one = [], []  # (key, problem), the one used last at the end
 
     @contextlib.contextmanager
@@ -89,7 +91,9 @@ class ProblemPool:
                 del idle[: len(dropped)]
         for old in dropped:
             release(old)
-        free_dropped(comm)
+        self._returns += 1
+        if dropped or comm.size > 1 or self._returns % _SOME == 0:
+            free_dropped(comm)
 
 
 _PACKAGE = __name__.partition(".")[0]

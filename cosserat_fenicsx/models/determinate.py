@@ -101,7 +101,7 @@ class Tree:
         Returns:
             (k, N, d).
         """
-        within = np.einsum("jg,kcgi->kcji", rule.from_slopes, tangents)
+        within = rule.from_slopes @ tangents
         r = np.empty((len(tangents), *rest.shape))
         for nodes, cells, entry, before in self._rods(self._order):
             steps = within[:, cells]
@@ -207,12 +207,13 @@ class DeterminateInPlane(_KnownForce, PlaneModel):
             turned, curvature = inside @ basis.T, inside @ rule.slopes.T / sizes[:, None]
             c, s = np.cos(turned), np.sin(turned)
             t1, t2 = section.R_R[..., 0], section.R_R[..., 1]
-            t = np.stack([c * t1 - s * t2, s * t1 + c * t2], axis=-1)
-            a = np.stack([-t[..., 1], t[..., 0]], axis=-1)
+            t = np.empty((*turned.shape, 2))
+            a, material, bent = np.empty_like(t), np.zeros((*turned.shape, 3)), np.zeros((*turned.shape, 3))
+            t[..., 0], t[..., 1] = c * t1 - s * t2, s * t1 + c * t2
+            a[..., 0], a[..., 1] = -t[..., 1], t[..., 0]
             n = load_factors[:, None, None, None] * known + lasting
-            none = np.zeros_like(curvature)
-            material = np.stack([np.einsum("...i,...i", a, n), none, np.einsum("...i,...i", t, n)], axis=-1)
-            bent = np.stack([none, curvature, none], axis=-1)
+            material[..., 0], material[..., 2] = (np.einsum("...i,...i", direction, n) for direction in (a, t))
+            bent[..., 1] = curvature
             e = strain(section, material, bent)
             sheared, stretched = section.v_R[..., 0] + e[..., 0], section.v_R[..., 1] + e[..., 2]
             r_s = sheared[..., None] * a + stretched[..., None] * t

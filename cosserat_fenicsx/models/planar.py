@@ -68,10 +68,14 @@ def in_space(axes, offset, r, theta, n, m, r_s):
     Returns:
         (r, q) (k, N, 7) and (n, m, r') (.., 9), inertial; q is continuous where theta is, beyond full turns too.
     """
-    rq = np.concatenate(
-        [r @ axes[:2] + offset, np.cos(theta / 2)[..., None], np.sin(theta / 2)[..., None] * axes[2]], axis=-1
-    )
-    return rq, np.concatenate([n @ axes[:2], m[..., None] * axes[2], r_s @ axes[:2]], axis=-1)
+    rq, fields = np.empty((*theta.shape, 7)), np.empty((*m.shape, 9))
+    half = theta / 2
+    rq[..., :3] = r @ axes[:2] + offset
+    rq[..., 3], rq[..., 4:] = np.cos(half), np.sin(half)[..., None] * axes[2]
+    for first, part in ((0, n), (6, r_s)):
+        fields[..., first : first + 3] = part @ axes[:2]
+    fields[..., 3:6] = m[..., None] * axes[2]
+    return rq, fields
 
 
 class PlanarModel(PlaneModel):

@@ -115,7 +115,7 @@ def error_before(apart, gain):
 
 def order_of(gain, p):
     """(4,) orders in h of the errors, from the gains (4, n) of a halving."""
-    return np.clip(np.log2(_LIKELY * np.min(gain, axis=1)), 1, p + 0.5)
+    return np.minimum(np.maximum(np.log2(_LIKELY * gain.min(axis=1)), 1), p + 0.5)
 
 
 def carry_error(fine, coarse, factor, order, before=None):
@@ -263,7 +263,7 @@ def leading_of(path):
     """(2, rods, points) the largest leading coefficient of an element's displacement, and of its rotation (twice that
     of q), dimensionless."""
     first = [cells.start for cells in cells_of(path.layout)]
-    moved, turned = (leading_coefficients(path, values) for values in np.split(path._motion, [3], axis=2))
+    moved, turned = (leading_coefficients(path, path._motion[..., part]) for part in (slice(0, 3), slice(3, 7)))
     return np.array([np.maximum.reduceat(found, first, axis=1).T for found in (moved, 2 * turned)])
 
 
@@ -271,7 +271,8 @@ def leading_coefficients(path, values):
     """(points, elements) sizes of the leading coefficients of nodal values (points, nodes, k) in the elements of all
     rods."""
     of_elements = values[:, all_cell_nodes(path.layout, path.degree)]
-    return np.linalg.norm(np.einsum("j,kcji->kci", path.rule.leading, of_elements), axis=2)
+    found = path.rule.leading @ of_elements
+    return np.sqrt(np.einsum("kci,kci->kc", found, found))
 
 
 def expected_differences(path):
@@ -299,10 +300,10 @@ def on_mesh(path, layout):
     """
     rule, n = path.rule, path._stacked("gauss_fields")[..., :3]
     (nodes, at_nodes), (cells, at_gauss) = transferred(path.layout, layout, rule)
-    rq = np.einsum("xj,nxjk->nxk", at_nodes, path._motion[:, nodes])
+    rq = (at_nodes[:, None] @ path._motion[:, nodes])[:, :, 0]
     rq[..., :3] += resting(path.scene, layout, rule) / path.scales.length
     rq[..., 3:] /= np.linalg.norm(rq[..., 3:], axis=2, keepdims=True)
-    forces = np.einsum("xj,nxjk->nxk", at_gauss, n[:, cells])
+    forces = (at_gauss[:, None] @ n[:, cells])[:, :, 0]
     return rq, forces.reshape(len(n), -1, len(rule.gauss), 3)
 
 

@@ -268,7 +268,7 @@ def sizes_of(path):
     for criterion in path.criteria:
         own = np.maximum(criterion.sizes(path), 1e-300)
         sizes, noise = np.vstack([sizes, own]), np.vstack([noise, np.zeros((1, noise.shape[1]))])
-    return Sizes(sizes, turned > moved, np.broadcast_to(noise, sizes.shape))
+    return Sizes(sizes, turned > moved, noise + np.zeros_like(sizes))
 
 
 def _squares(vectors):

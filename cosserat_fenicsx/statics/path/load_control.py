@@ -8,6 +8,7 @@ negative mode that appears in steps of a thousandth of the path too is one of th
 `Sweep` advances in C (algebra/sweep.c) as long as every step is accepted at once, or halved.
 """
 
+import itertools
 import math
 from collections import namedtuple
 from dataclasses import dataclass
@@ -344,12 +345,12 @@ class Sweep(Pointers):
     def _follow(self, track):
         """Take C's last points, number of steps and load factor over to the track."""
         sweep = self.c
-        parts = np.cumsum([track.problem.numbering.size, *(len(x) for x in track.here.numbers[1:])])[:-1]
         if sweep.steps == track.steps:
             track.problem.set_load_factor(track.here.load_factor)
             return
+        ends = [0, *itertools.accumulate(map(len, track.here.numbers))]
         track.history = [
-            PathPoint(sweep.known_load_factors[k], [part.copy() for part in np.split(self._points[k], parts)],
+            PathPoint(sweep.known_load_factors[k], [self._points[k, a:b].copy() for a, b in itertools.pairwise(ends)],
                       sweep.negative, 0)
             for k in range(sweep.known)
         ]  # fmt: skip
