@@ -131,7 +131,7 @@ def comparison(rod, scene, chosen):
                 *(f"{d:.7f}  {e:.0e}" for d, e in zip(delta, error, strict=True)),
             ]
         )
-    heads = ["model", "degree, elements", "unknowns", "SNES iterations", "steps of the continuation", "seconds, warm"]
+    heads = ["model", "degree, elements", "unknowns", "Newton iterations", "steps of the continuation", "seconds, warm"]
     heads += [f"delta (m), error at eta = {eta:g}" for eta in COMPARED]
     for head, *cells in zip(heads, *columns, strict=True):
         table.add_row(head, *cells)

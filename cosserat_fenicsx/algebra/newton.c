@@ -1,5 +1,5 @@
-/* Newton's method: the callbacks of PETSc's SNES, and the iterations of a time step. Hooks let Python add constraint
-   equations, exchange with other ranks, and evaluate loads. */
+/* Newton's method for equilibria, and the iterations of a time step. Hooks let Python add constraint equations, exchange
+   with other ranks, and evaluate loads. */
 #include "chain.h"
 
 #include <math.h>

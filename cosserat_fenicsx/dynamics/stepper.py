@@ -236,8 +236,7 @@ class StepNewton:
     """Newton's method for the steps of one `StepProblem`: full increments, one factorised tangent for many steps.
 
     An iteration with an old tangent costs one residual and one back-substitution: on a fine mesh a tenth of one with a
-    new tangent. PETSc's SNES would evaluate one more residual per step, and unused norms. (Broyden's updates of the old
-    tangent need as many iterations, and each costs more.)
+    new tangent. (Broyden's updates of the old tangent need as many iterations, and each costs more.)
 
     Convergence is tested on the increments of the nodal unknowns alone: contact forces and reactions have larger
     rounding errors, and the residual of a stiff rod cannot fall below its rounding.
