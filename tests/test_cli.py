@@ -296,6 +296,8 @@ def test_modes(capsys):
     from cosserat_fenicsx import modes
     from cosserat_fenicsx.cli import main as cli
 
+    assert cli.main(["modes", str(DEMO), "--count", "2", "--damped", "--near", "10j"]) == 0
+    assert "eigenvalues with" in capsys.readouterr().out
     assert cli.main(["modes", str(DEMO), "--count", "2"]) == 0
     said = capsys.readouterr().out
     found = modes(cf.read(DEMO).scene, 2)
@@ -303,7 +305,7 @@ def test_modes(capsys):
     assert [float(row[2]) for row in rows] == pytest.approx(found.frequencies, rel=1e-6)
     for row in rows:
         along = [float(x) for x in row[-4:-1]]
-        assert "column.end" in row[-5] and along[2] == 0 and np.hypot(*along[:2]) == pytest.approx(1, abs=0.01)
+        assert "oscillates" in row[5] and "column.end" in row[-5] and along[2] == 0 and np.hypot(*along[:2]) == pytest.approx(1, abs=0.01)
 
 
 def test_soft_materials_are_asked_about(tmp_path, capsys):

@@ -43,8 +43,12 @@ def parser():
     buckling = commands.add_parser("buckling", help="critical load factors by linear buckling")
     _eigenvalues(buckling, "buckling", 3, "1e-5")
 
-    modes = commands.add_parser("modes", help="natural frequencies about any equilibrium")
+    modes = commands.add_parser("modes", help="modes about any equilibrium or steady rotation, damped or not")
     _eigenvalues(modes, "modes", 5, "1e-6")
+    modes.add_argument("--damped", action=argparse.BooleanOptionalAction,
+                       help="complex modes [where something damps, rotates or follows]")  # fmt: skip
+    modes.add_argument("--near", type=complex, metavar="Z",
+                       help="complex modes nearest this eigenvalue, 1/s, such as --near=-1+50j")  # fmt: skip
 
     explain = commands.add_parser("explain", help="say which model would be solved and how large it is")
     _common(explain)

@@ -90,7 +90,8 @@ def eigenvalues(options, found, tables):
         from cosserat_fenicsx.statics.natural_modes import modes as compute
     for caution in found.scene.doubts:
         say(f"cosserat: warning: {caution}")
-    name, settings = options.command, given(options, ("tol", "elements", "degree"))
+    name, more = options.command, ("damped", "near") if options.command == "modes" else ()
+    settings = given(options, ("tol", "elements", "degree", *more))
 
     def files(result):
         return {
