@@ -1,6 +1,7 @@
 """Many cases of a scene, `compile`: each equals `solve` of the same scene, or went there."""
 
 import dataclasses
+import pickle
 
 import numpy as np
 import pytest
@@ -176,3 +177,22 @@ def test_each_rank_alone():
         found = cf.compile(scene, ["loads[0].force[0]"], ASKED[:1]).batch([[2.0], [3.0]])
     assert not found.by_solve.any()
     assert found.values[1, 0] == pytest.approx(cf.solve(scene, [1.0]).displacement("column.end")[0, 0], rel=1e-12)
+
+
+@pytest.mark.serial
+def test_a_study_of_a_compiled_scene(tmp_path):
+    """The same numbers as of `batch`, with names, units and failures, again from the folder; other names are refused."""
+    compiled = cf.compile(column(), ["loads[0].force[0]", "rods[0].section.diameter"], ASKED[:2])
+    cases = {"loads[0].force[0]": [1.0, 2.0], "rods[0].section.diameter": [0.01, -1.0]}
+    found = cf.study(compiled, cases, folder=tmp_path)
+    expected = compiled.batch([[1.0, 0.01], [1.0, -1.0], [2.0, 0.01], [2.0, -1.0]])
+    for k in (0, 2):
+        assert list(found.results[k].values()) == [*expected.values[k], *expected.errors[k]]
+    assert [found.why(k) for k in (1, 3)] == [expected.failures[k] for k in (1, 3)]
+    assert found.units["error of position column.end z"] == "m" and found.units["loads[0].force[0]"] == "N"
+    assert "displacement column.end x" in found.results[0]
+    again = cf.study(compiled, cases, folder=tmp_path)
+    assert again.results == found.results and (again.seconds[::2] == found.seconds[::2]).all()
+    assert pickle.loads(pickle.dumps(compiled.task())).many(found.cases[:1]) == [found.results[0]]
+    with pytest.raises(cf.SceneError, match="compiled over"):
+        cf.study(compiled, {"force": [1.0]})

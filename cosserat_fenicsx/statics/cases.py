@@ -9,9 +9,11 @@ exactly, each case is loaded by itself. What cannot be decided this way goes to 
 
 import itertools
 import threading
+import uuid
 import weakref
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
+from functools import cached_property
 
 import numpy as np
 
@@ -113,6 +115,7 @@ class Query:
     rod: int
     share: float
     component: int | None
+    label: str
 
     @property
     def kind(self):
@@ -134,7 +137,8 @@ class Query:
         station = scene.station(station) if isinstance(station, str) else station
         if getattr(station, "rod", None) not in scene.rods:
             raise SceneError(f"compile: query {given!r}: expected a station of the scene, or its name")
-        return cls(name, scene.number(station.rod), station.s / station.rod.length, component)
+        label = f"{name} {station}" if component is None else f"{name} {station} {'xyz'[component]}"
+        return cls(name, scene.number(station.rod), station.s / station.rod.length, component, label)
 
     def on(self, path):
         """(points,) values and (points,) estimated errors."""
@@ -146,6 +150,56 @@ class Query:
         return values if self.component is None else values[:, self.component], path._errors[k] * (
             path._reference.sizes[k] * unit
         )
+
+
+@dataclass(frozen=True, eq=False)
+class CasesTask:
+    """The task of `study` that solves the cases of a compiled scene: pickle takes it, and it can be compared."""
+
+    scene: Scene
+    names: tuple[str, ...]
+    queries: tuple[Query, ...]
+    load_factor: float
+    tol: float
+
+    @cached_property
+    def compiled(self):
+        """The `CompiledScene` of this process."""
+        return CompiledScene(*(getattr(self, x.name) for x in fields(self)))
+
+    @cached_property
+    def _token(self):
+        return uuid.uuid4().hex
+
+    def __reduce__(self):
+        return _known_task, (self._token, *(getattr(self, x.name) for x in fields(self)))
+
+    @property
+    def units(self):
+        """{name of a parameter or of a result: its unit}."""
+        found = {name: parameter_of(self.scene, name).unit for name in self.names}
+        return found | {f"{what}{x.label}": _UNITS[x.kind] for x in self.queries for what in ("", _ERROR_OF)}
+
+    def many(self, cases):
+        """What each case gives: {label of a query: value, and "error of" it: its estimated error}, or why it has
+        no equilibrium."""
+        found = self.compiled.batch([[case[name] for name in self.names] for case in cases])
+        labels = [f"{what}{x.label}" for what in ("", _ERROR_OF) for x in self.queries]
+        rows = np.concatenate([found.values, found.errors], axis=1).tolist()
+        return [found.failures.get(k) or dict(zip(labels, row, strict=True)) for k, row in enumerate(rows)]
+
+
+_ERROR_OF = "error of "
+_UNITS = {"position": "m", "rotation": "rad", "force": "N", "moment": "N m"}
+# The tasks of this process by their tokens: an executor sends one with every case.
+_TASKS = {}
+
+
+def _known_task(token, *given):
+    if token not in _TASKS:
+        _TASKS.clear()  # of studies before
+        _TASKS[token] = CasesTask(*given)
+    return _TASKS[token]
 
 
 class CompiledScene:
@@ -162,10 +216,19 @@ class CompiledScene:
         self._scene, self._queries, self._load_factor, self._tol = scene, queries, load_factor, tol
         self._pair, self._linear = None, False
         self._comm, self._lock = communicator(), threading.Lock()
-        obstacle = "there are several ranks" if self._comm.size > 1 else self._prepare()
+        self._begin("there are several ranks" if self._comm.size > 1 else self._prepare())
+
+    def _begin(self, obstacle):
         if obstacle:
             self._pair, self.model = None, ""
-            self.why.append(f"every case goes to solve: {obstacle}")
+            self.why = [f"every case goes to solve: {obstacle}"]
+
+    def task(self) -> CasesTask:
+        """What `study` takes this object for: a task whose arguments are the parameters, by their names."""
+        task = CasesTask(self._scene, self.names, tuple(self._queries), self._load_factor, self._tol)
+        if self._comm.size == 1:
+            vars(task)["compiled"] = self
+        return task
 
     def __repr__(self):
         return f"<CompiledScene over {', '.join(self.names)}: {'; '.join(self.why)}>"

@@ -18,7 +18,7 @@ from cosserat_fenicsx.progress import CaseProgress
 from cosserat_fenicsx.ranks import communicator
 from cosserat_fenicsx.storage.mark import NotMarked, mark_of
 from cosserat_fenicsx.storage.store import Kind, Nowhere, Store
-from cosserat_fenicsx.studies.executors import by_executor, computed, executor_of
+from cosserat_fenicsx.studies.executors import by_executor, computed, computed_at_once, executor_of
 from cosserat_fenicsx.studies.outcome import Study, from_data
 
 KIND = Kind(
@@ -49,7 +49,7 @@ def study(
     `InstallationError` is none: what is missing for one case is missing for all.
 
     Args:
-        task: a function of the arguments of a case, by name; lists, dicts and arrays among them are its own, and may
+        task: a function of the arguments of a case, by name, or what `compile` returns; lists, dicts and arrays among them are its own, and may
             be changed. It returns a number, a text, an array of numbers or of
             texts, None, or a dict of these by name; where it computes more, it writes that to files of its own.
         cases: dicts of arguments, in a list or another iterable; or one dict {name: values}, whose product is taken,
@@ -79,6 +79,7 @@ def study(
         RuntimeError: the executor has broken, as where a worker was killed; a folder keeps what was computed.
     """
     comm = communicator(comm if executor is None else MPI.COMM_SELF)
+    task = task.task() if hasattr(task, "task") else task  # a compiled scene
     cases, grid = cases_of(cases)
     check_task(task, cases)
     instance("study", "retry", retry, bool, "True or False")
@@ -102,6 +103,7 @@ def study(
         store.release()
     found = {i: (from_data(row.get("result")), row.get("failure", ""), row["seconds"]) for i, row in rows.items()}
     found = Study(cases, grid, dict(sorted(found.items())))
+    found.units = dict(getattr(task, "units", {}))
     _raise_first(run.trouble, troubles, found, store)
     return found
 
@@ -136,6 +138,10 @@ def _outcome_in(row, count):
         raise ValueError(f"case = {row['case']}: expected a result or a failure of one of {count} cases")
     row["attempt"] + row["seconds"], from_data(row.get("result"))
     return row
+
+
+# Most cases that a task takes at once.
+_BLOCK = 256
 
 
 class _Run:
@@ -186,6 +192,12 @@ class _Run:
         todo = (self._missing[k] for k in pool)
         if self._executor is not None:
             yield from by_executor(self._executor, self._task, self._cases, todo)
+            return
+        if hasattr(self._task, "many"):
+            size = max(1, min(_BLOCK, len(self._missing) // (4 * self._comm.size)))
+            while block := [*itertools.islice(todo, size)]:
+                obey()
+                yield from zip(block, computed_at_once(self._task, [self._cases[i] for i in block]), strict=True)
             return
         for i in todo:
             obey()
@@ -267,6 +279,14 @@ def _values(field, values, what, expected="a list of values"):
 
 def check_task(task, cases):
     """Refuse a task that cannot be called with its cases, before any of them is computed."""
+    if hasattr(task, "many"):
+        for i, case in enumerate(cases):
+            if set(case) != set(task.names):
+                raise SceneError(
+                    f"study.cases: case {i} has the names {', '.join(case) or '(none)'}: expected those that the scene "
+                    f"is compiled over, {', '.join(task.names)}"
+                )
+        return
     if not callable(task):
         refuse("study", "task", task, "a function of the arguments of a case")
     try:
