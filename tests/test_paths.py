@@ -587,10 +587,10 @@ def test_warm_calls_make_nothing():
 # -- the pool itself ---------------------------------------------------------------------------------------------------
 
 
-def used(pool, key, comm=MPI.COMM_WORLD, error=None):
+def used(pool, key, comm=MPI.COMM_WORLD, error=None, **more):
     """Borrow and return a problem; an error may be raised in between."""
     try:
-        with pool.lend(key, comm, object, KeyError) as problem:
+        with pool.lend(key, comm, object, KeyError, **more) as problem:
             if error:
                 raise error
     except type(error) if error else ():
@@ -620,6 +620,17 @@ def test_what_is_idle_is_bounded():
     assert used(pool, "a") is a and pool.made == made
     used(pool, "b")
     assert pool.made == made + 1
+
+
+def test_a_large_problem_is_alone():
+    """Other large ones that are idle are dropped before it is made; it stays for the next caller, as small ones do."""
+    pool = ProblemPool()
+    small, large = used(pool, "small"), used(pool, "one", large=True)
+    assert used(pool, "one", large=True) is large
+    used(pool, "other", large=True)
+    made = pool.made
+    assert used(pool, "small") is small and pool.made == made
+    assert used(pool, "one", large=True) is not large and pool.made == made + 1
 
 
 def test_what_may_be_half_way_is_not_kept():

@@ -37,10 +37,10 @@ class ProblemPool:
 
     def __init__(self, most_idle=MOST_IDLE):
         self._lock, self._most_idle, self.made, self._returns = threading.Lock(), most_idle, 0, 0
-        self._idle_of_all, self._idle_of_one = [], []  # (key, problem), the one used last at the end
+        self._idle_of_all, self._idle_of_one = [], []  # (key, problem, large), the one used last at the end
 
     @contextlib.contextmanager
-    def lend(self, key, comm, make, outcomes=()):
+    def lend(self, key, comm, make, outcomes=(), *, large=False):
         """A context whose value is a problem that nobody else uses within it.
 
         Args:
@@ -50,22 +50,25 @@ class ProblemPool:
             make: called for a problem where none that fits is idle.
             outcomes: exceptions that leave a problem usable. After any other it is dropped, since it may be half way
                 through an assembly or a solution.
+            large: whether it takes so much memory that no other such problem stays idle when it is made.
         """
         idle = self._idle_on(comm)
         problem = self._take(idle, key)
         if problem is None:
+            if large:
+                self._drop_large(idle, comm)
             begin()
             problem = make()
         try:
             yield problem
         except outcomes:
-            self._give_back(idle, key, problem, comm)
+            self._give_back(idle, (key, problem, large), comm)
             raise
         except Exception:  # under mpirun the other ranks may not have raised it
             if comm.size == 1:
                 release(problem)
             raise
-        self._give_back(idle, key, problem, comm)
+        self._give_back(idle, (key, problem, large), comm)
 
     def _idle_on(self, comm):
         """The list of idle problems on a communicator; None for one created by the user."""
@@ -81,15 +84,25 @@ class ProblemPool:
             self.made += 1
         return None
 
-    def _give_back(self, idle, key, problem, comm):
+    def _give_back(self, idle, lent, comm):
         with self._lock:
             if idle is None:
-                dropped = [problem]
+                dropped = [lent]
             else:
-                idle.append((key, problem))
-                dropped = [old for _, old in idle[: max(0, len(idle) - self._most_idle)]]
+                idle.append(lent)
+                dropped = idle[: max(0, len(idle) - self._most_idle)]
                 del idle[: len(dropped)]
-        for old in dropped:
+        self._release(dropped, comm)
+
+    def _drop_large(self, idle, comm):
+        with self._lock:
+            dropped = [old for old in idle or () if old[2]]
+            if dropped:
+                idle[:] = [old for old in idle if not old[2]]
+        self._release(dropped, comm)
+
+    def _release(self, dropped, comm):
+        for _, old, _ in dropped:
             release(old)
         self._returns += 1
         if dropped or comm.size > 1 or self._returns % _SOME == 0:
@@ -119,8 +132,9 @@ def free_dropped(comm):
 
 
 def _destroy(value, seen):
-    """Destroy the PETSc objects in an object of this package, and in those that it refers to."""
-    if id(value) in seen:
+    """Destroy the PETSc objects in an object of this package, and in those that it refers to; frozen ones are data, of
+    scenes for example, and own none."""
+    if id(value) in seen or getattr(getattr(value, "__dataclass_params__", None), "frozen", False):
         return
     seen.add(id(value))
     if isinstance(value, PETSc.Object):

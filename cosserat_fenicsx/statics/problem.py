@@ -256,6 +256,8 @@ class Promoted(Exception):
         return max(a, c) <= _ALIKE * min(b, d)
 
 
+# Unknowns from which on a problem takes a GB or so.
+_LARGE = 200_000
 # Exceptions that leave the problem and its solvers fit for use: they are raised between two steps.
 _OUTCOMES = (NotConverged, Promoted)
 
@@ -275,7 +277,8 @@ def solvers_of(scene, layout, *, formulation="mixed", degree=4, points=None, com
     """
     comm = communicator(comm)
     signature = Signature.of(scene, layout, formulation=formulation, degree=degree, points=points, model=model)
-    with PROBLEMS.lend(("equilibrium", signature), comm, lambda: make_solvers(comm, signature), _OUTCOMES) as solvers:
+    key, large = ("equilibrium", signature), signature.unknowns > _LARGE
+    with PROBLEMS.lend(key, comm, lambda: make_solvers(comm, signature), _OUTCOMES, large=large) as solvers:
         problem, _, stability = solvers
         if problem.load(scene, layout):
             stability.load()
