@@ -134,3 +134,15 @@ def test_stored_states_and_kinks(tmp_path):
 def test_what_is_refused(make, says):
     with pytest.raises(cf.SceneError, match=says):
         make()
+
+
+def test_in_stages():
+    """Tightened one after the other, then one is released: the end is that of the other alone."""
+    one, other = TWO
+    stages = [cf.Stage(loads=[other], load_factors=[1.0]), cf.Stage(release=one, load_factors=[0.5, 1.0])]
+    path = cf.solve(cf.Scene([ROD], [cf.Clamp(ROD.start)], [one], stages=stages), [1.0], tol=1e-7)
+    assert path.tendon(one).tension == pytest.approx([4.0, 4.0, 2.0, 0.0])
+    assert path.tendon(other).tension == pytest.approx([0.0, 2.0, 2.0, 2.0])
+    alone = cf.solve(arm(other), [1.0], tol=1e-7)
+    assert path.position(ROD.end)[-1] == pytest.approx(alone.position(ROD.end)[-1], abs=1e-9)
+    assert path.force(ROD.start)[-1] == pytest.approx(alone.force(ROD.start)[-1], abs=1e-7)

@@ -162,16 +162,17 @@ class RodResult(Result, Extremes, Reactions, Stresses, States):
         """Tension and length of a tendon in every state.
 
         Args:
-            tendon: one of the `Tendon`s in `result.scene.loads`.
+            tendon: one of the `Tendon`s in `result.scene.loads`, or in those of a stage.
 
         Raises:
             SceneError: it is not one of them.
         """
-        found = next((load for load in self.scene.loads if load.is_thread and load == tendon), None)
-        if found is None:
+        if not any(load.is_thread and load == tendon for load in self.scene.all_loads):
             raise SceneError(f"tendon: {tendon!r} is no tendon of the scene: expected one of result.scene.loads")
-        threads = Threads(self)
-        return TendonState(threads.tension(found), threads.length(found))
+        return TendonState(self._tension(tendon), Threads(self).length(tendon))
+
+    def _tension(self, tendon):
+        return Threads(self).tension(tendon)
 
     def centreline(self, k: int = -1, rod: RodOrName | None = None) -> np.ndarray:
         """(nodes, 3) m, inertial: the nodes of a rod (default the first) at point k."""

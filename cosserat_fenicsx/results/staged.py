@@ -9,6 +9,7 @@ import numpy as np
 from cosserat_fenicsx.quantities import Quantity
 from cosserat_fenicsx.results.path import Path
 from cosserat_fenicsx.results.records import Record, Records
+from cosserat_fenicsx.results.threads import Threads
 from cosserat_fenicsx.results.result import by_name
 from cosserat_fenicsx.scene.rod import Station
 
@@ -134,6 +135,15 @@ class StagedPath(Path):
 
     def _without_stress(self, which, rod, s):
         return self.at_points(which)._by_stages(lambda _, part: part._without_stress(range(len(part)), rod, s))
+
+    def _tension(self, tendon):
+        """See `RodResult.tendon`: what the stage applies to it, and what stages before have left."""
+
+        def acting(_, part):
+            alike = (x for x in part.scene.loads if x.is_thread and (x.rod, x.offset) == (tendon.rod, tendon.offset))
+            return sum((Threads(part).tension(x) for x in alike), np.zeros(len(part)))
+
+        return self._by_stages(acting)
 
     @property
     def conservative(self):

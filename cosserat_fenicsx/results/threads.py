@@ -79,7 +79,7 @@ class Threads:
         """(n,) N."""
         records = self._records
         times = records["time"] if "time" in records.columns else np.zeros(len(records))
-        full = np.array([np.reshape(at(thread, t).tension, -1)[0] for t in times], dtype=float)
+        full = thread.amplitude * np.array([np.reshape(at(thread, t).tension, -1)[0] for t in times], dtype=float)
         return full * records["load_factor"] if thread.scaled else full
 
     def length(self, thread):

@@ -364,7 +364,7 @@ class Scene(Part):
     @cached_property
     def has_threads(self):
         """Whether a thread runs along a rod, see `Action.is_thread`."""
-        return any(action.is_thread for action in self.actions)
+        return any(load.is_thread for load in self.all_loads)
 
     @cached_property
     def acts_in_law(self):
