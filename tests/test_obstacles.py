@@ -101,8 +101,8 @@ def test_a_stiff_rope_on_a_bollard(a, ratio):
     path = cf.solve(scene, [ratio * (1 - 1e-3) - 1], elements=20, model="planar")
     touch = path.contacts(bollard)
     assert touch.force[-1, 2] == pytest.approx(ratio * (1 - 1e-3) + 1, rel=1e-6)
-    with pytest.raises(cf.NotConverged):
-        cf.solve(scene, [ratio * (1 + 1e-3) - 1], elements=20, model="planar", control="load")
+    with pytest.raises(cf.NotConverged, match="Friction may not hold more"):
+        cf.solve(scene, [ratio * (1 + 1e-3) - 1], elements=20, model="planar")
 
 
 def test_a_rod_slides_to_rest():
@@ -126,6 +126,12 @@ BEAM = cf.Rod(cf.Line((0, 0, 1), (1, 0, 1)), cf.Rectangle(0.02, 0.03), cf.Materi
     [
         (lambda: cf.Plane((0, 0, 0), (0, 0, 0)), "Plane.normal = .*expected a direction"),
         (lambda: cf.Plane((0, 0, 0), (0, 0, 1), friction=-0.1), "Plane.friction = -0.1: expected"),
+        (
+            lambda: cf.solve(
+                cf.Scene([ROD], [cf.Clamp(ROD.start)], [cf.Plane((0, 0, 0), (0, 0, 1), friction=0.1)]), control="arc"
+            ),
+            "expected load control and no branch, since an obstacle has friction",
+        ),
         (lambda: cf.Sphere((0, 0, 0), 0.0), "Sphere.radius = 0.0: expected"),
         (lambda: cf.Scene([BEAM], [], [cf.Plane((0, 0, 0), (0, 0, 1))]), "contact_radius is missing.*rod 'beam'"),
         (

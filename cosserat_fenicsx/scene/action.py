@@ -222,3 +222,8 @@ def without_stress(scene, rod, s, t=0.0):
 def path_dependent(scene):
     """Whether an action of a scene has a memory, so that states must be computed in order."""
     return any(action.memory for action in scene.actions)
+
+
+def rubs(scene):
+    """Whether an obstacle of a scene has friction: an equilibrium is then reached by load control alone."""
+    return any(load.gaps is not None and load.friction for load in scene.all_loads)

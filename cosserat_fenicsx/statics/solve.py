@@ -24,7 +24,7 @@ from cosserat_fenicsx.results.accuracy import FEW
 from cosserat_fenicsx.results.compared import NAMES, Criterion, criteria_of
 from cosserat_fenicsx.results.contacts import check_passes
 from cosserat_fenicsx.results.path import Path
-from cosserat_fenicsx.scene.action import path_dependent
+from cosserat_fenicsx.scene.action import path_dependent, rubs
 from cosserat_fenicsx.scene.scene import Scene, check_magnitudes
 from cosserat_fenicsx.statics.arguments import check_arguments, check_static
 from cosserat_fenicsx.statics.legs import Followed, Legs
@@ -114,6 +114,10 @@ def solve(
         scene.warn()
     discretised = {"formulation": formulation, "degree": degree, "points": gauss_points}
     steps = _STEPS if steps is None else instance("solve", "steps", steps, StepControl, "a StepControl")
+    if rubs(scene):
+        if branch or control == "arc":
+            raise SceneError("control, branch: expected load control and no branch, since an obstacle has friction")
+        control = "load"
     follow = _follow_options(steps, control, branch)
     if until is not None and not (callable(until) and free):
         raise SceneError("until: expected a function of the Path, with a pair of load factors (a, b)")

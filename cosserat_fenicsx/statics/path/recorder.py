@@ -21,6 +21,7 @@ from cosserat_fenicsx.results.export import saved
 from cosserat_fenicsx.results.path import Path
 from cosserat_fenicsx.results.records import Event, Record, Records
 from cosserat_fenicsx.results.staged import StagedPath
+from cosserat_fenicsx.scene.action import rubs
 from cosserat_fenicsx.statics.critical import derivatives_of
 from cosserat_fenicsx.statics.path.chord import Chord
 from cosserat_fenicsx.statics.path.events import Lost
@@ -234,7 +235,9 @@ class Tracing:
             where = (
                 f"Try a first step below {self._follower.smallest:.1g}, by steps=StepControl(smallest={shorter:.1g}),"
             )
-        if here and self._options["control"] == "load":
+        if here and rubs(self.model.scene):
+            where = "Friction may not hold more; otherwise try"
+        elif here and self._options["control"] == "load":
             where = "There may be a limit point, which load control cannot pass (control='auto' can); otherwise try"
         softer = ", a softer wall" if any(action.at_nodes for action in self.model.scene.actions) else ""
         return f"{where} load factors in between, more elements{softer}, or {self.model.signature.formulation.advice}."
