@@ -19,16 +19,20 @@ class Point:
         theta: rotation vector from the reference; in space for angles below a full turn, in a plane for any angle.
         curvature: axial vector of R^T R', `equilibrium.Motion.curvature`; None in the determinate models.
         r_t, omega: velocity and angular velocity; zero at rest.
-        fixed: the same point with values that `variation` does not differentiate, such as the limit of friction; by
-            default the point itself.
+        fixed: see the property.
         rest, frame: functions that give the position at rest, from the same origin, and [d_1R d_2R d_3R], the directors
             at rest as columns. They are called only where a virtual work needs them.
     """
 
     def __init__(self, r, r_s, R, theta, *, rest, frame, curvature=None, r_t=NONE, omega=NONE, fixed=None):
         self.r, self.r_s, self.R, self.theta, self.curvature = r, r_s, R, theta, curvature
-        self.r_t, self.omega, self.fixed = r_t, omega, fixed or self
-        self._rest, self._frame = rest, frame
+        self.r_t, self.omega = r_t, omega
+        self._rest, self._frame, self._fixed = rest, frame, fixed
+
+    @property
+    def fixed(self):
+        """The same point with values that `variation` does not differentiate, such as for the limit of friction."""
+        return self._fixed or self
 
     @cached_property
     def rest(self):
