@@ -305,7 +305,12 @@ def test_modes(capsys):
     assert [float(row[2]) for row in rows] == pytest.approx(found.frequencies, rel=1e-6)
     for row in rows:
         along = [float(x) for x in row[-4:-1]]
-        assert "oscillates" in row[5] and "column.end" in row[-5] and along[2] == 0 and np.hypot(*along[:2]) == pytest.approx(1, abs=0.01)
+        assert (
+            "oscillates" in row[5]
+            and "column.end" in row[-5]
+            and along[2] == 0
+            and np.hypot(*along[:2]) == pytest.approx(1, abs=0.01)
+        )
 
 
 def test_soft_materials_are_asked_about(tmp_path, capsys):
