@@ -239,9 +239,12 @@ class RodResult(Result, Extremes, Reactions, Stresses, States):
     def _without_stress(self, which, rod, s):
         """(k, 2, n, 3) curvature, 1/m, and strain without stress beyond the reference, material, at arc lengths s (n,)
         of a rod in several states: see `action.without_stress`."""
-        records = [self._records[k] for k in which]
-        parts = [without_stress(self.scene, rod, s, getattr(record, "time", 0.0)) for record in records]
-        return np.array([full + r.load_factor * scaled for r, (full, scaled) in zip(records, parts, strict=True)])
+        records, known, found = [self._records[k] for k in which], {}, []
+        for record in records:
+            time = getattr(record, "time", 0.0)
+            full, scaled = known[time] = known[time] if time in known else without_stress(self.scene, rod, s, time)
+            found.append(full + record.load_factor * scaled)
+        return np.array(found)
 
     def largest_displacement(self) -> np.ndarray:
         """(n,) the largest displacement of any node, m."""
