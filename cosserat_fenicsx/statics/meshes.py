@@ -162,7 +162,7 @@ def _acts_evenly(scene):
             and not any(map(callable, vars(action).values()))
             and traits_of(action, scene.rods).dead
         )
-        for action in scene.actions
+        for action in (*scene.actions, *scene.all_loads)
     )
 
 

@@ -165,12 +165,11 @@ def solve(
             check_passes(found)
             return found
         many = legs[0].free or len(legs[0].load_factors) > FEW
-        layout, usual = first_layout(legs[0].scene, degree), None
-        if simple and len(legs) == 1:
-            layout, usual = meshes_for(scene, degree, tol, many)
-        elif known:
-            given = next(iter(known.values())).layout
-            layout = given if given.fits(scene) else layout
+        given = next(iter(known.values())).layout if known else None
+        if given is not None and given.fits(scene):
+            layout, usual = given, None
+        else:
+            layout, usual = meshes_for(scene, degree, tol, many) if simple else (first_layout(scene, degree), None)
         for leg in legs:
             layout = layout if leg is legs[0] else resolving(leg.scene, layout, degree)
             turning = resolving_turns(leg.scene, layout, max(map(abs, leg.load_factors)))
