@@ -145,3 +145,11 @@ def test_what_modes_refuse():
         cf.campbell(cf.Scene([rod], [clamp]), [1.0])
     with pytest.raises(cf.SceneError, match="rates from 0 on"):
         cf.campbell(cf.Scene([rod], [clamp], [cf.Centrifugal((0, 0, 1.0))]), [-1.0])
+
+
+def test_free_motions_and_their_decay_are_found_as_such():
+    """A free rod has six motions for nothing; with drag each of them decays, too."""
+    for drag, kinds in ((0.0, ["free"] * 6 + ["oscillates"]), (0.1, ["free"] * 6 + ["overdamped"])):
+        rod, _ = cantilever((1.0, 2.0), stiff=1e4, J=1e-3, damping=cf.Damping(drag=drag))
+        found = cf.modes(cf.Scene([rod]), 7, damped=True, elements=4)
+        assert found.kind.tolist() == kinds and found.eigenvalues[:6].tolist() == [0j] * 6

@@ -16,8 +16,9 @@ _TOLERANCE, _ROUGH = 1e-12, 1e-2
 _RESTARTS, _BESIDE = 40, 0.99
 # Largest number of shifts that are tried, and of looks for missed eigenvalues.
 _SHIFTS, _LOOKS = 12, 20
-# Size of an eigenvalue that is as good as none, in units of frequency; and over a shift, of a free motion.
-_LOW, _NOTHING = 1e-3, 1e-4
+# Size of an eigenvalue that is as good as none, in units of frequency; and squares of those of free motions over the
+# rounding of K.
+_LOW, _FREE = 1e-3, 4.0
 # A real shift is this many times the smallest size of an eigenvalue, within these bounds.
 _SHIFT, _BOUNDS = 0.5, (0.02, 5.0)
 # Eigenvalues with a smaller relative difference are treated as one multiple eigenvalue.
@@ -60,14 +61,24 @@ class QuadraticPencil:
         Raises:
             NotConverged: some were not found.
         """
-        shift = _SHIFT * self._size_of_lowest()
+        shift, asked = _SHIFT * self._size_of_lowest(), count
         for _ in range(_SHIFTS):
-            values, vectors = self._nearest(shift, count, lambda values, shift: abs(values) + shift)
-            moving = abs(values[abs(values) > _NOTHING * shift])
-            if not len(moving) or _BOUNDS[0] < shift / moving.min() < _BOUNDS[1]:
+            values, vectors = self._nearest(shift, asked, lambda values, shift: abs(values) + shift)
+            moving = abs(values[~self._free(values, vectors)])
+            if len(moving) and not _BOUNDS[0] < shift / moving.min() < _BOUNDS[1]:
+                shift = _SHIFT * moving.min()
+                continue
+            found = self._polished(values, vectors, count, 0.0)
+            if len(found.values) >= min(count, self.count // 2) or asked >= 2 * count:
                 break
-            shift = _SHIFT * moving.min()
-        return self._polished(values, vectors, count, 0.0, _NOTHING * shift)
+            asked = 2 * count  # pairs of zeros stand for one free motion each
+        return found
+
+    def _free(self, values, vectors):
+        """(n,) whether eigenvalues are those of free motions: a pair of zeros, up to the root of the rounding of K."""
+        sizes = np.einsum("ik,ik->k", np.abs(vectors), self._K_sizes @ np.abs(vectors))
+        masses = np.einsum("ik,ik->k", vectors.conj(), self.M @ vectors).real
+        return np.abs(values) ** 2 <= _FREE * np.finfo(float).eps * sizes / masses
 
     def _size_of_lowest(self):
         """About the smallest size of an eigenvalue, by inverse iteration."""
@@ -80,7 +91,7 @@ class QuadraticPencil:
     def nearest(self, point, count):
         """The eigenvalues nearest a complex point, in the upper half plane, `Found`, ascending by the distance."""
         values, vectors = self._nearest(complex(point), count, lambda values, shift: abs(values - shift))
-        return self._polished(values, vectors, count, point, 0.0)
+        return self._polished(values, vectors, count, point)
 
     # -- iteration ---------------------------------------------------------------------------------------------------
 
@@ -177,11 +188,11 @@ class QuadraticPencil:
 
     # -- accuracy ----------------------------------------------------------------------------------------------------
 
-    def _polished(self, values, vectors, count, point, nothing):
+    def _polished(self, values, vectors, count, point):
         """`Found` of the `count` eigenvalues nearest a point: by Rayleigh's quotients with left and right vectors, whose
-        errors are squares of those of the vectors. Those below `nothing` are free motions: pairs of zeros."""
+        errors are squares of those of the vectors."""
         left, found = np.ones(len(values), dtype=bool), []
-        free = np.flatnonzero(np.abs(values) <= nothing)
+        free = np.flatnonzero(self._free(values, vectors))
         if len(free):
             U, sizes, _ = np.linalg.svd(np.column_stack([vectors[:, free].real, vectors[:, free].imag]), False)
             found += [(0j, x.astype(complex), 0.0) for x in U.T[sizes > _SAME_MOTION * sizes[0]]]
