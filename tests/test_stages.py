@@ -181,6 +181,8 @@ PUSH, SIDE = cf.Force("rod.end", (1, 0, 0)), cf.Force("rod@0.7", (0, 1, 0))
         (lambda: cf.solve(column([PUSH], [cf.Stage(release="rod.start")])), "stages[0]: Scene.supports: nothing holds"),
         (lambda: column([PUSH], [cf.Stage(supports=[cf.Pin("rod.start")])]), "hold the same motion twice"),
         (lambda: cf.solve(column([PUSH], [cf.Stage([SIDE])]), [0.5]), "load_factors end at 0.5, and stages[0] goes on"),
+        (lambda: cf.solve(column([PUSH, cf.Plane((0, 0, -1), (0, 0, 1), friction=0.1, contact_radius=0.1)],
+                                 [cf.Stage([SIDE])])), "has a memory, which stages do not hand on"),
         (lambda: cf.buckling(column([PUSH], [cf.Stage([SIDE])]), 1), "buckling knows no stages: expected `solve`"),
         (lambda: cf.modes(column([PUSH], [cf.Stage([SIDE])], section=HEAVY), 1), "modes knows no stages: expected"),
         (lambda: cf.simulate(column([PUSH], [cf.Stage([SIDE])], section=HEAVY), 1), "simulate knows no stages"),

@@ -25,6 +25,7 @@ from cosserat_fenicsx.results.compared import NAMES, Criterion, criteria_of
 from cosserat_fenicsx.results.contacts import check_passes
 from cosserat_fenicsx.results.path import Path
 from cosserat_fenicsx.scene.action import path_dependent, rubs
+from cosserat_fenicsx.scene.describe import describe
 from cosserat_fenicsx.scene.scene import Scene, check_magnitudes
 from cosserat_fenicsx.statics.arguments import check_arguments, check_static
 from cosserat_fenicsx.statics.legs import Followed, Legs
@@ -141,6 +142,11 @@ def solve(
         choice = choose(part, model=model, follows=branch is not None or control == "arc", **discretised)
         return Followed(leg, part, factors, any_between, choice, options)
 
+    if scene.stages and (remembers := next((load for load in scene.all_loads if load.memory), None)):
+        raise SceneError(
+            f"Scene.stages: {describe(remembers)} has a memory, which stages do not hand on: expected loads and "
+            "obstacles without friction or another memory, or a scene without stages"
+        )
     legs = [followed(leg) for leg in scene.legs] if scene.stages else [followed(None)]
     _keep_in_space(legs)
     known = _followed_before(scene, start, legs, degree)
