@@ -166,8 +166,9 @@ _SAME = 1e-2
 _KINDS = {"limit": "a limit point", "bifurcation": "a bifurcation"}
 #: All kinds of events, as files number them.
 KINDS = ("bifurcation", "limit", "flutter")
-# Differences are relative to the event's load factor, or to this times the largest one of the path if that is larger.
-_LEAST = 1e-3
+# Differences are relative to the event's load factor, or to this times the largest one of the path if that is larger:
+# near zero, events are located to a share of the steps there (`Search.fine`).
+_LEAST = 1e-2
 
 
 def find_again(fine, coarse):
