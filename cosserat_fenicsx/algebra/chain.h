@@ -111,7 +111,6 @@ typedef struct {
     int most, iterations, verdict;
     double steps[4];                /* sizes of the last ones, the latest first */
     double *b, *change;             /* (unknowns,) residual, and the step that is subtracted */
-    void *self;                     /* for the hook that finds steps in its own way, or 0 */
 } newton;
 
 /* Newton's method of a time step, see `Iteration` in dynamics/stepper.py. */
@@ -255,6 +254,8 @@ int tangent(problem *p);
 int solve(problem *p, const double *b, double *x);
 void advance(problem *p);
 int equilibrate(newton *n, double *x);
+void begin_newton(newton *n);
+int judge_residual(newton *n, const double *b, const double *change);
 int iterate(stepping *s);
 
 void find_motion(contact *c, const double *now);

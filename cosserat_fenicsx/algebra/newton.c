@@ -6,7 +6,7 @@
 #include <string.h>
 
 enum { STATE = 1, RESIDUAL = 2, TANGENT = 4, INTERFACE = 8, ADD_UP = 16, SUM = 32, MATRICES = 64, CONTACT = 256, COMPLIANCE = 512,
-       NODES = 1024, STEP = 2048 };
+       NODES = 1024 };
 enum { FAILED = 1 };
 
 static int python_hook(void *self, int what, double *a, double *b);
@@ -282,7 +282,7 @@ static int root_of(const problem *p, double sum, double *root)
 
 /* Judge the residual b after a step, or at the start where `change` is 0. Of the step only the part that is motion counts:
    forces and multipliers differ in scale and in rounding error. */
-static int judge_residual(newton *n, const double *b, const double *change)
+int judge_residual(newton *n, const double *b, const double *change)
 {
     const problem *p = n->problem;
     double norm = 0, step = 0;
@@ -303,18 +303,25 @@ static int judge_residual(newton *n, const double *b, const double *change)
     return 0;
 }
 
+/* Begin Newton's method at the state. */
+void begin_newton(newton *n)
+{
+    const problem *p = n->problem;
+    n->iterations = 0, n->verdict = ITERATING;
+    if (p->advance) memcpy(p->before, p->state, p->locals * sizeof *p->state);
+}
+
 /* Newton's method with full steps from the state, whose unknowns are x; these, the state and the carried contact force
-   follow. */
+   follow. It takes the steps that SNES takes (algebra/newton.py), without the time that SNES takes for its options. */
 int equilibrate(newton *n, double *x)
 {
     problem *p = n->problem;
-    n->iterations = 0, n->verdict = ITERATING;
-    if (p->advance) memcpy(p->before, p->state, p->locals * sizeof *p->state);
+    begin_newton(n);
     if (residual(p, x, n->b) || judge_residual(n, n->b, 0)) return FAILED;
     while (n->verdict == ITERATING) {
         if (n->iterations > 0) advance(p);
         if (tangent(p)) return FAILED;
-        if (n->self ? python_hook(n->self, STEP, n->b, n->change) : solve(p, n->b, n->change)) return FAILED;
+        if (solve(p, n->b, n->change)) return FAILED;
         if (p->singular) {
             n->verdict = SINGULAR;
             return 0;

@@ -1,8 +1,9 @@
-"""Newton's method on a `Problem` with full steps, in C, stopped on the increment and the residual together.
+"""Newton's method on a `Problem`: PETSc's SNES with full steps, stopped on the increment and the residual together.
 
-A test of the residual norm alone is unreliable: on slender rods the rounding error of |F| grows with EA L^2/EI. Line
-searches impair convergence on eq. (1). `LimitedNewton` takes single steps of limited length, for states far from the
-solution.
+A test of the residual norm alone is unreliable (on slender rods the rounding error of |F| grows with EA L^2/EI), and
+PETSc's default line search impairs convergence on eq. (1); so the line search is `basic` and the convergence test is
+that of newton.c, which takes the same steps without SNES in sweeps over load factors. `LimitedNewton` takes single steps
+of limited length, for states far from the solution.
 """
 
 import math
@@ -11,15 +12,22 @@ from functools import cached_property
 
 import numpy as np
 from mpi4py import MPI
+from petsc4py import PETSc
 
 from cosserat_fenicsx.algebra.elimination import ZERO_PIVOT
-from cosserat_fenicsx.algebra.equations import Called
+from cosserat_fenicsx.algebra.building import Pointers
 from cosserat_fenicsx.errors import NotConverged
 
 #: Newton stops when the increment, or the remaining error estimated from the contraction, is below this (root mean
 #: square over the nodal unknowns, positions in units of L).
 INCREMENT = 1e-11
-#: The verdicts in words.
+_Reason = PETSc.SNES.ConvergedReason
+# SNES's reasons for the verdicts in chain.h.
+_REASONS = (
+    _Reason.CONVERGED_ITERATING, _Reason.CONVERGED_SNORM_RELATIVE, _Reason.DIVERGED_LINEAR_SOLVE,
+    _Reason.DIVERGED_DTOL, _Reason.DIVERGED_DTOL, _Reason.DIVERGED_MAX_IT,
+)  # fmt: skip
+#: The verdicts in words, of SNES and of time steps.
 WORDS = (
     "", "converged", "the tangent is singular", "the residual is not a number", "Newton's steps grew without bound",
     "Newton's iterations ran out",
@@ -35,8 +43,17 @@ class Solved:
     reason: str
 
 
-class Newton(Called):
-    """Newton's method for one problem, see `equilibrate` in newton.c.
+def take_full_steps(snes):
+    """Take full Newton steps: the line search `basic`, which petsc4py 3.18 can set only through an option."""
+    option, options = f"cosserat_{id(snes):x}_snes_linesearch_type", PETSc.Options()
+    snes.setOptionsPrefix(option.removesuffix("snes_linesearch_type"))
+    options[option] = "basic"
+    snes.setFromOptions()
+    options.delValue(option)
+
+
+class Newton(Pointers):
+    """Newton's method for one problem, by SNES.
 
     Args:
         problem: a `Problem`.
@@ -54,6 +71,42 @@ class Newton(Called):
         newton.contracts = not (model.signature.slender and model.carries_force)
         self._step = numbering.vector()
         newton.b, newton.change = (self.doubles(vector.array_w) for vector in (problem.b, self._step))
+        self.snes = snes = PETSc.SNES().create(comm)
+        snes.setType("newtonls")
+        matrix = PETSc.Mat().create(comm)  # SNES wants one; only its inverse is ever applied
+        matrix.setSizes(((numbering.size, numbering.total),) * 2)
+        matrix.setType("shell")
+        matrix.setUp()
+        snes.setFunction(self._residual, problem.b)
+        snes.setJacobian(self._tangent, matrix)
+        snes.setConvergenceTest(self._judge)
+        snes.getKSP().setType("preonly")
+        pc = snes.getKSP().getPC()
+        pc.setType("python")
+        pc.setPythonContext(self)
+        take_full_steps(snes)
+
+    def _residual(self, snes, x, b):
+        self.problem.function(x, b)
+
+    def _tangent(self, snes, x, matrix, _):
+        if self.c.iterations > 0:
+            self.problem.advance()
+        self.problem.factor()
+
+    def _judge(self, snes, iterations, norms):
+        """PETSc calls this after every evaluation of the residual."""
+        failed = self._lib.judge_residual(self.c, self.c.b, self.c.change if iterations else self._ffi.NULL)
+        self.problem._done(failed)
+        return _REASONS[self.c.verdict]
+
+    def apply(self, pc, residual, step):
+        """PETSc calls this to compute the step, which it subtracts from x."""
+        self._direction()
+        step.array_w[:] = self._step.array_r
+
+    def _direction(self):
+        self.problem.solve(self.problem.b, self._step)
 
     @cached_property
     def bordered(self):
@@ -63,6 +116,7 @@ class Newton(Called):
     def allow(self, iterations):
         """Set the largest number of iterations."""
         self.c.most = iterations
+        self.snes.setTolerances(max_it=iterations + 1)  # newton.c stops before SNES's own limit
 
     def _take_loads(self):
         """Set the limits of the residual's norm."""
@@ -77,18 +131,24 @@ class Newton(Called):
         """
         problem, newton = self.problem, self.c
         self._take_loads()
-        failed = self._lib.equilibrate(newton, problem._written(problem.x))
-        self.raise_failure()
-        problem._done(failed)
-        return Solved(newton.verdict == self._lib.CONVERGED, newton.iterations, WORDS[newton.verdict])
+        self._lib.begin_newton(newton)
+        self.snes.solve(None, problem.x)
+        verdict = newton.verdict
+        if verdict == self._lib.CONVERGED:  # the residual was last evaluated at x, so the state agrees with it
+            problem.advance()
+        elif problem.c.singular:
+            verdict = self._lib.SINGULAR
+        elif verdict == self._lib.ITERATING:  # PETSc stops by itself where the residual is not a number
+            verdict = self._lib.NOT_A_NUMBER
+        return Solved(verdict == self._lib.CONVERGED, newton.iterations, WORDS[verdict])
 
 
 class BorderedNewton(Newton):
     """Newton's method for (x, eta): equilibrium, and a plane <normal, x - x_0> + weight (eta - eta_0) = 0.
 
-    C solves for x alone. Where it applies the tangent's inverse, the bordered system is solved by block elimination
+    SNES solves for x alone. Where it applies the tangent's inverse, the bordered system is solved by block elimination
     (Keller, in: Applications of Bifurcation Theory, 1977, 359): with the tangent A, A d1 = R and A d2 = dR/deta the
-    step is -(d1 + d2 deta), and the plane gives deta. The load factor eta is updated with x, so that the next
+    step is -(d1 + d2 deta), and the plane gives deta. The load factor eta is updated with x, so that SNES's next
     residual and tangent are those of the new (x, eta). Products with `normal` are the model's inner products over all
     ranks, so that all ranks have the same load factor.
 
@@ -98,7 +158,7 @@ class BorderedNewton(Newton):
 
     def __init__(self, problem):
         super().__init__(problem)
-        self.neutral, self.c.self = None, self._handle
+        self.neutral = None
         self._slope, self._free, self._force = (problem.numbering.vector() for _ in range(3))
 
     @property
@@ -123,8 +183,7 @@ class BorderedNewton(Newton):
         self._normal, self._weight, self.neutral = normal, weight, neutral
         self._x0, self._load_factor0 = self.problem.x.array_r.copy(), self.problem.load_factor
 
-    def _answer(self, what, a, b):
-        """The step, which C subtracts from x."""
+    def _direction(self):
         problem, inner, step = self.problem, self.problem.model.inner, self._step
         problem.solve(problem.b, step)
         problem.solve(problem.load_derivative(problem.x), self._slope)
