@@ -111,6 +111,16 @@ def test_what_a_stage_has_reached_stays():
         np.testing.assert_allclose(path.fields(-1, "rod")[name], values, rtol=0, atol=1e-8, err_msg=name)
 
 
+def test_a_permanent_load_alone_is_there_before_the_first_stage():
+    """A support holds what it has bent, and takes it over."""
+    push, hold = cf.Force("rod.end", (0.8, 0.3, -0.5), permanent=True), cf.Pin("rod.end")
+    path = cf.solve(column([push], [cf.Stage(supports=[hold], release=[push], load_factors=[1.0])], section=SOFT),
+                    elements=4)  # fmt: skip
+    bent = cf.solve(column([dataclasses.replace(push, permanent=False)], section=SOFT), [1.0], elements=4)
+    np.testing.assert_allclose(path.position("rod.end"), tip(bent)[None].repeat(len(path), 0), rtol=0, atol=1e-9)
+    np.testing.assert_allclose(path.reaction(hold)[0][-1], push.force, rtol=0, atol=1e-8)
+
+
 @pytest.fixture(scope="module")
 def held():
     """A push, a pin that takes over from it, a side force, and the pin's release."""
@@ -165,6 +175,7 @@ def test_stages_in_a_scene_file(held, tmp_path):
 
 
 PUSH, SIDE = cf.Force("rod.end", (1, 0, 0)), cf.Force("rod@0.7", (0, 1, 0))
+PIN = cf.Pin("rod.end")
 
 
 @pytest.mark.parametrize(
@@ -183,6 +194,9 @@ PUSH, SIDE = cf.Force("rod.end", (1, 0, 0)), cf.Force("rod@0.7", (0, 1, 0))
         (lambda: cf.solve(column([PUSH], [cf.Stage([SIDE])]), [0.5]), "load_factors end at 0.5, and stages[0] goes on"),
         (lambda: cf.solve(column([PUSH, cf.Plane((0, 0, -1), (0, 0, 1), friction=0.1, contact_radius=0.1)],
                                  [cf.Stage([SIDE])])), "has a memory, which stages do not hand on"),
+        (lambda: column([PUSH], [cf.Stage(supports=[PIN]), cf.Stage(release=[PIN], load_factors=[0.5]), cf.Stage([SIDE])]),
+         "stages[1].load_factors end at 0.5, and a stage follows: expected 1"),
+        (lambda: cf.solve(column([PUSH], [cf.Stage([SIDE])]), elements=2).modes(1), "path.part(stage).modes(count)"),
         (lambda: cf.buckling(column([PUSH], [cf.Stage([SIDE])]), 1), "buckling knows no stages: expected `solve`"),
         (lambda: cf.modes(column([PUSH], [cf.Stage([SIDE])], section=HEAVY), 1), "modes knows no stages: expected"),
         (lambda: cf.simulate(column([PUSH], [cf.Stage([SIDE])], section=HEAVY), 1), "simulate knows no stages"),

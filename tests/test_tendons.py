@@ -127,6 +127,8 @@ def test_stored_states_and_kinks(tmp_path):
         (lambda: cf.Helical(0.0, 1.0), "Helical.radius"),
         (lambda: cf.Helical(0.1, 0.0), "not zero"),
         (lambda: cf.solve(arm(HELIX), [1.0], elements=2).tendon(TWO[0]), "no tendon of the scene"),
+        (lambda: cf.solve(arm(HELIX), [-1.0]), "load factor -1: the tension of Tendon on arm would be -1 times"),
+        (lambda: cf.modes(arm(HELIX), load_factor=-1.0), "expected load factors at which no tendon is pressed"),
         (lambda: cf.solve(arm(HELIX), model="planar"), "planar"),
         (lambda: cf.solve(arm(TWO[0]), model="determinate"), "determinate"),
     ],
@@ -137,8 +139,8 @@ def test_what_is_refused(make, says):
 
 
 def test_in_stages():
-    """Tightened one after the other, then one is released: the end is that of the other alone."""
-    one, other = TWO
+    """Tightened one after the other in one place, then one is released: the end is that of the other alone."""
+    one, other = TWO[0], cf.Tendon(ROD, TWO[0].offset, 2.0)
     stages = [cf.Stage(loads=[other], load_factors=[1.0]), cf.Stage(release=one, load_factors=[0.5, 1.0])]
     path = cf.solve(cf.Scene([ROD], [cf.Clamp(ROD.start)], [one], stages=stages), [1.0], tol=1e-7)
     assert path.tendon(one).tension == pytest.approx([4.0, 4.0, 2.0, 0.0])
@@ -146,3 +148,8 @@ def test_in_stages():
     alone = cf.solve(arm(other), [1.0], tol=1e-7)
     assert path.position(ROD.end)[-1] == pytest.approx(alone.position(ROD.end)[-1], abs=1e-9)
     assert path.force(ROD.start)[-1] == pytest.approx(alone.force(ROD.start)[-1], abs=1e-7)
+    pressed = [cf.Stage(release=one, load_factors=[1.5])]
+    with pytest.raises(
+        cf.SceneError, match=r"stages\[0\]: load factor 1.5: the tension of Tendon on arm would be -0.5"
+    ):
+        cf.solve(cf.Scene([ROD], [cf.Clamp(ROD.start)], [one], stages=pressed), [1.0])

@@ -26,7 +26,7 @@ from cosserat_fenicsx.ranks import communicator
 from cosserat_fenicsx.results.history import History
 from cosserat_fenicsx.results.path import Path
 from cosserat_fenicsx.scene.action import path_dependent
-from cosserat_fenicsx.scene.scene import Scene, check_magnitudes
+from cosserat_fenicsx.scene.scene import Scene, check_magnitudes, check_tensions
 from cosserat_fenicsx.scene.stages import refuse_stages
 from cosserat_fenicsx.statics.meshes import turning_in_law
 from cosserat_fenicsx.storage.store import Nowhere, Store
@@ -127,6 +127,7 @@ def simulate(
     number("simulate", "load_factor", load_factor, "a finite number", math.isfinite)
     scene_over = scene.over(duration)
     check_magnitudes(scene_over, load_factor)
+    check_tensions(scene, [load_factor])
     if comm.rank == 0:
         scene.warn()
     cautions = []

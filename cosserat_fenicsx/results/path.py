@@ -394,6 +394,11 @@ class Path(RodResult):
         Raises:
             SceneError, NotConverged: as of `modes`; an empty path; more Gauss points than the degree.
         """
+        if self._vibrating is None:
+            raise SceneError(
+                "modes: they are not known along a path through stages: expected those of one stage, "
+                "path.part(stage).modes(count)"
+            )
         return self._vibrating(self, count, damped)
 
     def mode(self, event: Event, rod: RodOrName | None = None) -> np.ndarray:

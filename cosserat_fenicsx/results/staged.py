@@ -9,7 +9,6 @@ import numpy as np
 from cosserat_fenicsx.quantities import Quantity
 from cosserat_fenicsx.results.path import Path
 from cosserat_fenicsx.results.records import Record, Records
-from cosserat_fenicsx.results.threads import Threads
 from cosserat_fenicsx.results.result import by_name
 from cosserat_fenicsx.scene.rod import Station
 
@@ -72,10 +71,7 @@ class StagedPath(Path):
         return f"{self._stage[k]}: {super().label(k)}"
 
     def share_of(self, load, k):
-        leg = self._legs[self._stage[k]]
-        return sum(x.value for x in leg.standing if x.item is load) + self.load_factors[k] * sum(
-            x.value for x in leg.ramped if x.item is load
-        )
+        return self._legs[self._stage[k]].share_of(load, self.load_factors[k])
 
     def supports_at(self, k):
         return tuple(x.item for x in self._legs[self._stage[k]].supports)
@@ -137,13 +133,10 @@ class StagedPath(Path):
         return self.at_points(which)._by_stages(lambda _, part: part._without_stress(range(len(part)), rod, s))
 
     def _tension(self, tendon):
-        """See `RodResult.tendon`: what the stage applies to it, and what stages before have left."""
-
-        def acting(_, part):
-            alike = (x for x in part.scene.loads if x.is_thread and (x.rod, x.offset) == (tendon.rod, tendon.offset))
-            return sum((Threads(part).tension(x) for x in alike), np.zeros(len(part)))
-
-        return self._by_stages(acting)
+        """See `RodResult.tendon`; the scene may be another with the same tendons, as one that was read."""
+        load = min((load for load in self.scene.all_loads if load == tendon), key=lambda load: load is not tendon)
+        full = np.reshape(load.tension, -1)[0]
+        return np.array([full * self.share_of(load, k) for k in range(len(self))])
 
     @property
     def conservative(self):

@@ -101,6 +101,25 @@ def check_magnitudes(scene, load_factor):
             )
 
 
+def check_tensions(scene, load_factors, leg=None):
+    """Refuse load factors that give a thread a negative tension.
+
+    Args:
+        scene: a `Scene`; load_factors: all that are requested; leg: its `Leg`, None of a scene without stages.
+
+    Raises:
+        SceneError: naming the thread and the load factor.
+    """
+    for load in scene.all_loads:
+        for factor in load_factors if load.is_thread else ():
+            share = leg.share_of(load, factor) if leg else factor if load.scaled else 1.0
+            if share < 0:
+                raise SceneError(
+                    f"load factor {factor:g}: the tension of {describe(load)} would be {share:g} times the given one: "
+                    "expected load factors at which no tendon is pressed"
+                )
+
+
 # Young's moduli below this, Pa, are probably mistakes in units.
 _SOFTEST = 1e6
 # Densities, kg/m^3, and moduli, Pa, of steel and cast iron; rolled profiles are of these.

@@ -122,6 +122,11 @@ class Leg:
         """The load factor at its end; `solve` sees to it that the scene's own loads end at 1."""
         return float(np.ravel(self.load_factors if self.load_factors is not None else 1.0)[-1])
 
+    def share_of(self, load, factor):
+        """The factor of a load where the load factor of the stage has this value; 0 where it does not act."""
+        found = [[x.value for x in part if x.item is load] for part in (self.standing, self.ramped)]
+        return sum(found[0]) + factor * sum(found[1])
+
     @property
     def depends_on_state(self):
         """Whether its scene depends on the state at its begin."""
@@ -248,7 +253,16 @@ def legs_of(scene):
 
 
 def after(leg):
-    """The loads and supports, lists of `Named`, that a stage after this one finds."""
+    """The loads and supports, lists of `Named`, that a stage after this one finds.
+
+    Raises:
+        SceneError: a part of the reaction of a released support is left.
+    """
+    if leg.released and leg.last != 1:
+        raise SceneError(
+            f"{leg.words}.load_factors end at {leg.last:g}, and a stage follows: expected 1 at the end, since a support "
+            "is released in full"
+        )
     reached = {}
     for x in (*leg.standing, *(x._replace(value=leg.last * x.value) for x in leg.ramped)):
         reached[x.place] = x._replace(value=x.value + reached[x.place].value if x.place in reached else x.value)

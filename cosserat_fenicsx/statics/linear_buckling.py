@@ -14,7 +14,7 @@ from cosserat_fenicsx.ranks import communicator
 from cosserat_fenicsx.results.modes import Buckling
 from cosserat_fenicsx.results.shapes import Equilibrium
 from cosserat_fenicsx.scene.action import has_permanent
-from cosserat_fenicsx.scene.scene import Scene, check_magnitudes
+from cosserat_fenicsx.scene.scene import Scene, check_magnitudes, check_tensions
 from cosserat_fenicsx.statics.arguments import check_arguments
 from cosserat_fenicsx.statics.circulatory import circulatory_part, static_bifurcations
 from cosserat_fenicsx.statics.critical import Energies, critical_sensitivity
@@ -88,6 +88,7 @@ def buckling(
     whole("buckling", "count", count)
     number("buckling", "load_factor", load_factor, "a finite number", math.isfinite)
     check_magnitudes(scene, max(abs(load_factor), 1.0))
+    check_tensions(scene, [load_factor])
     comm = communicator(comm)
 
     (critical, _, state, shapes, shared, conservative, most), error = until_two_meshes_agree(

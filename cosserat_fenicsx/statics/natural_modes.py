@@ -20,7 +20,7 @@ from cosserat_fenicsx.scene.action import has_permanent
 from cosserat_fenicsx.scene.describe import describe
 from cosserat_fenicsx.scene.loads import Load
 from cosserat_fenicsx.scene.rod import require_inertia
-from cosserat_fenicsx.scene.scene import Scene, check_magnitudes
+from cosserat_fenicsx.scene.scene import Scene, check_magnitudes, check_tensions
 from cosserat_fenicsx.scene.signals import at
 from cosserat_fenicsx.scene.stages import refuse_stages
 from cosserat_fenicsx.scene.statical import without_mechanism
@@ -114,6 +114,7 @@ def modes(
     if load_factor or has_permanent(scene):
         check_arguments(without_mechanism(scene), tol, elements, owner="modes")
         check_magnitudes(scene, load_factor)
+        check_tensions(scene, [load_factor])
     comm, slowed = communicator(comm), _slowed(scene)
     if damped is None and (near is not None or rotation is not None or slowed):
         damped = True

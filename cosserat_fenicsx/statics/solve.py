@@ -26,7 +26,7 @@ from cosserat_fenicsx.results.contacts import check_passes
 from cosserat_fenicsx.results.path import Path
 from cosserat_fenicsx.scene.action import path_dependent, rubs
 from cosserat_fenicsx.scene.describe import describe
-from cosserat_fenicsx.scene.scene import Scene, check_magnitudes
+from cosserat_fenicsx.scene.scene import Scene, check_magnitudes, check_tensions
 from cosserat_fenicsx.statics.arguments import check_arguments, check_static
 from cosserat_fenicsx.statics.legs import Followed, Legs
 from cosserat_fenicsx.statics.meshes import first_layout, meshes_for, resolving, resolving_turns, turning_in_law
@@ -131,6 +131,7 @@ def solve(
         try:
             check_static(part)
             check_magnitudes(part, max(map(abs, factors)))
+            check_tensions(scene, factors, leg)
         except SceneError as problem:
             raise problem if leg is None else SceneError(f"{leg.words}: {problem}") from None
         options = follow
@@ -218,7 +219,7 @@ def _keep_in_space(legs):
 def _followed_before(scene, start, legs, degree):
     """{stage: its `Path`} of the path that is to go on."""
     for leg, following in itertools.pairwise(legs):
-        if leg.leg.stage == -1 and leg.load_factors[-1] != 1:
+        if leg.leg.load_factors is None and leg.load_factors[-1] != 1:
             raise SceneError(
                 f"load_factors end at {leg.load_factors[-1]:g}, and {following.leg.words} goes on from there: expected "
                 "1 at the end; another share of the scene's own loads is a Stage with its own load_factors"
