@@ -256,6 +256,7 @@ class Signal:
         function: of t (s), returns `size` numbers.
         jumps: times where it is not smooth, s.
         place: where its load or support acts, for error messages.
+        inner: the `Kind` of its values, which knows their limits.
     """
 
     owner: str
@@ -265,6 +266,7 @@ class Signal:
     jumps: tuple
     size: int = 3
     place: str = ""
+    inner: object = None
 
     def as_data(self):
         """Its form in stored data: the function."""
@@ -274,17 +276,20 @@ class Signal:
         """The vector at t, s.
 
         Raises:
-            SceneError: the function raised, or returned another number of values or values that are not finite; the
-                message gives the time.
+            SceneError: the function raised, or returned another number of values, values that are not finite, or
+                outside the limits of the field; the message gives the time.
         """
         when = f"at the time t = {t:g} s" + (f", of the {self.owner} at {self.place}" if self.place else "")
         given = call(self.function, t, f"{self.owner}.{self.field}: its function", f", {when}")
         given = (given,) if self.size == 1 and isinstance(given, numbers.Real) else given
+        limits = getattr(self.inner, "limits", None)
         floats = type(given) is tuple and all(type(x) is float and abs(x) <= LARGEST for x in given)
+        floats = floats and (limits is None or all(map(limits.admit, given)))
         if floats and len(given) == self.size:
             return given  # the usual case; the full check takes ten times as long
         try:
-            return vector(self.owner, self.field, given, self.unit, self.size)
+            found = vector(self.owner, self.field, given, self.unit, self.size)
+            return found if limits is None else (self.inner.check(self.owner, self.field, found[0]),)
         except SceneError as problem:
             raise SceneError(f"{problem}, {when}") from None
 
@@ -322,7 +327,7 @@ class VectorInTime(Either):
         place = getattr(owner, "station", None) or getattr(owner, "rod", None)
         place = str(getattr(place, "name", place) or "")
         size = getattr(self.inner, "size", 1)
-        signal = Signal(type(owner).__name__, field, unit, function, jumps, size, place)
+        signal = Signal(type(owner).__name__, field, unit, function, jumps, size, place, self.inner)
         signal(0.0)
         return signal
 
