@@ -64,6 +64,16 @@ class TestNothingPassesUnseen:
         touch = path.contacts(self.post)
         assert touch.force[-1, 2] > 0.3 and touch.gap[-1].min() > -2e-5
 
+    @pytest.mark.parametrize("dt", [1e-3, 2e-2])
+    def test_in_motion(self, dt):
+        """A rod that falls on the post, which it meets between two nodes, or leaps over in one step."""
+        section = cf.Stiffness((1e4, 1e4), 1e4, (1.0, 1.0), 1.0, mass=1.0, inertia=(1e-3, 1e-3, 2e-3))
+        rod = cf.Rod(cf.Line((0, 0, 0.1), (1, 0, 0.1)), section)
+        scene = cf.Scene([rod], [], [self.post], velocities=[cf.InitialVelocity(rod, linear=(0, 0, -8.0))])
+        with pytest.raises(cf.NotConverged, match="passes into Cylinder by .* expected more elements there") as raised:
+            cf.simulate(scene, 0.06, dt=dt, elements=2, degree=2, model="planar")
+        assert raised.value.path.position(rod.at(0.53))[-1, 2] > -0.06
+
 
 def test_a_bar_is_pulled_and_released():
     """An elastic bar on a rough plane under F, then 0: it slides over F/(mu w), its end moves by F^2/(2 EA mu w), and half

@@ -136,6 +136,10 @@ class Stepper:
         """Difference between the end of the last step and the predictor, in the norm of `error`."""
         return self.problem.model.largest_of(self._state - self._predictor, ROTATION_WEIGHT)
 
+    def moved(self):
+        """Largest displacement of a node in the last step, over all ranks, dimensionless."""
+        return self.problem.model.largest_of(self._state - self._past[-1][1], 0.0)
+
     def undo(self):
         """Return to the state before the last step."""
         _, state, rates, (self.work, self.dissipated) = self._past.pop()

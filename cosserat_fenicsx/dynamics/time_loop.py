@@ -3,6 +3,7 @@ fail, saved states and checkpoints."""
 
 import itertools
 import math
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -10,11 +11,47 @@ import numpy as np
 from cosserat_fenicsx.errors import NotConverged, SceneError
 from cosserat_fenicsx.interrupts import obey
 from cosserat_fenicsx.progress import Progress
+from cosserat_fenicsx.results.contacts import Passes, check_passes, least_gap
+from cosserat_fenicsx.results.history import History
 from cosserat_fenicsx.results.records import Instant, Ledger
 from cosserat_fenicsx.scene.signals import signals_of
 
 _HALVINGS = 12  # times that a failing step is halved before the motion is given up
 _REMEMBERED = "t", "first", "h", "count", "steps", "iterations", "saved"  # numbers of a `TimeLoop` for its continuation
+
+
+# Largest movement between two looks at the parts of rods between nodes, over the obstacle's size.
+_LOOK = 0.25
+
+
+class _Obstacles:
+    """Whether rods pass unseen through obstacles of a size, such as a thin post: between two states, or two nodes."""
+
+    def __init__(self, problem):
+        self._problem, self._model = problem, problem.model
+        sizes = [action.largest_step for action in self._model.scene.actions if action.gaps is not None]
+        self._size = min(sizes, default=math.inf) / self._model.scales.length
+        self._unseen = 0.0
+
+    def _here(self, t):
+        here, model = History.of(self._model, ""), self._model
+        here.append(Instant(self._problem.load_factor, *model.snapshot(), 0, 0, np.empty(0), time=t))
+        return here
+
+    def leapt(self, stepper, t):
+        """Whether the last step, to the time t (s), was so long that a rod may have leapt over an obstacle."""
+        if self._size == math.inf or (moved := stepper.moved()) <= self._size:
+            return False
+        return least_gap(self._here(t)) < moved * self._model.scales.length
+
+    def look(self, stepper, t):
+        """Look between the nodes after an accepted step; raises `Passes`."""
+        if self._size == math.inf:
+            return
+        self._unseen += stepper.moved()
+        if self._unseen > _LOOK * self._size:
+            self._unseen = 0.0
+            check_passes(self._here(t))
 
 
 class TimeLoop:
@@ -28,7 +65,7 @@ class TimeLoop:
 
     def __init__(self, problem, stepper, pace, history, store):
         self.problem, self.model, self._stepper, self._pace = problem, problem.model, stepper, pace
-        self.history, self._store = history, store
+        self.history, self._store, self._obstacles = history, store, _Obstacles(problem)
         self._t = self._first = self._h = 0.0
         self._count = self._steps = self._iterations = self._saved = 0
 
@@ -107,11 +144,18 @@ class TimeLoop:
         """Step from t by h (s), in halves where that fails; False to try a shorter step instead."""
         solved = self._stepper.step(t, h)
         self._iterations += solved.iterations
+        if solved.converged and self._obstacles.leapt(self._stepper, t + h):
+            self._stepper.undo()
+            solved = replace(solved, converged=False, reason="a rod moved farther at once than an obstacle is wide")
         if solved.converged:
             if not halvings and not self._pace.accepts(self._stepper, h):
                 self._stepper.undo()
                 return False
             self._steps += 1
+            try:
+                self._obstacles.look(self._stepper, t + h)
+            except Passes as found:
+                self._lose(t + h, str(found))
             return True
         if not halvings and self._pace.failed(h):
             return False

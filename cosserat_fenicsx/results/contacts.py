@@ -15,6 +15,8 @@ from cosserat_fenicsx.scene.describe import describe
 _BETWEEN = 3
 # Depth between two nodes over that at the deeper one of them up to which the mesh resolves the penetration.
 _DEEPER = 2.0
+# Depth between two nodes, over the size of the obstacle (see `Action.gaps`), that is never allowed.
+_SHALLOW = 0.1
 # A friction force below this times the limit of friction is one at which the surface sticks.
 _STICKS = 1 - 1e-9
 
@@ -129,9 +131,16 @@ def _shares(path, i):
     return shares
 
 
+def least_gap(path):
+    """The smallest gap of a node from an obstacle in all states, m."""
+    rods = list(zip(path.scene.rods, path.layout.node_s(path.rule.nodes), strict=True))
+    obstacles = [action for action in path.scene.actions if action.gaps is not None]
+    return min(_gaps(path, one, rod, x)[0].min() for one in obstacles for rod, x in rods if one.acts_on(rod))
+
+
 def check_passes(path, share=1e-2, whole=None):
-    """Refuse a path where a rod passes into an obstacle between two nodes far deeper than at these nodes, and by more than
-    a share of the largest displacement of that state.
+    """Refuse a path or motion where a rod passes into an obstacle between two nodes far deeper than at these nodes, and
+    by more than a share of the largest displacement of that state or of the obstacle's size.
 
     Raises:
         Passes: naming rod, place and depth; with the path `whole`, or with this one.
@@ -141,8 +150,9 @@ def check_passes(path, share=1e-2, whole=None):
             check_passes(part, share, whole=path)
         return
     obstacles = [action for action in path.scene.actions if action.gaps is not None]
-    allowed = share * path.largest_displacement() if obstacles else None
+    moved = path.largest_displacement() if obstacles else None
     for obstacle in obstacles:
+        allowed = np.minimum(share * moved, _SHALLOW * obstacle.largest_step)
         for rod, x in zip(path.scene.rods, path.layout.node_s(path.rule.nodes), strict=True):
             if not obstacle.acts_on(rod):
                 continue
@@ -156,7 +166,7 @@ def check_passes(path, share=1e-2, whole=None):
                 k, *where = np.unravel_index(np.argmax(excess), excess.shape)
                 raise Passes(
                     f"rod '{rod.name}' passes into {describe(obstacle)} by {inside[(k, *where)]:.3g} m between two "
-                    f"nodes, at s = {between[tuple(where)] * rod.length:.6g} m, at the load factor "
-                    f"{path.load_factors[k]:.6g}: expected more elements there",
+                    f"nodes, at s = {between[tuple(where)] * rod.length:.6g} m, at the {path.axis} "
+                    f"{path.along_axis[k]:.6g}{' s' * (path.axis == 'time')}: expected more elements there",
                     path if whole is None else whole,
                 )
