@@ -101,7 +101,8 @@ def friction_force(point, surface, shape, arm, stiffness, friction, stick, moved
     pressure = pressed(gap - arm, stiffness)
     limit = pressed(surface(point.fixed.r, *shape)[0] - arm, stiffness)
     size, most = ufl.sqrt(ufl.max_value(ufl.dot(trial, trial), _NO_FORCE)), friction * ufl.max_value(limit, 0)
-    share = ufl.conditional(ufl.le(size, most), 1, most / size)
+    still = ufl.le(size, ufl.max_value(most, _NO_FORCE**0.5))  # without a force, a rod at rest sticks, too
+    share = ufl.conditional(still, 1, most / size)
     touches = ufl.And(ufl.le(gap - arm, _TOUCHES), ufl.le(gap_before - arm, _TOUCHES))
     return normal, pressure, ufl.conditional(touches, share, 0) * trial
 

@@ -1,6 +1,7 @@
 """Rods that touch planes, cylinders and spheres, without and with friction: closed forms and solutions of boundary value
 problems by another program."""
 
+import dataclasses
 import math
 
 import numpy as np
@@ -125,6 +126,29 @@ def test_a_rod_slides_to_rest():
     scene = cf.Scene([rod], [], [floor, cf.Weight((0, 0, -g))], velocities=moving)
     moved = cf.simulate(scene, 0.8, dt=5e-3, elements=2, degree=2).displacement(rod.at(0.5))[-1]
     assert np.hypot(*moved[:2]) == pytest.approx(v**2 / (2 * mu * g), rel=1e-4)
+
+
+class TestWhatAResultLeavesOpen:
+    rod = cf.Rod(cf.Line((0, 0, 0), (1, 0, 0)), cf.Stiffness((1e4, 1e4), 1e4, (1.0, 100.0), 1.0, mass=1.0,
+                 inertia=(1e-3, 1e-3, 2e-3)), name="strut")  # fmt: skip
+    floor = cf.Plane((0, 0, 0), (0, 0, 1), contact_radius=0.0)
+
+    def test_a_strut_may_lift_off(self):
+        """It touches without pressing: it buckles upwards at pi^2/4, which no linear theory of held rods sees."""
+        scene = cf.Scene([self.rod], [cf.Clamp(self.rod.start)], [self.floor, cf.Force(self.rod.end, (-10.0, 0, 0))])
+        for linear in (cf.buckling, cf.modes):
+            with pytest.raises(cf.SceneError, match="'strut' touches, at s = .* Plane without pressing on it, and may"):
+                linear(scene, 1, elements=4)
+        assert "does not see that it may lift off" in str(cf.solve(scene, 1.0, elements=4))
+
+    def test_stiffness_of_the_surface(self):
+        """A rod under its weight: depth w/k, elastic slip F/(L stick)."""
+        floor = dataclasses.replace(self.floor, stiffness=1e4, friction=0.5)
+        level = cf.Prescribed(self.rod.start, rotation=(0, 0, 0))
+        scene = cf.Scene([self.rod], [level], [floor, cf.LineForce(self.rod, (2.0, 0, -10.0), permanent=True)])
+        told = " ".join(str(cf.solve(scene, 1.0, elements=4, model="planar")).split())
+        assert "Plane lets rods in by up to 0.001 m and slip by up to 0.02 m before it gives way" in told
+        assert "estimated errors do not contain it" in told and "may lift off" not in told
 
 
 ROD = cf.Rod(cf.Line((0, 0, 0.01), (1, 0, 0.01)), cf.Circle(0.02), cf.Material(1e9, 0.3), name="rope")

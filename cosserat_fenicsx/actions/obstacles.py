@@ -122,8 +122,12 @@ class Obstacle(Pressing, LineAction):
         sizes = action.scalar(self.radius_of(rod, s), "m"), action.scalar(self.stiffness, "N/m^2")
         if not self.friction:
             return *self.shape(), *sizes, *self._law_data()
-        stick = self.stiffness * _STICKS if self.stick is None else self.stick
-        return *self.shape(), *sizes, action.scalar(self.friction, "1"), action.scalar(stick, "N/m^2")
+        return *self.shape(), *sizes, action.scalar(self.friction, "1"), action.scalar(self.sticks, "N/m^2")
+
+    @property
+    def sticks(self):
+        """Friction force per length over the elastic slip, N/m^2."""
+        return self.stiffness * _STICKS if self.stick is None else self.stick
 
     @property
     def memory(self):

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from cosserat_fenicsx.checks import refuse
-from cosserat_fenicsx.errors import NotConverged
+from cosserat_fenicsx.errors import NotConverged, SceneError
 from cosserat_fenicsx.quantities import Quantity, Units
 from cosserat_fenicsx.results import screen
 from cosserat_fenicsx.scene.describe import describe
@@ -17,6 +17,8 @@ _BETWEEN = 3
 _DEEPER = 2.0
 # Depth between two nodes, over the size of the obstacle (see `Action.gaps`), that is never allowed.
 _SHALLOW = 0.1
+# Gap over the rod's length up to which a rod that does not press touches: rounding.
+_GRAZES = 1e-13
 # A friction force below this times the limit of friction is one at which the surface sticks.
 _STICKS = 1 - 1e-9
 
@@ -129,6 +131,70 @@ def _shares(path, i):
     p, shares = path.degree, np.zeros(len(sizes) * path.degree + 1)
     np.add.at(shares, np.arange(len(sizes))[:, None] * p + np.arange(p + 1), sizes[:, None] * path.rule.lobatto)
     return shares
+
+
+def contacts_in_words(path):
+    """Sentences on what a result of obstacles leaves open: how far their stiffness lets rods in and slip, which is no part
+    of estimated errors; and what touches without pressing, which may lift off."""
+    if path.scene.stages:
+        for stage, part in path.parts.items():
+            yield from (f"Stage {stage}: {sentence}" for sentence in contacts_in_words(part))
+        return
+    largest = path.largest_displacement().max(initial=0.0)
+    for obstacle in path.scene.actions:
+        if obstacle.gaps is None or not len(path):
+            continue
+        told, grazing, depth = [], "", 0.0
+        for rod, x in zip(path.scene.rods, path.layout.node_s(path.rule.nodes), strict=True):
+            if obstacle.acts_on(rod):
+                gap, _ = _gaps(path, obstacle, rod, x)
+                depth = max(depth, -gap.min())
+                grazing = grazing or _grazing(rod, x * rod.length, gap[-1])
+        if obstacle.law is None and depth > 0:
+            told.append(f"lets rods in by up to {depth:.2g} m")
+        if obstacle.friction and path.counts_modes and obstacle.law is None:
+            slip = (
+                np.nanmax(np.linalg.norm(contacts_of(path, obstacle).friction, axis=2), initial=0.0) / obstacle.sticks
+            )
+            told.append(f"slip by up to {slip:.2g} m before it gives way")
+            depth = max(depth, slip)
+        if told and largest:
+            yield (
+                f"{describe(obstacle)} {' and '.join(told)}, {depth / largest:.1g} of the largest displacement: its "
+                "stiffness makes that, and estimated errors do not contain it."
+            )
+        if grazing and path.counts_modes:
+            yield f"{grazing} {describe(obstacle)} {_LIFTS}."
+
+
+_LIFTS = "without pressing on it: stability counts it as held there both ways, and does not see that it may lift off"
+
+
+def _grazing(rod, s, gap):
+    """The words of where a rod touches without pressing, "" where it does not."""
+    where = np.flatnonzero(np.abs(gap) <= _GRAZES * rod.length)
+    return f"Rod '{rod.name}' touches, at s = {s[where[0]]:.6g} m," if len(where) else ""
+
+
+def refuse_grazing(state, owner):
+    """Refuse small motions of rods that touch an obstacle without pressing on it, which may lift off: they have no tangent.
+
+    Args:
+        state: an `Equilibrium`; owner: of the message.
+
+    Raises:
+        SceneError: naming rod and place.
+    """
+    for obstacle in state.scene.actions:
+        for rod in state.scene.rods:
+            if obstacle.gaps is not None and obstacle.acts_on(rod):
+                s = state.s(rod)
+                if where := _grazing(rod, s, obstacle.gaps(rod, s, state.position(rod))[0]):
+                    raise SceneError(
+                        f"{owner}: {where} {describe(obstacle)} without pressing on it, and may lift off on one side, "
+                        "which no linear theory has: expected a permanent load or a load factor that presses it there, "
+                        "or a gap"
+                    )
 
 
 def least_gap(path):

@@ -10,6 +10,7 @@ from cosserat_fenicsx.checks import File
 from cosserat_fenicsx.numerics import directors
 from cosserat_fenicsx.quantities import Quantity
 from cosserat_fenicsx.results import screen
+from cosserat_fenicsx.results.contacts import contacts_in_words
 from cosserat_fenicsx.results.recovery import viscous_contact
 from cosserat_fenicsx.results.result import by_name
 from cosserat_fenicsx.results.rods import RodResult
@@ -98,6 +99,7 @@ class History(RodResult):
         if largest:
             worst = np.abs(self.balance).max()
             yield f"The energy balance is off by at most {worst:.1e} J, {worst / largest:.1e} of the largest energy."
+        yield from contacts_in_words(self)
         yield f"{self.steps[-1]} steps of the scheme {self.scheme}, {self.model} model."
 
     def _table(self, units, rows, station=None):

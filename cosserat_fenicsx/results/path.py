@@ -12,14 +12,14 @@ from cosserat_fenicsx.quantities import Quantity
 from cosserat_fenicsx.results import screen
 from cosserat_fenicsx.results.accuracy import leading_of
 from cosserat_fenicsx.results.compared import NAMES, Errors, all_cell_nodes, of_sections, sizes_of, words_of
-from cosserat_fenicsx.results.contacts import Contacts, contacts_of
+from cosserat_fenicsx.results.contacts import Contacts, contacts_in_words, contacts_of
 from cosserat_fenicsx.results.modes_along import ModesAlong
 from cosserat_fenicsx.results.records import Event, Records
 from cosserat_fenicsx.results.recovery import element_contact
-from cosserat_fenicsx.results.threads import Threads
 from cosserat_fenicsx.results.result import by_name
 from cosserat_fenicsx.results.rods import RodResult
 from cosserat_fenicsx.results.sensitivity import Sensitivity, Uncertainty
+from cosserat_fenicsx.results.threads import Threads
 from cosserat_fenicsx.scene.action import Action
 from cosserat_fenicsx.scene.describe import actions_in_words
 from cosserat_fenicsx.scene.parameters import Parameter, check_once
@@ -180,6 +180,7 @@ class Path(RodResult):
         for doubt in self.scene.doubts:
             yield f"First check: {doubt}"
         yield from errors_in_words(self)
+        yield from contacts_in_words(self)
         events = self._events_in_words()
         yield from events[:_EVENTS]
         if len(events) > _EVENTS:

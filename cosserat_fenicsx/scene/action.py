@@ -110,7 +110,7 @@ class Action(Part, family="load or action", homes=("cosserat_fenicsx.scene.loads
             contact begins.
         gaps: None; or, of an obstacle, a method (rod, arc lengths s (n,), its points there (n, 3)) -> gaps (n,) between
             the rod's surface and the obstacle, m, and unit normals (n, 3) towards the free side. It then has
-            `stiffness` (N/m^2), `friction`, `law` and `largest_step`, how far (m) a rod may move at once without passing
+            `stiffness` (N/m^2), `friction`, with it `sticks` (N/m^2), `law` and `largest_step`, how far (m) a rod may move at once without passing
             through it unseen.
         in_law: whether it is no load but a part of the law along a rod. Its `data` are then what sections have without
             stress beyond the reference, inertial in the reference: curvature and twist, rad/m, and strain, 1.

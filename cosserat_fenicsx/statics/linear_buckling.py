@@ -11,6 +11,7 @@ from cosserat_fenicsx.algebra import eigen
 from cosserat_fenicsx.checks import number, whole
 from cosserat_fenicsx.errors import NotConverged
 from cosserat_fenicsx.ranks import communicator
+from cosserat_fenicsx.results.contacts import refuse_grazing
 from cosserat_fenicsx.results.modes import Buckling
 from cosserat_fenicsx.results.shapes import Equilibrium
 from cosserat_fenicsx.scene.action import has_permanent
@@ -188,6 +189,7 @@ def _critical(scene, layout, count, load_factor, tol, degree, comm):
         whole = [np.concatenate(model.comm.allgather(vector.array_r)) for vector in vectors]
         shapes = shapes_of(whole, values, model.rows_of_nodes, model.scales.length)[:count]
         state = Equilibrium.of(model, load_factor)
+        refuse_grazing(state, "buckling")
         errors = np.array([softness, rounding])
         return critical, layers, state, shapes, errors, conservative, load_factor + most
 

@@ -14,6 +14,7 @@ from cosserat_fenicsx.checks import instance, number, refuse, tolerance, whole
 from cosserat_fenicsx.errors import NotConverged, SceneError
 from cosserat_fenicsx.models.traits import traits_of
 from cosserat_fenicsx.ranks import communicator
+from cosserat_fenicsx.results.contacts import refuse_grazing
 from cosserat_fenicsx.results.modes import Modes
 from cosserat_fenicsx.results.shapes import Equilibrium
 from cosserat_fenicsx.scene.action import has_permanent
@@ -247,6 +248,7 @@ def _on_mesh(scene, layout, count, load_factor, degree, comm, damped, near, rota
         bodies, time = Bodies(model, unit), math.sqrt(unit * scales.length**2 / scales.force)
         layers = layers_of(model) if loaded else None
         state, (rq, n) = Equilibrium.of(model, load_factor), model.snapshot()
+        refuse_grazing(state, "modes")
     with circulatory_part(scene, layout, degree, comm) as circulatory:
         conservative = circulatory.vanishes(rq, load_factor)
         if damped is None:
