@@ -104,6 +104,8 @@ def test_the_tensions_that_bring_the_tip_to_a_point():
         slopes = np.column_stack([found[name] for name in names])
         tensions = tensions + np.linalg.solve(slopes, wanted - tip(path))
     assert tensions == pytest.approx([4.0, 2.0], rel=1e-6)
+    by_offset = path.sensitivity(lambda path: path.moment(ROD.start)[-1], ["loads[0].offset[0]"])["loads[0].offset[0]"]
+    assert by_offset == pytest.approx((0, path.scene.loads[0].tension, 0), abs=1e-7)
 
 
 def test_stored_states_and_kinks(tmp_path):

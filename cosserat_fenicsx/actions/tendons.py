@@ -114,7 +114,8 @@ class Tendon(Load, LineAction):
         middle = np.clip(s, low + max(PLACES) * step, high - max(PLACES) * step)
         x, powers = ((s - middle) / step)[:, None], np.arange(1, len(PLACES))
         weights = (powers * x ** (powers - 1)) @ np.linalg.inv(np.vander(PLACES, increasing=True))[1:]
-        arms = [self._arm(rod, middle + place * step) for place in PLACES]
+        # without the part that is constant: its rounding over the step would be no smooth function of the offset
+        arms = [self._arm(rod, middle + place * step) - self._arm(rod, middle) for place in PLACES]
         return np.einsum("kp,pki->ki", weights, arms) / step[:, None]
 
     @property
