@@ -48,7 +48,7 @@ class Stage(Part):
             1: each as it was given, a station or its name for all supports there, or its place, "supports[0]",
             "loads[1]", "stages[0].loads[0]".
         load_factors: as for `solve`; in a file a text such as "0:1", or a list. The last one stays for the stages
-            after.
+            after; it is 1 where a support is released and a stage follows.
         name: for messages.
 
     Raises:
@@ -211,7 +211,7 @@ def legs_of(scene):
     """The `Leg`s of a scene with stages, in order: of its own loads, where there are such, then of its stages.
 
     Raises:
-        SceneError: a stage releases what is gone, or names what no load factor multiplies.
+        SceneError: a stage releases what is gone, or not all of a support; or names what no load factor multiplies.
     """
     always = [Named(f"loads[{i}]", x, 1.0) for i, x in enumerate(scene.loads) if not x.scaled]
     ramped = [Named(f"loads[{i}]", x, 1.0) for i, x in enumerate(scene.loads) if x.scaled]

@@ -28,7 +28,7 @@ from cosserat_fenicsx.ranks import communicator
 from cosserat_fenicsx.results.compared import NAMES
 from cosserat_fenicsx.scene.action import path_dependent
 from cosserat_fenicsx.scene.parameters import admitted_laws, check_once, laws_with, parameter_of, scene_with
-from cosserat_fenicsx.scene.scene import Scene
+from cosserat_fenicsx.scene.scene import Scene, check_tensions
 from cosserat_fenicsx.statics.arguments import check_arguments
 from cosserat_fenicsx.statics.loaded import Loaded
 from cosserat_fenicsx.statics.meshes import meshes_for, resolving_turns, turning_in_law
@@ -94,6 +94,7 @@ def compile(  # noqa: A001  public as cf.compile
     """
     check_arguments(scene, tol, None, owner="compile")
     number("compile", "load_factor", load_factor, "a finite number other than 0", lambda x: 0 < abs(x) < np.inf)
+    check_tensions(scene, [load_factor])
     names = [over] if isinstance(over, str) else list(over)
     for name in names:
         if not isinstance(name, str):
