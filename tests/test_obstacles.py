@@ -141,6 +141,19 @@ class TestWhatAResultLeavesOpen:
                 linear(scene, 1, elements=4)
         assert "does not see that it may lift off" in str(cf.solve(scene, 1.0, elements=4))
 
+    def test_a_post_beside_the_nodes(self):
+        """A bent cantilever on a thin post: the force is across the rod, at 0.22 rad (shooting: 0.19849, 0.88747 N); that
+        of a node beside the place has another direction by up to h/2R."""
+        rod = cf.Rod(cf.Line((0, 0, 0.1), (1, 0, 0.1)), cf.Stiffness((1e4, 1e4), 1e4, (1.0, 1.0), 1.0))
+        post = cf.Cylinder((0.7, 0, 0), (0, 1, 0), 0.02, contact_radius=0.0)
+        scene = cf.Scene([rod], [cf.Clamp(rod.start)], [post, cf.Force(rod.end, (0, 0, -1.0))])
+        with pytest.warns(cf.SceneWarning, match="Cylinder pushes along rods by up to 0.11 of its"):
+            path = cf.solve(scene, 1.0, elements=40)
+        assert any("pushes along rods" in sentence for sentence in path.why)
+        path = cf.solve(scene, 1.0, tol=1e-3)
+        np.testing.assert_allclose(path.contacts(post).force[-1], (0.19848653, 0, 0.88746699), atol=2e-4)
+        assert "pushes along" not in str(path)
+
     def test_stiffness_of_the_surface(self):
         """A rod under its weight: depth w/k, elastic slip F/(L stick)."""
         floor = dataclasses.replace(self.floor, stiffness=1e4, friction=0.5)

@@ -19,6 +19,8 @@ _DEEPER = 2.0
 _SHALLOW = 0.1
 # Gap over the rod's length up to which a rod that does not press touches: rounding.
 _GRAZES = 1e-13
+# Share of an obstacle's pressure along rods from which on a sentence tells it.
+_SLANTED = 0.02
 # A friction force below this times the limit of friction is one at which the surface sticks.
 _STICKS = 1 - 1e-9
 
@@ -163,8 +165,28 @@ def contacts_in_words(path):
                 f"{describe(obstacle)} {' and '.join(told)}, {depth / largest:.1g} of the largest displacement: its "
                 "stiffness makes that, and estimated errors do not contain it."
             )
+        yield from slanted(path, obstacle)
         if grazing and path.counts_modes:
             yield f"{grazing} {describe(obstacle)} {_LIFTS}."
+
+
+def slanted(path, obstacle):
+    """A sentence where an obstacle pushes along rods: a rod touches beside its nodes, where the normal is another one."""
+    along = total = np.zeros(len(path))
+    for i, (rod, x) in enumerate(zip(path.scene.rods, path.layout.node_s(path.rule.nodes), strict=True)):
+        if obstacle.acts_on(rod):
+            gap, normal = _gaps(path, obstacle, rod, x)
+            moved = path.motion(rod, x)[..., :3] * path.scales.length
+            tangent = np.gradient(rod.curve.position(x * rod.length) + moved, x * rod.length, axis=1)
+            push = np.maximum(-gap, 0.0)[:, 1:-1] * _shares(path, i)[1:-1]  # an end may be pushed along its rod
+            along = along + np.sum(push * np.abs(np.einsum("kni,kni->kn", tangent, normal))[:, 1:-1], axis=1)
+            total = total + push.sum(axis=1)
+    share = np.divide(along, total, out=np.zeros(len(path)), where=total > 0).max(initial=0.0)
+    if share > _SLANTED:
+        yield (
+            f"{describe(obstacle)} pushes along rods by up to {share:.2g} of its pressure, which no surface does: rods "
+            "touch it beside their nodes. Expected more elements there, or a tol, which puts a node there."
+        )
 
 
 _LIFTS = "without pressing on it: stability counts it as held there both ways, and does not see that it may lift off"

@@ -12,7 +12,7 @@ import numpy as np
 from mpi4py import MPI
 
 from cosserat_fenicsx.algebra.eigen import reference_blas
-from cosserat_fenicsx.checks import instance
+from cosserat_fenicsx.checks import instance, warn
 from cosserat_fenicsx.errors import SceneError, nearest
 from cosserat_fenicsx.models.choose import choose
 from cosserat_fenicsx.models.formulation import formulation_of
@@ -22,7 +22,7 @@ from cosserat_fenicsx.ranks import communicator
 from cosserat_fenicsx.remember import per_scene
 from cosserat_fenicsx.results.accuracy import FEW
 from cosserat_fenicsx.results.compared import NAMES, Criterion, criteria_of
-from cosserat_fenicsx.results.contacts import check_passes
+from cosserat_fenicsx.results.contacts import check_passes, slanted
 from cosserat_fenicsx.results.path import Path
 from cosserat_fenicsx.scene.action import path_dependent, rubs
 from cosserat_fenicsx.scene.describe import describe
@@ -200,6 +200,12 @@ def solve(
             "netlib's reference BLAS solves the equations where rods meet: OpenBLAS takes about a third of the time "
             "for them (on Debian: apt install libopenblas0-serial)"
         )
+    if elements is not None:
+        for part in path.parts.values() if scene.stages else [path]:
+            told = [words for x in part.scene.actions if x.gaps is not None for words in slanted(part, x)]
+            path.why.extend(told)
+            for words in told if comm.rank == 0 else ():
+                warn(words)
     if oscillates:
         path.why.append(
             "with more Gauss points than the degree, contact forces and moments oscillate inside elements: tol bounds "
