@@ -153,3 +153,14 @@ def test_free_motions_and_their_decay_are_found_as_such():
         rod, _ = cantilever((1.0, 2.0), stiff=1e4, J=1e-3, damping=cf.Damping(drag=drag))
         found = cf.modes(cf.Scene([rod]), 7, damped=True, elements=4)
         assert found.kind.tolist() == kinds and found.eigenvalues[:6].tolist() == [0j] * 6
+
+
+def test_slow_decay_is_no_free_motion_and_free_motions_are_not_nearer_than_others():
+    """l^2 + c l + w^2 = 0 with a strong drag, whose small root is about -w^2/c."""
+    for drag in (1e4, 1e6):
+        rod, clamp = cantilever(stiff=1e6)
+        found = cf.modes(cf.Scene([rod], [clamp], [cf.LinearDrag(rod, drag, drag)]), 4, elements=4)
+        exact = -np.repeat([3.5160152685, 22.0344915647], 2) ** 2 / drag
+        assert found.kind.tolist() == ["overdamped"] * 4 and off(found, exact).max() < 2e-4
+    rod, _ = cantilever((1.0, 2.0), stiff=1e4, J=1e-3, damping=cf.Damping(time=0.01))
+    assert (cf.modes(cf.Scene([rod]), 2, near=20j, elements=2).frequencies > 3).all()

@@ -75,10 +75,14 @@ class QuadraticPencil:
         return found
 
     def _free(self, values, vectors):
-        """(n,) whether eigenvalues are those of free motions: a pair of zeros, up to the root of the rounding of K."""
+        """(n,) whether eigenvalues are those of free motions: a pair of zeros, up to the root of the rounding of K.
+
+        Strong damping makes eigenvalues small, too, as those of k/c, but not the work of K by their motions.
+        """
         sizes = np.einsum("ik,ik->k", np.abs(vectors), self._K_sizes @ np.abs(vectors))
         masses = np.einsum("ik,ik->k", vectors.conj(), self.M @ vectors).real
-        return np.abs(values) ** 2 <= _FREE * np.finfo(float).eps * sizes / masses
+        works = np.abs(np.einsum("ik,ik->k", vectors.conj(), self.K @ vectors))
+        return np.maximum(np.abs(values) ** 2 * masses, works) <= _FREE * np.finfo(float).eps * sizes
 
     def _size_of_lowest(self):
         """About the smallest size of an eigenvalue, by inverse iteration."""
@@ -197,7 +201,8 @@ class QuadraticPencil:
             U, sizes, _ = np.linalg.svd(np.column_stack([vectors[:, free].real, vectors[:, free].imag]), False)
             found += [(0j, x.astype(complex), 0.0) for x in U.T[sizes > _SAME_MOTION * sizes[0]]]
             left[free] = False
-        while left.any() and len(found) < count:
+        most = count + (len(found) if point else 0)  # free motions may be farther from the point than others
+        while left.any() and len(found) < most:
             first = np.flatnonzero(left)[0]
             group = np.flatnonzero(left & (np.abs(values - values[first]) <= _TOGETHER * np.abs(values[first])))
             found += self._of_group(values[group], vectors[:, group])
@@ -228,10 +233,10 @@ class QuadraticPencil:
             x = X @ turns[:, j]
             x = x / np.linalg.norm(x)
             value = roots[j]
-            if abs(value.imag) <= _REAL * abs(value):
+            error = _TYPICAL * np.finfo(float).eps * np.max(bound.T @ (self._K_sizes @ np.abs(x)))
+            if abs(value.imag) <= max(_REAL * abs(value), error):
                 value = complex(value.real)
-            error = np.finfo(float).eps * np.max(bound.T @ (self._K_sizes @ np.abs(x)))
-            found.append((value, x, _TYPICAL * error))
+            found.append((value, x, error))
         return found
 
     def _left(self, value, X):
