@@ -121,7 +121,7 @@ def more_in_words(answer, units):
             unit, size = units.on_screen(answer.quantities["md"], [answer.depth])
             places = ", ".join(f"{np.interp(x.start, answer.solved.s, answer.md) / size:.5g}" for x in rough[:most])
             more = f" and {len(rough) - most} more" if len(rough) > most else ""
-            which = f"of these forces, those at md = {places}{more} {unit}"
+            which = f"of these forces, those at md = {places} {unit}{more}"
             if len(rough) == len(at_points):
                 which = "all of these forces"
             yield (
