@@ -84,7 +84,7 @@ def add_lines(plotter, pyvista, lines, color="grey"):
 
 def thicker(factors):
     """A list of one note on the factors by which sections are enlarged; empty where none is."""
-    told = sorted({f"{float(f'{factor:.2g}'):g}" for factor in factors if factor > 1}, key=float)
+    told = sorted({f"{float(f'{factor:.2g}'):g}" for factor in factors if factor > 1} - {"1"}, key=float)
     if len(told) > 3:
         told = [f"{told[0]} to {told[-1]}"]
     return [f"sections drawn {' and '.join(told)} times their size"] if told else []
