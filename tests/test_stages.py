@@ -93,6 +93,14 @@ def test_a_support_holds_what_it_finds_and_leaves_as_its_reaction(how):
     np.testing.assert_allclose(place[-1], (0, 0, 1), rtol=0, atol=1e-8)
 
 
+def test_a_reaction_that_the_structure_cannot_carry():
+    """A column is pressed with more than its load as a cantilever, and released: it would jump."""
+    press = cf.Prescribed("rod.end", displacement=(0, 0, -0.02))
+    stages = [cf.Stage(supports=[press], load_factors=[1.0]), cf.Stage(release=[press])]
+    with pytest.raises(cf.NotConverged, match=r"^stages\[1\]: .* may be unstable: then release it where"):
+        cf.solve(column([cf.Force("rod@0.5", (0.5, 0, 0))], stages, section=SOFT), elements=2, control="load")
+
+
 def test_what_a_stage_has_reached_stays():
     """Loads with a unique equilibrium, in parts and one after another, as at once."""
 

@@ -15,6 +15,12 @@ from cosserat_fenicsx.scene.stages import Leg
 from cosserat_fenicsx.statics.path.recorder import Tracing
 from cosserat_fenicsx.statics.problem import Promoted, solvers_of
 
+# What is added to messages of stages that release supports.
+_RELEASED = (
+    " A released support is replaced by its reaction, a dead load under which the structure may be unstable: then "
+    "release it where the reaction is small, or in a motion, simulate(scene, duration, start=path)."
+)
+
 
 @dataclass(eq=False)
 class Followed:
@@ -70,7 +76,7 @@ class Legs:
                     if failure.path is not None:
                         failure.path = self._joined({**self._so_far, leg.leg.stage: failure.path})
                     if isinstance(failure, NotConverged):
-                        failure.args = (f"{leg.leg.words}: {failure}",)
+                        failure.args = (f"{leg.leg.words}: {failure}{_RELEASED if leg.leg.released else ''}",)
                 raise
             except Promoted as found:
                 found.leg = k
