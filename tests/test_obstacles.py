@@ -164,6 +164,14 @@ class TestWhatAResultLeavesOpen:
         assert "estimated errors do not contain it" in told and "may lift off" not in told
 
 
+def test_a_motion_does_not_start_inside_an_obstacle():
+    rod = TestWhatAResultLeavesOpen.rod
+    bent = cf.solve(cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Force(rod.end, (0, 0, -0.1))]), 1.0, elements=2)
+    scene = cf.Scene([rod], [cf.Clamp(rod.start)], [TestWhatAResultLeavesOpen.floor])
+    with pytest.raises(cf.SceneError, match="start: rod 'strut' overlaps Plane by .* m at s = 1 m: expected a path of"):
+        cf.simulate(scene, 0.01, dt=1e-3, start=bent, elements=2)
+
+
 ROD = cf.Rod(cf.Line((0, 0, 0.01), (1, 0, 0.01)), cf.Circle(0.02), cf.Material(1e9, 0.3), name="rope")
 BEAM = cf.Rod(cf.Line((0, 0, 1), (1, 0, 1)), cf.Rectangle(0.02, 0.03), cf.Material(1e9, 0.3), name="beam")
 

@@ -10,6 +10,7 @@ from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.models.choose import not_flat
 from cosserat_fenicsx.results.path import Path
 from cosserat_fenicsx.scene.action import has_permanent
+from cosserat_fenicsx.scene.describe import describe
 from cosserat_fenicsx.scene.scene import Scene
 from cosserat_fenicsx.scene.signals import at
 from cosserat_fenicsx.statics.solve import solve
@@ -17,6 +18,7 @@ from cosserat_fenicsx.statics.solve import solve
 # Largest violation of supports and joints by the initial state: positions over the unit of length, rotations in rad,
 # velocities over the largest one.
 _LARGEST_VIOLATION = 1e-6
+_OVERLAP = 1e-9  # with an obstacle, over the rod's length
 _DIFFERENCE = 1e-6  # interval of the forward difference of prescribed motions, over the unit of time
 _ZERO_VELOCITY = 1e-9  # rounding of dimensionless velocities
 _OUT_OF_PLANE = 1e-10  # rounding of components out of a plane, over all
@@ -33,11 +35,14 @@ def put_start(model, start):
         warnings, a list of sentences.
 
     Raises:
-        SceneError: a start of another scene's rods, or one that violates supports or joints.
+        SceneError: a start of another scene's rods, or one that violates supports or joints, or overlaps an obstacle
+            that its path does not have.
     """
     scene, layout = model.scene, model.layout
     rq = _at_rest(model) if start is None else _of_path(model, *_point(start))
     model.set_motion(model.unknowns_of(rq), np.zeros((sum(layout.counts), model.signature.points, 3)))
+    if start is not None:
+        _check_overlap(scene, *_point(start))
     held = rq[model.tied_slots]
     if model.ties:
         c, _ = model.ties_at(0.0).evaluate(held, float(model.load_factor.value))
@@ -88,6 +93,23 @@ def _point(start):
     if not len(path) or not -len(path) <= k < len(path):
         refuse("simulate", "start", start, f"a point that the path has; it has {len(path)}")
     return path, k
+
+
+def _check_overlap(scene, path, k):
+    """Refuse a start inside of an obstacle whose forces are not part of that equilibrium: it would be shot out."""
+    for obstacle in scene.actions:
+        if obstacle.gaps is None or obstacle in path.scene.actions:
+            continue
+        for rod in scene.rods_of(obstacle):
+            x = path.layout.node_s(path.rule.nodes)[path.scene.rods.index(rod)]
+            moved = path.motion(rod, x, [path._records[k]])[0][:, :3] * path.scales.length
+            gap, _ = obstacle.gaps(rod, x * rod.length, rod.curve.position(x * rod.length) + moved)
+            worst = int(np.argmin(gap))
+            if gap[worst] < -_OVERLAP * rod.length:
+                raise SceneError(
+                    f"simulate.start: rod '{rod.name}' overlaps {describe(obstacle)} by {-gap[worst]:.3g} m at s = "
+                    f"{x[worst] * rod.length:.6g} m: expected a path of a scene with this obstacle, or a start outside"
+                )
 
 
 def _at_rest(model):

@@ -340,9 +340,13 @@ def _not_accurate(tol, reached, best, elements, degree, path):
     advice = "a larger tol" if degree == 4 else "a larger tol, or degree 4"
     if any(action.at_nodes for action in path.scene.actions):
         advice += " (the pressure at a wall has kinks, which meshes resolve slowly), or a softer wall"
+    if any(action.memory for action in path.scene.actions):
+        advice += ", or give elements in place of tol: friction moves the edges of contact from step to step"
     if path.scene.doubts:
         advice = f"{advice}, but first: {'; '.join(path.scene.doubts)}"
     stays = f"is {reached:.2g}, and was {best:.2g} on a coarser mesh" if reached > best else f"stays at {reached:.2g}"
+    if reached <= tol:
+        stays = f"is {reached:.2g}, but elements do not end yet where contact begins, or a layer is"
     return (
         f"the accuracy tol = {tol:g} was not reached with {elements} elements of degree {degree} per rod: "
         f"the estimated error {stays}. Ask for {advice}."

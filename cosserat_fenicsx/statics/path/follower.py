@@ -83,10 +83,11 @@ class Follower:
         if problem.begins:
             steps = replace(self._steps, first=None, largest=None, adaptive=True)
             if not Continuation(track, steps).to(1.0):
+                softer = ", softer walls or obstacles" * any(x.at_nodes for x in problem.model.scene.actions)
                 raise NotConverged(
                     f"no equilibrium under the permanent loads was found beyond {track.here.load_factor:.3g} of them: "
                     f"{track.failure}. Are the units those of SI (N, m, Pa), and do supports hold every rod? Otherwise "
-                    "try more elements, or loads that are not permanent"
+                    f"try more elements{softer}, or loads that are not permanent"
                 )
             problem.end_beginning()
             track.begin_here()
