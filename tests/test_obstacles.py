@@ -140,6 +140,8 @@ class TestWhatAResultLeavesOpen:
             with pytest.raises(cf.SceneError, match="'strut' touches, at s = .* Plane without pressing on it, and may"):
                 linear(scene, 1, elements=4)
         assert "does not see that it may lift off" in str(cf.solve(scene, 1.0, elements=4))
+        pressed = dataclasses.replace(scene, loads=[*scene.loads, cf.LineForce(self.rod, (0, 0, -1.0), permanent=True)])
+        assert cf.buckling(pressed, 1, elements=4).load_factors[0] > 20  # as long as it presses
 
     def test_a_post_beside_the_nodes(self):
         """A bent cantilever on a thin post: the force is across the rod, at 0.22 rad (shooting: 0.19849, 0.88747 N); that

@@ -151,7 +151,7 @@ def contacts_in_words(path):
             if obstacle.acts_on(rod):
                 gap, _ = _gaps(path, obstacle, rod, x)
                 depth = max(depth, -gap.min())
-                grazing = grazing or _grazing(rod, x * rod.length, gap[-1])
+                grazing = grazing or _grazing(path.scene, rod, x * rod.length, gap[-1])
         if obstacle.law is None and depth > 0:
             told.append(f"lets rods in by up to {depth:.2g} m")
         if obstacle.friction and path.counts_modes and obstacle.law is None:
@@ -192,9 +192,11 @@ def slanted(path, obstacle):
 _LIFTS = "without pressing on it: stability counts it as held there both ways, and does not see that it may lift off"
 
 
-def _grazing(rod, s, gap):
-    """The words of where a rod touches without pressing, "" where it does not."""
-    where = np.flatnonzero(np.abs(gap) <= _GRAZES * rod.length)
+def _grazing(scene, rod, s, gap):
+    """The words of where a rod touches without pressing, "" where it does not, or only where a support holds it."""
+    held = [x.station.s for x in scene.all_supports if x.station is not None and x.station.rod is rod]
+    free = ~np.isclose(s[:, None], held, rtol=0, atol=1e-9 * rod.length).any(axis=1)
+    where = np.flatnonzero(free & (np.abs(gap) <= _GRAZES * rod.length))
     return f"Rod '{rod.name}' touches, at s = {s[where[0]]:.6g} m," if len(where) else ""
 
 
@@ -211,7 +213,7 @@ def refuse_grazing(state, owner):
         for rod in state.scene.rods:
             if obstacle.gaps is not None and obstacle.acts_on(rod):
                 s = state.s(rod)
-                if where := _grazing(rod, s, obstacle.gaps(rod, s, state.position(rod))[0]):
+                if where := _grazing(state.scene, rod, s, obstacle.gaps(rod, s, state.position(rod))[0]):
                     raise SceneError(
                         f"{owner}: {where} {describe(obstacle)} without pressing on it, and may lift off on one side, "
                         "which no linear theory has: expected a permanent load or a load factor that presses it there, "
