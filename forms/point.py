@@ -95,8 +95,9 @@ def slowed(work, point, test, velocity):
     a `VirtualMotion` are velocity and angular velocity."""
     r_t, omega = ufl.variable(NONE), ufl.variable(NONE)
     point = Point(
-        point.r, point.r_s, point.R, point.theta, rest=point._rest, frame=point._frame, r_t=r_t, omega=omega
-    )
+        point.r, point.r_s, point.R, point.theta, curvature=point.curvature, rest=point._rest, frame=point._frame,
+        r_t=r_t, omega=omega,
+    )  # fmt: skip
     value = work(point, test)
     return ufl.dot(ufl.diff(value, r_t), velocity.phi_r) + ufl.dot(ufl.diff(value, omega), velocity.phi)
 

@@ -164,3 +164,16 @@ def test_slow_decay_is_no_free_motion_and_free_motions_are_not_nearer_than_other
         assert found.kind.tolist() == ["overdamped"] * 4 and off(found, exact).max() < 2e-4
     rod, _ = cantilever((1.0, 2.0), stiff=1e4, J=1e-3, damping=cf.Damping(time=0.01))
     assert (cf.modes(cf.Scene([rod]), 2, near=20j, elements=2).frequencies > 3).all()
+
+
+def test_a_tendon_and_a_free_spin_in_complex_modes():
+    """Without anything that damps, complex modes are the undamped ones."""
+    rod, clamp = cantilever((1.0, 1.5), J=1e-4)
+    hanging = cf.Rod(cf.Line((0, 0, 0), (0, 0, -1)), rod.section)
+    for scene in (
+        cf.Scene([rod], [clamp], [cf.Tendon(rod, (0.05, 0.02), 3.0)]),
+        cf.Scene([hanging], [cf.Pin(hanging.start)], [cf.Weight((0, 0, -9.81))]),
+    ):
+        found, plain = (cf.modes(scene, 3, load_factor=1, damped=x, elements=4) for x in (True, False))
+        np.testing.assert_allclose(found.frequencies, plain.frequencies, rtol=1e-8)
+        assert found.negative_modes == plain.negative_modes == 0

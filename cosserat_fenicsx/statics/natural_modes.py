@@ -257,8 +257,7 @@ def _on_mesh(scene, layout, count, load_factor, degree, comm, damped, near, rota
             K = K + on_every_rank(circulatory.skew(rq, load_factor))
     if not damped:
         squares, vectors, rounding = Pencil(K, bodies.mass(), held).lowest(count)
-        if (squares == 0).any():  # `stability` counts these by the sign of their rounding; all below are known here
-            negative = np.count_nonzero(squares < 0)
+        negative = _below_free(squares, negative)
         shapes = shapes_of(vectors.T, squares, rows, scales.length)
         rounding = np.where(squares == 0, 0.0, rounding / np.abs(np.where(squares == 0, 1.0, squares)))
         return _OnMesh(squares / time**2, layers, rounding, shapes, negative, state, conservative, False, (rq, n))
@@ -273,9 +272,16 @@ def _on_mesh(scene, layout, count, load_factor, degree, comm, damped, near, rota
     pencil = QuadraticPencil(K + more, C, bodies.mass(), held)
     found = pencil.lowest(count) if near is None else pencil.nearest(near * time, count)
     values = found.values
+    if (values == 0).any():
+        negative = _below_free(Pencil((K + K.T) / 2, bodies.mass(), held).lowest(count)[0], negative)
     shapes = shapes_of(found.vectors.T, values, rows, scales.length)
     rounding = np.where(values == 0, 0.0, found.rounding / np.abs(np.where(values == 0, 1.0, values)))
     return _OnMesh(values / time, layers, rounding, shapes, negative, state, conservative, True, (rq, n))
+
+
+def _below_free(squares, negative):
+    """The number of negative modes. Free ones were counted by the sign of their rounding; all below them are known."""
+    return np.count_nonzero(squares < 0) if (squares == 0).any() else negative
 
 
 @contextlib.contextmanager
