@@ -246,7 +246,10 @@ def add_tubes(plotter, pyvista, scene, radii, enlarged=1.0):
     low, high = np.reshape(plotter.bounds, (3, 2)).T
     for load in scene.loads:
         if (points := load.drawn(low, high)) is not None:
-            plotter.add_mesh(pyvista.StructuredGrid(*np.moveaxis(points, 2, 0)), color=_WALL, opacity=0.2)
+            surface = pyvista.StructuredGrid(*np.moveaxis(points, 2, 0))
+            plotter.add_mesh(surface, color=_WALL, opacity=0.2)
+            if surface.n_cells == 1:  # a plane, which may be seen edge on
+                plotter.add_mesh(surface.extract_all_edges(), color=_WALL, line_width=3)
         if (tube := load.tube()) is not None:
             axis, clearance = tube
             rod = load.rod if load.station is None else load.station.rod
