@@ -136,8 +136,8 @@ def _shares(path, i):
 
 
 def contacts_in_words(path):
-    """Sentences on what a result of obstacles leaves open: how far their stiffness lets rods in and slip, which is no part
-    of estimated errors; and what touches without pressing, which may lift off."""
+    """Sentences on what a result of obstacles leaves open: how far their stiffness lets rods in and slip, which is no
+    part of estimated errors; and what touches without pressing, which may lift off."""
     if path.scene.stages:
         for stage, part in path.parts.items():
             yield from (f"Stage {stage}: {sentence}" for sentence in contacts_in_words(part))
@@ -171,7 +171,7 @@ def contacts_in_words(path):
 
 
 def slanted(path, obstacle):
-    """A sentence where an obstacle pushes along rods: a rod touches beside its nodes, where the normal is another one."""
+    """A sentence where an obstacle pushes along rods: a rod touches beside its nodes, where the normal is another."""
     along = total = np.zeros(len(path))
     for i, (rod, x) in enumerate(zip(path.scene.rods, path.layout.node_s(path.rule.nodes), strict=True)):
         if obstacle.acts_on(rod):
@@ -201,7 +201,7 @@ def _grazing(scene, rod, s, gap):
 
 
 def refuse_grazing(state, owner):
-    """Refuse small motions of rods that touch an obstacle without pressing on it, which may lift off: they have no tangent.
+    """Refuse small motions of rods that touch an obstacle without pressing on it, which may lift off.
 
     Args:
         state: an `Equilibrium`; owner: of the message.
