@@ -137,10 +137,14 @@ def test_what_modes_refuse():
         ([cf.Centrifugal((0, 0, 1.0)), cf.LinearDrag(rod, 1.0)], {}, "acts on the rods in the steady rotation"),
         ([], {"near": complex("nan")}, "near = .*expected a finite complex number"),
         ([], {"near": -1j}, "near = .*upper half plane"),
+        ([], {"damped": "no"}, "damped = 'no': expected True, False, or None"),
         ([cf.Centrifugal((0, 0, 1.0))], {"damped": False}, "damped = False: expected None or True"),
     ):
         with pytest.raises(cf.SceneError, match=words):
             cf.modes(cf.Scene([rod], [clamp], loads), elements=2, **more)
+    path = cf.solve(cf.Scene([rod], [clamp], [cf.Centrifugal((0, 0, 1.0))]), [0.0], elements=2)
+    with pytest.raises(cf.SceneError, match="Path.modes: damped = False: expected None or True"):
+        path.modes(1, damped=False)
     with pytest.raises(cf.SceneError, match="0 steady rotations"):
         cf.campbell(cf.Scene([rod], [clamp]), [1.0])
     with pytest.raises(cf.SceneError, match="rates from 0 on"):
@@ -160,7 +164,7 @@ def test_slow_decay_is_no_free_motion_and_free_motions_are_not_nearer_than_other
     for drag in (1e4, 1e6):
         rod, clamp = cantilever(stiff=1e6)
         found = cf.modes(cf.Scene([rod], [clamp], [cf.LinearDrag(rod, drag, drag)]), 4, elements=4)
-        exact = -np.repeat([3.5160152685, 22.0344915647], 2) ** 2 / drag
+        exact = -(np.repeat([3.5160152685, 22.0344915647], 2) ** 2) / drag
         assert found.kind.tolist() == ["overdamped"] * 4 and off(found, exact).max() < 2e-4
     rod, _ = cantilever((1.0, 2.0), stiff=1e4, J=1e-3, damping=cf.Damping(time=0.01))
     assert (cf.modes(cf.Scene([rod]), 2, near=20j, elements=2).frequencies > 3).all()
@@ -177,3 +181,12 @@ def test_a_tendon_and_a_free_spin_in_complex_modes():
         found, plain = (cf.modes(scene, 3, load_factor=1, damped=x, elements=4) for x in (True, False))
         np.testing.assert_allclose(found.frequencies, plain.frequencies, rtol=1e-8)
         assert found.negative_modes == plain.negative_modes == 0
+
+
+def test_modes_are_followed_from_free_ones():
+    """A rod that spins about its axis: free at rest and in rotation, one of the others with the rate."""
+    rod, _ = cantilever((1.0, 1.0), J=1e-4)
+    held = [cf.Pin(rod.start)]
+    found = cf.campbell(cf.Scene([rod], held, [cf.Centrifugal((0, 0, 1.0))]), [0.0, 1.0, 2.0], 3, elements=2)
+    assert [(x.kind == "free").sum() for x in found.modes] == [3, 2, 2]
+    np.testing.assert_allclose([np.sort(x.eigenvalues.imag)[2] for x in found.modes], found.rates, atol=1e-6)

@@ -3,6 +3,7 @@
 import contextlib
 import math
 from collections import namedtuple
+from numbers import Complex
 
 import numpy as np
 from mpi4py import MPI
@@ -38,6 +39,8 @@ _CORRECTIONS = 10  # Newton iterations after the added constraints of a mechanis
 # By how much the largest gain of a halving that is assumed, as a power of 2, is below twice the degree: of squares, and
 # of complex eigenvalues, whose errors are not of one sign.
 _OF_SQUARES, _OF_EIGENVALUES = 2, 4
+# Sizes below this share of the largest eigenvalue, such as of free motions, count as that where others follow them.
+_LEAST = 1e-9
 # Sine of the angle between a vector and the axis of a rotation below which it has the axis's direction; arc lengths, as
 # shares of a rod, where that is tried.
 _ALONG, _TRIED = 1e-9, np.array([0.0, 0.31, 0.73, 1.0])
@@ -91,27 +94,19 @@ def modes(
         NotConverged: the load factor or the accuracy is not reached.
     """
     instance("modes", "scene", scene, Scene, "a Scene")
-    for rod in scene.rods:
-        require_inertia(rod, "a motion")
-    for action in scene.actions:
-        if action.delayed is not None:
-            raise SceneError(
-                f"modes: {describe(action)}: expected no actions whose forces come from earlier motion: rods in "
-                "its place, or the spectrum of a simulated motion, show the modes"
-            )
-    refuse_stages("modes", scene)
+    admit("modes", scene, damped)
     number("modes", "load_factor", load_factor, "a finite number", math.isfinite)
     whole("modes", "count", count)
     whole("modes", "elements", 1 if elements is None else elements)
     tolerance("modes", tol)
     rotation = _rotation(scene)
     if near is not None:
-        if isinstance(near, bool) or not isinstance(near, int | float | complex) or not np.isfinite(near):
+        if isinstance(near, bool) or not isinstance(near, Complex) or not np.isfinite(near):
             refuse("modes", "near", near, "a finite complex number (1/s)")
         if near.imag < 0:
             refuse("modes", "near", near, "a number of the upper half plane, whose eigenvalues stand for their pairs")
-    if damped is False and (near is not None or rotation is not None):
-        raise SceneError("modes: damped = False: expected None or True with `near` or a `Centrifugal`")
+    if damped is False and near is not None:
+        raise SceneError("modes: damped = False: expected None or True with `near`")
     if load_factor or has_permanent(scene):
         check_arguments(without_mechanism(scene), tol, elements, owner="modes")
         check_magnitudes(scene, load_factor)
@@ -137,6 +132,23 @@ def modes(
             "of themselves, since the rods are so slender. Ask for a larger tol."
         )
     return _result(scene, found, error, comm, near or 0.0)
+
+
+def admit(owner, scene, damped):
+    """Raise a SceneError of `owner` for scenes and `damped` that modes do not admit."""
+    for rod in scene.rods:
+        require_inertia(rod, "a motion")
+    for action in scene.actions:
+        if action.delayed is not None:
+            raise SceneError(
+                f"{owner}: {describe(action)}: expected no actions whose forces come from earlier motion: rods in "
+                "its place, or the spectrum of a simulated motion, show the modes"
+            )
+    refuse_stages(owner, scene)
+    if damped is not None and not isinstance(damped, bool):
+        refuse(owner, "damped", damped, "True, False, or None")
+    if damped is False and _rotation(scene) is not None:
+        raise SceneError(f"{owner}: damped = False: expected None or True with a `Centrifugal`")
 
 
 def at_state(scene, layout, degree, count, load_factor, damped, start):
@@ -233,7 +245,7 @@ class _Following:
 
 def assigned(before, values):
     """Indices of complex `values` (n,) that continue `before` (n,): the least sum of relative distances."""
-    sizes = np.maximum(np.abs(before), np.finfo(float).tiny)
+    sizes = np.maximum(np.abs(before), _LEAST * np.abs([before, values]).max() or 1.0)
     return linear_sum_assignment(np.abs(values[None, :] - before[:, None]) / sizes[:, None])[1]
 
 

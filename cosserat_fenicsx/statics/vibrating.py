@@ -13,7 +13,7 @@ from cosserat_fenicsx.interrupts import obey
 from cosserat_fenicsx.results.modes_along import ModesAlong
 from cosserat_fenicsx.results.records import Event
 from cosserat_fenicsx.scene.scene import Scene
-from cosserat_fenicsx.statics.natural_modes import assigned, at_state, modes
+from cosserat_fenicsx.statics.natural_modes import admit, assigned, at_state, modes
 
 # Relative width of the bracket of a load factor of flutter; and of the bracket around it on a coarser mesh.
 _LOCATED, _NEAR = 1e-9, 1e-3
@@ -25,6 +25,7 @@ def modes_along(path, count, damped):
     if not len(path):
         raise SceneError("Path.modes: the path is empty: expected at least one point")
     records, scene = path._records, path.scene
+    admit("Path.modes", scene, damped)
     if records[0].gauss_fields is not None and records[0].gauss_fields.shape[1] != path.degree:
         raise SceneError("Path.modes: expected a path with as many Gauss points as the degree (gauss_points=None)")
 
