@@ -168,6 +168,7 @@ def test_slow_decay_is_no_free_motion_and_free_motions_are_not_nearer_than_other
         assert found.kind.tolist() == ["overdamped"] * 4 and off(found, exact).max() < 2e-4
     rod, _ = cantilever((1.0, 2.0), stiff=1e4, J=1e-3, damping=cf.Damping(time=0.01))
     assert (cf.modes(cf.Scene([rod]), 2, near=20j, elements=2).frequencies > 3).all()
+    assert cf.modes(cf.Scene([rod]), 2, near=0, elements=2).kind.tolist() == ["free"] * 2
 
 
 def test_a_tendon_and_a_free_spin_in_complex_modes():

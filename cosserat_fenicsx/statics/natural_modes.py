@@ -282,7 +282,7 @@ def _on_mesh(scene, layout, count, load_factor, degree, comm, damped, near, rota
     if rotation is not None:
         C = C + bodies.gyroscopic(w)
     pencil = QuadraticPencil(K + more, C, bodies.mass(), held)
-    found = pencil.lowest(count) if near is None else pencil.nearest(near * time, count)
+    found = pencil.nearest(near * time, count) if near else pencil.lowest(count)
     values = found.values
     if (values == 0).any():
         negative = _below_free(Pencil((K + K.T) / 2, bodies.mass(), held).lowest(count)[0], negative)
