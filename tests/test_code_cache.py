@@ -33,7 +33,7 @@ extern "Python" double change(double x);
 """
 CODE = """#include "small.h"
 static double change(double x);
-PetscInt zero = 0;
+int zero = 0;
 double product(const pair *given) { return change(given->a * given->b) + KERNEL_ARGUMENTS + zero; }
 """
 

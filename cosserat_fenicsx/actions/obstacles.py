@@ -77,7 +77,7 @@ class Obstacle(Pressing, LineAction):
             self.check_rod(self.rod)
 
     def shape(self):
-        """The `Datum`s of the gap function."""
+        """The data of the gap function, a tuple of `Datum`."""
         raise NotImplementedError
 
     def beside(self, points):

@@ -146,7 +146,8 @@ class Buckling(Shapes):
 
 # Largest number of things that are left out to name in a sentence.
 _NAMED = 6
-# Growth rates below this many estimated errors, or below this over the size of the eigenvalue, are none; and areas of ellipses over those of circles.
+# Growth rates below this many estimated errors, or below this over the size of the eigenvalue, are none; and areas of
+# ellipses over those of circles.
 _UNSURE, _NO_GROWTH, _NO_WHIRL = 3.0, 1e-9, 1e-3
 # Share of the area of a circle above which a motion is one.
 _ROUND = 0.99
@@ -227,7 +228,8 @@ class Modes(Shapes):
 
     @property
     def squares(self):
-        """(n,) rad^2/s^2: omega^2, below zero where the state is unstable; of complex modes |lambda|^2."""
+        """(n,) rad^2/s^2: omega^2, below zero where the state is unstable; of complex modes the square of the
+        size of lambda."""
         return np.abs(self.eigenvalues) ** 2 if self.complex else -np.square(self.eigenvalues).real
 
     @property
@@ -248,7 +250,8 @@ class Modes(Shapes):
 
     @property
     def damping_ratios(self):
-        """(n,) -Re lambda/|lambda|: 1 and more for critical damping, negative where the motion grows; 0 for free ones.
+        """(n,) -Re lambda over the size of lambda: 1 and more for critical damping, negative where the motion grows; 0 for
+        free ones.
 
         A real eigenvalue has the ratio 1 (or -1)."""
         sizes = np.abs(self.eigenvalues)
@@ -322,7 +325,8 @@ class Modes(Shapes):
         if kind == "free":
             return "0 Hz, free motion"
         grows = f", flutter: growth {value.real:.4g} 1/s" if kind == "flutter" else ""
-        damping = f", damping ratio {self.damping_ratios[k]:.3g}" if value.real and not grows else ""
+        damped = not grows and abs(self.damping_ratios[k]) > _NO_GROWTH
+        damping = f", damping ratio {self.damping_ratios[k]:.3g}" if damped else ""
         return f"{self.frequencies[k]:.4g} Hz{grows}{damping}"
 
     def _answer(self, units):

@@ -381,6 +381,11 @@ class Scene(Part):
             warn(doubt)
 
     @cached_property
+    def has_obstacles(self):
+        """Whether there is an obstacle that rods may touch, see `Action.gaps`."""
+        return any(load.gaps is not None for load in self.all_loads)
+
+    @cached_property
     def has_threads(self):
         """Whether a thread runs along a rod, see `Action.is_thread`."""
         return any(load.is_thread for load in self.all_loads)

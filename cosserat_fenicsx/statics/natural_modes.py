@@ -71,7 +71,7 @@ def modes(
 
     Args:
         scene: a `Scene`; every rod needs a mass and inertia. Without a load factor it may be free to move.
-        count: number of modes, from the smallest square or the smallest |lambda| on.
+        count: number of modes, from the smallest square, or the smallest size of lambda, on.
         load_factor: eta of the state, a point of the path of load control from the unloaded reference. The reference
             of a mechanism, such as a rod that hangs on a hinge, must be its equilibrium position but for strains.
         damped: whether to compute complex modes: None where something resists velocities, the scene rotates, or its

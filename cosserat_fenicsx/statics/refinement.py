@@ -135,7 +135,8 @@ class _Search:
         elements = max(layout.counts)
         try:
             found = self._found_on(layout)
-            check_passes(found, self._tol)
+            if self._scene.has_obstacles:
+                check_passes(found, self._tol)
         except (NotConverged, Promoted) as problem:
             if self._usual is not None:
                 raise _TooCoarse from None

@@ -28,7 +28,7 @@ class Search:
     # over its length.
     nearly: float = 0.35
     # Distances on both sides of a critical point at which the path is solved for.
-    beside: tuple[float, ...] = (1e-3, 1e-4, 1e-2)
+    beside: tuple[float, ...] = (1e-3, 1e-4)
     steep: float = 2.0  # largest length between these two points, over their distance along the chord
     # Largest distance of the direction between these two points from the mean of their tangents, over the angle between
     # the tangents: on a smooth path it is of second order in their distance, while points beside each other with
