@@ -79,7 +79,7 @@ def test_a_rotating_blade(EI, hub, rate, tau, exact):
     assert off(found, exact).max() < 1e-7 and found.stable
 
 
-def test_flutter_is_an_event_of_a_path(tmp_path):
+def test_flutter_is_an_event_of_a_path(tmp_path_all):
     """Beck's column; with a little Kelvin-Voigt damping at about half the load (Ziegler's paradox). The exact loads are
     20.0509536 and 10.9391220 without shear, whose effect is 1.2e-5 and 6e-6 here."""
     for time, exact in ((0.0, 20.0507172), (1e-3, 10.9390562)):
@@ -91,13 +91,13 @@ def test_flutter_is_an_event_of_a_path(tmp_path):
         assert event.kind == "flutter" and event.after == (2 if time == 0 else 1)
         assert event.load_factor == pytest.approx(exact, rel=1e-6) and event.error < 2e-6
         assert [x.stable for x in along.modes] == [True, True, time == 0, False]
-    path.save(tmp_path / "path.h5")
-    assert cf.read_path(tmp_path / "path.h5").events[0].kind == "flutter" and "Flutter at" in str(path)
+    path.save(tmp_path_all / "path.h5")
+    assert cf.read_path(tmp_path_all / "path.h5").events[0].kind == "flutter" and "Flutter at" in str(path)
     with pytest.raises(cf.SceneError, match="the onset of flutter: expected a limit point or a bifurcation"):
         path.sensitivity(event, ["rods.beam.length"])
 
 
-def test_whirl_of_a_shaft_between_bearings(tmp_path):
+def test_whirl_of_a_shaft_between_bearings(tmp_path_all):
     """Timoshenko's shaft, whirl rates in space at 300 rad/s (closed form); forward and backward; Campbell diagram."""
     E, d, nu, rho, spin = 210e9, 0.1, 0.3, 7850.0, 300.0
     A, I = np.pi * d**2 / 4, np.pi * d**4 / 64
@@ -113,8 +113,8 @@ def test_whirl_of_a_shaft_between_bearings(tmp_path):
     np.testing.assert_allclose(rates[1], [1262.994162319, 4886.078979331], rtol=2e-8)
     np.testing.assert_allclose(rates[-1], [1259.441927398, 4873.4134679], rtol=2e-8)
     assert found[1].eigenvalues.imag[1] == pytest.approx(1262.994162319 - spin, rel=1e-7)
-    found.plot(tmp_path / "campbell.png", seen="inertial", width=400)
-    assert (tmp_path / "campbell.png").stat().st_size > 3000 and found.rates.tolist() == [0, spin]
+    found.plot(tmp_path_all / "campbell.png", seen="inertial", width=400)
+    assert (tmp_path_all / "campbell.png").stat().st_size > 3000 and found.rates.tolist() == [0, spin]
 
 
 def test_a_rotor_with_damping_inside_and_outside():

@@ -149,15 +149,15 @@ def test_errors_of_stages_are_those_of_the_whole_history(held):
     assert (off[1:] <= held.errors.position[1:] * held.largest_displacement()[1:]).all()
 
 
-def test_a_saved_path_has_its_stages(held, tmp_path):
-    held[3:14].save(tmp_path / "path.h5")
-    back = cf.read_path(tmp_path / "path.h5")
+def test_a_saved_path_has_its_stages(held, tmp_path_all):
+    held[3:14].save(tmp_path_all / "path.h5")
+    back = cf.read_path(tmp_path_all / "path.h5")
     np.testing.assert_array_equal(back.stage, held.stage[3:14])
     for a, b in zip(back.reaction("rod@0.5"), held.reaction("rod@0.5"), strict=True):
         np.testing.assert_array_equal(a, b[3:14])
     np.testing.assert_array_equal(back.force("rod@0.3"), held.force("rod@0.3")[3:14])
-    held.write(tmp_path / "path.csv")
-    assert (tmp_path / "path.csv").read_text().startswith("load factor,stage,")
+    held.write(tmp_path_all / "path.csv")
+    assert (tmp_path_all / "path.csv").read_text().startswith("load factor,stage,")
 
 
 def test_a_path_goes_on_from_another_one(held):
@@ -174,11 +174,11 @@ def test_a_path_goes_on_from_another_one(held):
         cf.solve(column([], [cf.Stage([cf.Force("rod.end", (1, 0, 0))])]), start=whole)
 
 
-def test_stages_in_a_scene_file(held, tmp_path):
-    cf.write(held.scene, tmp_path / "scene.toml")
-    text = (tmp_path / "scene.toml").read_text()
+def test_stages_in_a_scene_file(held, tmp_path_all):
+    cf.write(held.scene, tmp_path_all / "scene.toml")
+    text = (tmp_path_all / "scene.toml").read_text()
     assert 'release = ["stages[0].supports[0]"]' in text and 'load_factors = "0.0:1.0"' in text
-    path = cf.read(tmp_path / "scene.toml").run(elements=8)
+    path = cf.read(tmp_path_all / "scene.toml").run(elements=8)
     np.testing.assert_array_equal(path.position("rod.end"), cf.solve(held.scene, elements=8).position("rod.end"))
 
 
