@@ -20,7 +20,7 @@ def off(found, exact):
 
 
 def test_a_dashpot_at_the_end_may_overdamp():
-    """Roots of Euler's beam with a dashpot c = 2 and Kelvin-Voigt's damping; shear changes them by about 4e-6 of the third."""
+    """Roots of Euler's beam with a dashpot c = 2 and Kelvin-Voigt's damping; shear changes the third by about 4e-6."""
     rod, clamp = cantilever(stiff=1e7, J=1e-9)
     found = cf.modes(cf.Scene([rod], [clamp], [cf.Dashpot(rod.end, 2.0)]), 8, elements=8)
     exact = [-1.93970800974, -3.649734575226 + 20.34901540283j, -3.873655659255 + 60.72439620323j]
