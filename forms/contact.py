@@ -1,8 +1,8 @@
 """Contact of a rod with obstacles and walls: the gap of a point of its axis, pressure, and Coulomb friction.
 
-Obstacles and straight walls are gap functions: (position, *shape) -> distance of the position from the surface, negative
-beyond it, and the unit normal there, towards the free side. Curved tubes find their nearest point as data. Pressure and
-friction act on the rod's surface, where it touches: friction has a moment about the centreline.
+Obstacles and straight walls are gap functions: (position, *shape) -> distance of the position from the surface,
+negative beyond it, and the unit normal there, towards the free side. Curved tubes find their nearest point as data.
+Pressure and friction act on the rod's surface, where it touches: friction has a moment about the centreline.
 """
 
 import ufl
@@ -22,7 +22,7 @@ def linear(depth, stiffness):
     return stiffness * depth
 
 
-# -- gap functions -------------------------------------------------------------------------------------------------------
+# -- gap functions -----------------------------------------------------------------------------------------------------
 
 
 def plane(r, point, normal):
@@ -85,7 +85,8 @@ def friction_force(point, surface, shape, arm, stiffness, friction, stick, moved
     returned to friction times the pressure where it is larger (return mapping; Simo & Hughes, Computational
     Inelasticity, 1998, ch. 1). Slip is that of the material point that touched in
     that state, so a rod that rolls does not slip. It begins where the point touches: a rod that is laid down has no
-    friction from its way there. In the second variation the limit is fixed: where a rod slips, friction is a dead force.
+    friction from its way there. In the second variation the limit is fixed: where a rod slips, friction is a dead
+    force.
 
     Args:
         see `obstacle_work`; friction: the coefficient; stick: force per area.

@@ -112,7 +112,8 @@ class Obstacle(Pressing, LineAction):
         k = int(np.argmin(gap))
         if gap[k] < -_NOTHING * rod.length:
             raise SceneError(
-                f"{type(self).__name__}: rod '{rod.name}' lies beyond its surface at rest, at s = {s[k]:.6g} m by {-gap[k]:.4g} m: "
+                f"{type(self).__name__}: rod '{rod.name}' lies beyond its surface at rest, at s = {s[k]:.6g} m by "
+                f"{-gap[k]:.4g} m: "
                 f"expected {self._expected}"
             )
 

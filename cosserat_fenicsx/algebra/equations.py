@@ -258,8 +258,8 @@ class Equations(Called):
         return self.ties.forces(self.tie_load_factor) if self.ties else np.empty((0, 2, 6))
 
     def at_ties(self, x, load_factors):
-        """(multipliers (n, ties), `tie_forces` (n, ties, 2, 6)) at unknowns x (n, this rank's part) and load factors (n,);
-        the ties stay at the last one."""
+        """(multipliers (n, ties), `tie_forces` (n, ties, 2, 6)) at unknowns x (n, this rank's part) and load factors
+        (n,); the ties stay at the last one."""
         if not self.ties:
             return np.empty((len(x), 0)), np.empty((len(x), 0, 2, 6))
         found = []

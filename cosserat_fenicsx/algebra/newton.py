@@ -2,8 +2,8 @@
 
 A test of the residual norm alone is unreliable (on slender rods the rounding error of |F| grows with EA L^2/EI), and
 PETSc's default line search impairs convergence on eq. (1); so the line search is `basic` and the convergence test is
-that of newton.c, which takes the same steps without SNES in sweeps over load factors. `LimitedNewton` takes single steps
-of limited length, for states far from the solution.
+that of newton.c, which takes the same steps without SNES in sweeps over load factors. `LimitedNewton` takes single
+steps of limited length, for states far from the solution.
 """
 
 import math

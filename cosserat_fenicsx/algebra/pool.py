@@ -16,7 +16,8 @@ from cosserat_fenicsx.algebra.building import begin
 
 #: Largest number of idle problems kept for each communicator; the least recently used one is dropped first.
 MOST_IDLE = 24
-# Problems given back by one process until what Python has dropped meanwhile is freed, which takes as long as a few points.
+# Problems given back by one process until what Python has dropped meanwhile is freed, which takes as long as a few
+# points.
 _SOME = 8
 
 

@@ -1,5 +1,5 @@
-"""Eigenvalues of lambda^2 M + lambda C + K with held x = 0: real matrices of any symmetry, eigenvalues of the upper half
-plane. Every rank solves all of it."""
+"""Eigenvalues of lambda^2 M + lambda C + K with held x = 0: real matrices of any symmetry, eigenvalues of the upper
+half plane. Every rank solves all of it."""
 
 from collections import namedtuple
 
@@ -193,8 +193,8 @@ class QuadraticPencil:
     # -- accuracy ----------------------------------------------------------------------------------------------------
 
     def _polished(self, values, vectors, count, point):
-        """`Found` of the `count` eigenvalues nearest a point: by Rayleigh's quotients with left and right vectors, whose
-        errors are squares of those of the vectors."""
+        """`Found` of the `count` eigenvalues nearest a point: by Rayleigh's quotients with left and right vectors,
+        whose errors are squares of those of the vectors."""
         left, found = np.ones(len(values), dtype=bool), []
         free = np.flatnonzero(self._free(values, vectors))
         if len(free):

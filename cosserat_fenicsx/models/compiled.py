@@ -286,8 +286,8 @@ def action_work(model, dx, test, point_at, unknowns, accepted_at=None, test_at=N
 
 
 def action_densities(model, point_at):
-    """Force and moment per length of the distributed actions, threads excepted: {number of the term: (place, UFL (6,))},
-    place "line" (Gauss points) or "node" (for actions integrated there)."""
+    """Force and moment per length of the distributed actions, threads excepted: {number of the term: (place, UFL
+    (6,))}, place "line" (Gauss points) or "node" (for actions integrated there)."""
     found = {}
     for number, term, factor, point in acting_at(model, point_at):
         place = term.kind.place

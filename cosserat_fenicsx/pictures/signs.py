@@ -166,8 +166,8 @@ def span_of(scene, shapes, everywhere):
 
 
 def without_sign(scene, tubes, threads=True):
-    """Words for the loads that are not drawn; tubes, threads: whether tubes and obstacles around rods, and threads along
-    them are."""
+    """Words for the loads that are not drawn; tubes, threads: whether tubes and obstacles around rods, and threads
+    along them are."""
     corner = np.zeros(3)
 
     def drawn(load):

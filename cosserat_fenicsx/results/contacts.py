@@ -31,7 +31,8 @@ class Passes(NotConverged):
 
 @dataclass(frozen=True, eq=False)
 class Contacts:
-    """Contact of rods with one obstacle at m nodes of the mesh, in n states. `print` shows where rods touch in the last.
+    """Contact of rods with one obstacle at m nodes of the mesh, in n states. `print` shows where rods touch in the
+    last.
 
     Attributes:
         rod: (m,) names of the rods. s: (m,) arc lengths, m.

@@ -250,8 +250,8 @@ class Modes(Shapes):
 
     @property
     def damping_ratios(self):
-        """(n,) -Re lambda over the size of lambda: 1 and more for critical damping, negative where the motion grows; 0 for
-        free ones.
+        """(n,) -Re lambda over the size of lambda: 1 and more for critical damping, negative where the motion grows; 0
+        for free ones.
 
         A real eigenvalue has the ratio 1 (or -1)."""
         sizes = np.abs(self.eigenvalues)

@@ -139,8 +139,8 @@ class Event:
             `Path.modes`), where a vibration begins to grow.
         load_factor: located to a relative 1e-6.
         mode: (N, 3) displacements, inertial, of all nodes of all rods in the scene's order, the largest of length 1:
-            the path's own direction at a limit point, the buckling mode at a bifurcation, the mode that grows in flutter.
-            `Path.mode` picks a rod.
+            the path's own direction at a limit point, the buckling mode at a bifurcation, the mode that grows in
+            flutter. `Path.mode` picks a rod.
         after: index of the path's last point before it; -1 where there is none.
         residual: how nearly the tangent is singular: the stiffness against the mode at the event over that in the
             unloaded state; events with more than 1e-5 are not listed. The stiffness against a motion v is

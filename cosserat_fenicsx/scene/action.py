@@ -17,8 +17,8 @@ from cosserat_fenicsx.scene.signals import at
 Datum = namedtuple("Datum", "value unit size")
 
 # Powers of force, length and time of each unit; whether a vector with this unit is axial, like a moment: in a plane
-# motion it is normal to the plane. "m from origin" marks positions, which models measure from `Scene.origin`; "axis" unit
-# vectors along axes that are normal to the plane.
+# motion it is normal to the plane. "m from origin" marks positions, which models measure from `Scene.origin`; "axis"
+# unit vectors along axes that are normal to the plane.
 _UNITS = {
     "1": (0, 0, 0, False),
     "axis": (0, 0, 0, True),
@@ -110,8 +110,8 @@ class Action(Part, family="load or action", homes=("cosserat_fenicsx.scene.loads
             contact begins.
         gaps: None; or, of an obstacle, a method (rod, arc lengths s (n,), its points there (n, 3)) -> gaps (n,) between
             the rod's surface and the obstacle, m, and unit normals (n, 3) towards the free side. It then has
-            `stiffness` (N/m^2), `friction`, with it `sticks` (N/m^2), `law` and `largest_step`, how far (m) a rod may move at once without passing
-            through it unseen.
+            `stiffness` (N/m^2), `friction`, with it `sticks` (N/m^2), `law` and `largest_step`, how far (m) a rod may
+            move at once without passing through it unseen.
         in_law: whether it is no load but a part of the law along a rod. Its `data` are then what sections have without
             stress beyond the reference, inertial in the reference: curvature and twist, rad/m, and strain, 1.
         is_thread: whether it is the tension of a thread along a rod, which is no part of the rod's contact force. Its
@@ -170,8 +170,8 @@ class Action(Part, family="load or action", homes=("cosserat_fenicsx.scene.loads
         return None
 
     def drawn(self, low, high):
-        """For pictures, of an obstacle: (n, m, 3) points of its surface, m, as large as the box with the corners low and
-        high (3,), m; else None."""
+        """For pictures, of an obstacle: (n, m, 3) points of its surface, m, as large as the box with the corners low
+        and high (3,), m; else None."""
         return None
 
     def companions(self, scene):

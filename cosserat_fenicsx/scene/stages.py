@@ -260,8 +260,8 @@ def after(leg):
     """
     if leg.released and leg.last != 1:
         raise SceneError(
-            f"{leg.words}.load_factors end at {leg.last:g}, and a stage follows: expected 1 at the end, since a support "
-            "is released in full"
+            f"{leg.words}.load_factors end at {leg.last:g}, and a stage follows: expected 1 at the end, since a "
+            "support is released in full"
         )
     reached = {}
     for x in (*leg.standing, *(x._replace(value=leg.last * x.value) for x in leg.ramped)):

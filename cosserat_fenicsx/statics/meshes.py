@@ -325,8 +325,8 @@ def surely_resolved(scene, layout, degree):
 
 
 def plainly_resolved(path):
-    """Whether the mesh of a path surely resolves boundary layers, half-waves of buckling and turns in all its points, by
-    bounds that need no look at its elements."""
+    """Whether the mesh of a path surely resolves boundary layers, half-waves of buckling and turns in all its points,
+    by bounds that need no look at its elements."""
     fields, scene, scales = path._stacked("gauss_fields"), path.scene, path.scales
     force, moment = (unit * np.sqrt(np.einsum("kcgi,kcgi->kcg", x, x))
                      for x, unit in ((fields[..., :3], scales.force), (fields[..., 3:6], scales.moment)))  # fmt: skip
@@ -434,8 +434,8 @@ def until_two_meshes_agree(owner, scene, on_mesh, tol, *, most, elements, degree
     Args:
         owner: name of the computation.
         scene: the scene.
-        on_mesh: a function of a layout that returns a tuple: the numbers to compare (n,), which may be complex, the lengths
-            of boundary layers (see `layers_of`) or None, and further results.
+        on_mesh: a function of a layout that returns a tuple: the numbers to compare (n,), which may be complex, the
+            lengths of boundary layers (see `layers_of`) or None, and further results.
         tol: largest relative difference.
         most: elements per rod of the last mesh; elements: those of a given mesh, or None.
         degree, advice: for error messages.

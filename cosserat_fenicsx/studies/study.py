@@ -49,8 +49,8 @@ def study(
     `InstallationError` is none: what is missing for one case is missing for all.
 
     Args:
-        task: a function of the arguments of a case, by name, or what `compile` returns; lists, dicts and arrays among them are its own, and may
-            be changed. It returns a number, a text, an array of numbers or of
+        task: a function of the arguments of a case, by name, or what `compile` returns; lists, dicts and arrays among
+            them are its own, and may be changed. It returns a number, a text, an array of numbers or of
             texts, None, or a dict of these by name; where it computes more, it writes that to files of its own.
         cases: dicts of arguments, in a list or another iterable; or one dict {name: values}, whose product is taken,
             the last name running fastest: `{"speed": [40, 60], "weight": [50e3, 100e3]}` has four cases.

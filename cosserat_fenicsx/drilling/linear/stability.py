@@ -209,8 +209,8 @@ class Stability(Result):
         drive = own or type(self.scene.drive.control).__name__
         yield (
             "growth: in 1/s. largest growth: of all cases. middle case: of those in which the mode grows; frequency "
-            f"and growth there are those of the middle case, with the drive of the scene, {drive}. mode: counted from 0 "
-            f"by frequency there. To the right the growth with {'each drive' if own else 'other drives'}: "
+            f"and growth there are those of the middle case, with the drive of the scene, {drive}. mode: counted from "
+            f"0 by frequency there. To the right the growth with {'each drive' if own else 'other drives'}: "
             f"{_words(rows[0][3])}. gone: with that drive no mode is near."
         )
         for k, i, j, _ in rows:
