@@ -26,7 +26,7 @@ _TOGETHER = 1e-5
 # Relative difference of eigenvalues that is rounding; and of vectors of real ones.
 _EQUAL, _NO_PART = 1e-8, 1e-6
 # Imaginary parts below this times the size of an eigenvalue are rounding.
-_REAL = 1e-9
+_REAL, _NEARLY_REAL = 1e-9, 1e-5
 # Singular values of the vectors of free motions, relative, that are not rounding.
 _SAME_MOTION = 1e-3
 # Typical rounding error over its bound, as in `pencil`.
@@ -143,7 +143,7 @@ class QuadraticPencil:
             image = np.column_stack([image, *(applied(z)[:, None] for z in basis[:, image.shape[1] :].T)])
             theta, turn = np.linalg.eig(basis.conj().T @ image)
             values, z = shift + 1 / theta, basis @ turn
-            upper = values.imag >= -_REAL * np.abs(values)
+            upper = values.imag >= -_NEARLY_REAL * np.abs(values)  # rounding may make a pair of two real ones
             order = np.argsort(np.abs(values[upper] - (shift if kind is complex else 0)))
             values, z = values[upper][order], z[:, upper][:, order]
             if basis.shape[1] >= most:
@@ -236,7 +236,8 @@ class QuadraticPencil:
             error = _TYPICAL * np.finfo(float).eps * np.max(bound.T @ (self._K_sizes @ np.abs(x)))
             if abs(value.imag) <= max(_REAL * abs(value), error):
                 value = complex(value.real)
-            found.append((value, x, error))
+            if value.imag >= 0:
+                found.append((value, x, error))
         return found
 
     def _left(self, value, X):
