@@ -38,9 +38,7 @@ class Threads:
         points, inertial, dimensionless."""
         found = np.zeros((*self._records["gauss_fields"].shape[:3], 6))
         for thread in self._threads:
-            places = _Places(self._result, thread.rod, self._result.rule.gauss)
-            R, k = places.turned(self._records)
-            v = np.einsum("...ji,...j->...i", R, self._records["gauss_fields"][:, places.cells, :, 6:])
+            places, R, v, k = self._strained(thread)
             found[:, places.cells] += _inertial(R, self._carried(thread, places, v, k)[0])
         return found
 
@@ -84,11 +82,16 @@ class Threads:
 
     def length(self, thread):
         """(n,) m."""
+        places, _, v, k = self._strained(thread)
+        sizes = np.linalg.norm(_along(thread, places, v, k)[1], axis=-1)
+        return sizes @ self._result.rule.weights @ np.diff(places.breaks) * places.rod.length
+
+    def _strained(self, thread):
+        """The Gauss points of a thread's rod, the directors there, and v and u - u_R, see `_Places`."""
         places = _Places(self._result, thread.rod, self._result.rule.gauss)
         R, k = places.turned(self._records)
         v = np.einsum("...ji,...j->...i", R, self._records["gauss_fields"][:, places.cells, :, 6:])
-        sizes = np.linalg.norm(_along(thread, places, v, k)[1], axis=-1)
-        return sizes @ self._result.rule.weights @ np.diff(places.breaks) * places.rod.length
+        return places, R, v, k
 
     def _carried(self, thread, places, v, k):
         """T t and p x T t (n, elements, points, 6) for strains v and u - u_R, and their derivatives by these (.., 6,

@@ -40,7 +40,7 @@ from cosserat_fenicsx.statics.solve import solve
 #: What a case may be asked for: {name of a method of `Path`: the estimated error that bounds its own}.
 QUERIES = {"position": "position", "displacement": "position", "rotation_angle": "rotation", "force": "force",
            "moment": "moment"}  # fmt: skip
-_DEGREE, _FORMULATION = 4, "mixed"  # the defaults of `solve`
+_DEGREE = 4  # the default of `solve`
 # Changes of the parameters, over their sizes, of the scenes by which the dependence of the data is found and checked.
 _BESIDE, _APART, _CHECK = 0.043, 0.25, -0.117
 _BLOCK = 256  # cases that are solved at once
