@@ -26,10 +26,8 @@ _SINGULAR = (-6, -10)
 
 
 class _Inverse:
-    """The inverse of a factored matrix as a matrix, and as a preconditioner.
-
-    SLEPc calls it in every iteration, and signals to the process are handled there.
-    """
+    """The inverse of a factored matrix as a matrix, and as a preconditioner; SLEPc calls it in every iteration, and
+    signals to the process are handled there."""
 
     def __init__(self, pc):
         self._pc = pc
@@ -45,17 +43,8 @@ class _Inverse:
 
 
 def nearest_zero(K, pc, count, side=0):
-    """Eigenvalues of a symmetric matrix next to zero, from an existing factorisation.
-
-    Args:
-        K: the matrix.
-        pc: a PC that holds its factors.
-        count: how many.
-        side: 1 for positive ones, -1 for negative ones, 0 for both.
-
-    Returns:
-        (values (n,), vectors): nearest first, n <= count; PETSc vectors of unit norm.
-    """
+    """Eigenvalues of a symmetric matrix K next to zero, from an existing factorisation, a PC: (values (n,), PETSc
+    vectors of unit norm), nearest first, n <= count; side: 1 for positive ones, -1 for negative ones, 0 for both."""
     inverse = PETSc.Mat().createPython(K.getSizes(), _Inverse(pc), comm=K.comm)
     inverse.setUp()
     solver = SLEPc.EPS().create(K.comm)
@@ -68,17 +57,11 @@ def nearest_zero(K, pc, count, side=0):
 
 
 def largest_of_pencil(A, B, count, least):
-    """The largest eigenvalues nu of A x = nu B x, A symmetric, B symmetric and positive definite.
+    """The largest eigenvalues nu > least > 0 of A x = nu B x, A symmetric, B symmetric and positive definite: (values
+    (n,), vectors), the largest first, n <= count; smaller ones than `least` may be among them.
 
-    How many are above `least` is counted first, by Sylvester's law of inertia: an iteration that looks for more of
-    them would continue among the others, which may lie close together.
-
-    Args:
-        count: how many to find; least: only eigenvalues above this positive number are wanted.
-
-    Returns:
-        (values (n,), vectors), see `nearest_zero`; the largest first, n <= count. Smaller ones than `least` may be
-        among them.
+    How many are above `least` is counted first, by Sylvester's law of inertia: an iteration that looks for more of them
+    would continue among the others, which may lie close together.
     """
     if A.norm() == 0:
         return np.empty(0), []
@@ -104,11 +87,8 @@ def _above(A, B, least):
 
 
 def _balanced(A, B):
-    """(D A D, D B D, D) with the diagonal D > 0, a vector, that makes the diagonal of B about 1.
-
-    The unknowns of thick and of thin rods then count alike, whatever their units: PETSc's Cholesky factorisation takes
-    small pivots for zero. D holds powers of two, so that nothing is rounded.
-    """
+    """(D A D, D B D, D) with the diagonal D > 0, a vector of powers of two, that makes the diagonal of B about 1. The
+    unknowns of thick and of thin rods then count alike: PETSc's Cholesky factorisation takes small pivots for zero."""
     A, B, scale = A.copy(), B.copy(), B.getDiagonal()
     sizes = np.abs(scale.array_r)
     scale.array_w[:] = np.exp2(np.round(-0.5 * np.log2(np.where(sizes > 0, sizes, 1.0))))
@@ -126,14 +106,9 @@ def _in_units(vectors, scale):
 
 
 def real_of_pencil(A, B, count):
-    """Real positive eigenvalues nu of A x = nu B x, both unsymmetric, among the `count` of the largest magnitude.
-
-    Eigenvalues of a non-normal pencil may be artefacts of rounding; those differ between the pencil and its transpose,
-    and are discarded.
-
-    Returns:
-        (values (n,), vectors), the largest first, n <= count; PETSc vectors of unit norm.
-    """
+    """Real positive eigenvalues nu of A x = nu B x, both unsymmetric, among the `count` of the largest magnitude:
+    (values (n,), PETSc vectors of unit norm), the largest first. Those of a non-normal pencil may be artefacts of
+    rounding, which differ between the pencil and its transpose, and are discarded."""
     A, B, scale = _balanced(A, B)
     (values, vectors), (others, _) = (
         _unsymmetric(a, b, count) for a, b in ((A, B), (A.copy().transpose(), B.copy().transpose()))
@@ -169,16 +144,9 @@ def _of_pencil(A, B, factor):
 
 
 def largest_of_operator(operator, size, count, known):
-    """Eigenvalues of the largest magnitude of a symmetric operator, on this rank alone.
-
-    Args:
-        operator: has `mult(mat, x, y)`.
-        size: of its vectors; count: how many eigenvalues to find.
-        known: (size, k) known eigenvectors of unit norm, which are excluded.
-
-    Returns:
-        (values (n,), vectors (size, n) of unit norm), the largest first, n <= count.
-    """
+    """Eigenvalues of the largest magnitude of a symmetric operator with `mult(mat, x, y)`, on this rank alone: (values
+    (n,), vectors (size, n) of unit norm), the largest first, n <= count; known: (size, k) eigenvectors of unit norm,
+    which are excluded."""
     matrix = PETSc.Mat().createPython([size, size], operator, comm=PETSc.COMM_SELF)
     matrix.setUp()
     solver = SLEPc.EPS().create(PETSc.COMM_SELF)
@@ -243,12 +211,9 @@ def factor_second_variation(pc, K):
 
 
 def constrained_factors(matrix, null=0.0):
-    """A PC with the factors of a symmetric matrix whose diagonal may be zero because of constraint equations.
-
-    Args:
-        matrix: of PETSc, or of scipy (csr, on this rank alone).
-        null: pivots below this count as zero; 0.0 for a threshold of rounding, relative to the largest row.
-    """
+    """A PC with the factors of a symmetric matrix (of PETSc, or scipy's csr on this rank alone) whose diagonal may be
+    zero because of constraint equations; null: pivots below this count as zero; 0.0 for a threshold of rounding,
+    relative to the largest row."""
     A = matrix
     if not isinstance(matrix, PETSc.Mat):
         parts = matrix.indptr.astype(PETSc.IntType), matrix.indices.astype(PETSc.IntType), matrix.data
@@ -272,13 +237,8 @@ def reference_blas():
 
 class RepeatedInertia:
     """Eigenvalues' signs of symmetric matrices of one pattern on this rank, by factors with pivots of two rows too; the
-    symbolic analysis is made once.
-
-    Arguments: see `RepeatedFactors` and `constrained_factors`.
-
-    Attributes:
-        regular: whether there are factors, of a matrix without null pivots.
-    """
+    symbolic analysis is made once. Arguments: see `RepeatedFactors` and `constrained_factors`. regular: whether there
+    are factors, of a matrix without null pivots."""
 
     def __init__(self, starts, columns, null):
         self.regular = False
@@ -316,12 +276,9 @@ class RepeatedFactors:
     """Solves with sparse matrices of one pattern on this rank, by LU factors; its symbolic analysis is made once.
 
     Factors of a large matrix are kept while the matrices change little: they precondition GMRES, until it needs so many
-    iterations that new factors are cheaper. Instead of the first ones an inverse that is known already is taken.
-
-    Args:
-        starts: (rows + 1,) where each row starts among the entries; columns: (entries,) theirs, ascending in a row.
-        near: None, or what nearly is the inverse: `take(values)` the entries of a matrix, whether it is known;
-            `apply(pc, b, x)` of PETSc's vectors; and `leave()`, called where GMRES does not converge with it.
+    iterations that new factors are cheaper. starts (rows + 1,), columns (entries,): the pattern, by rows. near: None,
+    or what nearly is the inverse, taken instead of the first factors: `take(values)` the entries of a matrix, whether
+    it is known; `apply(pc, b, x)` of PETSc's vectors; and `leave()`, called where GMRES does not converge with it.
     """
 
     def __init__(self, starts, columns, near=None):

@@ -24,17 +24,11 @@ _BESIDE = 4
 class Elimination(Pointers):
     """The C structure `chain` for the elements of this rank.
 
-    Args:
-        numbering: the `Numbering` of the unknowns.
-        cell_dofs: (elements, width) local degrees of freedom in the order of the kernel.
-        order: (elements,) this rank's elements in turn along the rods.
-        tied: numbers of the unknowns in constraint equations; the same on all ranks.
-        delays: whether some pivots may be zero.
-        factors: whether factors are kept, for solutions; without them only pivots can be counted.
-
-    Attributes:
-        interface: (interfaces,) numbers of its unknowns; the same on all ranks.
-        places: (entries,) rows and columns, in the interface, of the entries of all ranks' condensed matrices.
+    cell_dofs: (elements, width) local degrees of freedom in the order of the kernel; order: (elements,) in turn along
+    the rods; tied: numbers of the unknowns in constraint equations, the same on all ranks; delays: whether some pivots
+    may be zero; factors: whether they are kept, for solutions; without them only pivots can be counted. interface:
+    (interfaces,) numbers of its unknowns; places: (entries,) rows and columns, in it, of the entries of all ranks'
+    condensed matrices.
     """
 
     def __init__(self, numbering, cell_dofs, order, tied, *, delays=False, factors=True):
@@ -178,12 +172,8 @@ _DENSE = 150
 
 
 def condensed(model, numbering, cell_dofs, tied, **options):
-    """The `Elimination` along a model's rods, and the `Interface` that it leaves, or None where it leaves nothing.
-
-    Args:
-        numbering: the `Numbering` of the unknowns; cell_dofs: see `Elimination`, as for the options.
-        tied: (tied nodes, block) numbers of the unknowns in constraint equations, -1 where clamped.
-    """
+    """The `Elimination` along a model's rods, and the `Interface` that it leaves, or None where it leaves nothing;
+    tied: (tied nodes, block) numbers of the unknowns in constraint equations, -1 where clamped."""
     order = np.argsort(model.rods.cells[: len(cell_dofs)])
     elimination = Elimination(numbering, cell_dofs, order, tied.ravel(), **options)
     if not elimination.unknowns and numbering.comm.size == 1:
@@ -194,17 +184,9 @@ def condensed(model, numbering, cell_dofs, tied, **options):
 
 
 class Interface:
-    """The system of the unknowns that `Elimination` leaves, with the constraint equations.
-
-    Args:
-        elimination: the `Elimination`.
-        tied: (tied nodes, block) numbers of the unknowns in constraint equations, -1 where clamped.
-        pattern: the `TiePattern` of the tied nodes.
-        equations: indices of the ties whose multipliers belong to the system.
-
-    Attributes:
-        nodes: places in the system of the tied nodes' unknowns, -1 where clamped.
-    """
+    """The system of the unknowns that `Elimination` leaves, with the constraint equations; tied: see `condensed`;
+    pattern: the `TiePattern`; equations: indices of the ties whose multipliers belong to the system; nodes: places in
+    it of the tied nodes' unknowns, -1 where clamped."""
 
     def __init__(self, elimination, tied, pattern, equations=()):
         self._elimination, self._size = elimination, elimination.unknowns
@@ -221,12 +203,8 @@ class Interface:
         self._entry = self._solver.entries(rows[self._here], columns[self._here])
 
     def _values(self, of_nodes, *others):
-        """The entries of the sum of all ranks' condensed matrices and of the constraint equations' derivatives.
-
-        Args:
-            of_nodes, others: derivatives of the reactions by nodes and by multipliers, and of the equations by nodes,
-                as `TieRows.tangent_blocks` returns them; the last two only where multipliers belong to the system.
-        """
+        """The entries of the sum of all ranks' condensed matrices and of the constraint equations' derivatives, see
+        `TieRows.tangent_blocks`; others only where multipliers belong to the system."""
         values = np.concatenate([self._elimination.all_condensed(), *(part.ravel() for part in (of_nodes, *others))])
         if not self._everywhere:
             values = values[self._here[: len(values)]]
@@ -238,12 +216,8 @@ class Interface:
         return self._solver.factor(self._kept, self._elimination.c.zero_pivot)
 
     def begin_with(self, other, maps, count):
-        """Let solutions begin with the factors of another interface, which counts signs; only where both have the same
-        nodes and no constraint equations.
-
-        Args:
-            maps: see `RodModel.small_motion_maps`; count: counts the other's signs at the state.
-        """
+        """Let solutions begin with the factors of another interface, which counts signs (count: at the state); only
+        where both have the same nodes and no constraint equations; maps: see `RodModel.small_motion_maps`."""
         ours, theirs = (x._elimination.numbering.block for x in (self, other))
         known = [x._elimination.interface // x._elimination.numbering.block for x in (self, other)]
         alike = len(known[0]) * theirs == len(known[1]) * ours and np.array_equal(known[0][::ours], known[1][::theirs])
@@ -307,12 +281,8 @@ class _Dense(Pointers):
 
 
 class _Near:
-    """Nearly the inverse of a system: that of the second variation, whose factors counted signs last.
-
-    Args:
-        system, variation: the `_Sparse` systems; block: unknowns of a node in the first; maps, count: see
-            `Interface.begin_with`.
-    """
+    """Nearly the inverse of a `_Sparse` system: that of the second variation, whose factors counted signs last; block:
+    unknowns of a node in the first; maps, count: see `Interface.begin_with`."""
 
     def __init__(self, system, variation, block, maps, count):
         self._variation, self._maps, self._block, self._count = variation, maps, block, count
@@ -339,12 +309,8 @@ class _Near:
 
 
 class _Sparse:
-    """A system by its rows, with factors by MUMPS.
-
-    Attributes:
-        near: None, or a `_Near`, set before the first factors.
-        counts: how often signs were counted.
-    """
+    """A system by its rows, with factors by MUMPS; near: None, or a `_Near`, set before the first factors; counts: how
+    often signs were counted."""
 
     near, counts = None, 0
 

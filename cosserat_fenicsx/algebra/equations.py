@@ -33,11 +33,7 @@ def _hook():
 
 
 class Called(Pointers):
-    """An object whose hooks C calls.
-
-    Attributes:
-        failure: the exception raised by the last hook, if any.
-    """
+    """An object whose hooks C calls; failure: the exception raised by the last hook, if any."""
 
     def __init__(self):
         super().__init__()
@@ -55,19 +51,12 @@ class Called(Pointers):
 
 
 class Equations(Called):
-    """Residual and tangent of a model, in the solver's unknowns (`models.numbering`).
+    """Residual and tangent of a model (`models.base.RodModel`) in the solver's unknowns; hooks: those of STATE,
+    RESIDUAL and MATRICES that a subclass needs in addition; c: the C structure `problem`.
 
-    Args:
-        model: see `models.base.RodModel` for the protocol.
-        hooks: those of STATE, RESIDUAL and MATRICES that a subclass needs in addition.
-
-    Attributes:
-        x, b: unknowns, residual; the model's state follows x.
-        load_factor_array: array of one value, the factor of loads and prescribed motions.
-        ties: the `TieRows` of the constraint equations of supports and joints, or None.
-        elimination: the `Elimination` of the tangent; interface: its `Interface`, or None.
-        tangent_form: the `Packed` tangent.
-        c: the C structure `problem`.
+    x, b: unknowns, residual; the model's state follows x. load_factor_array: of one value, the factor of loads and
+    prescribed motions; ties: the `TieRows` of supports and joints, or None; elimination, interface: of the `Packed`
+    tangent_form, the latter None where nothing is left.
     """
 
     #: the class of `ties`, called with (model, numbering)

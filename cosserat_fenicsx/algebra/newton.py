@@ -173,13 +173,9 @@ class BorderedNewton(Newton):
         self.problem.elimination.c.zero_pivot = ZERO_PIVOT if motion is None else 0.0
 
     def stay_in_plane(self, normal, weight, neutral=None):
-        """Solve from now on in the plane through the problem's x and load factor.
-
-        Args:
-            normal: (owned unknowns,) normal of the plane; None to keep the load factor fixed.
-            weight: of the load factor.
-            neutral: (owned unknowns,) a neutral motion, or None.
-        """
+        """Solve from now on in the plane through the problem's x and load factor, of a normal (owned unknowns,), None
+        to keep the load factor fixed, and the load factor's weight; neutral: (owned unknowns,) a neutral motion, or
+        None."""
         self._normal, self._weight, self.neutral = normal, weight, neutral
         self._x0, self._load_factor0 = self.problem.x.array_r.copy(), self.problem.load_factor
 
@@ -226,17 +222,10 @@ class BorderedNewton(Newton):
         return motion / math.sqrt(self.work(motion, motion) or 1.0)
 
     def response(self, motion):
-        """The linear response at the problem's x and load factor to nodal forces proportional to a motion.
-
-        Args:
-            motion: v, (nodes, 6), see `motion_of`.
-
-        Returns:
-            (1/(v S^-1 v), S^-1 v of unit norm) with S the tangent in displacements and rotations, with the true
-            stiffnesses. The first is an eigenvalue where v is an eigenvector, and changes sign through zero where the
-            tangent becomes singular with a null vector not orthogonal to v. (0.0, v) where the tangent is exactly
-            singular.
-        """
+        """The linear response at the problem's x and load factor to nodal forces proportional to a motion v (nodes, 6),
+        see `motion_of`: (1/(v S^-1 v), S^-1 v of unit norm) with S the tangent in displacements and rotations, with the
+        true stiffnesses; (0.0, v) where it is exactly singular. The first is an eigenvalue where v is an eigenvector,
+        and changes sign through zero where the tangent becomes singular with a null vector not orthogonal to v."""
         displacements, rows = self._tie_maps()
         self._force.set(0.0)
         self._by_nodes(self._force.array_w)[:] = (rows @ motion[..., None])[..., 0]
@@ -269,11 +258,8 @@ class BorderedNewton(Newton):
         return problem.solve(force, motion) and math.isfinite(motion.norm())
 
     def slope_here(self, neutral=None):
-        """(owned unknowns,) dx/d load_factor at the problem's x and load factor, without the neutral motion.
-
-        Raises:
-            NotConverged: the tangent is singular.
-        """
+        """(owned unknowns,) dx/d load_factor at the problem's x and load factor, without the neutral motion;
+        NotConverged where the tangent is singular."""
         problem, self.neutral = self.problem, neutral
         if not self._solved_here(problem.load_derivative(problem.x), self._slope):
             raise NotConverged(
@@ -300,20 +286,13 @@ class Step:
 
 
 class LimitedNewton:
-    """Newton steps of limited length, from the problem's state, for states far from the solution, such as a rod pressed
-    against a wall.
+    """Newton steps of limited length, from the state of a `Problem`, for states far from the solution, such as a rod
+    pressed against a wall; longest, widest: displacement of a node in a step, in the model's unit of length, and its
+    rotation, rad.
 
     The contact force that is carried at the Gauss points takes the same share of its step as the motion. A tangent that
     is singular to rounding is used nevertheless, because pivots of a slender rod beside a stiff wall are as small; the
     caller must check the result by its balance.
-
-    Args:
-        problem: a `Problem`.
-        longest: the longest displacement of a node in a step, in the model's unit of length.
-        widest: the largest rotation of a node in a step, rad.
-
-    Attributes:
-        iterations: steps so far.
     """
 
     def __init__(self, problem, longest, widest):

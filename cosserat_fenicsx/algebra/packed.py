@@ -39,15 +39,9 @@ class _Kernel(Pointers):
 
 
 class Packed(_Kernel):
-    """A compiled form.
-
-    Args:
-        form: a linear or bilinear form, integrated over this rank's elements; or several as a tuple, for their sum.
-        moving, constants: the Functions and Constants whose values change; all others are read by `refresh`.
-
-    Attributes:
-        dofs_c: C's pointer to the local degrees of freedom (elements, size) of the vector, of a linear form.
-    """
+    """A compiled form, linear or bilinear, integrated over this rank's elements; or several as a tuple, for their sum;
+    moving, constants: the Functions and Constants whose values change; all others are read by `refresh`. dofs_c: C's
+    pointer to the local degrees of freedom (elements, size) of the vector, of a linear form."""
 
     def __init__(self, form, moving, constants):
         form, *others = form if isinstance(form, tuple) else (form,)
@@ -123,14 +117,7 @@ class Packed(_Kernel):
 
 class PackedExpression(_Kernel):
     """A compiled expression at points of all local elements, ghosts included, or of this rank's own; all of its
-    coefficients and constants are read at every evaluation.
-
-    Args:
-        expression: a compiled expression.
-        mesh: its mesh.
-        elements: number of elements.
-        size: numbers of an element, (points, components).
-    """
+    coefficients and constants are read at every evaluation; size: numbers of an element, (points, components)."""
 
     def __init__(self, expression, mesh, elements, size):
         address, functions, constants = compat.expression_address(expression)

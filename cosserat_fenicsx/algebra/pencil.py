@@ -30,24 +30,16 @@ def on_every_rank(A):
 
 
 def constraint_rows(gradients, tied, size):
-    """(equations, size) gradients of constraint equations by all unknowns.
-
-    Args:
-        gradients: (equations, tied nodes, block); tied: (tied nodes, block) numbers of the unknowns, -1 where clamped.
-    """
+    """(equations, size) gradients of constraint equations by all unknowns, from those by (tied nodes, block); tied:
+    numbers of the unknowns, -1 where clamped."""
     held = np.zeros((len(gradients), size + 1))  # number -1 goes to the last column
     held[:, tied.ravel()] = gradients.reshape(len(gradients), tied.size)
     return held[:, :size]
 
 
 class Pencil:
-    """K x = lambda M x, held x = 0.
-
-    Args:
-        K: (size, size), symmetric, sparse, of scipy.
-        M: symmetric and positive definite, block diagonal (scipy's bsr_matrix).
-        held: (equations, size), dense, of full rank.
-    """
+    """K x = lambda M x, held x = 0, of scipy: K symmetric, sparse; M symmetric and positive definite, block diagonal
+    (bsr_matrix); held (equations, size) dense, of full rank."""
 
     def __init__(self, K, M, held):
         self._K, self._M, self._held = K, M, sparse.csr_matrix(held)
@@ -59,18 +51,13 @@ class Pencil:
         self.count = self.size - len(held)
 
     def lowest(self, count):
-        """The lowest eigenvalues, with their multiplicity.
+        """The lowest eigenvalues, with their multiplicity: (values (n,) ascending, vectors (size, n), typical rounding
+        errors (n,) of the values), n <= count; values that are zero to rounding are 0.0. NotConverged where some were
+        not found.
 
         An eigensolver may miss copies of repeated eigenvalues, or eigenvalues that are small against the shift. The
         number of negative eigenvalues of K - lambda M is the number of eigenvalues below lambda (Sylvester's law of
         inertia); missing ones are located by bisection with this count.
-
-        Returns:
-            (values (n,) ascending, vectors (size, n), typical rounding errors (n,) of the values), n <= count; values
-            that are zero to rounding are 0.0.
-
-        Raises:
-            NotConverged: some were not found.
         """
         count = min(count, self.count)
         values, vectors = np.empty(0), np.empty((self.size, 0))  # in the variables L^T x, orthonormal

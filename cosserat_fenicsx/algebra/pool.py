@@ -22,18 +22,13 @@ _SOME = 8
 
 
 class ProblemPool:
-    """Owns compiled problems and lends them.
+    """Owns compiled problems and lends them; most_idle: largest number of idle ones kept for each communicator; made:
+    how many were made so far.
 
     A problem that is lent belongs to its caller alone until it is given back: a call inside another one (from `until`,
     from a force as a function of time, from another thread) gets a problem of its own. All ranks of a communicator must
     borrow and return in the same order, which they do if every rank makes the same calls. Each communicator has a
     separate limit: what one rank does on its own must not decide what all ranks have to create collectively.
-
-    Args:
-        most_idle: largest number of idle problems kept for each communicator.
-
-    Attributes:
-        made: how many problems were made so far.
     """
 
     def __init__(self, most_idle=MOST_IDLE):
@@ -42,17 +37,11 @@ class ProblemPool:
 
     @contextlib.contextmanager
     def lend(self, key, comm, make, outcomes=(), *, large=False):
-        """A context whose value is a problem that nobody else uses within it.
-
-        Args:
-            key: hashable; a problem fits if its key is equal.
-            comm: MPI communicator of the problem. Problems on a communicator created by the user are not kept, since
-                the user may free it.
-            make: called for a problem where none that fits is idle.
-            outcomes: exceptions that leave a problem usable. After any other it is dropped, since it may be half way
-                through an assembly or a solution.
-            large: whether it takes so much memory that no other such problem stays idle when it is made.
-        """
+        """A context whose value is a problem of a hashable key that nobody else uses within it; make: called where none
+        that fits is idle. Problems on a communicator created by the user are not kept, since the user may free it.
+        outcomes: exceptions that leave a problem usable; after any other it is dropped, since it may be half way
+        through an assembly or a solution. large: whether it takes so much memory that no other such problem stays idle
+        when it is made."""
         idle = self._idle_on(comm)
         problem = self._take(idle, key)
         if problem is None:

@@ -37,12 +37,8 @@ Found = namedtuple("Found", "values vectors rounding")
 
 
 class QuadraticPencil:
-    """(lambda^2 M + lambda C + K) x = 0, held x = 0.
-
-    Args:
-        K, C, M: (size, size), real, sparse, of scipy; M symmetric and positive definite.
-        held: (equations, size), of full rank.
-    """
+    """(lambda^2 M + lambda C + K) x = 0, held x = 0, of scipy: K, C, M (size, size), real, sparse; M symmetric and
+    positive definite; held (equations, size) of full rank."""
 
     def __init__(self, K, C, M, held):
         self.K, self.C, self.M, self.held = (sparse.csc_matrix(a) for a in (K, C, M, held))
@@ -53,14 +49,9 @@ class QuadraticPencil:
         self._K_sizes, self._start = abs(self.K), np.random.default_rng(0)
 
     def lowest(self, count):
-        """The eigenvalues of the smallest size in the upper half plane, `Found`, ascending by size.
-
-        One real shift sigma > 0, where no eigenvalue of a stable structure is, serves for all: the eigenvalues within
-        the distance rho of it are found, and none of a size below rho - sigma is missed.
-
-        Raises:
-            NotConverged: some were not found.
-        """
+        """The eigenvalues of the smallest size in the upper half plane, `Found`, ascending by size; NotConverged where
+        some were not found. One real shift sigma > 0, where no eigenvalue of a stable structure is, serves for all: the
+        eigenvalues within the distance rho of it are found, and none of a size below rho - sigma is missed."""
         shift, asked = _SHIFT * self._size_of_lowest(), count
         for _ in range(_SHIFTS):
             values, vectors = self._nearest(shift, asked, lambda values, shift: abs(values) + shift)
@@ -76,9 +67,7 @@ class QuadraticPencil:
 
     def _free(self, values, vectors):
         """(n,) whether eigenvalues are those of free motions: a pair of zeros, up to the root of the rounding of K.
-
-        Strong damping makes eigenvalues small, too, as those of k/c, but not the work of K by their motions.
-        """
+        Strong damping makes eigenvalues small, too, as those of k/c, but not the work of K by their motions."""
         sizes = np.einsum("ik,ik->k", np.abs(vectors), self._K_sizes @ np.abs(vectors))
         masses = np.einsum("ik,ik->k", vectors.conj(), self.M @ vectors).real
         works = np.abs(np.einsum("ik,ik->k", vectors.conj(), self.K @ vectors))
@@ -115,12 +104,9 @@ class QuadraticPencil:
 
     def _nearest(self, shift, count, radius):
         """Eigenvalues and vectors around a shift: all within the largest `radius` (values, shift) of the `count` wanted
-        ones.
-
-        The operator on (x, lambda x) has the eigenvalues 1/(lambda - shift). An iteration from one vector may miss
-        copies of repeated eigenvalues: it is repeated beside the invariant subspace of what is found, until nothing
-        else lies within that distance.
-        """
+        ones. The operator on (x, lambda x) has the eigenvalues 1/(lambda - shift). An iteration from one vector may
+        miss copies of repeated eigenvalues: it is repeated beside the invariant subspace of what is found, until
+        nothing else lies within that distance."""
         factors, n, kind = self._factors(shift), self.size, complex if isinstance(shift, complex) else float
 
         def applied(z):

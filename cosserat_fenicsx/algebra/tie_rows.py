@@ -10,17 +10,11 @@ _WILD = {"invalid": "ignore", "over": "ignore"}
 
 
 class TieRows:
-    """Constraint equations of one problem; all ranks evaluate them.
+    """Constraint equations of one problem, by its model and `Numbering`; all ranks evaluate them.
 
-    Args:
-        model: its `rows_of_tied`, `signature.connections`, `ties`, `held_forces`, `tied_motion`, `tie_maps`,
-            `rows_turn` and `tied_at_rest` are used.
-        numbering: the problem's `Numbering`.
-
-    Attributes:
-        rows: (tied nodes, block) solver's numbers, -1 where clamped.
-        seen: the tied nodes' unknowns and the multipliers of all equations, as of the last call of `see`.
-        share: in motion, where in the step reactions act: 0 at its start, 1 at its end, where the equations hold.
+    rows: (tied nodes, block) solver's numbers, -1 where clamped; seen: the tied nodes' unknowns and the multipliers of
+    all equations, as of the last call of `see`; share: in motion, where in the step reactions act: 0 at its start, 1 at
+    its end, where the equations hold.
     """
 
     share = 1.0
@@ -130,12 +124,9 @@ class TieRows:
 
     @np.errstate(**_WILD)
     def tangent_blocks(self, load_factor):
-        """Derivatives of `residual_blocks`, in blocks of few nodes each.
-
-        Returns:
-            Of the reactions by the nodes, (pairs, block, block) of the `TiePattern`; of the reactions at both ends of
-            every equation by its multiplier, (equations, 2, block); and of the equations by the same unknowns.
-        """
+        """Derivatives of `residual_blocks`, in blocks of few nodes each: of the reactions by the nodes, (pairs, block,
+        block) of the `TiePattern`; of the reactions at both ends of every equation by its multiplier, (equations, 2,
+        block); and of the equations by the same unknowns."""
         (nodal, multipliers), acting, ties, model = self.seen, self._acting(), self.ties, self.model
         change = ties.change(model.tied_motion(acting), load_factor, multipliers)
         gradients = self._gradients(load_factor)
@@ -160,24 +151,14 @@ class TieRows:
         np.add.at(b, self._mine_rows, np.concatenate([forces[self._free], c])[self._mine])
 
     def second_variation(self, axes, load_factor):
-        """The geometric stiffness of the reactions, whose directions change with the nodes.
-
-        All equations contribute, in the plane and out of it, also those that a plane model does not need.
-
-        Args:
-            axes: (block, 6) the (displacement, rotation) of each of the unknowns of a node.
-
-        Returns:
-            (pairs, block, block) of the `TiePattern`.
-        """
+        """(pairs, block, block) of the `TiePattern`: the geometric stiffness of the reactions, whose directions change
+        with the nodes, of all equations, also those that a plane model does not need; axes: (block, 6) the
+        (displacement, rotation) of each of the unknowns of a node."""
         return axes @ self._symmetric_change(load_factor) @ axes.T
 
     def springs(self, axes, load_factor, resistance):
-        """Penalty springs that replace all constraint equations; arguments and result as of `second_variation`.
-
-        Args:
-            resistance: (tied nodes * block,) stiffness of the elements against these motions of the nodes.
-        """
+        """Penalty springs that replace all constraint equations, as `second_variation`; resistance: (tied nodes *
+        block,) stiffness of the elements against these motions of the nodes."""
         gradient, stiffness = self._springs(axes, load_factor, resistance)
         return self._pattern.sums(np.einsum("t,tia,tjb->tiajb", stiffness, gradient, gradient))
 
@@ -204,11 +185,8 @@ class TieRows:
         return self._pattern.energy(blocks, motions)
 
     def add_to_matrix(self, A, rows, blocks):
-        """Add what `second_variation` returned to a PETSc matrix on rank 0.
-
-        Args:
-            rows: (tied nodes, block) numbers of the unknowns, -1 where clamped.
-        """
+        """Add what `second_variation` returned to a PETSc matrix on rank 0; rows: (tied nodes, block), -1 where
+        clamped."""
         rows, pattern = rows.astype(PETSc.IntType), self._pattern
         for i, j, values in zip(rows[pattern.first], rows[pattern.second], blocks, strict=True):
             A.setValues(i, j, values, PETSc.InsertMode.ADD_VALUES)

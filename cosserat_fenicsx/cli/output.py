@@ -45,12 +45,10 @@ def refuse_of_rods(options, kind):
 def deliver(computed, options, names, files_of, tables=None, *, moving=False, obeys=True):
     """Compute, then print and write the result, or the partial one; returns the exit code.
 
-    Args:
-        computed: function without arguments that returns the result.
-        names: of all files that may be written. files_of: function of the result that returns {name: function that
-            writes this file; True where the one before writes it as well; or what is false for none}.
-        tables: of the scene file, where there is one. moving: whether it is a motion.
-        obeys: whether the computation looks for requested stops itself, by `interrupts.obey`; others end at once.
+    names: of all files that may be written; files_of: function of the result that returns {name: function that writes
+    this file; True where the one before writes it as well; or what is false for none}; tables: of the scene file, where
+    there is one; obeys: whether the computation looks for requested stops itself, by `interrupts.obey`; others end at
+    once.
     """
     film = getattr(options, "animate", None)
     if film is not None:
@@ -84,10 +82,8 @@ def deliver(computed, options, names, files_of, tables=None, *, moving=False, ob
 
 
 def _write(files, out, stops):
-    """Write files, see `deliver`, and say which: first all that need no library for pictures, then the pictures.
-
-    With `stops`, a signal ends the writing between two files by a KeyboardInterrupt.
-    """
+    """Write files, see `deliver`, and say which: first all that need no library for pictures, then the pictures. With
+    `stops`, a signal ends the writing between two files by a KeyboardInterrupt."""
     for pictures in (False, True):
         some = {name: write for name, write in files.items() if write and name.endswith(_PICTURES) == pictures}
         _write_some(some, out, stops)
@@ -114,10 +110,8 @@ def _write_some(files, out, stops):
 
 
 def _ended(compute, waiting):
-    """(result or partial result, the exception or None, exit code) of a function, called in a context manager.
-
-    A SceneError before anything was computed is raised.
-    """
+    """(result or partial result, the exception or None, exit code) of a function, called in a context manager; a
+    SceneError before anything was computed is raised."""
     try:
         with waiting:
             return compute(), None, DONE
@@ -132,14 +126,9 @@ def _ended(compute, waiting):
 
 
 def output_of(options, names, tables=None):
-    """The output folder, a Path, which is made before anything is computed; None without one.
-
-    Args:
-        names: of all files that may be written. tables: of the scene file, where there is one.
-
-    Raises:
-        SceneError: it cannot be written to; or a file would replace the scene file, or one that this names.
-    """
+    """The output folder, a Path, made before anything is computed; None without one. names: of all files that may be
+    written; a SceneError where it cannot be written to, or where a file would replace the scene file, or one that its
+    tables name."""
     if not options.output:
         return None
     out = Path(options.output)

@@ -17,11 +17,7 @@ from cosserat_fenicsx.numerics import directors, lobatto_weights, small_rotation
 
 
 class TouchingNodes:
-    """Nodes of a moving model by their numbers in the scene; arrays over them are the same on all ranks.
-
-    Args:
-        problem: a `StepProblem`; slots: (n,) the scene's numbers of the nodes.
-    """
+    """Nodes of a `StepProblem` by their numbers (n,) in the scene; arrays over them are the same on all ranks."""
 
     def __init__(self, problem, slots):
         model, numbering = problem.model, problem.numbering
@@ -110,12 +106,8 @@ _OF_NODES = "clearance", "stiffness", "friction", "damping", "arm", "multiplier"
 
 
 class NodalContact(Pointers):
-    """Contact of the nodes of a problem with the walls of its scene.
-
-    Args:
-        problem: a `StepProblem`, loaded; walls: the actions that touch, see `Action.touches`.
-        at_end: whether forces are those of the end of a step.
-    """
+    """Contact of the nodes of a loaded `StepProblem` with the walls of its scene (see `Action.touches`); at_end:
+    whether forces are those of the end of a step."""
 
     def __init__(self, problem, walls, *, at_end):
         super().__init__()
@@ -316,16 +308,11 @@ _MOST_FOR_SPEED, _SMALL_CHANGE = 60, 1e-14
 
 class SpinLaw(Pointers):
     """The law of one action with `Action.resists`: a torque at a node against its rotation, set-valued, such as that of
-    a bit on rock.
+    a bit on rock. Its methods are those of `NodalContact`.
 
-    As walls do (`NodalContact`), it acts on the compliance of the moving rods: the rotation of the node about its axis
-    d3 in a step is a linear function of the torque, by the tangent of Newton's method, and with it the law is solved
-    exactly before Newton's step is taken. The node sticks as long as a torque up to the static one can keep it.
-
-    Its methods are those of `NodalContact`.
-
-    Args:
-        problem: a `StepProblem`, loaded; action: the action.
+    As walls do, it acts on the compliance of the moving rods: the rotation of the node about its axis d3 in a step is a
+    linear function of the torque, by the tangent of Newton's method, and with it the law is solved exactly before
+    Newton's step is taken. The node sticks as long as a torque up to the static one can keep it.
     """
 
     def __init__(self, problem, action):

@@ -23,14 +23,8 @@ from cosserat_fenicsx.scene.signals import signals_of
 
 
 class Fixed:
-    """Steps of one length, shortened so that a whole number of them ends at every `Mark`.
-
-    Args:
-        dt: s.
-
-    Attributes:
-        stuck: whether thousands of steps in a row were tiny, so that the motion makes no progress.
-    """
+    """Steps of one length dt (s), shortened so that a whole number of them ends at every `Mark`; stuck: whether
+    thousands of steps in a row were tiny, so that the motion makes no progress."""
 
     def __init__(self, dt):
         self._dt = dt
@@ -68,13 +62,8 @@ class Fixed:
 
 
 class Adaptive(Fixed):
-    """Steps whose local errors add up to `tol` over the duration, and that resolve loads and prescribed motions.
-
-    The length changes only where that saves time: every change costs a new tangent and its factorisation.
-
-    Args:
-        tol: see `simulate`; duration: s.
-    """
+    """Steps whose local errors add up to `tol` over the duration (s), and that resolve loads and prescribed motions.
+    The length changes only where that saves time: every change costs a new tangent and its factorisation."""
 
     _AFTER_JUMP = 1 / 8  #: factor on the step after a jump
     _INITIAL = 1e-4  #: first step of a motion over the duration
@@ -189,11 +178,7 @@ _GOLDEN = (math.sqrt(5) - 1) / 2
 
 
 class Resolution:
-    """The longest steps that resolve the functions of time of a `Scene`.
-
-    Args:
-        duration: s; tol: see `simulate`; load_factor: of all loads; impulse_error: see `Stepper.impulse_error`.
-    """
+    """The longest steps that resolve the functions of time of a `Scene`; impulse_error: see `Stepper`."""
 
     def __init__(self, scene, duration, tol, load_factor, impulse_error):
         size = max(rod.length for rod in scene.rods)
@@ -248,18 +233,12 @@ def _nonlinear(scene):
 
 
 class _SampledSignal:
-    """A function of time and the step length that it requires.
+    """A `Signal` and the step length that it requires.
 
-    Args:
-        signal: a `Signal`.
-        acceleration: the largest that it gives its rod, m/s^2 per unit of the load; None for a prescribed motion.
-        persistence: see `_persistence`, s; duration: s.
-        allowed: displacement that errors of its impulse may cause, m.
-
-    Attributes:
-        piece: begin and end (s) of the current interval between two jumps.
-        range: largest minus smallest value there, of the component where that is largest.
-        required: 1/h^2 of the longest step h that resolves it, 1/s^2.
+    acceleration: the largest that it gives its rod, m/s^2 per unit of the load; None for a prescribed motion;
+    persistence: see `_persistence`, s; allowed: displacement that errors of its impulse may cause, m; piece: begin and
+    end (s) of the current interval between two jumps; range: largest minus smallest value there, of the component where
+    that is largest; required: 1/h^2 of the longest step h that resolves it, 1/s^2.
     """
 
     def __init__(self, signal, acceleration, persistence, duration, allowed):

@@ -118,12 +118,8 @@ class TripleJump(Momentum):
     order, adapts = 4, False
 
     def begin(self):
-        """See `Stepper`.
-
-        Raises:
-            SceneError: a rod with damping, which would make the motion grow without bound back in time; an action with
-                memory; or a wall that nodes touch.
-        """
+        """See `Stepper`. A SceneError for a rod with damping, which would make the motion grow without bound back in
+        time; an action with memory; or a wall that nodes touch."""
         model = self.problem.model
         for found, expected in (
             (model.damped, ": expected rods without damping"),
@@ -164,10 +160,8 @@ class Rule(NamedTuple):
         return cls(alpha_m, alpha_f, (1 + alpha_f - alpha_m) ** 2 / 4, 0.5 + alpha_f - alpha_m)
 
     def ahead(self, h):
-        """(3, 4): v, a and s = (b - a)/h at the end of a step as combinations of D, v, a and s at its start.
-
-        For `Collocated.take_scheme`; s stays valid when h changes.
-        """
+        """(3, 4): v, a and s = (b - a)/h at the end of a step as combinations of D, v, a and s at its start, for
+        `Collocated.take_scheme`; s stays valid when h changes."""
         D, v0, a0, s0 = np.eye(4)
         b0 = a0 + h * s0
         b1 = (D - h * v0) / (self.beta * h**2) - (0.5 / self.beta - 1) * b0
@@ -211,11 +205,8 @@ class EndTies(MovingTies):
 
 
 class CollocationProblem(StepProblem):
-    """See `StepProblem`: eq. (1) at the end of a step, for a model with accelerations.
-
-    Attributes:
-        rule: the `Rule` of the next steps.
-    """
+    """See `StepProblem`: eq. (1) at the end of a step, for a model with accelerations; rule: the `Rule` of the next
+    steps."""
 
     ties_class, acting_share, loads_share, takes_momentum = EndTies, 1.0, 1 - _BEFORE_END, False
 
@@ -237,11 +228,9 @@ class CollocationProblem(StepProblem):
         return super().clamp_forces()
 
     def free_velocities(self, t, h):
-        """Let supports and joints keep the current velocities in the step from t to t + h, s.
-
-        The constraints c at the end get the value c(t) + h c'(t), by three points of uniform motion, instead of 0,
-        since the correction of small violations by the velocities would take large accelerations.
-        """
+        """Let supports and joints keep the current velocities in the step from t to t + h, s: the constraints c at the
+        end get the value c(t) + h c'(t), by three points of uniform motion, instead of 0, since the correction of small
+        violations by the velocities would take large accelerations."""
         if not self.ties:
             return
         velocity, values = self.model.velocity.x.array, []

@@ -157,11 +157,7 @@ def simulate(
 
 
 def pace_of(duration, *, tol=None, dt=None, scheme="momentum", save_every=None, elements=ELEMENTS):
-    """The step size control, `Fixed` or `Adaptive`, from arguments of `simulate`.
-
-    Raises:
-        SceneError: one of them is outside its range.
-    """
+    """The step size control, `Fixed` or `Adaptive`, from arguments of `simulate`, or a SceneError."""
     duration = positive_time("duration", duration)
     if not isinstance(scheme, str) or scheme not in SCHEMES:
         raise SceneError(f"scheme = {scheme!r}: {nearest(scheme, SCHEMES)}")
@@ -221,11 +217,8 @@ _MODELS = {
 
 
 def chosen_model(scene, model, scheme, start=None):
-    """The model's name, and the reason for its choice, from arguments of `simulate`; start: None, a Path or (Path, k).
-
-    Raises:
-        SceneError: an unknown model, or one that the scene does not fit.
-    """
+    """The model's name, and the reason for its choice, from arguments of `simulate` (start: None, a Path or (Path, k)),
+    or a SceneError."""
     if model not in ("auto", "planar", "spatial"):
         raise SceneError(f"model = {model!r}: {nearest(model, ('auto', 'planar', 'spatial'))}")
     if model == "spatial":
@@ -246,10 +239,8 @@ def chosen_model(scene, model, scheme, start=None):
 
 @contextlib.contextmanager
 def solvers_of(scene, layout, degree, scheme, load_factor, comm, model):
-    """Context manager that gives the loaded problem and stepper of a scene on a mesh.
-
-    No other caller uses them within the context; afterwards another one may, so that results must not refer to them.
-    """
+    """Context manager that gives the loaded problem and stepper of a scene on a mesh; afterwards another caller may use
+    them, so that results must not refer to them."""
     signature = Signature.of(scene, layout, formulation="displacement", degree=degree, model=model)
     with PROBLEMS.lend((scheme, signature), comm, lambda: _make(comm, signature, scheme), NotConverged) as solvers:
         solvers[0].load(scene, layout, load_factor)

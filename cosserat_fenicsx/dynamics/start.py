@@ -25,19 +25,9 @@ _OUT_OF_PLANE = 1e-10  # rounding of components out of a plane, over all
 
 
 def put_start(model, start):
-    """Put (r, q) and the velocities of the scene at the time 0 into a loaded moving model.
-
-    Args:
-        model: see `models.moving.Moving`.
-        start: None for the reference, a Path for its last point, or (Path, k).
-
-    Returns:
-        warnings, a list of sentences.
-
-    Raises:
-        SceneError: a start of another scene's rods, or one that violates supports or joints, or overlaps an obstacle
-            that its path does not have.
-    """
+    """Put (r, q) and the velocities of the scene at the time 0 into a loaded moving model, from None for the reference,
+    a Path for its last point, or (Path, k); returns warnings, a list of sentences. A SceneError for a start of another
+    scene's rods, or one that violates supports or joints, or overlaps an obstacle that its path does not have."""
     scene, layout = model.scene, model.layout
     rq = _at_rest(model) if start is None else _of_path(model, *_point(start))
     model.set_motion(model.unknowns_of(rq), np.zeros((sum(layout.counts), model.signature.points, 3)))
@@ -172,12 +162,8 @@ def _driven(model, rq, rates, t=0.0):
 
 
 def _off(model, rq, rates, t=0.0):
-    """Rates of change of the constraints of supports and joints after the time t (s), dimensionless.
-
-    Returns:
-        the rates with velocities `rates` (N, 6); the gradient of the constraints; the rates by prescribed motions
-        alone.
-    """
+    """Rates of change of the constraints of supports and joints after the time t (s), dimensionless: with velocities
+    `rates` (N, 6); their gradient; and the rates by prescribed motions alone."""
     load_factor, now, held = float(model.load_factor.value), rates[model.tied_slots], rq[model.tied_slots]
     c, gradients = model.ties_at(t).evaluate(held, load_factor)
     later, _ = model.ties_at(t + _DIFFERENCE * model.time).evaluate(held, load_factor)

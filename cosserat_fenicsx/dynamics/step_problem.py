@@ -55,16 +55,11 @@ class MovingTies(TieRows):
 
 
 class StepProblem(Equations):
-    """The equations of a step, whatever the scheme that made the model's forms.
+    """The equations of a step, whatever the scheme that made the forms of its model (`models.moving.Moving`); see
+    `Equations`; x is the state at the end of the step.
 
-    Args:
-        model: see `models.moving.Moving` for the protocol.
-
-    Attributes:
-        see `Equations`; x is the state at the end of the step.
-        fresh: whether the next iteration takes a new tangent.
-        h: the length of the step, dimensionless.
-        load_factor: multiplies all loads and prescribed motions.
+    fresh: whether the next iteration takes a new tangent; h: the length of the step, dimensionless; load_factor:
+    multiplies all loads and prescribed motions.
     """
 
     ties_class = MovingTies

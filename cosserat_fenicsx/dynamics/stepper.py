@@ -67,12 +67,8 @@ class Stepper:
         """The slope of a load, and so the rate of the acceleration, jumps at the current time; predictors may stay."""
 
     def step(self, t, h):
-        """Step from the time t to t + h, s.
-
-        Returns:
-            `Solved`. Where it has converged, the problem's x and the model's state and velocity are those of t + h;
-            otherwise they are as they were at t.
-        """
+        """Step from the time t to t + h, s: `Solved`. Where it has converged, the problem's x and the model's state and
+        velocity are those of t + h; otherwise they are as they were at t."""
         problem, delays = self.problem, self.problem.model.delays
         if h > delays.longest:
             return Solved(False, 0, f"it is longer than the {delays.longest:.3g} s that an action allows")
@@ -151,10 +147,8 @@ class Stepper:
         self.problem.begin_again()
 
     def memory(self):
-        """All data, besides the scene and the time, that later steps depend on: arrays, numbers, and dicts of them.
-
-        It includes the problem's own (`StepProblem.memory`): a motion continued from it has the same digits.
-        """
+        """All data, besides the scene and the time, that later steps depend on: arrays, numbers, and dicts of them, the
+        problem's own included (`StepProblem.memory`): a motion continued from it has the same digits."""
         past = self._past
         return {
             "h": np.nan if self._h is None else self._h,

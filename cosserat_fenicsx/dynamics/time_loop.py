@@ -55,13 +55,7 @@ class _Obstacles:
 
 
 class TimeLoop:
-    """The computation of a motion, with its saved states and checkpoints.
-
-    Args:
-        problem: a `StepProblem`; stepper: see `Stepper`; pace: the step size control, see `pace`.
-        history: the `History` that states are appended to.
-        store: the `Store` that states and checkpoints are written to, or `Nowhere`.
-    """
+    """The computation of a motion, with its saved states (`History`) and checkpoints (in a `Store`, or `Nowhere`)."""
 
     def __init__(self, problem, stepper, pace, history, store):
         self.problem, self.model, self._stepper, self._pace = problem, problem.model, stepper, pace
@@ -81,11 +75,8 @@ class TimeLoop:
         self._stepper.recall(memory["stepper"])
 
     def over(self, marks, save_all, progress):
-        """Compute the motion from its current time to the last of the `Mark`s; the history.
-
-        Args:
-            marks: the first at the start; save_all: whether every step is saved; progress: see `simulate`.
-        """
+        """Compute the motion from its current time to the last of the `Mark`s, the first at the start; the history.
+        save_all: whether every step is saved."""
         comm, model = self.model.comm, self.model
         try:
             with self._store.ending(self.history), Progress([marks[-1].time], progress, comm, "t (s) =") as bar:
@@ -206,13 +197,8 @@ _JUMP_INTERVAL, _ROUNDING = 1e-9, 1e-13
 
 
 class Mark(NamedTuple):
-    """A time (s) that a step ends at.
-
-    Attributes:
-        kink: whether a load or a prescribed motion is not smooth there (a kink or a jump).
-        jump: whether a load jumps there or a prescribed motion has a kink: accelerations and velocities jump.
-        saved: whether the state is saved.
-    """
+    """A time (s) that a step ends at; kink: whether a load or a prescribed motion is not smooth there; jump: whether a
+    load jumps there or a prescribed motion has a kink: accelerations and velocities jump."""
 
     time: float
     kink: bool = False
@@ -221,15 +207,9 @@ class Mark(NamedTuple):
 
 
 def marks_of(scene, duration, save_every, ends=()):
-    """The `Mark`s of a motion, ascending: the first at 0, the last at the end.
-
-    Args:
-        scene: a `Scene`; duration: s; save_every: s between saved states, or None.
-        ends: ends (s) of shorter durations that the motion was computed for before, see `resume`.
-
-    Raises:
-        SceneError: a prescribed motion that is discontinuous.
-    """
+    """The `Mark`s of a motion, ascending: the first at 0, the last at its duration (s); save_every: s between saved
+    states, or None; ends: ends (s) of shorter durations that the motion was computed for before, see `resume`. A
+    SceneError for a prescribed motion that is discontinuous."""
     _check_driven(scene, duration)
     signals = [(item, signal) for item in scene.moving for signal in signals_of(item).values()]
     kinks = {t for _, signal in signals for t in signal.jumps if 0 < t < duration}

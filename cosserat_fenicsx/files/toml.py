@@ -52,7 +52,7 @@ def _refused(text, problem):
 
 
 def _at(text, offset):
-    """", line ..., column ..." of an offset."""
+    """ ", line ..., column ..." of an offset."""
     line, column = _line_and_column(text, offset)
     return f", line {line}, column {column}"
 
@@ -133,10 +133,8 @@ def _value(text, i, place, found):
 
 
 def to_toml(tables):
-    """Tables of numbers, texts, lists and tables as TOML; None is left out.
-
-    Lists of tables become [[arrays]], and tables [tables], at the top; within these they stand in line.
-    """
+    """Tables of numbers, texts, lists and tables as TOML; None is left out. Lists of tables become [[arrays]], and
+    tables [tables], at the top; within these they stand in line."""
     plain = {name: value for name, value in tables.items() if not _is_tables(value)}
     blocks = ["\n".join(f"{_key(name)} = {_inline(value)}" for name, value in plain.items() if value is not None)]
     for name, value in tables.items():

@@ -16,16 +16,12 @@ _PLACES, _WEIGHTS = np.polynomial.legendre.leggauss(3)
 
 
 def nearest_polynomials(action, rod, s, starts, lengths):
-    """The action's `Datum`s at the Gauss points, as the nearest polynomials on elements with kinks inside.
+    """The `Datum`s of an action along a rod at the Gauss points s (elements * p,), m, as the nearest polynomials on
+    elements with kinks inside; starts, lengths: (elements,), m.
 
     Gauss points may miss a narrow peak. The polynomial of degree p - 1 that is nearest in the mean square has the same
     integrals against polynomials of degree p - 1, the total and the moment of a load among them, and its values at the
     p Gauss points are integrals against the Lagrange polynomials through these points, which are orthogonal.
-
-    Args:
-        action, rod: an action along the rod.
-        s: (elements * p,) arc lengths of the Gauss points, element by element, m.
-        starts, lengths: (elements,), m.
     """
     given = action.data(rod, s)
     if not len(starts):
@@ -110,24 +106,13 @@ _INSIDE = 1e-9
 
 
 class ActionTerms:
-    """The terms of a signature.
-
-    Args:
-        rods: the `RodMesh`; signature: the `Signature`; nodes: reference coordinates of an element's nodes, ascending.
-
-    Attributes:
-        terms: the `Term`s.
-    """
+    """The `Term`s of a `Signature` on a `RodMesh`; nodes: reference coordinates of an element's nodes, ascending."""
 
     def __init__(self, rods, signature, nodes):
         self.terms = [Term(rods, signature, nodes, kind) for kind in signature.terms]
 
     def fill(self, model, time=1.0):
-        """Fill the Functions with the data of the model's scene at the time 0.
-
-        Args:
-            model: a `RodModel`; time: its unit of time, s.
-        """
+        """Fill the Functions with the data of the scene of a `RodModel` at the time 0; time: its unit of time, s."""
         placed = place_actions(model.scene, model.layout)
         for term, (_, members) in zip(self.terms, placed, strict=True):
             term.fill(model, members, time)
@@ -185,16 +170,12 @@ class ActionTerms:
 
 
 class Term:
-    """Actions of one kind: a virtual work, and the Functions of its data.
+    """Actions of one `TermKind`: a virtual work, and the Functions of its data and of its memory (history variables).
 
-    Attributes:
-        kind: the `signature.TermKind`.
-        weight: Function: 1 where distributed actions act; 2 over the element length at the station of a point action,
-            because the end-point rule gives each end half that length; 0 elsewhere.
-        data, memory: Functions of the data, and of the memory (history variables).
-        moves: whether any of its data depend on time.
-        compiled_evolution: the compiled `evolution`; None without memory.
-        acting: (action, rod) of those that depend on time, with their values at the time of the last `put`.
+    weight: Function: 1 where distributed actions act; 2 over the element length at the station of a point action,
+    because the end-point rule gives each end half that length; 0 elsewhere. moves: whether any data depend on time;
+    compiled_evolution: the compiled `evolution`; None without memory; acting: (action, rod) of those that depend on
+    time, with their values at the time of the last `put`.
     """
 
     def __init__(self, rods, signature, nodes, kind):
@@ -249,11 +230,8 @@ class Term:
         return compat.element_nodes(self.weight.function_space)
 
     def fill(self, model, members, time):
-        """Fill in the data of actions.
-
-        Args:
-            model: loaded with their scene; members: (action, index of its rod, element end or None) of each; time: s.
-        """
+        """Fill in the data of actions of the model's scene; members: (action, index of its rod, element end or None);
+        time: s."""
         self._model, self._time = model, time
         scene, layout, rods, x = model.scene, model.layout, self._rods, self._dof_places
         numbers = compat.cell_nodes(self.weight.function_space)  # the same for all Functions of this term
@@ -384,11 +362,7 @@ StationMotion = namedtuple("StationMotion", "displacement rotation velocity angu
 
 
 class StationNode:
-    """The node of a station.
-
-    Args:
-        model: a spatial moving model, loaded; station: a station of its scene.
-    """
+    """The node of a station of the scene of a loaded spatial moving model."""
 
     def __init__(self, model, station):
         self._model = model
@@ -428,14 +402,8 @@ class StationNode:
 
 
 class Delays:
-    """The actions of a moving model that depend on the earlier motion of their stations, see `Action.delayed`.
-
-    Args:
-        model: a moving model, loaded.
-
-    Attributes:
-        longest: the longest step that they allow, s.
-    """
+    """The actions of a loaded moving model that depend on the earlier motion of their stations, see `Action.delayed`;
+    longest: the longest step that they allow, s."""
 
     def __init__(self, model):
         self._model, actions = model, [x for x in model.scene.actions if x.delayed is not None]

@@ -32,10 +32,8 @@ from cosserat_fenicsx.scene.action import powers
 
 @dataclass(frozen=True)
 class Scales:
-    """Units of length (m), force (N) and moment (N m): L, EI/L^2 and EI/L of the longest rod.
-
-    One tolerance then suits every scene.
-    """
+    """Units of length (m), force (N) and moment (N m): L, EI/L^2 and EI/L of the longest rod. One tolerance then suits
+    every scene."""
 
     length: float
     force: float
@@ -185,16 +183,10 @@ class RodModel:
         raise NotImplementedError
 
     def small_motion_maps(self, tangent):
-        """How the inverse of the tangent nearly follows from that of the second variation; of models in space whose
-        nodes have no multipliers.
-
-        Args:
-            tangent: (nodes, components, components) its blocks on the diagonal.
-
-        Returns:
-            Matrices from the rows of a node to (force, moment); from its (displacement, rotation) to its unknowns; and
-            from its rows to its unknowns for what is no motion.
-        """
+        """How the inverse of the tangent (tangent: (nodes, components, components) its blocks on the diagonal) nearly
+        follows from that of the second variation; of models in space whose nodes have no multipliers: matrices from the
+        rows of a node to (force, moment); from its (displacement, rotation) to its unknowns; and from its rows to its
+        unknowns for what is no motion."""
         raise NotImplementedError
 
     def held_forces(self, forces):
@@ -353,11 +345,8 @@ class RodModel:
             function.x.array[:] = 0
 
     def round_off_of(self, section, sizes):
-        """Bound on the rounding error of |F|: strains are differences of r over the spacing of the nodes.
-
-        Args:
-            section: the `RodData`, or those of many scenes, K and J (n, elements, points, 3); sizes: of the elements.
-        """
+        """Bound on the rounding error of |F|: strains are differences of r over the spacing of the nodes; section:
+        `RodData`, or of many scenes, K and J (n, elements, points, 3); sizes: of the elements."""
         stiffest = np.where(np.isfinite(section.K), section.K, 0.0).max(axis=(-3, -2, -1))
         return 4 * np.finfo(float).eps * stiffest * self.signature.degree / sizes.min() * np.sqrt(self.unknowns)
 

@@ -15,14 +15,8 @@ MODELS = ("auto", *RUNGS)
 
 @dataclass(frozen=True)
 class Choice:
-    """A model for a scene.
-
-    Attributes:
-        model: "determinate", "planar" or "spatial".
-        why: sentences that say why this one, and why not a cheaper one.
-        promoted: whether a planar solution that becomes unstable, in or out of its plane, is to be solved again in
-            space.
-    """
+    """A model for a scene, and sentences that say why this one, and why not a cheaper one; promoted: whether a planar
+    solution that becomes unstable, in or out of its plane, is to be solved again in space."""
 
     model: str
     why: list = field(default_factory=list)

@@ -103,12 +103,8 @@ class Collocated:
     D are the increments of the nodes' motion over a step. The scheme is a matrix that gives the rates (v, a, s) at the
     end of the step from D and the rates at its beginning: velocities, accelerations and the scheme's auxiliary rate.
     The same matrix gives strain rates from the increments of the strains at the Gauss points, so that rigid motions are
-    not damped.
-
-    Attributes:
-        by_velocity, by_acceleration: Constants, the factors of D in v and a.
-        known_velocity, known_acceleration, known_strain_rate: Functions, the parts of the rates that do not depend on
-            the increments.
+    not damped. by_velocity, by_acceleration: Constants, the factors of D in v and a; known_velocity,
+    known_acceleration, known_strain_rate: Functions, the parts of the rates that do not depend on the increments.
     """
 
     #: components of a node's velocity
@@ -157,13 +153,8 @@ class Collocated:
             self._strain_rates[0] = self._at_gauss(self._strain_rate)
 
     def take_scheme(self, ahead):
-        """Set the scheme of the next step.
-
-        `start` and the state must be those at its beginning.
-
-        Args:
-            ahead: (3, 4), rows v, a, s at its end, columns D and v, a, s at its beginning.
-        """
+        """Set the scheme of the next step, at whose beginning `start` and the state must be; ahead: (3, 4), rows v, a,
+        s at its end, columns D and v, a, s at its beginning."""
         self._ahead = ahead
         self.by_velocity.value, self.by_acceleration.value = ahead[:2, 0]
         rates = self._velocities(), *self._node_rates

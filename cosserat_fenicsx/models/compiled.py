@@ -75,13 +75,9 @@ def along(w):
 
 
 def compile_static(model, spaces, displacements=None):
-    """The `CompiledForms` of a model in statics.
-
-    Args:
-        model: supplies mesh, data, the terms of the actions, and UFL of its unknowns (see `RodModel`).
-        spaces: of the second variations.
-        displacements: space of three components per node on which forces do work, of the determinate models; or None.
-    """
+    """The `CompiledForms` of a model in statics, from its mesh, data, terms of the actions, and UFL of its unknowns;
+    spaces: of the second variations; displacements: of the determinate models, space of three components per node on
+    which forces do work."""
     force, data, dx = model.signature.formulation.force, model.data, measures(model)
     U, U_node = model.state, compat.alias(model.state)
 
@@ -137,16 +133,10 @@ def compile_static(model, spaces, displacements=None):
 
 
 def compile_parts(model, core, terms, fields, *, advance=None, densities=None, **works):
-    """Compile UFL: one module for the model without actions, and one for each term of the actions.
-
-    Args:
-        core: {name: form}; terms: {number of a term: {name: form}}; works: for a name {number of a term: form}. Names
-            are attributes, or the numbers of second variations; forms may be None.
-        fields, advance: see `CompiledForms`; densities: see `action_densities`.
-
-    Returns:
-        The attributes of `CompiledForms`, symbols excepted, and of a subclass; tuples of all forms of a name.
-    """
+    """Compile UFL: one module for the model without actions (core: {name: form}), and one for each term of the actions
+    (terms: {its number: {name: form}}; works: for a name {its number: form}). Names are attributes of `CompiledForms`
+    or of a subclass, or the numbers of second variations; forms may be None. densities: see `action_densities`. Returns
+    these attributes, symbols excepted; tuples of all forms of a name."""
     densities = densities or {}
     points, weights = basix.make_quadrature(basix.CellType.interval, 2 * model.signature.points - 1)
     places = {"line": points, "node": model.nodes}
@@ -259,15 +249,10 @@ def acting_at(model, point_at):
 
 
 def action_work(model, dx, test, point_at, unknowns, accepted_at=None, test_at=None):
-    """The `ActionWork` of a model's actions.
-
-    Args:
-        dx: the `Measures`; test: a `VirtualMotion`.
-        point_at: function (place of a `TermKind`, rest, frame) -> the `Point` there; see `Point` for the last two.
-        unknowns: Functions; an action whose form contains one of them depends on the state.
-        accepted_at: as `point_at`, for the update of memory at an accepted state; by default the same.
-        test_at: function place -> the `VirtualMotion` there; given where test functions depend on the state.
-    """
+    """The `ActionWork` of a model's actions, by the `Measures` dx and a `VirtualMotion`; point_at: function (place of a
+    `TermKind`, rest, frame) -> the `Point` there; unknowns: Functions; an action whose form contains one of them
+    depends on the state; accepted_at: as `point_at`, for the update of memory at an accepted state; test_at: function
+    place -> the `VirtualMotion` there; given where test functions depend on the state."""
     dead, live = {"load": {}, "permanent": {}}, []
     for number, term, factor, point in acting_at(model, point_at):
         kind = term.kind

@@ -25,12 +25,10 @@ from cosserat_fenicsx.scene.supports import AngleTie, PositionTie
 class Connections:
     """Which nodes have unknowns and which constraint equations are added; vertices are (rod index, element end).
 
-    Attributes:
-        clamped: vertices without unknowns.
-        leaders: pairs (vertex, leader): rigidly joined vertices and the one whose unknowns they share.
-        ties: (kind, vertex of a, vertex of b or None) of all scalar equations of supports and joints, in the scene's
-            order.
-        equations: indices of the ties that are added: in a plane only independent ones that constrain motions in it.
+    clamped: vertices without unknowns; leaders: pairs (vertex, leader): rigidly joined vertices and the one whose
+    unknowns they share; ties: (kind, vertex of a, vertex of b or None) of all scalar equations of supports and joints,
+    in the scene's order; equations: indices of the ties that are added: in a plane only independent ones that constrain
+    motions in it.
     """
 
     clamped: tuple
@@ -80,19 +78,12 @@ def ties_of(scene, t=0.0):
 
 
 class TiePattern:
-    """The pairs of tied nodes that constraint equations (ties) connect.
+    """The pairs of tied nodes that constraint equations (ties) connect; ends: (a, b) of every tie as indices into
+    `count` tied nodes; b = -1 for the ground. Blocks of a matrix are stored pair by pair, (pairs, rows of a node,
+    columns of a node); all others are zero.
 
-    Blocks of a matrix are stored pair by pair, (pairs, rows of a node, columns of a node); all others are zero.
-
-    Args:
-        ends: (a, b) of every tie as indices into the tied nodes; b = -1 for the ground.
-        count: number of the tied nodes.
-
-    Attributes:
-        ends: the same as an array (ties, 2).
-        first, second: (pairs,) the nodes of a pair's rows and columns; every node has a pair with itself.
-        own: (nodes,) the pair of every node with itself.
-        mirrored: (pairs,) the pair with the two nodes exchanged.
+    first, second: (pairs,) the nodes of a pair's rows and columns; every node has a pair with itself: own (nodes,);
+    mirrored: (pairs,) the pair with the two nodes exchanged.
     """
 
     def __init__(self, ends, count):
@@ -148,17 +139,10 @@ class TiePattern:
         return np.einsum("kpi,pij,kpj->k", motions[:, self.first], blocks, motions[:, self.second])
 
     def places(self, rows, equations):
-        """Rows and columns in a matrix of what ties fill.
-
-        Args:
-            rows: (nodes, n) the numbers of the nodes' unknowns, -1 where these are clamped.
-            equations: (added,) indices of the ties that are equations; those follow the nodes in the order of
-                `equations` with numbers from 0.
-
-        Returns:
-            (2, pairs * n * n) of blocks (pairs, n, n); rows (added * 2 * n,) of the ends' unknowns, -1 for the ground;
-            and for each of them its equation.
-        """
+        """Rows and columns in a matrix of what ties fill: (2, pairs * n * n) of blocks (pairs, n, n); rows (added * 2 *
+        n,) of the ends' unknowns, -1 for the ground; and for each of them its equation. rows: (nodes, n) the numbers of
+        the nodes' unknowns, -1 where clamped; equations: (added,) indices of the ties that are equations, which follow
+        the nodes in this order with numbers from 0."""
         n = rows.shape[1]
         i, j = rows[self.first][:, :, None], rows[self.second][:, None, :]
         blocks = np.stack([np.broadcast_to(x, (len(self.first), n, n)).ravel() for x in (i, j)])
@@ -181,15 +165,8 @@ def _kernels():
 
 
 class Ties:
-    """The ties of a scene, dimensionless.
-
-    Args:
-        ties: those of the scene (`cosserat_fenicsx.scene.supports`).
-        pattern: the `TiePattern` of the tied nodes.
-        reference: (tied nodes, 3) positions at rest.
-        length: unit of length, m.
-        comm: of the ranks that make them together.
-    """
+    """The ties of a scene (`scene.supports`), dimensionless, with the `TiePattern` of the tied nodes; reference: (tied
+    nodes, 3) positions at rest; length: unit of length, m; comm: of the ranks that make them together."""
 
     def __init__(self, ties, pattern, reference, length, comm=MPI.COMM_SELF):
         with compiling():
@@ -224,12 +201,8 @@ class Ties:
         self._rows[:, eq.PLACES["load_factor"]] = load_factor
 
     def evaluate(self, rq, load_factor):
-        """Values at (r, q) (tied nodes, 7) and a load factor.
-
-        Returns:
-            c (ties,); gradients (ties, 2, 6) over (displacement, rotation) of the nodes a and b, or the ground, which
-            are also the reactions per unit of multiplier.
-        """
+        """(c (ties,); gradients (ties, 2, 6) over (displacement, rotation) of the nodes a and b, or the ground, which
+        are also the reactions per unit of multiplier) at (r, q) (tied nodes, 7) and a load factor."""
         found = np.zeros((len(self._rows), 13))
         self._see(rq, load_factor)
         self._add_values(self._rows, found)
@@ -261,13 +234,8 @@ def _numbers(tie, length):
 
 
 class Clamps:
-    """The clamped points of a model, in the order of `Connections.clamped`. Rods joined rigidly there share one point.
-
-    Forces and moments are inertial and dimensionless.
-
-    Args:
-        model: a `RodModel`.
-    """
+    """The clamped points of a `RodModel`, in the order of `Connections.clamped`; rods joined rigidly there share one
+    point. Forces and moments are inertial and dimensionless."""
 
     def __init__(self, model):
         links, self._model = model.signature.connections, model

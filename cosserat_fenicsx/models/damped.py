@@ -16,12 +16,8 @@ from cosserat_fenicsx.scene.rod import Damping
 
 
 class Damped:
-    """Mixin that adds the viscous law (Kelvin-Voigt) to a `RodModel`.
-
-    Attributes:
-        viscosity: the Functions of the law of the strain rates, as `rod_data.law_of` takes them.
-        damped: whether any rod has damping.
-    """
+    """Mixin that adds the viscous law (Kelvin-Voigt) to a `RodModel`; viscosity: the Functions of the law of the strain
+    rates, as `rod_data.law_of` takes them; damped: whether any rod has damping."""
 
     def _viscous_fields(self):
         """Make the Functions of the viscous law."""

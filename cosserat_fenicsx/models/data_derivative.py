@@ -10,14 +10,8 @@ from cosserat_fenicsx.compat import compiling
 
 
 class DataDerivative:
-    """The change of the residual, and of n, in a direction of the data: of all Functions that `RodModel.load` fills in.
-
-    Args:
-        model: a `RodModel` of statics.
-
-    Attributes:
-        form: the compiled change of the residual at the model's state and data.
-    """
+    """The change of the residual, and of n, in a direction of the data: of all Functions that `RodModel.load` fills in,
+    in statics; form: the compiled change of the residual at the model's state and data."""
 
     def __init__(self, model):
         self._model, symbols = model, model.forms.symbols
@@ -46,11 +40,8 @@ class DataDerivative:
             df.x.array[:] = change
 
     def contact(self, moved):
-        """The change of the carried n, an array like `model.carried`'s; None where no n is carried.
-
-        Args:
-            moved: change of the model's state array, ghosts and clamped nodes included.
-        """
+        """The change of the carried n, an array like `model.carried`'s, with the model's state array (`moved`, ghosts
+        and clamped nodes included); None where no n is carried."""
         if self._contact is None:
             return None
         model = self._model
@@ -62,12 +53,8 @@ class DataDerivative:
 
 
 class EnergyOfMotion:
-    """The second variation of a spatial model along one motion, without supports and joints: a sum of squares of small
-    strains, which keeps its digits where the entries of the matrix would lose them.
-
-    Args:
-        model: a `SpatialModel`.
-    """
+    """The second variation of a `SpatialModel` along one motion, without supports and joints: a sum of squares of small
+    strains, which keeps its digits where the entries of the matrix would lose them."""
 
     def __init__(self, model):
         (space,), (second,) = model.variation_spaces, model.forms.symbols.seconds
@@ -76,11 +63,8 @@ class EnergyOfMotion:
             (self._form,) = compat.forms(model.mesh, [ufl.action(ufl.action(second, self._motion), self._motion)])
 
     def along(self, motion):
-        """The value at the model's state, over all ranks, dimensionless.
-
-        Args:
-            motion: (N, 6) displacements and rotations of all nodes in the scene's order, inertial, dimensionless.
-        """
+        """The value at the model's state, over all ranks, along displacements and rotations (N, 6) of all nodes in the
+        scene's order, inertial; all dimensionless."""
         self._motion.x.array.reshape(-1, 6)[:] = motion[self._model.slots]
         return self._model.comm.allreduce(fem.assemble_scalar(self._form))
 

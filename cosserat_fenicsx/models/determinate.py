@@ -16,15 +16,8 @@ from cosserat_fenicsx.numerics import conjugate_product, directors
 
 
 class Tree:
-    """The rods of a signature, in order from their clamps outwards.
-
-    Args:
-        signature: a `Signature` whose rods are trees, each with one clamped point and rigid joints alone.
-        rods: the `RodMesh`.
-
-    Attributes:
-        cell_nodes: (elements, p + 1) nodes of every element, the scene's order.
-    """
+    """The rods of a `Signature`, which are trees with one clamped point and rigid joints alone, from their clamps
+    outwards; cell_nodes: (elements, p + 1) nodes of every element, the scene's order."""
 
     def __init__(self, signature, rods):
         self._p = p = signature.degree
@@ -62,17 +55,9 @@ class Tree:
             yield nodes, slice(self._first_cell[rod], self._first_cell[rod + 1]), entry, before
 
     def forces(self, nodal, rule):
-        """The contact force at the Gauss points that balances dead forces.
-
-        Solves the discrete balance (n, l_i') = f_i for all nodes of an element except the one towards the clamp; at its
-        other end acts the sum of all forces beyond it.
-
-        Args:
-            nodal: (N, d) forces on the nodes; rule: the `ElementRule`.
-
-        Returns:
-            (elements, points, d).
-        """
+        """(elements, points, d) the contact force at the Gauss points that balances dead forces (N, d) on the nodes:
+        solves the discrete balance (n, l_i') = f_i for all nodes of an element except the one towards the clamp; at its
+        other end acts the sum of all forces beyond it."""
         p, nodal = self._p, nodal.copy()
         gradient = rule.weights * rule.slopes.T  # (p + 1, points)
         n = np.empty((len(self.cell_nodes), len(rule.gauss), nodal.shape[1]))
@@ -91,16 +76,8 @@ class Tree:
         return n
 
     def positions(self, tangents, rest, rule):
-        """Positions of all nodes from r' at the Gauss points.
-
-        Args:
-            tangents: (k, elements, points, d) r' times the length of its element.
-            rest: (N, d) positions at rest, where the clamps stay.
-            rule: the `ElementRule`.
-
-        Returns:
-            (k, N, d).
-        """
+        """(k, N, d) positions of all nodes from `tangents` (k, elements, points, d), r' at the Gauss points times the
+        length of its element; rest: (N, d) positions at rest, where the clamps stay."""
         within = rule.from_slopes @ tangents
         r = np.empty((len(tangents), *rest.shape))
         for nodes, cells, entry, before in self._rods(self._order):

@@ -261,14 +261,7 @@ class Multiplier(Formulation):
 
 
 def formulation_of(given=None):
-    """A `Formulation`, the default for None.
-
-    Args:
-        given: a name, a subclass of `Formulation` or an object of one.
-
-    Raises:
-        SceneError: an unknown name.
-    """
+    """A `Formulation`, the default for None, of a name (a SceneError for an unknown one), a subclass or an object."""
     if isinstance(given, Formulation):
         return given
     if isinstance(given, type) and issubclass(given, Formulation):

@@ -147,14 +147,9 @@ class StepForms:
         return 0 if held is None else held * self.dx.nodes
 
     def compiled(self, residual, acting, working, of_step, *, turned=False):
-        """`MotionForms` of a residual without actions.
-
-        Args:
-            acting: `ActionWork` in the residual; working: in the energy balance, at the middle of the step, or None for
-                the same.
-            of_step: see `virtual_work_of_step`.
-            turned: whether the live part of `working` has a tangent of its own.
-        """
+        """`MotionForms` of a residual without actions; acting: `ActionWork` in the residual; working: in the energy
+        balance, at the middle of the step, or None for the same; of_step: see `virtual_work_of_step`; turned: whether
+        the live part of `working` has a tangent of its own."""
         model, dx, derivative = self.model, self.dx, self.derivative
         n, m = inertia.contact(
             self.after, self.section, self.viscosity, lambda a: ufl.derivative(a, self.state, self.velocity)
@@ -202,15 +197,9 @@ def compile_momentum(step, stress=inertia.averaged_stress):
 
 
 def virtual_work_of_step(model, stress, point_at):
-    """Coefficients of the virtual work of a step per unit length: of the stress, minus the actions along rods.
-
-    Args:
-        stress: function from a `VirtualMotion` to the virtual work of the stress; point_at: see `action_work`.
-
-    Returns:
-        UFL (12,), the coefficients of phi_r, phi, phi_r' and phi' at the Gauss points; and (6,), those of phi_r and phi
-        for the actions integrated at the nodes, None without such. (None, None) for a scene without clamps.
-    """
+    """Coefficients of the virtual work of a step per unit length, of the stress (a function of a `VirtualMotion`),
+    minus the actions along rods: UFL (12,), of phi_r, phi, phi_r' and phi' at the Gauss points; and (6,), of phi_r and
+    phi for the actions integrated at the nodes, None without such. (None, None) for a scene without clamps."""
     if not model.signature.connections.clamped:
         return None, None
     acting = list(acting_at(model, point_at))
@@ -226,11 +215,7 @@ def virtual_work_of_step(model, stress, point_at):
 
 
 class SpatialStep(StepForms):
-    """See `StepForms`.
-
-    Attributes:
-        body: the `Inertia` of a section.
-    """
+    """See `StepForms`; body: the `Inertia` of a section."""
 
     def __init__(self, model):
         I = model.inertia
@@ -295,11 +280,7 @@ class Moving(Damped):
         self._viscous_fields()
 
     def load(self, scene, layout):
-        """See `RodModel`; mass and inertia too.
-
-        Raises:
-            SceneError: a rod without mass or inertia.
-        """
+        """See `RodModel`; mass and inertia too. A SceneError for a rod without these."""
         check_inertia(scene)
         scales, heaviest = Scales.of(scene), max(float(rod.profile.range[1].mass) for rod in scene.rods)
         self.time = math.sqrt(heaviest * scales.length**2 / scales.force)
@@ -393,11 +374,8 @@ class Moving(Damped):
         return self._gather_nodes(self._arrays[2][self.nodal[: self.owned_nodes]])
 
     def momenta(self, tested):
-        """Linear (3,) and angular momentum (3,) about the inertial origin, over all ranks, dimensionless.
-
-        Args:
-            tested: (local degrees of freedom,) the assembled `forms.momentum`, contributions of this rank's elements.
-        """
+        """Linear (3,) and angular momentum (3,) about the inertial origin, over all ranks, dimensionless; tested:
+        (local degrees of freedom,) the assembled `forms.momentum`, contributions of this rank's elements."""
         linear, angular = self._momenta_of(tested[self.nodal])
         place = self.positions() + self._origins[self.slots]
         both = np.concatenate([linear.sum(axis=0), (cross(place, linear) + angular).sum(axis=0)])

@@ -64,11 +64,7 @@ class MovingPlanar(Moving, PlanarModel):
         return super().unknowns_of(rq)
 
     def loads_at(self, t):
-        """See `Moving`.
-
-        Raises:
-            SceneError: a load that leaves the plane at this time.
-        """
+        """See `Moving`; a SceneError for a load that leaves the plane at this time."""
         if not super().loads_at(t):
             return False
         for load, rod in (pair for term in self.actions.terms for pair in term.acting):
@@ -82,11 +78,7 @@ class MovingPlanar(Moving, PlanarModel):
         return True
 
     def ties_at(self, t):
-        """See `Moving`.
-
-        Raises:
-            SceneError: a prescribed motion that leaves the plane at this time.
-        """
+        """See `Moving`; a SceneError for a prescribed motion that leaves the plane at this time."""
         across = self.axes[2], self.axes[:2]
         for support in self.scene.supports:
             for field, signal in signals_of(support).items():

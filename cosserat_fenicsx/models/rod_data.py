@@ -25,12 +25,8 @@ LawData = namedtuple("LawData", "K J A_axes S_axes G", defaults=(None, None, Non
 
 
 def law_data(along, scales, *, coupled):
-    """The `LawData` of `Stiffnesses`.
-
-    Args:
-        scales: anything with the units `force` and `length`.
-        coupled: whether to return full matrices, also for diagonal sections.
-    """
+    """The `LawData` of `Stiffnesses` in the units `force` and `length` of `scales`; coupled: whether to return full
+    matrices, also for diagonal sections."""
     force, length = scales.force, scales.length
     K, J = along.K / force, along.J / (force * length**2)
     if not coupled:
@@ -79,11 +75,8 @@ def _times(matrix, a):
 
 
 def field_values(data, stiff):
-    """Values of the Functions K, K_inv, K_stiff, J and G, (elements, points, k): diagonals, or matrices row by row.
-
-    Args:
-        data: the `LawData`; stiff: the bounded K for the second variation.
-    """
+    """Values of the Functions K, K_inv, K_stiff, J and G, (elements, points, k), of `LawData`: diagonals, or matrices
+    row by row; stiff: the bounded K for the second variation."""
     finite = np.where(np.isinf(data.K), 0.0, data.K)
     K, K_inv, K_stiff = (stretch_values(data, values) for values in (finite, 1 / data.K, stiff))
     return K, K_inv, K_stiff, _numbers(data.J, data.S_axes), _rows(data.G)
@@ -198,10 +191,8 @@ def rod_fields(mesh, points, frame, strain, *, coupled):
 
 def bending_lengths(data, lengths, counts):
     """(elements,) length scale of bending of each rod: its length, or the length of one radian of its arc if shorter.
-
-    The compliances of a coil of radius R due to bending and to shear are proportional to R^2/EI and 1/K, whatever the
-    length L of its wire: with K bounded by 1e6 EI/L^2 a spring of 40 turns would be 6 % too soft.
-    """
+    (The compliances of a coil of radius R due to bending and to shear are proportional to R^2/EI and 1/K, whatever the
+    length L of its wire: with K bounded by 1e6 EI/L^2 a spring of 40 turns would be 6 % too soft.)"""
     tangents = data.R_R[:, :, 2::3]
     along, first = tangents.reshape(-1, 3), np.cumsum([0, *counts[:-1]]) * tangents.shape[1]
     turned = np.append(0.0, np.arccos(np.clip(np.einsum("ki,ki->k", along[1:], along[:-1]), -1.0, 1.0)))
@@ -226,11 +217,7 @@ def fill_fields(fields, rods, data, stiff):
 
 
 def check_inertia(scene):
-    """Raise an error for a rod without inertia, or for an action that stands for inertia.
-
-    Raises:
-        SceneError: a rod without mass or inertia, or such an action.
-    """
+    """A SceneError for a rod without mass or inertia, or for an action that stands for inertia."""
     for i, load in enumerate(scene.loads):
         if load.of_inertia:
             raise SceneError(
@@ -248,11 +235,9 @@ NodalInertia = namedtuple("NodalInertia", "mass J frames offset apart lateral")
 
 
 def nodal_inertia(scene, layout, nodes):
-    """The `NodalInertia` of a scene. Point masses are added to one of the adjacent elements.
-
-    The mass of a rod lies at the offset a, masses that move with its axis lie on it. Together they are a mass m at the
-    offset a m_rod/m, and a moment of inertia m_rod (m - m_rod)/m (a.a - a a) in addition to that of the section.
-    """
+    """The `NodalInertia` of a scene; point masses are added to one of the adjacent elements. The mass of a rod lies at
+    the offset a, masses that move with its axis lie on it: together a mass m at the offset a m_rod/m, and a moment of
+    inertia m_rod (m - m_rod)/m (a.a - a a) in addition to that of the section."""
     parts, weights = [], lobatto_weights(nodes)
     for i, (rod, x) in enumerate(zip(scene.rods, layout.inside(nodes), strict=True)):
         s = x * rod.length

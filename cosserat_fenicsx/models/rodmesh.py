@@ -32,21 +32,14 @@ _GIGABYTES = 1e-4
 
 @dataclass(frozen=True, eq=False)
 class Layout:
-    """How many elements each rod has and where their ends lie.
-
-    Attributes:
-        breaks: for every rod the arc lengths of its element ends over its length, from 0 to 1.
-    """
+    """How many elements each rod has and where their ends lie; breaks: of every rod, over its length, from 0 to 1."""
 
     breaks: tuple
 
     @classmethod
     def of(cls, scene, elements):
-        """`elements` per rod, more only where supports, loads, joints and kinks need an element end.
-
-        Raises:
-            SceneError: more than `MOST_ELEMENTS` in all.
-        """
+        """`elements` per rod, more only where supports, loads, joints and kinks need an element end; a SceneError for
+        more than `MOST_ELEMENTS` in all."""
         return _equal(scene, elements)
 
     def finer(self, scene, factor):
@@ -54,11 +47,8 @@ class Layout:
         return _finer(scene, self, factor)
 
     def resized(self, scene, wanted):
-        """The layout with every element replaced by another number of elements.
-
-        Args:
-            wanted: for every rod (elements,) their number, which may be fractional: the sum over a piece is rounded up.
-        """
+        """The layout with every element replaced by another number of elements; wanted: for every rod (elements,),
+        which may be fractional: the sum over a piece is rounded up."""
 
         def divide(rod, start, end):
             breaks, first, last = self._piece(rod, start, end)
@@ -69,11 +59,8 @@ class Layout:
         return self._of_pieces(scene, divide, self._with(wanted))
 
     def with_short_ends(self, scene, longest):
-        """The layout whose pieces have short elements at their ends, by repeated halving of the end elements.
-
-        Args:
-            longest: for every rod (elements,) the largest length of each at the end of a piece, over the rod's length.
-        """
+        """The layout whose pieces have short elements at their ends, by repeated halving of the end elements; longest:
+        for every rod (elements,) the largest length of each at the end of a piece, over the rod's length."""
 
         def divide(rod, start, end):
             breaks, first, last = self._piece(rod, start, end)
@@ -197,10 +184,8 @@ def _finer(scene, layout, factor):
 
 @per_scene
 def _fixed_ends(scene):
-    """For every rod the element ends prescribed by supports, loads, joints and kinks, over its length, from 0 to 1.
-
-    The part of a rod between two of them is called a piece.
-    """
+    """For every rod the element ends prescribed by supports, loads, joints and kinks, over its length, from 0 to 1; the
+    part of a rod between two of them is called a piece."""
     found = []
     for rod in scene.rods:
         stations = {station.s / rod.length for station in scene.stations(rod)}
@@ -215,10 +200,8 @@ def _fixed_ends(scene):
 
 
 def same_places(scene, other):
-    """Whether what needs element ends lies at the same shares of the rods' lengths in two scenes with the same rods.
-
-    Places where the points of a spline lie are left out: nothing jumps there.
-    """
+    """Whether what needs element ends lies at the same shares of the rods' lengths in two scenes with the same rods;
+    places where the points of a spline lie are left out: nothing jumps there."""
 
     def places(rod, of):
         offsets = rod.mass_centre.breaks if rod.mass_centre else ()
@@ -229,14 +212,8 @@ def same_places(scene, other):
 
 
 class RodMesh:
-    """A dolfinx mesh of intervals in reference arc length, one chain per rod, each starting at zero.
-
-    Derivatives and integrals on it are those along the rods, which may be curved.
-
-    Args:
-        comm: MPI communicator.
-        counts: elements of each rod.
-    """
+    """A dolfinx mesh of intervals in reference arc length, one chain per rod, each starting at zero: derivatives and
+    integrals on it are those along the rods, which may be curved; counts: elements of each rod."""
 
     def __init__(self, comm, counts):
         self.counts = counts
@@ -314,24 +291,16 @@ class Gather:
 
 
 class Numbering:
-    """The unknowns on one space.
+    """The unknowns on one of dolfinx's spaces; comm: the caller's, not the mesh's copy, on which objects that PETSc
+    puts aside would never be freed.
 
-    Args:
-        comm: MPI communicator of the vectors and matrices: the caller's, not the mesh's copy, on which objects that
-            PETSc puts aside would never be freed.
-        space: dolfinx's space; `node_dofs` (local nodes, block): its local degrees of freedom of every node.
-        owned: number of the local nodes that this rank owns.
-        slots: the scene's number of every local node.
-        clamped, leaders: slots without unknowns, and {slot: the slot whose unknowns it shares}.
-        multipliers: number of constraint equations.
+    node_dofs: (local nodes, block) local degrees of freedom; owned: number of the local nodes that this rank owns;
+    slots: the scene's number of every local node; clamped, leaders: slots without unknowns, and {slot: the slot whose
+    unknowns it shares}; multipliers: number of constraint equations, of which the first is first_multiplier.
 
-    Attributes:
-        nodes: free nodes of this rank.
-        block: unknowns of a node.
-        size: unknowns of this rank, total: of all ranks.
-        rows: index in the solver's vector of every local degree of freedom of the space; -1 where clamped.
-        free, of_free: local degrees of freedom with an index there, and that index.
-        first_multiplier: index of the first multiplier.
+    nodes: free nodes of this rank, of `block` unknowns each; size, total: unknowns of this rank, of all; rows: index in
+    the solver's vector of every local degree of freedom of the space, -1 where clamped; free, of_free: local degrees of
+    freedom with an index there, and that index.
     """
 
     def __init__(self, comm, space, node_dofs, owned, slots, clamped, leaders, multipliers=0):
@@ -424,14 +393,9 @@ class Numbering:
             self._scatter.scatter(self._local, b, PETSc.InsertMode.ADD_VALUES, PETSc.ScatterMode.REVERSE)
 
     def matrix(self, cell_dofs, tied, pattern):
-        """A matrix preallocated for all elements of this rank and for what ties add between nodes.
-
-        Args:
-            cell_dofs: (cells, dofs) local degrees of freedom of every element of this rank.
-            tied: (tied nodes, block) indices (of any rank) of the unknowns in constraint equations, -1 where clamped;
-                the same on all ranks.
-            pattern: the `TiePattern` of the tied nodes.
-        """
+        """A matrix preallocated for all elements of this rank (cell_dofs: (cells, dofs) local degrees of freedom) and
+        for what ties of a `TiePattern` add between nodes; tied: (tied nodes, block) indices (of any rank) of the
+        unknowns in constraint equations, -1 where clamped; the same on all ranks."""
         A = PETSc.Mat().create(self.comm)
         A.setType("aij")
         A.setSizes(((self.size, self.total), (self.size, self.total)), bsize=self.block if self._blocked else 1)

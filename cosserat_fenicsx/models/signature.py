@@ -59,11 +59,8 @@ class Signature:
 
     @classmethod
     def of(cls, scene, layout, *, formulation, degree, points=None, model="spatial"):
-        """The signature of a scene on a layout, for an admissible model; `formulation` is a `Formulation` or its name.
-
-        Raises:
-            SceneError: an unknown formulation, a degree outside 1..4, or an infinite stiffness that the formulation
-                does not allow.
+        """The signature of a scene on a layout, for an admissible model, or a SceneError: an unknown formulation (a
+        `Formulation` or its name), a degree outside 1..4, or an infinite stiffness that the formulation does not allow.
         """
         return _signature(scene, layout, formulation, degree, points, model)
 

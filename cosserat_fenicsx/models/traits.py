@@ -20,17 +20,10 @@ _NOTHING, _TRIED = 1e-9, 3
 
 @dataclass(frozen=True)
 class Traits:
-    """Properties of a virtual work.
-
-    Attributes:
-        dead: depends on no position, rotation or velocity.
-        known_force: its force does not depend on them; its moment may.
-        rates: depends on velocities.
-        turns: is invariant under a common rotation of data and state, so that a model may use components along other
-            axes.
-        flat: where its vectors lie in a plane (axial ones along the normal), so does its force (and its moment along
-            the normal).
-    """
+    """Properties of a virtual work: dead: depends on no position, rotation or velocity; known_force: its force does not
+    depend on them; its moment may; rates: depends on velocities; turns: is invariant under a common rotation of data
+    and state, so that a model may use components along other axes; flat: where its vectors lie in a plane (axial ones
+    along the normal), so does its force (and its moment along the normal)."""
 
     dead: bool
     known_force: bool

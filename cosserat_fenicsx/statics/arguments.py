@@ -10,11 +10,7 @@ from cosserat_fenicsx.scene.statical import check_no_mechanism
 
 
 def check_arguments(scene, tol, elements, bound=NAMES, *, owner="solve"):
-    """Refuse arguments of `solve`, or of another function of static scenes (`owner`), outside their range.
-
-    Raises:
-        SceneError: naming the argument, its value and what was expected.
-    """
+    """Refuse (SceneError) arguments of `solve`, or of another function (`owner`) of static scenes, out of their range."""
     if not isinstance(scene, Scene):
         hint = ", as in read(file).scene" if hasattr(scene, "scene") else ""
         raise SceneError(f"scene is a {type(scene).__name__}: expected a Scene{hint}")

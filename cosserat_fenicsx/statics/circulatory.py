@@ -37,10 +37,8 @@ def conservative_along(path):
 
 
 class CirculatoryPart:
-    """Exterior derivative d omega of the virtual work omega of a scene's loads, see `models.circulatory`.
-
-    Matrices have the numbering of the spatial model's second variation; `model` is a loaded `CirculatoryModel`.
-    """
+    """Exterior derivative d omega of the virtual work omega of a scene's loads, by a loaded `CirculatoryModel`;
+    matrices have the numbering of the spatial model's second variation."""
 
     def __init__(self, model):
         self._model = model
@@ -86,16 +84,9 @@ _PER_REQUESTED, _EXTRA = 4, 12
 
 
 def static_bifurcations(slack, K, count):
-    """Changes mu of the load factor, from the state, at which the linearised second variation K - mu slack is singular.
-
-    Args:
-        slack: the decrease of the second variation per unit of load factor; K: the second variation at the state. Both
-            are pairs (symmetric part, skew-symmetric part) of PETSc matrices with the same numbering.
-        count: largest number of load factors to return.
-
-    Returns:
-        (1/mu (n,), descending; null vectors as PETSc vectors), n <= count.
-    """
+    """Changes mu of the load factor, from the state, at which the linearised second variation K - mu slack is singular:
+    (1/mu (n,), descending; null vectors as PETSc vectors), n <= count. Both K and slack, its decrease per unit of load
+    factor, are pairs (symmetric part, skew-symmetric part) of PETSc matrices with the same numbering."""
     A, B = (symmetric.copy() for symmetric, _ in (slack, K))
     for total, (_, skew) in ((A, slack), (B, K)):
         total.axpy(1.0, skew, PETSc.Mat.Structure.DIFFERENT)

@@ -129,13 +129,9 @@ def _check_pairs(buckling, parameter, relative, pairs):
 
 
 class Energies:
-    """The second variation along modes at the state of a `Problem`, supports and joints included.
-
-    Args:
-        problem: the `Problem`, in space.
-        modes: each (N, 6) displacements and rotations of all nodes in the scene's order, inertial, dimensionless.
-        resistance: see `Part`; None for modes that satisfy all constraint equations.
-    """
+    """The second variation along modes at the state of a `Problem` in space, supports and joints included; modes: each
+    (N, 6) displacements and rotations of all nodes in the scene's order, inertial, dimensionless; resistance: see
+    `Part`, None for modes that satisfy all constraint equations."""
 
     def __init__(self, problem, modes, resistance=None):
         model = problem.model

@@ -24,13 +24,8 @@ _RELEASED = (
 
 @dataclass(eq=False)
 class Followed:
-    """How a leg is followed.
-
-    Attributes:
-        leg: the `Leg`; None of a scene without stages.
-        scene: without the state at its begin; load_factors, free: see `Tracing.along`.
-        choice: of the model; follow: arguments of `Follower`.
-    """
+    """How a `Leg` (None of a scene without stages) is followed: scene, without the state at its begin; load_factors and
+    free of `Tracing.along`; choice of the model; arguments of `Follower`."""
 
     leg: Leg | None
     scene: Scene
@@ -41,14 +36,9 @@ class Followed:
 
 
 class Legs:
-    """Follows the legs of a scene, one after another, on meshes.
-
-    Args:
-        scene: the scene; legs: `Followed`, in order; known: {stage: `Path`} of legs that were followed before.
-        discretised: arguments of `solvers_of`; bar: a `Progress`; prepare: called with every new `Path`.
-        until: see `solve`. in_order: whether points have to be computed in their order; simple: whether points may be
-            corrected from a coarser mesh.
-    """
+    """Follows the `Followed` legs of a scene, one after another, on meshes; known: {stage: `Path`} of legs that were
+    followed before; prepare: called with every new `Path`; in_order: whether points have to be computed in their order;
+    simple: whether they may be corrected from a coarser mesh."""
 
     def __init__(self, scene, legs, discretised, bar, prepare, *, until, in_order, simple, known):
         self._scene, self._legs, self._discretised, self._bar = scene, legs, discretised, bar

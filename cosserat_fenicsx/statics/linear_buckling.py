@@ -118,14 +118,10 @@ def buckling(
 
 
 def _critical(scene, layout, count, load_factor, tol, degree, comm):
-    """The result on one mesh.
-
-    Returns:
-        Changes of the load factor (n,), the lengths of boundary layers or None, the `Equilibrium`, shapes (m, N, 6),
-        relative errors (2, n) of bounded stiffnesses and of rounding, whether the loads have a potential, and the
-        largest load factor that is considered.
-        With a potential n = m; else n = m + 1, and the bound comes first.
-    """
+    """The result on one mesh: changes of the load factor (n,), the lengths of boundary layers or None, the
+    `Equilibrium`, shapes (m, N, 6), relative errors (2, n) of bounded stiffnesses and of rounding, whether the loads
+    have a potential, and the largest load factor considered. With a potential n = m; else n = m + 1, and the bound
+    comes first."""
     with (
         solvers_of(scene, layout, degree=degree, comm=comm) as (problem, newton, stability),
         circulatory_part(scene, layout, degree, comm) as circulatory,
@@ -238,12 +234,8 @@ def _decrease(ahead, behind, change):
 
 def _extent(model, moved, slope, unit):
     """The step of the load factor for difference quotients, and its largest change with physical critical loads;
-    infinite where no rod bears the loads.
-
-    Args:
-        moved: (step) -> fields at the Gauss points of the state there, see `Snapshots.snapshot`.
-        slope: (owned unknowns,) derivative of the unknowns by the load factor; unit: size of the loads.
-    """
+    infinite where no rod bears the loads. moved: (step) -> fields at the Gauss points of the state there; slope:
+    derivative of the owned unknowns by the load factor; unit: size of the loads."""
     fastest = max(model.largest(slope), 1e-200)  # rods without extension do not move
     step = min(_MOVED / fastest, 1 / unit)
     rates = (moved(step) - moved(-step)) / (2 * step)
@@ -284,17 +276,12 @@ class Quotients(NamedTuple):
 
 
 def quotients(problem, part, slack, vectors, small):
-    """The `Quotients` of modes.
+    """The `Quotients` of modes (PETSc vectors); part: assembled at the state; slack: the decrease of the second
+    variation per unit of load factor; small: relative rounding errors below this may stay.
 
     The entries of K are as large as the stiffnesses against stretch and shear, and their rounding may exceed by far the
     stiffness of a slender rod in bending. Where it is not small, energies are computed from small strains instead; the
     errors of the quotients are then the squares of the modes' errors.
-
-    Args:
-        problem: a `Problem`; part: the `Part` of its second variation, assembled at the state.
-        slack: the decrease of the second variation per unit of load factor.
-        vectors: modes, PETSc vectors in their numbering.
-        small: relative rounding errors below this may stay.
     """
     if not vectors:
         return Quotients(*(np.empty(0),) * 4)

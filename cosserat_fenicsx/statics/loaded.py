@@ -24,16 +24,10 @@ Place = namedtuple("Place", "array places which")
 
 
 class Loaded(Pointers):
-    """A problem of its own on one mesh, with what C needs to expand its states.
+    """A problem of its own on one mesh, with what C needs to expand its states (`c`, the `mesh` of chain.h).
 
-    Args:
-        solvers: the new problem, its Newton solver and its `NegativeModes`; scene, layout: to load.
-        EI: N m^2, of the units, which then depend on no case.
-        load_factor: of all cases; iterations: of Newton's method in a step.
-
-    Attributes:
-        c: the `mesh` of chain.h.
-        turned: the largest angle of `surely_resolved`.
+    EI, N m^2, is that of the units, which then depend on no case; load_factor: of all cases; iterations: of Newton's
+    method in a step; turned: the largest angle of `surely_resolved`.
     """
 
     def __init__(self, solvers, scene, layout, EI, load_factor, *, iterations):

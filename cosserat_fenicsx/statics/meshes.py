@@ -64,11 +64,8 @@ _FIRST = FirstMesh()
 
 @per_scene
 def meshes_for(scene, degree, tol, many):
-    """The first mesh for a tolerance; and, where it is coarser than usual, the usual one, else None.
-
-    `many`: whether the path has so many points that the first mesh should suffice for them; else all are also computed
-    on one of elements half as long.
-    """
+    """The first mesh for a tolerance; and, where it is coarser than usual, the usual one, else None; many: whether the
+    path has so many points that the first mesh should suffice for them."""
     usual = first_layout(scene, degree)
     if not 1 <= degree <= 4 or not all(rod.uniform for rod in scene.rods) or not _acts_evenly(scene):
         return usual, None
@@ -87,11 +84,9 @@ def meshes_for(scene, degree, tol, many):
 
 @per_scene
 def resolving_turns(scene, layout, largest):
-    """A mesh with elements that turn by little where prescribed rotations or moments turn a rod by many radians, at
-    the largest load factor in size; None where `layout` is one.
-
-    On others the path may be lost: a P4 element that turns by more than half a turn has equilibria of its own.
-    """
+    """A mesh with elements that turn by little where prescribed rotations or moments turn a rod by many radians, at the
+    largest load factor in size; None where `layout` is one. (A P4 element that turns by more than half a turn has
+    equilibria of its own.)"""
     turns, moments = {}, {}
     for x in (*scene.supports, *scene.loads):
         if x.station is not None:
@@ -109,14 +104,8 @@ def resolving_turns(scene, layout, largest):
 
 
 def turning_in_law(scene, layout, load_factors, elements=None):
-    """The mesh, with elements that turn by at most a radian without stress (`Action.in_law`), for load factors.
-
-    Args:
-        elements: those of a given mesh, which stays.
-
-    Raises:
-        SceneError: more than a radian on a given mesh, or a rod that has no length left without stress.
-    """
+    """The mesh, with elements that turn by at most a radian without stress (`Action.in_law`), for load factors; a
+    SceneError where those of a given mesh (`elements`) turn by more, or a rod has no length left without stress."""
     if not scene.acts_in_law:
         return layout
     times = {t for action in scene.loads if action.in_law for t in sample_times(action, scene.horizon)}
@@ -309,13 +298,9 @@ def with_turns(scene, path):
 
 
 def surely_resolved(scene, layout, degree):
-    """Bounds with which the mesh surely resolves boundary layers, half-waves of buckling and turns, without a look at
-    its elements; nor do moments then turn a rod by many radians.
-
-    Returns:
-        (longest element l, m; most): |n| (l/LONGEST_IN_LAYER)^2 is at most the least EI, and |m| l at most `most` times
-        the least of EI and GJ.
-    """
+    """(longest element l, m; most): bounds with which the mesh surely resolves boundary layers, half-waves of buckling
+    and turns, without a look at its elements: |n| (l/LONGEST_IN_LAYER)^2 is at most the least EI, and |m| l at most
+    `most` times the least of EI and GJ; nor do moments then turn a rod by many radians."""
     longest = layout.sizes(scene).max()
     most = min(_GRADING.turned, degree / 2)
     applied = 2 * sum(hasattr(load, "moment") for load in scene.loads)
@@ -372,12 +357,8 @@ def loose_edges(path, edges):
 
 def balanced(fine, coarse, above):
     """A layout that, with all elements halved, has the target error, equidistributed over the elements; None where
-    uniform refinement does as well.
-
-    Args:
-        fine, coarse: Paths with the same points; the mesh of `fine` is that of `coarse` with all elements halved.
-        above: the estimated error of `fine` over the target error.
-    """
+    uniform refinement does as well. The mesh of `fine` is that of `coarse` with all elements halved; above: the
+    estimated error of `fine` over the target error."""
     layout, order = coarse.layout, coarse.degree + 1
     if sum(fine.elements) * above ** (1 / order) < _GRADING.many:
         return None
@@ -429,26 +410,14 @@ def _round_up(number):
 
 
 def until_two_meshes_agree(owner, scene, on_mesh, tol, *, most, elements, degree, advice, progress, comm, gains=None):
-    """Solve an eigenproblem on successively halved meshes until the results of two of them agree.
+    """Solve an eigenproblem on successively halved meshes until the results of two of them agree to `tol`, relative:
+    (what `on_mesh` returned, estimated relative errors (n,) or NaN).
 
-    Args:
-        owner: name of the computation.
-        scene: the scene.
-        on_mesh: a function of a layout that returns a tuple: the numbers to compare (n,), which may be complex, the
-            lengths of boundary layers (see `layers_of`) or None, and further results.
-        tol: largest relative difference.
-        most: elements per rod of the last mesh; elements: those of a given mesh, or None.
-        degree, advice: for error messages.
-        progress, comm: see `MeshProgress`.
-        gains: where the error is estimated by the gain of a halving, of order 2 p, instead of by the difference of two
-            meshes, which is larger: a function of what `on_mesh` returned to the largest gain that is assumed, as a
-            power of 2; else None.
-
-    Returns:
-        (what `on_mesh` returned, estimated relative errors (n,) or NaN).
-
-    Raises:
-        NotConverged: the accuracy is not reached, or two meshes in a row cannot be solved.
+    on_mesh: of a layout, returns a tuple: the numbers to compare (n,), which may be complex, the lengths of boundary
+    layers (see `layers_of`) or None, and further results. most: elements per rod of the last mesh; elements: those of a
+    given mesh, or None. gains: where the error is estimated by the gain of a halving, of order 2 p, instead of by the
+    difference of two meshes, which is larger: of what `on_mesh` returned, the largest gain that is assumed, as a power
+    of 2. Raises NotConverged.
     """
     layout = turning_in_law(scene, Layout.of(scene, elements or FIRST_ELEMENTS), [1.0], elements)
     coarse, best, worse = None, math.inf, 0

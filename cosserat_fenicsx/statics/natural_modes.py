@@ -152,11 +152,7 @@ def admit(owner, scene, damped):
 
 
 def at_state(scene, layout, degree, count, load_factor, damped, start):
-    """The `Modes` at one state on one mesh, on this rank alone, and the state for another start.
-
-    Args:
-        start: see `_loaded`; others: see `modes`.
-    """
+    """The `Modes` at one state on one mesh, on this rank alone, and the state for another start (see `_loaded`)."""
     rotation = _rotation(scene)
     if damped is None and (rotation is not None or _slowed(scene)):
         damped = True
@@ -191,11 +187,7 @@ def _at_kinks(scene):
 
 
 def _rotation(scene):
-    """The `Centrifugal` of a scene, or None.
-
-    Raises:
-        SceneError: several; a load, or what resists velocities, with a vector across the axis.
-    """
+    """The `Centrifugal` of a scene, or None; a SceneError for several, or for a vector across the axis in what acts."""
     found = [x for x in scene.loads if x.of_inertia]
     if not found:
         return None
@@ -298,15 +290,12 @@ def _below_free(squares, negative):
 
 @contextlib.contextmanager
 def _loaded(scene, layout, load_factor, degree, comm, loaded, start=None):
-    """Context manager that gives the problem, in equilibrium at a load factor, and its `NegativeModes`.
+    """Context manager that gives the problem, in equilibrium at a load factor, and its `NegativeModes`; loaded: whether
+    the reference is no equilibrium; start: (r, q) and contact force next to the equilibrium, on that mesh; None to
+    follow the path of load control.
 
     A mechanism that its loads stabilise has no path from the unloaded state: its equilibrium is computed with added
     constraints (`without_mechanism`), then corrected without them.
-
-    Args:
-        loaded: whether the reference is no equilibrium.
-        start: (r, q) and contact force of all nodes and Gauss points next to the equilibrium, as of a `Record`, on
-            that mesh; None to follow the path of load control.
     """
     where = "next to a point of the path"
     if start is None:

@@ -23,13 +23,8 @@ _PLACES = {"position": 0, "displacement": 0, "rotation_angle": 3, "force": 7, "m
 
 
 class Pair(Pointers):
-    """Two `Loaded` meshes, the second of elements half as long.
-
-    Args:
-        meshes: both; scene: that is loaded in them.
-        queries: with name, rod, share, component and kind, see `cases.Query`.
-        tol: largest estimated error; load_factor: of all cases; near: largest motion of a correction.
-    """
+    """Two `Loaded` meshes, the second of elements half as long, and a scene that is loaded in them; queries: see
+    `cases.Query`; tol: largest estimated error; near: largest motion of a correction."""
 
     def __init__(self, meshes, scene, queries, tol, load_factor, *, near):
         super().__init__()
@@ -148,14 +143,9 @@ class Pair(Pointers):
     # -- how numbers depend on those of a case ------------------------------------------------------------------------
 
     def depend(self, at, steps, other):
-        """Find how the numbers depend on those of a case; whether that describes another scene.
-
-        Args:
-            at: (parameters,) of the scene that is loaded.
-            steps: [(index, change of the parameter, its scene)] of those that do not change the law.
-            other: (parameters of another scene, the scene, its K and J (1, rods, 3), N and N m^2, or None where the law
-                is the same).
-        """
+        """Find how the numbers depend on those (parameters,) of the loaded scene; whether that describes another scene:
+        other = (its parameters, the scene, its K and J (1, rods, 3), N and N m^2, or None where the law is the same);
+        steps: [(index, change of the parameter, its scene)] of those that do not change the law."""
         before = [[array.copy() for array in mesh.read] for mesh in self.meshes]
         fixed = [mesh.fixed() for mesh in self.meshes]
         derivatives = [[np.zeros((len(at), array.size)) for array in arrays] for arrays in before]
@@ -251,11 +241,8 @@ class Pair(Pointers):
         return np.concatenate(parts, axis=1)
 
     def run(self, count, numbers=None):
-        """Solve cases in C, with their `numbers`, or as the scene that is loaded.
-
-        Returns:
-            (which are decided (cases,), values and estimated errors (cases, queries)).
-        """
+        """Solve cases in C, with their `numbers`, or as the scene that is loaded: (which are decided (cases,), values
+        and estimated errors (cases, queries))."""
         c, from_buffer = self._cases, self._ffi.from_buffer
         numbers = self._empty if numbers is None else np.ascontiguousarray(numbers)
         undecided, (found, errors) = np.zeros(count, np.int32), np.zeros((2, count, len(self._queries)))

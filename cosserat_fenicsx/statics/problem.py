@@ -25,18 +25,11 @@ CHANGE = 1e-4
 
 
 class Problem(Equations):
-    """Residual and tangent of a model in statics.
+    """Residual and tangent of a model in statics; see `Equations`.
 
-    Args:
-        model: see `models.base.RodModel` for the protocol.
-
-    Attributes:
-        see `Equations`.
-        load_factor: factor of loads and prescribed motions; while `begins`, the factor of permanent loads.
-        begins: whether permanent loads are still being applied, with a factor from 0 to 1, before all other loads.
-        fields: the `PackedExpression` of `CompiledForms.fields`; None where there is none, or with several ranks.
-        load_norm: Euclidean norm of the dead loads at load factor 1, dimensionless.
-        sweep: the `Sweep` that finds points in C, once it was asked for.
+    load_factor: of loads and prescribed motions; while `begins`, that of permanent loads, from 0 to 1, before all
+    others. fields: the `PackedExpression` of `CompiledForms.fields`, or None; load_norm: Euclidean norm of the dead
+    loads at load factor 1, dimensionless; sweep: the `Sweep` that finds points in C, once it was asked for.
     """
 
     ties_class, sweep = TieRows, None
@@ -191,12 +184,9 @@ class Problem(Equations):
         return found
 
     def assemble_data_derivative(self, form, clamped, vector):
-        """The change of the residual at the state, without supports and joints, with data and with clamped nodes.
-
-        Args:
-            form: see `DataDerivative`; clamped: change of the model's state array at clamped nodes, zero elsewhere.
-            vector: of the solver, for the result.
-        """
+        """The change of the residual at the state, without supports and joints, with data (form: see `DataDerivative`)
+        and with clamped nodes (clamped: change of the model's state array there, zero elsewhere), in a vector of the
+        solver."""
         self._local[:] = 0.0
         Packed(form, (), ()).add_to_vector(self._local)
         if clamped.any():
@@ -233,12 +223,8 @@ _ALIKE = 1.5
 
 
 class Promoted(Exception):
-    """A planar solution that has to be continued with the spatial model.
-
-    Args:
-        reason: a sentence for `Path.why`.
-        between: the two load factors between which negative modes appeared, where the mesh is too coarse to be sure of
-            them; else None.
+    """A planar solution that has to be continued with the spatial model; reason: a sentence for `Path.why`; between:
+    the load factors between which negative modes appeared, where the mesh is too coarse to be sure of them; else None.
     """
 
     def __init__(self, reason, between=None):
@@ -271,10 +257,8 @@ def make_solvers(comm, signature):
 
 @contextlib.contextmanager
 def solvers_of(scene, layout, *, formulation="mixed", degree=4, points=None, comm=None, model="spatial"):
-    """Context manager that gives the loaded `Problem`, its Newton solver and its `NegativeModes` for a scene on a mesh.
-
-    No other caller uses them within the context; afterwards another one may, so that results must not refer to them.
-    """
+    """Context manager that gives the loaded `Problem`, its Newton solver and its `NegativeModes` for a scene on a mesh;
+    afterwards another caller may use them, so that results must not refer to them."""
     comm = communicator(comm)
     signature = Signature.of(scene, layout, formulation=formulation, degree=degree, points=points, model=model)
     key, large = ("equilibrium", signature), signature.unknowns > _LARGE

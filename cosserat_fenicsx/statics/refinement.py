@@ -69,19 +69,13 @@ class _TooCoarse(Exception):
 
 
 def refine(trace, correct, scene, layout, tol, bound, degree, usual=None):
-    """A path whose estimated errors are at most `tol`.
+    """A path whose estimated errors are at most `tol`, relative, from the first mesh on; bound: the user's criteria
+    among those that it bounds.
 
-    Args:
-        trace: (layout, path or None) -> path followed from the unloaded state, through the points of the given path.
-        correct: (layout, path) -> the points of the path corrected on this mesh; None where that fails.
-        scene: the scene; layout: the first mesh.
-        usual: for a first mesh coarser than usual, the mesh to start again with unless the path is plain, see `_plain`.
-        tol: largest estimated error, relative; bound: the user's criteria among those that it bounds.
-        degree: of the elements.
-
-    Raises:
-        NotConverged: two meshes in a row cannot be solved, or the accuracy is not reached.
-        Promoted: the path leaves the plane; the spatial model is needed.
+    trace: (layout, path or None) -> path followed from the unloaded state, through the points of the given path;
+    correct: (layout, path) -> its points corrected on this mesh, None where that fails; usual: for a first mesh coarser
+    than usual, the mesh to start again with unless the path is plain, see `_plain`. Raises NotConverged where two
+    meshes in a row cannot be solved or the accuracy is not reached, Promoted where the path leaves the plane.
     """
     search = _Search(trace, correct, scene, tol, bound, degree, usual)
     try:
@@ -103,12 +97,8 @@ def refine(trace, correct, scene, layout, tol, bound, degree, usual=None):
 
 
 class _Search:
-    """State of the search for a mesh.
-
-    Attributes:
-        whole: the complete path on the last mesh on which all points were computed, or None.
-        accurate: the last path with accurate positions whose events differ from those of the mesh before; or None.
-    """
+    """State of the search for a mesh; whole: the complete path on the last mesh on which all points were computed, or
+    None; accurate: the last path with accurate positions whose events differ from those of the mesh before, or None."""
 
     def __init__(self, trace, correct, scene, tol, bound, degree, usual):
         self._trace, self._correct, self._scene, self._tol, self._degree = trace, correct, scene, tol, degree

@@ -62,11 +62,8 @@ def _numbers(value):
 
 
 def parameters_of(scene, given, critical=False):
-    """The `Parameter`s of a scene from one or several names or parameters; `critical`: of critical loads.
-
-    Raises:
-        SceneError: no such parameter, or loads whose derivatives are not known.
-    """
+    """The `Parameter`s of a scene from one or several names or parameters (critical: of critical loads), or a
+    SceneError: no such parameter, or loads whose derivatives are not known."""
     given = [given] if isinstance(given, str) or not hasattr(given, "__iter__") else given
     found = [parameter_of(scene, each) for each in given]
     if path_dependent(scene):
@@ -96,15 +93,8 @@ def _scenes_near(scene, parameter):
 
 
 class Direct:
-    """The direct method on one problem and path.
-
-    Args:
-        solvers: see `solvers_of`; scene, layout: of the loaded problem.
-        parameters: the `Parameter`s; scenes: see `_scenes_near`, for each.
-
-    Attributes:
-        points: [(load factor, numbers, `Record`)] of the states where derivatives are taken.
-    """
+    """The direct method on one problem and path; scenes: see `_scenes_near`, for each parameter; points: [(load factor,
+    numbers, `Record`)] of the states where derivatives are taken."""
 
     def __init__(self, solvers, scene, layout, parameters, scenes):
         self.problem, self.newton, self.stability = self.solvers = solvers

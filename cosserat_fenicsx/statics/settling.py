@@ -41,13 +41,10 @@ _BALANCED = 1e-6  # residual force of a node at equilibrium, over the norm of th
 
 def stages_from(spring, way="fast"):
     """The stages of a start on the axis: tuples (stiffness of the wall, stiffness of a spring to its axis, both over
-    the wall's own; whether the rod moves as in a viscous fluid, see `_relax`).
-
-    Args:
-        spring: stiffness of the first spring, with which the loads move the rod by about the clearance.
-        way: "fast"; "gentle", by small steps; "relaxed", for a rod that is compressed beyond its buckling load; or
-            "helix", for a rod that starts buckled, at the wall: as "relaxed", without the spring to the axis.
-    """
+    the wall's own; whether the rod moves as in a viscous fluid, see `_relax`). spring: the first one, with which the
+    loads move the rod by about the clearance. way: "fast"; "gentle", by small steps; "relaxed", for a rod that is
+    compressed beyond its buckling load; or "helix", for a rod that starts buckled, at the wall: as "relaxed", without
+    the spring to the axis."""
     least = DECADES[0][0]
     spring = min(max(spring, _SOFTEST), least / _TAKES_OVER)
     wall, (fades, step) = _TAKES_OVER * spring, _STEPS if way == "fast" else _SMALL_STEPS
@@ -64,23 +61,14 @@ def stages_from(spring, way="fast"):
 
 
 def settle(problem, walls, clearance, rounding, stages, careful=(), on_stage=None, hold=0.0):
-    """Bring a problem to equilibrium at its walls, from its state.
+    """Bring a problem to equilibrium at its walls, from its state; returns the number of Newton steps. Raises
+    NotConverged where a stage was not solved, or the result is no equilibrium.
 
-    Args:
-        problem: a `Problem` at its load factor.
-        walls: the `Stage`s of the scene's walls; they are left as in the last stage.
-        clearance: smallest distance from the axis at which the rod touches, in the model's unit of length.
-        rounding: residual force of a node that rounding may leave, in the model's unit of force.
-        stages: see `stages_from`. careful: indices of the stages to solve more precisely.
-        on_stage: called with the index of each solved stage.
-        hold: for a rod that is free, or almost free, to turn as a whole, such as a helix in a straight tube: stiffness,
-            over the wall's own, of springs to the last position. They keep the tangent regular, and vanish at rest.
-
-    Returns:
-        int: the number of Newton steps.
-
-    Raises:
-        NotConverged: a stage was not solved, or the result is no equilibrium.
+    walls: the `Stage`s of the scene's walls, left as in the last stage; clearance: smallest distance from the axis at
+    which the rod touches, in the model's unit of length; rounding: residual force of a node that rounding may leave, in
+    the model's unit; careful: indices of the stages to solve more precisely; on_stage: called with the index of each;
+    hold: for a rod that is free, or almost free, to turn as a whole, such as a helix in a straight tube: stiffness,
+    over the wall's own, of springs to the last position, which keep the tangent regular and vanish at rest.
     """
     newton = LimitedNewton(problem, max(_LONGEST * clearance, _OF_LENGTH), _WIDEST)
     for k, (stiffness, spring, viscous) in enumerate(stages):
@@ -111,15 +99,9 @@ def _solve_stage(newton, enough, name, walls, hold):
 
 
 def converge(newton, enough, before=None):
-    """Take Newton steps, and shares of them where the contact alternates between two states.
-
-    Args:
-        newton: a `LimitedNewton`; enough: size of a full step that ends it, in the model's unit of length.
-        before: called before every step.
-
-    Returns:
-        str: why it failed, "" where it converged.
-    """
+    """Take Newton steps, and shares of them where the contact alternates between two states; enough: size of a full
+    step that ends it, in the model's unit of length; before: called before every step. Returns why it failed, "" where
+    it converged."""
     moved, stalled = math.inf, 0
     for _ in range(_MOST):
         obey()

@@ -43,14 +43,8 @@ def stiffness(problem):
 
 
 class Bodies:
-    """The masses of the nodes, by Lobatto quadrature with the nodes as points.
-
-    Args:
-        model: a spatial model at the state; unit: of mass per length, kg/m.
-
-    Attributes:
-        size: of the matrices, which have one diagonal 6 x 6 block per node.
-    """
+    """The masses of the nodes of a spatial model at the state, by Lobatto quadrature with the nodes as points; unit: of
+    mass per length, kg/m; size: of the matrices, which have one diagonal 6 x 6 block per node."""
 
     def __init__(self, model, unit):
         scene, layout, scales, p = model.scene, model.layout, model.scales, model.signature.degree
@@ -119,15 +113,10 @@ def hat(a):
 
 
 def resisting(scene, layout, degree, comm, rq, load_factor, time, bodies, rotation=None):
-    """(C, K): what resists velocities, and what it adds to K in the frame of a rotation.
-
-    Args:
-        rq: (N, 7) state of all nodes, dimensionless; time: the unit, s; bodies: the `Bodies`.
-        rotation: (w (3,), rad per unit of time; positions (N, 3) from a point of its axis, dimensionless), or None.
-
-    Raises:
-        SceneError: it drives the rods in a steady rotation, whose equilibrium is another one then.
-    """
+    """(C, K): what resists velocities, and what it adds to K in the frame of a rotation (w (3,), rad per unit of time;
+    positions (N, 3) from a point of its axis, dimensionless) or None; rq: (N, 7) state of all nodes, dimensionless;
+    time: the unit, s. A SceneError where it drives the rods in a steady rotation, whose equilibrium is another one
+    then."""
     signature = Signature.of(scene, layout, formulation="mixed", degree=degree)
     with PROBLEMS.lend(("resisting", signature), comm, lambda: ResistingModel(comm, signature), NotConverged) as model:
         model.load(scene, layout, time)

@@ -22,14 +22,9 @@ _LARGEST_ROW = PETSc.NormType.NORM_INFINITY
 
 
 class NegativeModes(Called):
-    """Counts the negative eigenvalues of the second variation at the state of a `Problem`.
-
-    Attributes:
-        parts: the `Part`s of the second variation.
-        c: the C structure `second_variation`.
-        sideways: of the last count, the number of negative eigenvalues of motions out of the plane; 0 in space.
-        logarithm: of the absolute value of the determinant, of the last count; NaN with a neutral motion.
-    """
+    """Counts the negative eigenvalues of the second variation at the state of a `Problem`; sideways, logarithm: of the
+    last count, those of motions out of the plane (0 in space), and of the absolute value of the determinant (NaN with a
+    neutral motion)."""
 
     def __init__(self, problem):
         super().__init__()
@@ -71,13 +66,9 @@ class NegativeModes(Called):
 
 
 class Part:
-    """A diagonal block of the second variation, decoupled from the others: one of its model's `second_variations`.
-
-    Attributes:
-        variation: the model's `SecondVariation`; form: its `Packed` form.
-        elimination, interface: for counts; the latter None where nothing is to be added.
-        resistance: (tied unknowns,) the last scales of the springs in place of supports and joints.
-    """
+    """A diagonal block of the second variation, decoupled from the others: one of its model's `second_variations`, with
+    its `Packed` form; elimination, interface: for counts; resistance: (tied unknowns,) the last scales of the springs
+    in place of supports and joints."""
 
     resistance = None
 
@@ -227,11 +218,9 @@ def oriented(model, vectors):
 
 
 def orienting(shapes):
-    """A unitary matrix (m, m) that makes the shapes (m, N, 3) of one eigenvalue independent of the eigensolver.
-
-    The node with the largest displacement then moves along the first inertial axis possible, in the positive
-    direction, in the first shape alone; likewise for the remaining shapes. This fixes the sign of a single shape.
-    """
+    """A unitary matrix (m, m) that makes the shapes (m, N, 3) of one eigenvalue independent of the eigensolver: the
+    node with the largest displacement moves along the first inertial axis possible, in the positive direction, in the
+    first shape alone; likewise for the remaining shapes. This fixes the sign of a single shape."""
     whole = np.eye(len(shapes))
     for k in range(len(shapes)):
         moved = np.einsum("mni,mni->n", shapes[k:], shapes[k:].conj()).real
@@ -262,14 +251,11 @@ _TWIST = 1e-6
 
 
 def shapes_of(vectors, values, rows, length):
-    """(n, N, 6) displacements (m) and rotations (rad) of all nodes, of eigenvectors (n, size).
+    """(n, N, 6) displacements (m) and rotations (rad) of all nodes, of eigenvectors (n, size) in the numbering of the
+    second variation, with their eigenvalues in order; rows: see `RodModel.rows_of_nodes`; length: the model's unit, m.
 
     The largest displacement of each shape is 1, or its largest rotation times `length` where nothing is displaced.
     Shapes of a multiple eigenvalue are combined by `orienting`.
-
-    Args:
-        vectors: in the numbering of the second variation; values: (n,) their eigenvalues, in order.
-        rows: see `RodModel.rows_of_nodes`; length: the model's unit of length, m.
     """
     found, first = np.zeros((len(vectors), *rows.shape)), 0
     if len(vectors):

@@ -122,12 +122,8 @@ def _grows(calm):
 
 
 def _onset(path, at, k, ends, starts):
-    """The `Event` where a vibration begins to grow, or ceases to, between the points k and k + 1 of a path.
-
-    Args:
-        at: a function of a layout, a load factor and a start, see `at_state`; ends: load factors of both points;
-            starts: their states.
-    """
+    """The `Event` where a vibration begins to grow, or ceases to, between the points k and k + 1 of a path; at: see
+    `at_state`; ends, starts: load factors and states of both points."""
 
     def between(load_factor):
         share = (load_factor - ends[0]) / (ends[1] - ends[0])

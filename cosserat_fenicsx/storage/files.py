@@ -100,11 +100,9 @@ def read_checkpoint(file, seed=0):
 
 
 def unlike(memory, like, where=""):
-    """How the data of a checkpoint differ in structure from others, in words; None where they agree.
-
-    Every entry of `like` must be there: dicts, numbers and texts as such, and arrays of the same kind of numbers and
-    the same shape but for their first axis, since some grow during a computation.
-    """
+    """How the data of a checkpoint differ in structure from others, in words; None where they agree. Every entry of
+    `like` must be there: dicts, numbers and texts as such, and arrays of the same kind of numbers and the same shape
+    but for their first axis, since some grow during a computation."""
     for name, expected in like.items():
         what = f"{where}{name}"
         if name not in memory:

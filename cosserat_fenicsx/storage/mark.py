@@ -41,16 +41,10 @@ class NotMarked(Exception):
 
 
 def mark_of(value, where="", times=None):
-    """The mark of a value, equal for values that compute the same.
-
-    Args:
-        where: the name of the value, with which all places begin.
-        times: where functions of time are sampled, s, see `sample_times`; None where there is no time. With times,
-            objects of a class without declared fields are compared by their attributes.
-
-    Raises:
-        NotMarked: without times, a value that is none of numbers, texts, arrays, lists, dicts, functions, and
-            dataclasses of these (as the parts of scenes and of wells are).
+    """The mark of a value, equal for values that compute the same; where: its name, with which all places begin; times:
+    where functions of time are sampled, s, see `sample_times`; None where there is no time. With times, objects of a
+    class without declared fields are compared by their attributes; without, NotMarked for a value that is none of
+    numbers, texts, arrays, lists, dicts, functions, and dataclasses of these (as the parts of scenes and of wells are).
     """
     walk = _Walk(times)
     walk.into(where, value)

@@ -98,14 +98,8 @@ class Nowhere:
 
 
 class Store(Nowhere):
-    """A folder of one `Kind`. All ranks call; rank 0 writes, but for rows of each rank.
-
-    Args:
-        place: its name; comm: MPI communicator, or None for all ranks.
-
-    Attributes:
-        place: a `pathlib.Path`. head: the content of stored.json. tables: {name: `files.Table`}.
-    """
+    """A folder of one `Kind`, of all ranks of a communicator. All ranks call; rank 0 writes, but for rows of each rank.
+    place: a `pathlib.Path`; head: the content of stored.json; tables: {name: `files.Table`}."""
 
     #: Least time between checkpoints: in s, and as a multiple of the time of writing one.
     APART, SELDOM = 2.0, 50
@@ -118,15 +112,9 @@ class Store(Nowhere):
     # -- what the folder holds ---------------------------------------------------------------------------------------
 
     def make(self, asked, scene, duration):
-        """Make the folder for a new motion of a scene up to a duration (s), and lock it.
-
-        Args:
-            asked: {name: plain value}, entries of `head`.
-
-        Raises:
-            SceneError: it holds a computation, or files of the user's own that have the names of this one's; another
-                process writes to it, or it cannot be made.
-        """
+        """Make the folder for a new motion of a scene up to a duration (s), and lock it; asked: {name: plain value},
+        entries of `head`. A SceneError where it holds a computation, or files of the user's own that have the names of
+        this one's, where another process writes to it, or it cannot be made."""
         data = _data(lambda: to_data(scene))
         return self._made({**asked, "scene": data, **_marked(scene, mark.sample_times(duration))})
 
@@ -271,11 +259,8 @@ class Store(Nowhere):
     # -- rows that stand for themselves ------------------------------------------------------------------------------
 
     def begin(self, marked, as_data=None):
-        """Make the folder, or resume it where it holds the same computation; errors: see `make` and `compare`.
-
-        Args:
-            marked: the mark of all inputs; as_data: function that gives the arguments as data.
-        """
+        """Make the folder, or resume it where it holds the same computation; errors: see `make` and `compare`; marked:
+        the mark of all inputs; as_data: function that gives the arguments as data."""
         if self._from_first(lambda: holds(self.place)) != self.kind.what:
             return self._made({"scene": _data(as_data) if as_data else None, "mark": marked})
         self.open().hold()
@@ -307,11 +292,8 @@ class Store(Nowhere):
         return found
 
     def keep(self, row, result=()):
-        """Append a row, a dict, so that it survives the end of the process; `result`: the result so far.
-
-        Raises:
-            NotStored: it cannot be written; an OSError where every rank has rows of its own.
-        """
+        """Append a row, a dict, so that it survives the end of the process; result: so far. NotStored where it cannot
+        be written; an OSError where every rank has rows of its own."""
         if self.kind.each_rank:
             self._append(row)
         else:
@@ -369,11 +351,8 @@ class Store(Nowhere):
         self._apart = max(self.APART, self.SELDOM * (self._last - began))
 
     def memory(self, like=None, recall=None):
-        """The latest checkpoint of this rank whose rows are stored; with `recall`, the computation continues from it.
-
-        Args:
-            like: data of the same structure; recall: restores the data, and raises where they do not fit.
-        """
+        """The latest checkpoint of this rank whose rows are stored, of the structure of `like`; with `recall`, which
+        restores the data, and raises where they do not fit, the computation continues from it."""
         lost = []
         for name in (_LATEST, _START):
             whole, memory, why = self._read(name, like or {})

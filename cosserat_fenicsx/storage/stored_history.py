@@ -20,11 +20,7 @@ KIND = Kind(
 
 
 class StoredHistory(History):
-    """A `History` that keeps no states in memory. Rank 0 writes them, all ranks read them.
-
-    Attributes:
-        folder: the `pathlib.Path` of the folder with the file.
-    """
+    """A `History` that keeps no states in memory: rank 0 writes them to a folder, all ranks read them."""
 
     _computed = ()
 

@@ -82,11 +82,8 @@ def _in_worker(task, case):
 
 @contextlib.contextmanager
 def executor_of(task, workers, executor):
-    """The executor of a study, or None; one that is made for `workers` ends with it.
-
-    Raises:
-        SceneError: both are given, something that is no executor, or a task that new processes cannot import.
-    """
+    """The executor of a study, or None; one that is made for `workers` ends with it. A SceneError where both are given,
+    for something that is no executor, or a task that new processes cannot import."""
     if executor is None and not workers:
         yield None
         return
@@ -118,11 +115,8 @@ def executor_of(task, workers, executor):
 
 
 def by_executor(executor, task, cases, numbers):
-    """(number of a case, what `computed` gives) by an executor, as they are done; the rest is canceled at an exception.
-
-    Args:
-        numbers: of the cases to compute, an iterator.
-    """
+    """(number of a case, what `computed` gives) by an executor, as they are done; the rest is canceled at an exception;
+    numbers: an iterator of those to compute."""
     pending, done = {}, queue.SimpleQueue()  # `wait` would look at all that are pending, for each that is done
     try:
         while True:

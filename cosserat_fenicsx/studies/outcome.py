@@ -230,11 +230,7 @@ def _cell(value):
 
 
 def to_data(result):
-    """A task's result as data.
-
-    Raises:
-        SceneError: it is none of what a task may return.
-    """
+    """A task's result as data, or a SceneError where it is none of what a task may return."""
     if isinstance(result, dict):
         for name in result:
             if not isinstance(name, str):

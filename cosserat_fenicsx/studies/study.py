@@ -239,14 +239,8 @@ def _raise_first(own, troubles, found, store):
 
 
 def cases_of(cases):
-    """(list of dicts of arguments, {name: list of values} of their grid or None).
-
-    Args:
-        cases: an iterable of dicts; or a dict of lists of values, whose product is taken: the last name runs fastest.
-
-    Raises:
-        SceneError: they are something else, or there is none.
-    """
+    """(list of dicts of arguments, {name: list of values} of their grid or None), from an iterable of dicts, or a dict
+    of lists of values, whose product is taken: the last name runs fastest; else a SceneError."""
     if isinstance(cases, Mapping):
         grid = {_name(name): _values(f"cases['{name}']", values, "value") for name, values in cases.items()}
         if not grid:
@@ -309,16 +303,12 @@ _NEXT, _DONE, _FAILED = range(3)
 
 
 class TaskPool:
-    """Hands out the numbers below `count`, each to one rank, in ascending order.
+    """Hands out the numbers below `count`, each to one rank, in ascending order. Every rank makes it, iterates over it
+    until it ends, calls `meet`, and then `close`.
 
-    The numbers are counted in memory of rank 0 by one-sided operations of MPI, which it need not answer: it computes
-    as the others do. Ranks that share a computer, or a network with remote access to memory, do not wait for it; on
-    other networks a rank waits until rank 0 next enters MPI, which is the end of its task at the latest.
-
-    Every rank makes it, iterates over it until it ends, calls `meet`, and then `close`.
-
-    Args:
-        comm: MPI communicator; count: number of tasks.
+    The numbers are counted in memory of rank 0 by one-sided operations of MPI, which it need not answer: it computes as
+    the others do. Ranks that share a computer, or a network with remote access to memory, do not wait for it; on other
+    networks a rank waits until rank 0 next enters MPI, which is the end of its task at the latest.
     """
 
     def __init__(self, comm, count):

@@ -48,10 +48,8 @@ _CHANGED = (
 
 
 class ArcLength:
-    """Advances a `Track` in steps of arc length, by a `StepControl` and a `Locator`.
-
-    `on_event` is called with every `Crossing`; the continuation ends there where it returns True.
-    """
+    """Advances a `Track` in steps of arc length, by a `StepControl` and a `Locator`; `on_event` is called with every
+    `Crossing`, and the continuation ends there where it returns True."""
 
     def __init__(self, track, control, locator, on_event):
         self.track, self.control, self._locator, self._on_event = track, control, locator, on_event
@@ -63,16 +61,10 @@ class ArcLength:
         self._excused, self._excuses = False, 0
 
     def to(self, load_factor, *, first=None, on_step=None):
-        """Advance to the next point of the path with a load factor, solved at exactly that load factor.
-
-        Args:
-            load_factor: to land on.
-            first: the first `PathPoint` on a branch, which `Track.on_plane` has just found; None to stay on the path.
-            on_step: called with every accepted `PathPoint`, the last one included.
-
-        Returns:
-            bool: False where the steps became too small or too many; the track's `failure` gives the reason.
-        """
+        """Advance to the next point of the path with a load factor, solved at exactly that; first: the first
+        `PathPoint` on a branch, which `Track.on_plane` has just found; on_step: called with every accepted `PathPoint`,
+        the last one included. False where the steps became too small or too many: the track's `failure` gives the
+        reason."""
         track = self.track
         if first is None:
             self._set_out(load_factor)
@@ -226,10 +218,8 @@ class ArcLength:
         return self.track.length(between(a, b), self._weight)
 
     def _predict(self, step):
-        """Predictor (numbers, load factor) at the arc length `step` from the last point.
-
-        A polynomial through the last points with the tangent at the last one; carried fields (n) without the tangent.
-        """
+        """Predictor (numbers, load factor) at the arc length `step` from the last point: a polynomial through the last
+        points with the tangent at the last one; carried fields (n) without the tangent."""
         history = self.track.history
         here = history[-1]
         lengths = [self._length(a, b) for a, b in itertools.pairwise(history)]

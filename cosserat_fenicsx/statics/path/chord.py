@@ -46,19 +46,13 @@ _SEARCH = Search()
 
 
 class Chord:
-    """The segment of a path between two points, with the points computed on it so far.
+    """The segment of a path between two `PathPoint`s, with the points computed on it so far; the `Track` stands at a.
 
-    Args:
-        track: the `Track`, which stands at a.
-        a, b: the `PathPoint`s.
-        weight: of the load factor in the metric.
-        short: whether the segment is too short to lead from one path to another unnoticed.
-
-    Attributes:
-        dips: whether the determinant of the second variation almost vanishes between, more often than the number of
-            negative modes changes: two eigenvalues that change their signs together, in opposite directions, change
-            neither that number nor the determinant's sign.
-        varies: whether the determinant changes by more than a factor of `_SEARCH.varies`.
+    weight: of the load factor in the metric; short: whether it is too short to lead from one path to another unnoticed;
+    dips: whether the determinant of the second variation almost vanishes between, more often than the number of
+    negative modes changes (two eigenvalues that change their signs together, in opposite directions, change neither
+    that number nor the determinant's sign); varies: whether the determinant changes by more than a factor of
+    `_SEARCH.varies`.
     """
 
     dips = varies = False
@@ -133,14 +127,9 @@ class Chord:
         return _SEARCH.probes[int(np.flatnonzero(changes)[0])]
 
     def passes(self, place, *, turning):
-        """Whether the path passes smoothly through a coordinate, by points close to it on both sides.
-
-        Where an imperfect structure turns away before the bifurcation of the perfect one, these lie on two paths, or on
-        both sides of a limit point.
-
-        Args:
-            place: the coordinate; turning: whether the load factor has an extremum there.
-        """
+        """Whether the path passes smoothly through a coordinate, by points close to it on both sides; turning: whether
+        the load factor has an extremum there. Where an imperfect structure turns away before the bifurcation of the
+        perfect one, these lie on two paths, or on both sides of a limit point."""
         if self._short:  # points at these distances would differ by little more than rounding
             return True
         for apart in _SEARCH.beside:
@@ -159,11 +148,8 @@ class Chord:
         return (low or high)[-1], (high or low)[0]
 
     def root(self, value, near=None):
-        """The coordinate where a function of the path's points changes its sign; None where it does not.
-
-        Args:
-            value: the function, of a `PathPoint`.
-            near: expected coordinate of the root; then only the nearest known points and the ends are used.
+        """The coordinate where a function of the path's `PathPoint`s changes its sign; None where it does not. near:
+        its expected coordinate; then only the nearest known points and the ends are used.
 
         The root of the polynomial through the nearest values, among them those of the bracket, is iterated until two
         successive load factors agree. The equilibrium at the last root is not solved for, since its tangent would be

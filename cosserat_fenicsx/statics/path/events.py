@@ -44,17 +44,12 @@ ASIDE = "the path turns away just before the tangent becomes singular"
 
 @dataclass(frozen=True, eq=False)
 class Crossing:
-    """A limit point or bifurcation that was located.
+    """A limit point or bifurcation that was located: its `PathPoint`, interpolated between its neighbours, and place on
+    the chord (0 to 1).
 
-    Attributes:
-        kind: "limit" or "bifurcation".
-        point: the `PathPoint`, interpolated between its neighbours.
-        place: coordinate on the chord from the point before (0) to the point after (1).
-        direction: a change of the unknowns (entries that this rank owns): the tangent of the path at a limit point,
-            the mode at a bifurcation.
-        residual: see `Event`.
-        null: (nodes, 6) the null vector, see `BorderedNewton.response`.
-        partner: the direction of a second mode at the same load factor; None where there is none.
+    direction: a change of the owned unknowns: the tangent of the path at a limit point, the mode at a bifurcation;
+    residual: see `Event`; null: (nodes, 6) the null vector, see `BorderedNewton.response`; partner: the direction of a
+    second mode at the same load factor, or None.
     """
 
     kind: str
@@ -81,23 +76,13 @@ class Locator:
         self.track = track
 
     def between(self, a, b, load_factor, weight, *, probe=True, explained=True, short=False):
-        """The critical points and the requested load factor between two points.
+        """(landing, crossings) between two `PathPoint`s, the track at a: the first `PathPoint` with the load factor
+        after a, or None; the `Crossing`s up to there, in the order of the path.
 
-        Args:
-            a, b: the `PathPoint`s; the last accepted point of the track is a.
-            load_factor: to land on.
-            weight: of the load factor in the metric.
-            probe: whether to check for negative modes that appear and vanish between them.
-            explained: whether the number of negative modes must change as the critical points require.
-            short: whether the step is too short to lead to another path unnoticed.
-
-        Returns:
-            (landing, crossings): the first `PathPoint` with the load factor after a, or None; the `Crossing`s
-            up to there, in the order of the path.
-
-        Raises:
-            Lost: the point to land on was not found, negative modes appear and vanish between a and b, or their number
-                does not change as the critical points require.
+        weight: of the load factor in the metric; probe: whether to check for negative modes that appear and vanish
+        between them; explained: whether their number must change as the critical points require; short: whether the
+        step is too short to lead to another path unnoticed. Raises Lost where one of these checks fails, or the point
+        to land on was not found.
         """
         chord = Chord(self.track, a, b, weight, short=short)
         place = chord.comes_and_goes() if probe else None
@@ -124,11 +109,9 @@ class Locator:
         return landing, crossings
 
     def _explained(self, a, b, crossings):
-        """Whether two points agree with the critical points between them.
-
-        The load factor turns at a limit point alone, and elsewhere changes in the direction of the path. Each critical
-        point changes the number of negative modes by one, unless the loads have no potential.
-        """
+        """Whether two points agree with the critical points between them: the load factor turns at a limit point alone,
+        and elsewhere changes in the direction of the path. Each critical point changes the number of negative modes by
+        one, unless the loads have no potential."""
         limits = [crossing.point for crossing in crossings if crossing.kind == "limit"]
         if (a.rise * b.rise < 0) != bool(limits):
             return False
@@ -148,21 +131,15 @@ class Locator:
         return change <= len(crossings) and (len(crossings) - change) % 2 == 0
 
     def crossings(self, chord, limits=None):
-        """All `Crossing`s of a `Chord`, in order; `limits`: its limit points where they are known.
-
-        Raises:
-            Lost: a bifurcation was located where the path does not pass.
-        """
+        """All `Crossing`s of a `Chord`, in order; limits: its limit points where they are known. Raises Lost where a
+        bifurcation was located and the path does not pass."""
         limits = self.limits(chord) if limits is None else limits
         found = [*limits, *self.bifurcations(chord, limits)]
         return _in_order([crossing for crossing in found if crossing.residual <= _TOLERANCES.singular])
 
     def limits(self, chord):
-        """[the `Crossing` at the extremum of the load factor], whatever its residual; an empty list without one.
-
-        Raises:
-            Lost: it was located where the path does not pass.
-        """
+        """[the `Crossing` at the extremum of the load factor], whatever its residual; empty without one. Raises Lost
+        where it was located and the path does not pass."""
         (_, a), (_, b) = chord.known[0], chord.known[-1]
         if a.rise * b.rise >= 0:
             return []
@@ -173,12 +150,8 @@ class Locator:
         return self._singular("limit", chord, place, [direction])
 
     def bifurcations(self, chord, limits=()):
-        """The `Crossing`s where the tangent becomes singular away from limit points.
-
-        Raises:
-            Lost: one was located where the path does not pass: an imperfect structure turns away before it, and the
-                chord leads from its path to another one.
-        """
+        """The `Crossing`s where the tangent becomes singular away from limit points. Raises Lost where the path does
+        not pass one: an imperfect structure turns away before it, and the chord leads from its path to another one."""
         counts = [point.negative_modes for _, point in (chord.known[0], chord.known[-1])]
         if min(counts) < 0:  # singular to rounding at one of the two
             return []
@@ -243,12 +216,9 @@ class Locator:
         return found
 
     def _modes(self, chord, place, point, together):
-        """The modes whose eigenvalues change sign at a coordinate.
-
-        In a structure with a very soft member other eigenvalues may be as close to zero. Then the mode is taken from
-        the nearest point where its eigenvalue is negative by the count and by the factors that give modes, which
-        differ by rounding next to a singular point.
-        """
+        """The modes whose eigenvalues change sign at a coordinate. In a structure with a very soft member other
+        eigenvalues may be as close to zero: then the mode is taken from the nearest point where its eigenvalue is
+        negative by the count and by the factors that give modes, which differ by rounding next to a singular point."""
         track, stability = self.track, self.track.stability.whole
         track.put(point.numbers, point.load_factor)
         modes = stability.modes(together)

@@ -17,11 +17,7 @@ _TRIES = 8  # largest number of halvings of the first step onto a branch
 
 
 def standing(problem, newton, stability, load_factor):
-    """The `Track` of a loaded problem at a load factor, reached by load control.
-
-    Raises:
-        NotConverged: no equilibrium was found there.
-    """
+    """The `Track` of a loaded problem at a load factor, reached by load control, or NotConverged."""
     follower = Follower(problem, newton, stability, StepControl(), control="load")
     follower.begin([load_factor])
     if load_factor and not follower.to(load_factor):
@@ -30,18 +26,11 @@ def standing(problem, newton, stability, load_factor):
 
 
 class Follower:
-    """Advances along the path from one requested load factor to the next.
+    """Advances along the path from one requested load factor to the next; control: "auto", "load" or "arc"; branch: 1
+    or -1 to leave the path at the first bifurcation, 0 to stay; on_event: called with every `Crossing`.
 
-    Args:
-        problem, newton, stability: see `solvers_of`; steps: a `StepControl`.
-        control: "auto", "load" or "arc".
-        branch: 1 or -1 to leave the path at the first bifurcation; 0 to stay on it.
-        on_event: called with every `Crossing`.
-
-    Attributes:
-        track: the `Track`.
-        fork: the `Crossing` at which the path is left for a branch, once it is located; left: whether it was left.
-        used: "arc" once arc length was used, else "load".
+    fork: the `Crossing` at which the path is left for a branch, once it is located; left: whether it was left; used:
+    "arc" once arc length was used, else "load".
     """
 
     def __init__(self, problem, newton, stability, steps, *, control="auto", branch=0, on_event=None):
@@ -67,14 +56,8 @@ class Follower:
         return self._load.c.smallest
 
     def begin(self, load_factors, start=None):
-        """Begin the path over these load factors: apply the permanent loads in steps, and solve at load factor 0.
-
-        Args:
-            start: arguments of `Problem.begin_at`, of the state at the load factor 0; None for the reference.
-
-        Raises:
-            NotConverged: no equilibrium was found.
-        """
+        """Begin the path over these load factors: apply the permanent loads in steps, and solve at load factor 0, from
+        the reference or from a state there (`start`, arguments of `Problem.begin_at`). Raises NotConverged."""
         problem, track = self.track.problem, self.track
         self._load.reach = float(max(map(abs, load_factors))) or 1.0
         if start is not None:
@@ -113,17 +96,9 @@ class Follower:
         track.begin_here()
 
     def to(self, load_factor, *, on_step=None, once=False):
-        """Advance to a load factor, which is reached exactly; the path has begun.
-
-        Args:
-            load_factor: to reach.
-            on_step: called with every accepted `PathPoint`.
-            once: whether to return after the first accepted step of load control.
-
-        Returns:
-            bool: False where the path could not be continued; `track.failure` gives the reason, and the state is that
-            of `track.here`.
-        """
+        """Advance to a load factor, which is reached exactly; on_step: called with every accepted `PathPoint`; once:
+        return after the first accepted step of load control. False where the path could not be continued:
+        `track.failure` gives the reason, and the state is that of `track.here`."""
         track, here = self.track, self.track.here
         done = self._advance(load_factor, on_step, once)
         if self.fork and not self.left:

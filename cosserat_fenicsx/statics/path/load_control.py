@@ -78,17 +78,12 @@ class StepControl:
 
 
 class Continuation:
-    """Advances a `Track` by load control, by a `StepControl`.
+    """Advances a `Track` by load control; c: C's `step_control`, which a `Sweep` shares: its `step` is 0 until it is
+    chosen.
 
-    Args:
-        watch: called as watch(a, b, plain) before the point b after a is accepted; plain: whether b is close to its
-            predictor although the number of negative modes changes. False ends the continuation at a, None rejects
-            the step.
-        reach: largest size of the load factors of the path, to which steps are relative.
-
-    Attributes:
-        c: C's `step_control`, which a `Sweep` shares: `step` is 0 until it is chosen; `rejections` precede the next
-            call of `to`.
+    watch(a, b, plain) is called before the point b after a is accepted; plain: whether b is close to its predictor
+    although the number of negative modes changes. False ends the continuation at a, None rejects the step. reach:
+    largest size of the load factors of the path, to which steps are relative.
     """
 
     def __init__(self, track: Track, control: StepControl, watch=None, *, reach=1.0):
@@ -101,19 +96,10 @@ class Continuation:
         self.c.smallest = self.control.smallest * self.reach
 
     def to(self, load_factor, *, on_step=None, patience=None, once=False):
-        """Advance to a load factor, which is reached exactly.
-
-        Args:
-            load_factor: to reach.
-            on_step: called with every accepted `PathPoint`.
-            patience: rejected steps, without two successive accepted ones between, after which to stop; None for no
-                limit but the smallest step.
-            once: whether to return after the first accepted step.
-
-        Returns:
-            bool: False where too many steps were rejected, the steps became too small or `watch` returned False; the
-            track's `failure` gives the reason, and its state is that of `here`.
-        """
+        """Advance to a load factor, which is reached exactly; on_step: called with every accepted `PathPoint`;
+        patience: rejected steps, without two successive accepted ones between, after which to stop; once: return after
+        the first accepted step. False where too many steps were rejected, the steps became too small or `watch`
+        returned False: the track's `failure` gives the reason, and its state is that of `here`."""
         control, track, c = self.control, self.track, self.c
         if not control.adaptive:
             return self._attempt(load_factor, guard=False, on_step=on_step)
@@ -234,12 +220,8 @@ Swept = namedtuple("Swept", "load_factors x fields iterations steps")
 
 
 class Sweep(Pointers):
-    """Points of a path in C, of one process: by continuation, or corrected from a coarser mesh.
-
-    Args:
-        track: a `Track` of the problem, which may serve other tracks later; fields: the recorded `PackedExpression`, or
-            None.
-    """
+    """Points of a path in C, of one process: by continuation, or corrected from a coarser mesh; the `Track` may serve
+    other tracks of its problem later; fields: the recorded `PackedExpression`, or None."""
 
     def __init__(self, track, fields):
         super().__init__()
@@ -266,21 +248,12 @@ class Sweep(Pointers):
             setattr(sweep, f"recorded_{name}", self.integers(getattr(self._recorded, name)))
 
     def along(self, track, load_factors, control, patience, *, every, counted):
-        """Advance to load factors in turn while C can decide on steps by accepting or halving them.
+        """Advance to load factors in turn while C can decide on steps by accepting or halving them. Yields `Swept`,
+        with a progress that Ctrl-C keeps; after the last one the track is at the last accepted point. Returns (number
+        of load factors reached, iterations since the last record).
 
-        Args:
-            track: the `Track`, of this problem.
-            load_factors: to reach, in this order.
-            control: the `Continuation`, whose step control is shared.
-            patience: see `Continuation.to`.
-            every: whether every step is recorded, or these load factors alone.
-            counted: Newton iterations since the last record.
-
-        Yields:
-            `Swept`, with a progress that Ctrl-C keeps; after the last one the track is at the last accepted point.
-
-        Returns:
-            (number of load factors reached, iterations since the last record).
+        control: the `Continuation`, whose step control is shared; patience: see `Continuation.to`; every: whether every
+        step is recorded, or these load factors alone; counted: Newton iterations since the last record.
         """
         sweep, known = self.c, track.history
         for at, point in zip(self._points, known, strict=False):
@@ -300,16 +273,9 @@ class Sweep(Pointers):
                 return sweep.next, sweep.iterations
 
     def corrected(self, track, starts, load_factors, negative_modes, near):
-        """The points at load factors, each by Newton's method from its start on this mesh.
-
-        Args:
-            track: the `Track`, of this problem.
-            starts: (n, numbers) see `Problem.numbers`; negative_modes: (n,) that each point must have; near: the
-                largest motion between start and point (lengths, rad).
-
-        Yields:
-            `Swept`; None where a point is not found, and nothing more.
-        """
+        """Yields `Swept`: the points at load factors, each by Newton's method from its start on this mesh; None where a
+        point is not found, and nothing more. starts: (n, numbers) see `Problem.numbers`; negative_modes: (n,) that each
+        must have; near: largest motion between start and point (lengths, rad)."""
         starts, expected = np.ascontiguousarray(starts), np.array(negative_modes, dtype=np.int32)
         pointers = self._ffi.from_buffer("double[]", starts), self._ffi.from_buffer("int[]", expected)
         for why, swept in self._calls(track, load_factors, 0, lambda: self._lib.correct(self.c, *pointers, near)):

@@ -58,12 +58,8 @@ class _Enough(Exception):
 
 
 class Tracing:
-    """Computes and records a `Path`.
-
-    Args:
-        solvers: see `solvers_of`; follow: arguments of `Follower`; choice: of the model; bar: a `Progress`.
-        start: a path whose last point is the state at the load factor 0, on any mesh; None for the reference.
-    """
+    """Computes and records a `Path`; follow: arguments of `Follower`; start: a path whose last point is the state at
+    the load factor 0, on any mesh; None for the reference."""
 
     def __init__(self, solvers, follow, choice, bar, start=None):
         self.problem, _, self.stability = solvers
@@ -128,16 +124,8 @@ class Tracing:
             raise _Enough
 
     def along(self, load_factors, free, until=None):
-        """Continue the path over the load factors.
-
-        Args:
-            load_factors: reached exactly and in this order.
-            free: whether every step from the first to the second is recorded.
-            until: see `solve`.
-
-        Raises:
-            NotConverged, Interrupted: with the path so far.
-        """
+        """Continue the path over the load factors, reached exactly and in this order; free: whether every step from the
+        first to the second is recorded; until: see `solve`. NotConverged and Interrupted have the path so far."""
         track = self.track
         try:
             self._begin(load_factors)
@@ -244,11 +232,8 @@ class Tracing:
 
     def corrected(self, coarse):
         """The points of a path on a coarser mesh, corrected on this mesh by Newton's method at their load factors; None
-        where one fails to converge, moves too far or changes its number of negative modes.
-
-        Raises:
-            Interrupted: with the path so far.
-        """
+        where one fails to converge, moves too far or changes its number of negative modes. Interrupted has the path so
+        far."""
         problem, track, path = self.problem, self.track, self.path
         if problem.begins:
             problem.end_beginning()
@@ -293,11 +278,7 @@ class Tracing:
 
     def again(self, coarse):
         """The points of a path on a coarser mesh, corrected on this mesh in the plane perpendicular to the path, the
-        two ends at their load factors.
-
-        Raises:
-            NotConverged: one of them was not found.
-        """
+        two ends at their load factors; NotConverged where one was not found."""
         self._begin(coarse.load_factors)
         problem, track, last = self.problem, self.track, len(coarse) - 1
         guesses = []

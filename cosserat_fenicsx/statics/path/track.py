@@ -47,16 +47,11 @@ def step_control(**numbers):
 
 @dataclass(eq=False)
 class PathPoint:
-    """A converged point of a path.
+    """A converged point of a path: load factor (eta in the formulas below), `numbers` of the `Problem` and
+    `negative_modes`.
 
-    Attributes:
-        load_factor: the factor of loads and prescribed motions, eta in the formulas below.
-        numbers: see `Problem.numbers`; the first array holds the unknowns that this rank owns.
-        negative_modes: see `NegativeModes.count`.
-        iterations: Newton iterations of its solution.
-        rise, along: d eta/d arc and the owned entries of dx/d arc; None until they are computed.
-        logarithm: see `NegativeModes`; NaN until it is computed.
-        space: see `Part.negative_space`; None until it is computed.
+    iterations: Newton's, of its solution; rise, along: d eta/d arc and the owned entries of dx/d arc; logarithm: see
+    `NegativeModes`; space: see `Part.negative_space`. The last four are None or NaN until they are computed.
     """
 
     load_factor: float
@@ -70,19 +65,12 @@ class PathPoint:
 
 
 class Track:
-    """The state of a loaded problem on its path.
+    """The state of a loaded problem on its path; max_iterations: Newton iterations allowed in a step.
 
-    Args:
-        problem, newton, stability: see `solvers_of`; max_iterations: Newton iterations allowed in a step.
-
-    Attributes:
-        origin: the first `PathPoint` of the path, from `begin_here` on.
-        history: the last points, at most three.
-        iterations: Newton iterations so far, those of rejected steps included.
-        steps: number of accepted steps so far.
-        failure: the reason why the last step was rejected, in words.
-        neutral: owned entries of a motion that leaves the energy unchanged, such as the rotation of a buckled round
-            column about its axis; or None.
+    origin: the first `PathPoint`, from `begin_here` on; history: the last points, at most three; iterations, steps: so
+    far, those of rejected steps included, and accepted ones; failure: why the last step was rejected, in words;
+    neutral: owned entries of a motion that leaves the energy unchanged (of a buckled round column about its axis), or
+    None.
     """
 
     def __init__(self, problem, newton: Newton, stability: NegativeModes, max_iterations):
@@ -283,15 +271,9 @@ def through(points, places, at):
 
 @dataclass(frozen=True)
 class Bends:
-    """How much a step between two points of a path turns.
-
-    Attributes:
-        turn: angle between the tangents of the path at the two ends, rad.
-        corner: distance of the step's direction from the mean of these tangents, all of unit length: zero on a line and
-            on a circle.
-        length: of the step.
-        most_turn, most_corner: their largest values in a step that follows the path.
-    """
+    """How much a step between two points of a path turns: the angle between the tangents at the two ends, rad; the
+    distance of its direction from their mean, all of unit length (the corner: zero on a line and on a circle); its
+    length; and the largest values of both in a step that follows the path."""
 
     turn: float
     corner: float
