@@ -171,15 +171,9 @@ def vector(owner, field, value, unit, size=3):
 
 
 def text_of(file, expected, *, pipes=False):
-    """The text of a user's file, without the mark that some editors begin files with.
-
-    Args:
-        expected: what the file should be, for messages.
-        pipes: whether it may be a pipe.
-
-    Raises:
-        SceneError: it cannot be read, is no plain file, is too large, holds a workbook, or is not UTF-8.
-    """
+    """The text of a user's file, without the mark that some editors begin files with, or a SceneError: it cannot be
+    read, is no plain file (or pipe, with `pipes`), is too large, holds a workbook, or is not UTF-8; expected: in
+    messages."""
     data = bytes_of(file, expected, pipes=pipes)
     if data.startswith(_WORKBOOKS):
         raise SceneError(f"{file}: a workbook or another archive: expected {expected}; save the sheet as .csv (UTF-8)")
@@ -260,10 +254,8 @@ _USUAL = {"radius": "diameter", "r": "diameter", "d": "diameter", "young": "E", 
 
 
 def in_words(found):
-    """A public class or function with messages on wrong arguments; any other object unchanged.
-
-    Classes stay the same objects: the method `__init__` of those that are dataclasses is replaced.
-    """
+    """A public class or function with messages on wrong arguments; any other object unchanged. Classes stay the same
+    objects: the method `__init__` of those that are dataclasses is replaced."""
     if isinstance(found, types.FunctionType):
         return _checked(found, found)
     if dataclasses.is_dataclass(found) and isinstance(vars(found).get("__init__"), types.FunctionType):

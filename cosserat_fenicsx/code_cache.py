@@ -90,11 +90,9 @@ def make(path):
 
 @contextlib.contextmanager
 def alone_with(name):
-    """One process at a time makes the file `name` of the folder, in a new folder of its own, which is given.
-
-    The lock ends with its process, however that ends; where the file system has no locks, several processes may make
-    the same file. Folders that ended processes have left are removed.
-    """
+    """One process at a time makes the file `name` of the folder, in a new folder of its own, which is given; folders
+    that ended processes have left are removed. The lock ends with its process, however that ends; where the file system
+    has no locks, several processes may make the same file."""
     place = folder()
     make(place)
     with _locked(place / f"{name}.lock") as alone:

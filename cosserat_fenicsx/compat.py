@@ -243,15 +243,12 @@ def _names_of(given, module_name):
 
 
 def _compiled(kind, objects, level="-O3", beside=()):
-    """FFCx's (compiled objects, module, code) of a list of UFL's, all in one module, from the cache or compiled.
+    """FFCx's (compiled objects, module, code) of a list of UFL's ("forms", "expressions" or "elements"), all in one
+    module, from the cache or compiled; beside: (UFL expression, points) that are compiled with forms; they come last.
 
     Modules are compiled for speed: a tenth more to compile than by default, and from a sixth to half of the running
     time less. The macro among the flags gives them names of their own: no other program makes them. Warnings are off:
     FFCx's C has variables that it does not use.
-
-    Args:
-        kind: "forms", "expressions" or "elements". level: of optimisation.
-        beside: (UFL expression, points) that are compiled with forms, into the same module; they come last.
     """
     mark = "=" + ffcx_names.compute_signature(beside, "") if beside else ""
     flags = [level, "-g0", "-w", *instructions(), f"-DCOSSERAT_FENICSX{mark}", *code_cache.more_flags()]

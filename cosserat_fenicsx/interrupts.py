@@ -90,10 +90,8 @@ def obey():
 
 
 def interruptible(action):
-    """The result of `action()`, computed in a second thread, so that a stop takes effect at once.
-
-    The action may be abandoned at any point, and must release Python's global lock, as numpy's linear algebra does.
-    """
+    """The result of `action()`, computed in a second thread, so that a stop takes effect at once; it may be abandoned
+    at any point, and must release Python's global lock, as numpy's linear algebra does."""
     import queue
     import threading  # here, since the command line listens before it does anything else
 

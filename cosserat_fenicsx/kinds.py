@@ -152,12 +152,8 @@ def _names_in(part):
 
 @dataclasses.dataclass(frozen=True)
 class Reading:
-    """Where data are read from.
-
-    Attributes:
-        folder: of the scene file, to which names of files are relative; None for stored data.
-        named: {name of a class: {name: object}} of objects that data may refer to by their names.
-    """
+    """Where data are read from: the folder of the scene file, to which names of files are relative (None for stored
+    data), and {name of a class: {name: object}} of objects that data may refer to by their names."""
 
     folder: Path | None = None
     named: dict = dataclasses.field(default_factory=dict)
@@ -172,11 +168,8 @@ class Writing:
 
 
 def made(make, data, where=(), reading=Reading()):
-    """An object from a table of the arguments of a constructor.
-
-    Raises:
-        SceneError: no table, an unknown or a missing key, or a value that is refused; its `where` is the place.
-    """
+    """An object from a table of the arguments of a constructor, or a SceneError with its place `where`: no table, an
+    unknown or a missing key, or a value that is refused."""
     if not isinstance(data, dict):
         raise misplaced(where, f"{spoken(where)} = {data!r}: expected a table")
     name = make.__name__

@@ -15,11 +15,9 @@ class NotWritten(OSError):
 
 @contextlib.contextmanager
 def replaced(file):
-    """Context manager: the name of a new file, which replaces `file` at the end, or is removed where the block fails.
-
-    It has the same ending and lies in the same folder, which is made. A special file, such as a pipe, is written to
-    directly. `NotWritten` where it cannot be written.
-    """
+    """Context manager: the name of a new file of the same ending, in the same folder, which is made; it replaces `file`
+    at the end, or is removed where the block fails. A special file, such as a pipe, is written to directly.
+    `NotWritten` where it cannot be written."""
     file = Path(os.path.realpath(file))
     fresh = file.with_name(f"{file.stem}.new{file.suffix}")
     if file.exists() and not file.is_file():
@@ -75,11 +73,8 @@ def h5py_for(file):
 
 
 class _Patient:
-    """A file that HDF5 writes to through Python.
-
-    HDF5 cannot even close a file on a full disk: it prints its errors and may end the process. Here the first error is
-    kept, and everything after it is discarded.
-    """
+    """A file that HDF5 writes to through Python. HDF5 cannot even close a file on a full disk: it prints its errors and
+    may end the process. Here the first error is kept, and everything after it is discarded."""
 
     def __init__(self, stream):
         self._stream, self._place, self.trouble = stream, 0, None

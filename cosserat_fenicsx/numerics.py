@@ -37,12 +37,7 @@ def lobatto_weights(nodes):
 
 
 class ElementRule:
-    """Nodes, Gauss points and polynomials of one element on [0, 1].
-
-    Args:
-        nodes: Lobatto nodes of P_p, ascending.
-        gauss, weights: Gauss points and weights, ascending.
-    """
+    """Nodes (Lobatto's of P_p), Gauss points, weights and polynomials of one element on [0, 1], ascending."""
 
     def __init__(self, nodes, gauss, weights):
         order = np.argsort(gauss)
@@ -196,11 +191,8 @@ _SMOOTH, _ROUNDING = 1e-6, 1e-9
 
 
 def is_smooth(values, step, of_all=lambda sizes: sizes):
-    """Whether the estimated error of `derivative` is small: that the step is short, and no jump is near.
-
-    Args:
-        of_all: makes (3,) sizes the largest ones of all ranks, where these hold parts of the values.
-    """
+    """Whether the estimated error of `derivative` is small: that the step is short, and no jump is near; of_all: makes
+    (3,) sizes the largest ones of all ranks, where these hold parts of the values."""
     sizes = of_all(np.array([np.abs(x).max(initial=0.0) for x in (*derivative(values, step), values)]))
     return sizes[1] <= _SMOOTH * sizes[0] + _ROUNDING * sizes[2] / step
 

@@ -154,14 +154,9 @@ class FunctionAlong(
 
 
 def to_data(part, whole=True):
-    """A part as a table of lists, numbers, texts and None, which JSON can hold; "use": modules of users' classes.
-
-    Args:
-        whole: whether arguments with their default values are written too.
-
-    Raises:
-        NotData: a function written in Python, or an object of a class that is not known by its name.
-    """
+    """A part as a table of lists, numbers, texts and None, which JSON can hold; "use": modules of users' classes;
+    whole: whether arguments with their default values are written too. NotData for a function written in Python, or an
+    object of a class that is not known by its name."""
     writing = Writing(whole)
     data = Object((type(part),)).write(part, writing)
     return data | ({"use": sorted(writing.modules)} if writing.modules else {})

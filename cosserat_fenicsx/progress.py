@@ -18,13 +18,8 @@ def _shown(wanted, comm):
 
 
 class Progress:
-    """Context manager that shows the progress of a path or a motion.
-
-    Args:
-        targets: the requested load factors or times (s), in their order; quantity: their name.
-        wanted: True, False, or None to show it in runs of more than two seconds.
-        comm: MPI communicator; only rank 0 shows anything.
-    """
+    """Context manager that shows, on rank 0, the progress of a path or a motion over its load factors or times (s), in
+    their order; wanted: True, False, or None to show it in runs of more than two seconds."""
 
     def __init__(self, targets, wanted, comm, quantity="load factor"):
         self._quantity, self._show, self._now = quantity, _shown(wanted, comm), wanted is True
@@ -124,20 +119,15 @@ class _Clocked:
 
 class MeshProgress(_Clocked):
     """Context manager that shows the mesh of an eigenproblem and the elapsed time; the number of meshes is not known.
-
-    Args:
-        what: name of the computation; tol: its relative accuracy. wanted, comm: see `Progress`.
-    """
+    what: name of the computation; tol: its relative accuracy; wanted: see `Progress`."""
 
     def __init__(self, what, tol, wanted, comm):
         super().__init__(wanted, comm)
         self._what, self._tol, self._text = what, tol, what
 
     def on(self, elements, reached):
-        """The computation begins on a mesh of at most so many elements per rod.
-
-        `reached`: the estimated relative error so far, infinite where unknown.
-        """
+        """The computation begins on a mesh of at most so many elements per rod; reached: the estimated relative error
+        so far, infinite where unknown."""
         error = f", estimated error {reached:.1e} of {self._tol:g}" if math.isfinite(reached) else ""
         self._text = f"{self._what}: {elements} elements per rod{error}"
         self._say()
@@ -147,12 +137,8 @@ class MeshProgress(_Clocked):
 
 
 class CaseProgress(_Clocked):
-    """Context manager that shows how many cases of a study are done, on all ranks.
-
-    Args:
-        total: their number; counts: a function that returns how many are done, and how many of these have failed.
-        wanted, comm: see `Progress`.
-    """
+    """Context manager that shows how many cases of a study, of `total`, are done, on all ranks; counts: returns how
+    many are done, and how many of these have failed; wanted: see `Progress`."""
 
     def __init__(self, total, counts, wanted, comm):
         super().__init__(wanted, comm)

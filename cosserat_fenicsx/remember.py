@@ -8,10 +8,8 @@ _MOST = 64
 
 
 def per_scene(function):
-    """Decorator of a function (scene, ...) whose results depend on its arguments alone and are never changed.
-
-    Arguments that cannot be hashed are passed on; so are exceptions, which are not remembered.
-    """
+    """Decorator of a function (scene, ...) whose results depend on its arguments alone and are never changed. Arguments
+    that cannot be hashed are passed on; so are exceptions, which are not remembered."""
     known = weakref.WeakKeyDictionary()
 
     @functools.wraps(function)

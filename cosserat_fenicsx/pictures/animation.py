@@ -315,15 +315,10 @@ _AGREEMENT, _INVISIBLE = 0.1, 2e-3
 
 
 class Between:
-    """A `History` at any time of its duration.
-
-    Between two saved states, positions and quaternions are cubic Hermite polynomials by the values and velocities
-    there. Where the velocities do not agree with the change of position, because states were saved too seldom,
-    interpolation is linear, and where a section turns by more than half a turn the nearest state is taken.
-
-    Args:
-        colour: the `Colour` of the rods, whose values are interpolated linearly.
-    """
+    """A `History` at any time of its duration, with a `Colour` whose values are interpolated linearly. Between two
+    saved states, positions and quaternions are cubic Hermite polynomials by the values and velocities there. Where the
+    velocities do not agree with the change of position, because states were saved too seldom, interpolation is linear,
+    and where a section turns by more than half a turn the nearest state is taken."""
 
     def __init__(self, history, colour):
         self._history, self._times, self._colour = history, history.times, colour
@@ -390,12 +385,8 @@ def _turning(q, omega):
 
 
 class Enlarged:
-    """Enlarges the clearance of rods in the holes of a scene, for pictures.
-
-    Args:
-        scene: the scene; where: the name of the called function, for messages.
-        factor: of the distance between the axes of the hole and of a rod. Rods without a wall stay as they are.
-    """
+    """Enlarges the clearance of rods in the holes of a scene, for pictures, by a factor of the distance between the
+    axes of the hole and of a rod; rods without a wall stay as they are. where: the called function, for messages."""
 
     def __init__(self, scene, factor, where):
         self.factor = positive(where, "enlarge", factor, "-")

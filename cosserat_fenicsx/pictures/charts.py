@@ -48,18 +48,10 @@ _units = ContextVar("_units", default="SI")
 
 
 def draw_chart(make, file=None, comm=Alone, *, width=None, units="SI"):
-    """The Figure that `make` returns; or None where a file is given, which rank 0 writes.
-
-    Args:
-        make: a function that draws on an `empty_figure`.
-        width: of the picture, pixels; None for 150 to the inch.
-        units: that `scale` takes, see `Units`.
-
-    Raises:
-        SceneError: the file's ending is unknown to matplotlib, or it is missing; the width is no number from 300 to
-            10000; unknown units; or `make` raised it.
-        OSError: the file cannot be written.
-    """
+    """The Figure that `make` draws on an `empty_figure`; or None where a file is given, which rank 0 writes; width: of
+    the picture, pixels; None for 150 to the inch; units: that `scale` takes, see `Units`. A SceneError for a file's
+    ending that matplotlib does not know, a width outside 300 to 10000, or unknown units; an OSError where the file
+    cannot be written."""
     if width is not None:
         low, high = _WIDTHS
         width = number("plot", "width", width, f"pixels, from {low} to {high}", lambda x: low <= x <= high)
@@ -164,11 +156,7 @@ def empty_figure(width, height):
 
 
 def stacked(width, heights):
-    """A Figure (width in inches) and panels above each other with a common horizontal axis, such as time.
-
-    Args:
-        heights: of the panels, inches.
-    """
+    """A Figure and panels above each other with a common horizontal axis, such as time; width, heights: inches."""
     figure = empty_figure(width, 0.8 + sum(heights))
     panels = figure.subplots(len(heights), 1, sharex=True, squeeze=False, height_ratios=heights)[:, 0]
     panels[0].margins(x=0.0)
@@ -221,12 +209,8 @@ def _in_columns(panel, names):
 
 
 def ledger(times, stored, done, balance, title, about=""):
-    """The Figure of a ledger of energy over time: what is stored; works and losses, which may be many times as large;
-    and the error of their balance.
-
-    Args:
-        times: (n,) s. stored, done: see `draw_energies`. balance: (n,) unaccounted energy, J.
-        about: words after the label of the axis of what is stored.
+    """The Figure of a ledger of energy over times (n,), s: what is stored; works and losses, which may be many times as
+    large (see `draw_energies`); and the error of their balance (n,), J; about: words after the label of what is stored.
     """
     heights = (2.6, 2.2, 1.2) if any(values.any() for _, values, *_ in done) else (3.6, 1.2)
     figure, panels = stacked(10, heights)
@@ -239,13 +223,8 @@ def ledger(times, stored, done, balance, title, about=""):
 
 
 def draw_energies(panels, times, stored, done, about=""):
-    """Draw what is stored, with its sum, into the first panel, and works and losses into the next one, if there is one.
-
-    Args:
-        times: (n,) s.
-        stored: parts of the energy, done: works and losses: (label, values (n,) in J, colour, style) each; those that
-            stay zero are left out.
-    """
+    """Draw what is stored, with its sum, into the first panel, and works and losses (done) into the next one, if there
+    is one: (label, values (n,) in J, colour, style) each; those that stay zero are left out."""
     most = max(np.abs(values).max() for _, values, *_ in (*stored, *done))
     for panel, curves, quantity in zip(panels, (stored, done), (_ENERGY, _DONE), strict=False):
         curves = [curve for curve in curves if np.abs(curve[1]).max() > _LITTLE * most]
@@ -262,12 +241,8 @@ def draw_energies(panels, times, stored, done, about=""):
 
 
 def draw_quantity(over, shown, title="", file=None, comm=Alone, **look):
-    """Draw a quantity over another one: lines, one for each component, or its own `chart`.
-
-    Args:
-        over, shown: abscissa and ordinate, each a `Quantity` and its values (n,), of `shown` also (n, components).
-        file, comm, look: see `draw_chart`.
-    """
+    """Draw a quantity over another one, each a `Quantity` and its values (n,), of `shown` also (n, components): lines,
+    one for each component, or its own `chart`; look: see `draw_chart`."""
 
     def make():
         figure, (panel,) = stacked(8, (4.0,))

@@ -52,14 +52,9 @@ _UNSIGNED = 1e-6
 
 @dataclass(frozen=True)
 class Colour:
-    """A field that rods are coloured by.
-
-    Attributes:
-        name: as a user gives it; words, unit: on the colour bar.
-        field: of `Result.fields` that it is computed from.
-        signed: whether it has values of either sign.
-        of: a function from the dict of `Result.fields` to one number per node.
-    """
+    """A field that rods are coloured by, by a user's name; words, unit: on the colour bar; field: of `Result.fields`
+    that it is computed from, by `of`, a function from their dict to one number per node; signed: whether it has either
+    sign."""
 
     name: str
     words: str

@@ -182,17 +182,9 @@ def together(surfaces):
 
 
 def add_bodies(plotter, pyvista, bodies, factors, peak, colour, moving=False):
-    """Draw the surfaces of `Body`s, closed at both ends, coloured by their values.
-
-    Args:
-        bodies, factors: lists of them, and of what enlarges their sections.
-        peak: the largest size of the values in the picture, which the colours reach up to.
-        colour: the `Colour` of its values.
-        moving: whether the mesh's points will be changed.
-
-    Returns:
-        The mesh of all.
-    """
+    """Draw the surfaces of `Body`s, closed at both ends, coloured by their values, as one mesh, which is returned;
+    factors: of each, what enlarges its sections; peak: the largest size of the values in the picture, which the colours
+    reach up to; moving: whether the mesh's points will be changed."""
     scale, name = suited(peak, colour.unit)
     step = round_step((2 if colour.signed else 1) * peak / scale or 1.0, _BAR)
     low, high = colour.limits(math.ceil(peak / scale / step - 1e-9) * step)
@@ -217,12 +209,8 @@ def add_bodies(plotter, pyvista, bodies, factors, peak, colour, moving=False):
 
 
 def colour_bar(title, font, numbers, step, box):
-    """The arguments of pyvista for an upright bar of colours.
-
-    Args:
-        font: its size, pixels; numbers: how many there are, multiples of a round step; box: (x, y, width, height),
-            shares of the picture.
-    """
+    """The arguments of pyvista for an upright bar of colours; font: pixels; numbers: how many there are, multiples of a
+    round step; box: (x, y, width, height), shares of the picture."""
     x, y, width, height = box
     place = {"position_x": x, "position_y": y, "width": width, "height": height, "vertical": True}
     fonts = {"title_font_size": font, "label_font_size": font, "color": "black"}
@@ -238,11 +226,8 @@ def move(surface, body, factor, name, values):
 
 
 def add_tubes(plotter, pyvista, scene, radii, enlarged=1.0):
-    """Draw the tubes that rods are in, and obstacles, translucent.
-
-    Args:
-        radii: {rod: the radius that it is drawn with, m}; enlarged: factor of the clearances around them.
-    """
+    """Draw the tubes that rods are in, and obstacles, translucent; radii: {rod: the radius that it is drawn with, m};
+    enlarged: factor of the clearances around them."""
     low, high = np.reshape(plotter.bounds, (3, 2)).T
     for load in scene.loads:
         if (points := load.drawn(low, high)) is not None:

@@ -161,15 +161,10 @@ def draw_campbell(orbit):
 
 
 def spectra(orbit):
-    """Spectra of an `Orbit` in overlapping windows of its duration.
-
-    Their length T is that in which a rate that grows with the spin, by a in a unit of time, changes by as much as
-    T resolves: a T = 2 pi/T.
-
-    Returns:
-        at (m,): middles, s; amplitude (m, k): radius of a circle at each rate, m; speed (m,): size of the mean spin,
-        rad/s; rates (k,): ascending, rad/s, positive in the direction of the spin.
-    """
+    """Spectra of an `Orbit` in overlapping windows of its duration: at (m,): middles, s; amplitude (m, k): radius of a
+    circle at each rate, m; speed (m,): size of the mean spin, rad/s; rates (k,): ascending, rad/s, positive in the
+    direction of the spin. The windows' length T is that in which a rate that grows with the spin, by a in a unit of
+    time, changes by as much as T resolves: a T = 2 pi/T."""
     count = len(orbit.times)
     t = np.linspace(orbit.times[0], orbit.times[-1], count)
     x, y = (np.interp(t, orbit.times, values) for values in orbit.position.T)

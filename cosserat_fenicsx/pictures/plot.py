@@ -139,11 +139,8 @@ def _draw(path, points, magnify, color, side_by_side):
 
 
 def _apart(scene, shown, bodies, span, wish):
-    """{k: vector (3,), m} by which shapes are moved beside each other; empty where they stay.
-
-    Args:
-        wish: True or False, or None: where they would be tangled otherwise.
-    """
+    """{k: vector (3,), m} by which shapes are moved beside each other; empty where they stay; wish: True or False, or
+    None: where they would be tangled otherwise."""
     shapes, (_, right, above, _) = [[bodies[k, rod].line for rod in scene.rods] for k in shown], view_of(span)
     if wish is None:
         wish = all(load.tube() is None for load in scene.loads) and tangled(shapes, right, above)
@@ -184,12 +181,8 @@ def _draw_scene(scene):
 
 
 def _finish(plotter, pyvista, everywhere, symbols, lines, title, label, most=6):
-    """Draw signs, axes, labels, key and title, and place the camera.
-
-    Args:
-        lines: centrelines that labels keep off. title: lines of text. label: puts the first labels into the
-            `Labels`. most: see `drawing.frame`.
-    """
+    """Draw signs, axes, labels, key and title, and place the camera; lines: centrelines that labels keep off; title:
+    lines of text; label: puts the first labels into the `Labels`; most: see `drawing.frame`."""
     symbols.draw(plotter)
     font = letters(plotter)
     lettered = [line for text in title for line in textwrap.wrap(text, _TITLE_WIDTH)]

@@ -71,16 +71,9 @@ def film(found, file, k, *, fps, seconds, cycles, amplitude, size, progress):
 
 
 class Drawn:
-    """A shape as it is drawn: scaled, about its equilibrium.
-
-    Args:
-        found: the `Shapes`; k: the number of the mode.
-        amplitude: largest displacement as a share of the structure's size. Shapes with large rotations are smaller: the
-            tangent of their largest rotation is `_STEEPEST`.
-
-    Attributes:
-        factor: of displacements and rotations; note: how large they are drawn, in words.
-    """
+    """The k-th of `Shapes` as it is drawn: scaled, about its equilibrium, with displacements up to `amplitude`, a share
+    of the structure's size; smaller with large rotations: the tangent of the largest is `_STEEPEST`. factor: of
+    displacements and rotations; note: how large they are drawn, in words."""
 
     def __init__(self, found, k, amplitude):
         self._found, self._k = found, k
@@ -118,10 +111,8 @@ class Drawn:
 
 
 def _turned(frames, slopes):
-    """Frames (n, 3, 3) rotated about the directions of `slopes` (n, 3) by angles whose tangents are their sizes.
-
-    So sections stay at right angles to a line whose displacements are drawn large, as far as they were.
-    """
+    """Frames (n, 3, 3) rotated about the directions of `slopes` (n, 3) by angles whose tangents are their sizes, so
+    that sections stay at right angles to a line whose displacements are drawn large, as far as they were."""
     sizes = np.linalg.norm(slopes, axis=1)
     angles = np.arctan(sizes)
     axes = slopes / np.maximum(sizes, 1e-300)[:, None]

@@ -25,11 +25,8 @@ _OUT_OF_PLANE = 0.1
 
 
 class Resting:
-    """The rods of a scene at rest, with its loads at load factor 1, and at their largest if they depend on time.
-
-    Args:
-        radii: {rod: the radius that it is drawn with, m}.
-    """
+    """The rods of a scene at rest, with its loads at load factor 1, and at their largest if they depend on time; radii:
+    {rod: the radius that it is drawn with, m}."""
 
     time = None
 
@@ -105,15 +102,8 @@ class Deformed(Resting):
 
 
 def signs_of(pyvista, scene, shapes, everywhere, span):
-    """The `Symbols` of a scene.
-
-    Supports and joints are drawn on the last of the shapes, each load on the last one where it is not zero.
-
-    Args:
-        shapes: `Resting` or `Deformed`s.
-        everywhere: all points of the drawing (n, 3), m.
-        span: see `span_of`.
-    """
+    """The `Symbols` of a scene: supports and joints on the last of the shapes (`Resting` or `Deformed`), each load on
+    the last one where it is not zero; everywhere: all points of the drawing (n, 3), m; span: see `span_of`."""
     last, loads = shapes[-1], _acting(scene, shapes)
     supports = marks_of_supports(last.supports(scene))
     to_camera, right, above, _ = view_of(span)
@@ -210,18 +200,13 @@ _DEVICES = {"N/m": "spring", "N m/rad": "turning spring", "N s/m": "dashpot", "N
 
 @dataclass(frozen=True)
 class Mark:
-    """A support, a joint or a load to be drawn.
+    """A support, a joint or a load to be drawn, at a station, or along a rod (None of a load on all rods).
 
-    Attributes:
-        kind: "clamp", "pin", "hinge", "roller", "moved"; "force", "moment", "spring", "turning spring", "dashpot",
-            "mass"; "line force", "line moment"; "joint", "hinge joint", "ball joint".
-        station: where, or None of a load along a rod.
-        rod: of a load along a rod; None of one on all rods.
-        vector: force or moment, or along a rod (n, 3) of them at even arc lengths; the axis of a hinge, the normal of a
-            roller, the direction of a spring; inertial, in the reference.
-        unit: of the vector.
-        turns: whether the vector turns with the section. arm: from the station to where a force acts, which turns with
-            the section, in the reference, m.
+    kind: "clamp", "pin", "hinge", "roller", "moved"; "force", "moment", "spring", "turning spring", "dashpot", "mass";
+    "line force", "line moment"; "joint", "hinge joint", "ball joint". vector, in a unit: force or moment, or along a
+    rod (n, 3) of them at even arc lengths; the axis of a hinge, the normal of a roller, the direction of a spring;
+    inertial, in the reference. turns: whether it turns with the section; arm: from the station to where a force acts,
+    which turns with the section, in the reference, m.
     """
 
     kind: str
@@ -263,12 +248,8 @@ def joints_of(scene):
 
 
 def loads_of(load, scene, factor, time=None):
-    """The `Mark`s of a load or another action; none where it is zero, or where drawings know no sign for it.
-
-    Args:
-        load: one of `scene.loads`. factor: multiplies it.
-        time: s; None for the time at which a load that depends on time is largest.
-    """
+    """The `Mark`s of a load or another action, times a factor; none where it is zero, or where drawings know no sign
+    for it; time: s; None for the time at which a load that depends on time is largest."""
     times = sample_times(load, scene.horizon) if time is None and signals_of(load) else [time or 0.0]
     found = max((marks_of(at(load, t), scene, factor) for t in times), key=_size)
     return [mark for mark in found if mark.kind in _DEVICES.values() or mark.kind == "mass" or _size([mark]) > 0]

@@ -48,18 +48,9 @@ class Pose:
 
 
 class Symbols:
-    """The signs of a drawing.
-
-    Args:
-        pyvista: the module.
-        span: (3,) the extents that decide on the view, see `view.view_of`.
-        size: of a sign, m.
-        lines: centrelines of rods (n, 3), m, which arrows keep off as they do of each other.
-
-    Attributes:
-        covers: lines (n, 3), m, over what the signs cover. span: as given.
-        texts: (text, point, direction, colour) of the labels of the loads.
-    """
+    """The signs of a drawing; span: (3,) the extents that decide on the view, see `view.view_of`; size: of a sign, m;
+    lines: centrelines of rods (n, 3), m, which arrows keep off as they do of each other. covers: lines (n, 3), m, over
+    what the signs cover; texts: (text, point, direction, colour) of the labels of the loads."""
 
     def __init__(self, pyvista, span, size, lines):
         self._pyvista, self._size, self.texts, self.covers = pyvista, size, [], []
@@ -134,12 +125,8 @@ class Symbols:
     # -- loads -------------------------------------------------------------------------------------------------------
 
     def load(self, mark, pose, share, text):
-        """An arrow for a force, an arrow around the axis or a double-headed one for a moment, a zigzag for a spring.
-
-        Args:
-            share: the size of the load over the largest of its kind.
-            text: its label.
-        """
+        """An arrow for a force, an arrow around the axis or a double-headed one for a moment, a zigzag for a spring;
+        share: the size of the load over the largest of its kind; text: its label."""
         if mark.kind in ("force", "moment"):
             vector = pose.rotation @ mark.vector if mark.turns else mark.vector
             along, length = vector / np.linalg.norm(vector), self._size * max(_SHORTEST, _ARROW * np.sqrt(share))
@@ -163,11 +150,7 @@ class Symbols:
 
     def _placed(self, mark, point, along, length, gap, pulls):
         """Draw an arrow that begins (`pulls`) or ends at a distance `gap` from a point: as wished, the other way round,
-        or beside it, wherever there is nothing else.
-
-        Returns:
-            the place of its label, and the direction from there.
-        """
+        or beside it, wherever there is nothing else; returns the place of its label, and the direction from there."""
         aside = np.cross(self._view, along)
         for side, pulling in itertools.product((0.0, 1.0, -1.0), (pulls, not pulls)):
             start = point + side * (gap + 0.35 * self._size) * aside
@@ -224,11 +207,8 @@ class Symbols:
         self._add(mark, self._box(pose.place + (_SPRING + 0.05) * a * down, _frame_along(down), (a, a, 0.1 * a)))
 
     def along(self, mark, line, radius, top, text):
-        """A row of arrows for a load along a rod, of lengths in proportion to `top`.
-
-        Args:
-            line: the centreline (n, 3), m. radius: that the rod is drawn with, m.
-        """
+        """A row of arrows for a load along a rod, of lengths in proportion to `top`; line: the centreline (n, 3), m;
+        radius: that the rod is drawn with, m."""
         way = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1)))
         count = arrows_along(way[-1], self._size)
         places, x = np.linspace(0, way[-1], count), np.linspace(0, way[-1], len(mark.vector))

@@ -17,11 +17,8 @@ def narrow(file):
 
 
 def draw_both(plot, file, comm=Alone):
-    """Write a chart for wide pages, and that for narrow ones beside it, see `narrow`.
-
-    Args:
-        plot: returns the Figure for a `width` in pixels, such as `DrillingHistory.plot`.
-        file: .png. comm: of the ranks that draw it, of which the first writes.
+    """Write a chart (.png) for wide pages, and that for narrow ones beside it, see `narrow`; plot: returns the Figure
+    for a `width` in pixels, such as `DrillingHistory.plot`; comm: of the ranks that draw it, of which the first writes.
     """
     drawn = [(Path(file), *WIDE), (narrow(file), *NARROW)]
     figures = [(name, plot(width=width), pixels) for name, width, pixels in drawn]

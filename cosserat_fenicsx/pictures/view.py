@@ -19,12 +19,9 @@ _PANEL = (0.24, 0.07, 0.22, 0.24)
 
 
 def view_of(span):
-    """Directions for a drawing whose extents along x, y and z are `span` (3,): a plane scene is seen along its normal,
-    others from a corner.
-
-    Returns:
-        Unit vectors (3,): to the camera, to the right and upwards in the picture; and the upward direction in space.
-    """
+    """Unit vectors (3,): to the camera, to the right and upwards in the picture; and the upward direction in space, for
+    a drawing whose extents along x, y and z are `span` (3,): a plane scene is seen along its normal, others from a
+    corner."""
     thin = int(np.argmin(span))
     if span[thin] < 0.05 * span.max():
         view = np.zeros(3)
@@ -40,14 +37,9 @@ def view_of(span):
 
 @dataclass(frozen=True)
 class View:
-    """A parallel projection.
-
-    Attributes:
-        to_camera, right, above: unit vectors (3,), inertial; up: the upward direction in space.
-        focus: the point in the middle of the picture, m.
-        half: half the height of the picture, m.
-        window: (width, height), pixels.
-    """
+    """A parallel projection; to_camera, right, above: unit vectors (3,), inertial; up: the upward direction in space;
+    focus: the point in the middle of the picture, m; half: half the height of the picture, m; window: (width, height),
+    pixels."""
 
     to_camera: np.ndarray
     right: np.ndarray
@@ -59,14 +51,9 @@ class View:
 
     @classmethod
     def of(cls, points, span, window, panel=False, title=None):
-        """The view that shows all points (n, 3), m.
-
-        Args:
-            span: (3,) the extents that decide on its direction.
-            window: (width, height), pixels.
-            panel: whether it is one of several drawings side by side.
-            title: the height kept free for the title, pixels; None for a share of the window's.
-        """
+        """The view that shows all points (n, 3), m; span: see `view_of`; window: (width, height), pixels; panel:
+        whether it is one of several drawings side by side; title: the height kept free for it, pixels; None for a share
+        of the window's."""
         before, after, below, over = _PANEL if panel else _WHOLE
         if title is not None:
             below, over = _BELOW * window[0] / window[1], title / window[1]
@@ -127,12 +114,8 @@ _CLEAR, _CELL, _RODS = 10, 4, 4
 
 
 class Labels:
-    """The labels of a drawing; `draw` puts all of them into it.
-
-    Args:
-        view: the `View`.
-        lines: lines (n, 3), m, such as rods and arrows, that labels keep off where possible, more than off others.
-    """
+    """The labels of a drawing in a `View`; `draw` puts all of them into it; lines: (n, 3), m, such as rods and arrows,
+    that labels keep off where possible, more than off others."""
 
     def __init__(self, view, lines=()):
         self._view, self._placed, self._texts, self._leaders, self._ends = view, [], [], [], []
@@ -141,11 +124,8 @@ class Labels:
         self.left_out = []
 
     def fix(self, text, places, *, size, colour="black"):
-        """A label at the first of some places where no other label is.
-
-        Args:
-            places: [(point (3,), m, and how many pixels (2,) from there the middle of the label is)].
-        """
+        """A label at the first of some places where no other label is: [(point (3,), m, and how many pixels (2,) from
+        there the middle of the label is)]."""
         for point, away in places:
             box = _box(text, self._view.pixels(point) + away, size)
             if self._free(box):
@@ -164,13 +144,9 @@ class Labels:
         self._placed.append((*low, *high))
 
     def near(self, text, point, towards, *, size, colour="black"):
-        """A label near a point (3,), m, in the direction `towards` (3,) if there is room, else in another one; where
-        its line crosses those of other labels and these labels least and it covers no rod, and then where it covers
-        least.
-
-        Returns:
-            whether there was room for it.
-        """
+        """A label near a point (3,), m, in the direction `towards` (3,) if there is room (returned), else in another
+        one; where its line crosses those of other labels and these labels least and it covers no rod, and then where it
+        covers least."""
         anchor, wish = self._view.pixels(point), np.array([towards @ self._view.right, towards @ self._view.above])
         wish = wish / np.linalg.norm(wish) if np.linalg.norm(wish) > 1e-6 else np.array([0.0, 1.0])
         half = np.array([_width(text), _LINE]) * size / 2
@@ -198,11 +174,8 @@ class Labels:
         return True
 
     def evenly(self, texts, *, size, away):
-        """Labels of the ticks of an axis, every n-th of them, such that as many as possible have room.
-
-        Args:
-            texts: [(text, point (3,), m)] in the order of the ticks. away: as of `fix`.
-        """
+        """Labels [(text, point (3,), m)] of the ticks of an axis, in order, every n-th of them, such that as many as
+        possible have room; away: as of `fix`."""
         boxes, best = [_box(text, self._view.pixels(point) + away, size) for text, point in texts], []
         for n, first in ((n, first) for n in range(1, len(texts) + 1) for first in range(n)):
             some = range(first, len(texts), n)
@@ -322,11 +295,8 @@ _TICK, _SEEN, _ASIDE = 8, 20, 26
 
 @dataclass(frozen=True)
 class Axis:
-    """An axis of the box around a drawing.
-
-    Attributes:
-        name: with the unit; low, high: m; ticks: (position in m, text), none where the drawing is flat.
-    """
+    """An axis of the box around a drawing: its name with the unit; low, high: m; ticks: (position in m, text), none
+    where the drawing is flat."""
 
     name: str
     low: float
@@ -353,11 +323,7 @@ def axes_of(points, most=_INTERVALS):
 
 def draw_axes(plotter, pyvista, axes, view, labels, font=None):
     """Draw the edges of the box that carry ticks, outside in the picture: z at the left, x and y below; and the floor
-    of a box that is not flat.
-
-    Args:
-        axes: three `Axis`. view: the `View`. labels: the `Labels` that its texts join. font: their size, pixels.
-    """
+    of a box that is not flat. axes: three `Axis`; labels: the `Labels` that its texts join; font: pixels."""
     font = font or max(9, round(view.window[1] / 55))
     corner = {(i, end): getattr(axes[i], end) for i in range(3) for end in ("low", "high")}
     lines = []

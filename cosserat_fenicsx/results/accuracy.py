@@ -119,19 +119,14 @@ def order_of(gain, p):
 
 
 def carry_error(fine, coarse, factor, order, before=None):
-    """Set the errors of a path from the errors of the same points on a mesh of elements less than twice as long.
+    """Set the errors of a path from the errors of the same points on a mesh of elements less than twice as long, by the
+    ratio `factor` of their numbers; returns the differences (4, n) relative to the sizes. order: (4,) of the errors in
+    h, see `order_of`; before: relative differences of the coarser mesh from the one before, where its elements were
+    halved; or None.
 
     They are the coarser mesh's errors reduced by the assumed orders, limited to one to two times the Richardson
-    estimate from the difference of the two meshes, since the coarser mesh's errors may be overestimated. The Richardson
-    estimate uses the observed order minus one.
-
-    Args:
-        factor: ratio of the numbers of elements, fine over coarse.
-        order: (4,) of the errors in h, see `order_of`.
-        before: relative differences of the coarser mesh from the one before, where its elements were halved; or None.
-
-    Returns:
-        (4, n) the differences relative to the sizes.
+    estimate from the difference of the two meshes (by the observed order minus one), since the coarser mesh's errors
+    may be overestimated.
     """
     relative, *_ = _differences(fine, coarse)
     order = order[:, None]
@@ -146,10 +141,8 @@ def carry_error(fine, coarse, factor, order, before=None):
 
 
 def compare(fine, coarse):
-    """(4, n) differences of the same points on two meshes, relative to the sizes.
-
-    They are no error estimate where the meshes are not nested.
-    """
+    """(4, n) differences of the same points on two meshes, relative to the sizes: no error estimate where the meshes
+    are not nested."""
     return _differences(fine, coarse)[0]
 
 
@@ -160,16 +153,10 @@ def _differences(fine, coarse):
 
 
 def hardest(path):
-    """Sample points that determine the mesh that a path needs.
-
-    They are the points with the largest errors (of every rod those with the largest leading coefficients of
-    displacements and of rotations, relative to their sizes, where errors are unknown), the most displaced one, the
-    last, the smoothest (smallest leading coefficients) where it is much smoother, and then one between. All points
-    where these are few or the path has events.
-
-    Returns:
-        (Path of these points, their indices).
-    """
+    """(Path, indices) of sample points that determine the mesh that a path needs: those with the largest errors (of
+    every rod those with the largest leading coefficients of displacements and of rotations, relative to their sizes,
+    where errors are unknown), the most displaced one, the last, the smoothest (smallest leading coefficients) where it
+    is much smoother, and then one between. All points where these are few or the path has events."""
     if len(path) <= FEW or path.events:  # events have to be located on every mesh
         return path, np.arange(len(path))
     sizes, of_rods = path._reference.sizes, path._roughness
@@ -189,15 +176,11 @@ def hardest(path):
 
 
 def spread_error(path, few, which, coarse=None):
-    """Set the errors of a path from the errors of its sample points on the same mesh.
+    """Set the errors of a path from the errors of its sample points (few, of the indices `which`) on the same mesh.
 
-    The errors of the other points are interpolated logarithmically over an indicator: the differences from the same
-    points on a coarser mesh, or the leading coefficients (of displacements for positions, of rotations for the rest).
+    They are interpolated logarithmically over an indicator: the differences from the same points on a coarser mesh (the
+    whole path there, or None), or the leading coefficients (of displacements for positions, of rotations for the rest).
     Leading coefficients far from all samples, absolutely or relative to the sizes, increase the error.
-
-    Args:
-        few: the sample points, with their errors; which: their indices.
-        coarse: the whole path on a coarser mesh, or None.
     """
     sizes = path._reference.sizes
     if coarse is not None:
@@ -217,12 +200,9 @@ def spread_error(path, few, which, coarse=None):
 
 
 def _as_positions(found, known, which):
-    """(n,) lower bounds of the errors of rotations, from the errors of positions and the ratio of both at neighbouring
-    samples: the difference of rotations on two meshes may vanish where it changes its sign.
-
-    Args:
-        found: (4, n) absolute errors; known: (4, samples) of the sample points; which: their indices.
-    """
+    """(n,) lower bounds of the errors of rotations, from the absolute errors of positions (found: (4, n); known: (4,
+    samples)) and the ratio of both at neighbouring samples: the difference of rotations on two meshes may vanish where
+    it changes its sign."""
     usable = (known[[POSITION, ROTATION]] > ROUNDING).all(axis=0)
     if not usable.any():
         return np.zeros(found.shape[1])
@@ -231,13 +211,9 @@ def _as_positions(found, known, which):
 
 
 def _spread(indicator, sizes, errors, between, which, *, of_mesh):
-    """(n,) errors of one quantity at all points from those at the sample points, relative to its sizes.
-
-    Args:
-        indicator: (n,); sizes: (n,); errors: (samples,); between: safety factor at the other points; which: indices of
-            the samples.
-        of_mesh: whether the indicator is a difference of two meshes.
-    """
+    """(n,) errors of one quantity at all points from those at the sample points (errors, of the indices `which`),
+    relative to its sizes (n,), by an indicator (n,); between: safety factor at the other points; of_mesh: whether the
+    indicator is a difference of two meshes."""
     known, absolute = indicator[which], errors * sizes[which]
     usable = (known > 100 * ROUNDING) & (absolute > 0)
     if not usable.any():
@@ -292,12 +268,8 @@ def expected_differences(path):
 
 
 def on_mesh(path, layout):
-    """The points of a path interpolated to another mesh, as initial guesses.
-
-    Returns:
-        (r, q) at the nodes (points, N, 7) and n at the Gauss points (points, elements, Gauss points per element, 3),
-        dimensionless, inertial.
-    """
+    """The points of a path interpolated to another mesh, as initial guesses: (r, q) at the nodes (points, N, 7) and n
+    at the Gauss points (points, elements, Gauss points per element, 3), dimensionless, inertial."""
     rule, n = path.rule, path._stacked("gauss_fields")[..., :3]
     (nodes, at_nodes), (cells, at_gauss) = transferred(path.layout, layout, rule)
     rq = (at_nodes[:, None] @ path._motion[:, nodes])[:, :, 0]
@@ -314,15 +286,9 @@ _EXTRAPOLATED = 4
 
 
 def layer_lengths(scene, scales, layout, rule, n):
-    """Lengths sqrt(EI/|n|) of the boundary layers in which bending decays next to a support or a load.
-
-    Args:
-        scales: units of n; layout, rule: of the mesh.
-        n: (states, elements, points, 3) contact forces at the Gauss points, dimensionless, all rods one after another.
-
-    Returns:
-        For every rod (elements,), over the length of the rod; None where all elements are shorter than these.
-    """
+    """For every rod (elements,), over its length, the lengths sqrt(EI/|n|) of the boundary layers in which bending
+    decays next to a support or a load; None where all elements are shorter. n: (states, elements, points, 3) at the
+    Gauss points, dimensionless (by the scales), all rods one after another."""
     force = np.sqrt(3) * np.abs(n).max(initial=0.0) * scales.force
     softest = np.repeat(scene.extremes[0].J[:, :2].min(axis=1), layout.counts)
     if (force * (layout.sizes(scene) / LONGEST_IN_LAYER) ** 2 <= softest).all():
@@ -342,13 +308,11 @@ def of_path(path):
 
 
 def winding_lengths(path):
-    """Lengths 1/k for the wave numbers k with which rods under moments buckle, as in cos(k s).
+    """For every rod (elements,), over its length, the lengths 1/k for the wave numbers k with which rods under moments
+    buckle, as in cos(k s), of the largest moments over all points of a path.
 
-    Under a torque T that is k = T/EI (Greenhill 1883), under a moment M about the stiff axis
-    k^2 = (M^2/EI GJ) (1 - EI/EI_max) (1 - GJ/EI_max), with the smaller EI (Michell 1899, Prandtl 1899).
-
-    Returns:
-        For every rod (elements,), over the length of the rod, of the largest moments over all points of a path.
+    Under a torque T that is k = T/EI (Greenhill 1883), under a moment M about the stiff axis k^2 = (M^2/EI GJ) (1 -
+    EI/EI_max) (1 - GJ/EI_max), with the smaller EI (Michell 1899, Prandtl 1899).
     """
     fields, scale = path._stacked("gauss_fields"), path.scales.moment
     m, d3 = fields[..., 3:6], fields[..., 6:] / np.linalg.norm(fields[..., 6:], axis=-1, keepdims=True)
@@ -436,18 +400,13 @@ def resolves(layout, lengths):
 
 
 def element_differences(fine, coarse):
-    """The contribution of each element to the difference of the positions on two meshes.
+    """For every rod (elements of the coarse mesh,) the contribution of each element to the difference of the positions
+    of two Paths with the same points: maximum over all points, relative to the largest displacement of each. Every
+    element of `fine` lies within one of `coarse`.
 
     It is the largest difference of three quantities: positions within the element, relative to the line between its
-    ends; the relative displacement of its ends; their relative rotation times a lever arm. The lever arm is the length
-    over which the rest of the rod follows this rotation: the rod's length, or sqrt(EI/|n|) under tension.
-
-    Args:
-        fine, coarse: Paths with the same points; every element of `fine` lies within one of `coarse`.
-
-    Returns:
-        For every rod (elements of the coarse mesh,): maximum over all points, relative to the largest displacement of
-        each point.
+    ends; the relative displacement of its ends; their relative rotation times a lever arm, the length over which the
+    rest of the rod follows this rotation: the rod's length, or sqrt(EI/|n|) under tension.
     """
     sizes = fine._reference.sizes[POSITION]
     n = coarse._stacked("gauss_fields")[..., :3]
@@ -473,14 +432,9 @@ def element_differences(fine, coarse):
 
 
 def _deformation(motion, rest):
-    """Relative displacements of the two ends of elements, in the mean frame of both ends, and their relative rotations.
-
-    Args:
-        motion: (points, ends, 7) displacements and unit quaternions; rest: (ends, 3) reference positions.
-
-    Returns:
-        Two arrays (points, elements, 3), the second twice the vector parts of quaternions.
-    """
+    """Relative displacements of the two ends of elements, in the mean frame of both ends, and twice the vector parts of
+    the quaternions of their relative rotations, (points, elements, 3) each; motion: (points, ends, 7) displacements and
+    unit quaternions; rest: (ends, 3) reference positions."""
     q = motion[:, :, 3:]
     half_way = (q[:, :-1] + q[:, 1:]).reshape(-1, 4)
     frames = directors(half_way / np.linalg.norm(half_way, axis=1, keepdims=True)).reshape(len(q), -1, 3, 3)

@@ -178,14 +178,8 @@ POSITION, ROTATION, FORCE, MOMENT = 0, 1, 2, 3
 
 
 def criteria_of(bound):
-    """(names of the criteria that `tol` bounds, the further `Criterion`s beyond those of the package).
-
-    Args:
-        bound: names, or classes or objects of criteria.
-
-    Raises:
-        SceneError: something else.
-    """
+    """(names of the criteria that `tol` bounds, the further `Criterion`s beyond those of the package), from names, or
+    classes or objects of criteria; else a SceneError."""
     if isinstance(bound, str) or not isinstance(bound, Sequence) or not bound:
         raise SceneError(f"bound = {bound!r}: expected a list of some of {', '.join(map(repr, CRITERIA))}")
     found = {}
@@ -278,12 +272,8 @@ def _squares(vectors):
 
 def held_by_law(scene, layout, rule, scales, without, count):
     """(2, count) the largest force and moment, dimensionless, that would hold sections to their strains in the
-    reference in so many states; without infinite stiffnesses.
-
-    Args:
-        without: function of a rod and arc lengths s (n,), m, that gives what `action.without_stress` adds in every
-            state, curvature and strain (count, 2, n, 3).
-    """
+    reference in so many states; without infinite stiffnesses. without: function of a rod and arc lengths s (n,), m:
+    what `action.without_stress` adds in every state, curvature and strain (count, 2, n, 3)."""
     sizes = np.zeros((2, count))
     for rod, x in zip(scene.rods, layout.node_s(rule.nodes), strict=True):
         along = rod.stiffness_at(x * rod.length)
@@ -315,14 +305,10 @@ def shortest_of(scene, scales, layout):
 
 
 def rounding_of(least, K, J, shortest, p, by_statics):
-    """Radii of gyration (.., rods), and errors of n and of m by rounding (2, ..), dimensionless.
-
-    n is a stiffness times differences of positions over the spacing of the nodes, unless it follows from statics;
-    m likewise of rotations, with a share of the moment of n over the spacing of the nodes.
-
-    Args:
-        least: the least K, and K, J: the largest (.., rods, 3); shortest: elements (rods,).
-    """
+    """Radii of gyration (.., rods), and errors of n and of m by rounding (2, ..), dimensionless, from the least K, and
+    the largest K, J (.., rods, 3); shortest: elements (rods,). n is a stiffness times differences of positions over the
+    spacing of the nodes, unless it follows from statics; m likewise of rotations, with a share of the moment of n over
+    the spacing of the nodes."""
     stiffness = np.ones(K.shape[:-1]) if by_statics else np.where(np.isfinite(K), K, 0.0).max(axis=-1)
     gyrations = np.sqrt(J[..., :2].max(axis=-1) / least[..., 2])
     of_force, of_moment = OF_FORCE * stiffness * p * p / shortest, p / shortest + stiffness * p / 2

@@ -202,14 +202,8 @@ def _grazing(scene, rod, s, gap):
 
 
 def refuse_grazing(state, owner):
-    """Refuse small motions of rods that touch an obstacle without pressing on it, which may lift off.
-
-    Args:
-        state: an `Equilibrium`; owner: of the message.
-
-    Raises:
-        SceneError: naming rod and place.
-    """
+    """Refuse (SceneError with rod and place) small motions about an `Equilibrium` of rods that touch an obstacle
+    without pressing on it, which may lift off."""
     for obstacle in state.scene.actions:
         for rod in state.scene.rods:
             if obstacle.gaps is not None and obstacle.acts_on(rod):

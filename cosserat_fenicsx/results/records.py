@@ -172,11 +172,8 @@ _LEAST = 1e-2
 
 
 def find_again(fine, coarse):
-    """Set the `error` of the events of a path from the events of the same kind on a coarser mesh.
-
-    Returns:
-        The events of the coarser mesh without a counterpart.
-    """
+    """Set the `error` of the events of a path from the events of the same kind on a coarser mesh, of which those
+    without a counterpart are returned."""
     left, least = list(coarse.events), _LEAST * float(np.abs(fine.load_factors).max(initial=0.0))
 
     def apart(event, other):
@@ -194,12 +191,8 @@ def find_again(fine, coarse):
 
 
 def keep_confirmed(path, largest, left):
-    """Remove the events whose `error` is unknown or too large from a path's list, and report them in its `why`.
-
-    Args:
-        largest: error allowed.
-        left: events of a coarser mesh without a counterpart.
-    """
+    """Remove the events whose `error` is unknown or larger than `largest` from a path's list, and report them in its
+    `why`; left: events of a coarser mesh without a counterpart."""
     unsure = [event for event in path.events if not event.error <= largest]
     path.events = [event for event in path.events if event.error <= largest]
     meshes = [(event, "could not be confirmed on another mesh") for event in unsure]

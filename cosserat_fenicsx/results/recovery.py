@@ -83,12 +83,8 @@ def at_nodes(values):
 
 
 def viscous_contact(history, which, rod):
-    """n and m (n, nodes, 3) of Kelvin-Voigt damping in several states, N and N m, material; at a jump of the section
-    the values of the element before.
-
-    Args:
-        history: a `History`; which: indices of states (n,); rod: a rod with a `Damping`.
-    """
+    """n and m (n, nodes, 3) of Kelvin-Voigt damping of a rod in several states of a `History`, N and N m, material; at
+    a jump of the section the values of the element before."""
     s = history.layout.nodes_of(history._rows(rod)[0], history.rule.nodes) * rod.length
     law = rod.damping.viscosity(rod.stiffness_at(s, "left"))
     rates = np.array([_strain_rates(history, history._records[k], rod) for k in which])
@@ -96,11 +92,9 @@ def viscous_contact(history, which, rod):
 
 
 def _strain_rates(history, record, rod):
-    """(nodes, 6) rates of the material strains v and u, 1/s and 1/(m s), extrapolated from the Gauss points.
-
-    v_t = R^T (r_t' - w x r') and u_t = R^T w', with the angular velocity w = 2 vec(q_t conj(q))/|q|^2 of the
-    interpolated q, as in the models.
-    """
+    """(nodes, 6) rates of the material strains v and u, 1/s and 1/(m s), extrapolated from the Gauss points: v_t = R^T
+    (r_t' - w x r') and u_t = R^T w', with the angular velocity w = 2 vec(q_t conj(q))/|q|^2 of the interpolated q, as
+    in the models."""
     i, _ = history._rows(rod)
     rule, breaks, cells = history.rule, history.layout.breaks[i], history._cells(i)
     h = np.diff(breaks)[:, None, None] * rod.length / history.scales.length

@@ -113,11 +113,7 @@ def _along(thread, places, v, k):
 
 
 class _Places:
-    """Points of the elements of a rod.
-
-    Args:
-        result: a `Path` or `History`; rod: of its scene; x: (points,) in [0, 1].
-    """
+    """Points x (points,) in [0, 1] of the elements of a rod of a `Path` or `History`."""
 
     def __init__(self, result, rod, x):
         i, _ = result._rows(rod)

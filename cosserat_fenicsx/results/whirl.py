@@ -179,15 +179,9 @@ class Orbit(Result):
         return np.where(self.turns, (change + np.pi) % (2 * np.pi) - np.pi, 0.0)
 
     def _means(self, windows=1, least=0.0):
-        """Means over parts of the duration.
-
-        Args:
-            windows: maximum number of parts; least: share of a part in which the angle must be counted.
-
-        Returns:
-            at, rate, spin, radius: (m,) middle (s), rate of whirl (rad/s, forward positive; NaN where the angle is not
-            counted), spin (rad/s) and radius (m) of the parts.
-        """
+        """Means over at most so many parts of the duration: middle (s), rate of whirl (rad/s, forward positive; NaN
+        where the angle is not counted), spin (rad/s) and radius (m), (m,) each; least: share of a part in which the
+        angle must be counted."""
         count, lengths = len(self.times) - 1, np.diff(self.times)
         edges = np.unique(np.linspace(0, count, min(windows, count) + 1).astype(int))
 

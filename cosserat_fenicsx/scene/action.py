@@ -206,11 +206,8 @@ def has_permanent(scene):
 
 
 def without_stress(scene, rod, s, t=0.0):
-    """What the actions in the law give sections of a rod without stress at arc lengths s (n,), m, and the time t (s).
-
-    Returns:
-        (2, 2, n, 3), material: in full, and per unit of the load factor; curvature and twist, rad/m, and strain.
-    """
+    """(2, 2, n, 3), material: what the actions in the law give sections of a rod without stress at arc lengths s (n,),
+    m, and the time t (s): in full, and per unit of the load factor; curvature and twist, rad/m, and strain."""
     found, frames = np.zeros((2, 2, len(s), 3)), rod.curve.frame(s)
     for action in scene.actions:
         if action.in_law and action.acts_on(rod):

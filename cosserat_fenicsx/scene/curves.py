@@ -27,18 +27,10 @@ _APART = 1e-7
 
 
 def polyline(owner, field, given, *, closed):
-    """The points (n, 3), m, of an array or a file, without repetitions.
-
-    Args:
-        owner, field: named in error messages.
-        given: an array, or the path of a file: .csv (three columns, m, with or without a header) or one that meshio
-            reads.
-        closed: whether the last point is joined to the first; it may then repeat it.
-
-    Raises:
-        SceneError: a file that cannot be read or holds no single polyline without branches, too few points, numbers
-            that are not finite, or a point that repeats the one before.
-    """
+    """The points (n, 3), m, of an array or a file (.csv of three columns, m, with or without a header; or one that
+    meshio reads), without repetitions; closed: whether the last point is joined to the first; it may then repeat it. A
+    SceneError for a file that cannot be read or holds no single polyline without branches, too few points, numbers that
+    are not finite, or a point that repeats the one before; owner, field: in its message."""
     points, what = given, f"{given!r:.60}"
     if isinstance(given, str | Path):
         what = str(given)
@@ -147,15 +139,8 @@ _SERIES = np.array([(-1) ** k / math.factorial(2 * k + 3) for k in range(9)])
 
 
 def start_frame(owner, d3, default):
-    """The frame [d1 d2 d3] of a unit tangent, (3, 3).
-
-    Args:
-        owner: the curve; the component of `owner.d1` normal to the tangent gives the direction of d1.
-        default: the direction that is used where `owner.d1` is None.
-
-    Raises:
-        SceneError: d1 along the tangent.
-    """
+    """The frame [d1 d2 d3] of a unit tangent, (3, 3), with d1 by the component of `owner.d1`, or else of `default`,
+    normal to the tangent; a SceneError for d1 along it."""
     given = np.asarray(default if owner.d1 is None else owner.d1, dtype=float)
     across = given - np.dot(given, d3) * d3
     if np.linalg.norm(across) <= 1e-6 * np.linalg.norm(given):
@@ -357,10 +342,8 @@ class Spline(Curve):
         return first / np.linalg.norm(first, axis=-1, keepdims=True)
 
     def _locate(self, s):
-        """The panels of arc lengths s (n,), the coordinates in [-1, 1] on them, and their spans and parameters there.
-
-        By Newton's method, safeguarded by bisection.
-        """
+        """The panels of arc lengths s (n,), the coordinates in [-1, 1] on them, and their spans and parameters there,
+        by Newton's method, safeguarded by bisection."""
         s = np.clip(s, 0.0, self.length)
         panel = np.clip(np.searchsorted(self._arcs, s, side="right") - 1, 0, len(self._half) - 1)
         arc, span, middle, half = self._arc[:, panel], self._span[panel], self._middle[panel], self._half[panel]
@@ -437,11 +420,8 @@ class Line(Curve):
 
 
 def positions_along(curves, x, counts):
-    """(n, 3) inertial points of curves one after another, m, at arc lengths over their lengths x (n,).
-
-    Args:
-        counts: of every curve, how many of the n places are on it.
-    """
+    """(n, 3) inertial points of curves one after another, m, at arc lengths over their lengths x (n,); counts: of every
+    curve, how many of the n places are on it."""
     if not _straight(curves):
         return _one_by_one(curves, x, counts, "position")
     start, end = (np.repeat(points, counts, axis=0) for points in
@@ -467,9 +447,7 @@ def _one_by_one(curves, x, counts, name):
 
 class _Uniform(Curve):
     """A curve of constant material curvature u: R_R(s) = R_R(0) exp(s u x), r(s) = r(0) + integral of R_R (0, 0, 1).
-
-    Subclasses store `start`, `length`, `_frame` = R_R(0) and `_curvature` = u.
-    """
+    Subclasses store `start`, `length`, `_frame` = R_R(0) and `_curvature` = u."""
 
     breaks, uniform = (), True
 

@@ -83,14 +83,8 @@ class _OfScene(Parameter):
 
 
 def check_once(scene, given):
-    """Refuse two names of the same number, such as that of a shared material, whose uncertainty would count twice.
-
-    Args:
-        given: names or `Parameter`s.
-
-    Raises:
-        SceneError: there are two, or two parameters with one name; see also `parameter_of`.
-    """
+    """Refuse (SceneError) two names (or `Parameter`s) of the same number, such as that of a shared material, whose
+    uncertainty would count twice; or two parameters with one name; see also `parameter_of`."""
     names = {}
     for parameter in [parameter_of(scene, each) for each in given]:
         place = getattr(parameter, "place", parameter.name)
@@ -149,11 +143,8 @@ def scene_with(scene, names, values):
 
 
 def _changed(numbers):
-    """{id of an object: the same with other numbers}, all numbers of one at once.
-
-    Args:
-        numbers: (object, its field, indices within the field, value) of each.
-    """
+    """{id of an object: the same with other numbers}, all numbers of one at once, from (object, its field, indices
+    within the field, value) of each."""
     owners, fields = {}, {}
     for owner, field, keys, value in numbers:
         owners[id(owner)], of_owner = owner, fields.setdefault(id(owner), {})
@@ -162,14 +153,8 @@ def _changed(numbers):
 
 
 def laws_with(scene, parameters, values):
-    """The stiffnesses of uniform rods without couplings in a scene with other numbers of sections and materials.
-
-    Args:
-        parameters: by their names, see `parameter_of`; values: (cases, parameters).
-
-    Returns:
-        K and J, (cases, rods, 3), N and N m^2; NaN in cases that a constructor refuses.
-    """
+    """K and J, (cases, rods, 3), N and N m^2, of uniform rods without couplings in a scene with other numbers of
+    sections and materials, values (cases, parameters); NaN in cases that a constructor refuses."""
     found = np.empty((len(values), len(scene.rods), 6))
     for i, rod in enumerate(scene.rods):
         found[:, i, :3], found[:, i, 3:] = rod.profile.range[0].K, rod.profile.range[0].J
@@ -190,11 +175,8 @@ def laws_with(scene, parameters, values):
 
 
 def admitted_laws(scene, parameters, values):
-    """`laws_with` for values that the constructors admit, of all cases at once.
-
-    Raises:
-        Exception: of any kind, where the formulas of a section take no arrays.
-    """
+    """`laws_with` for values that the constructors admit, of all cases at once; raises anything where the formulas of a
+    section take no arrays."""
     known = {}
     for parameter, column in zip(parameters, values.T, strict=True):
         _, field, *keys = parameter.place
@@ -293,11 +275,8 @@ def _made(item, changes):
 
 
 class _Rebuilding:
-    """Copies of objects that hold, directly or not, one that is replaced; all others are kept.
-
-    Args:
-        known: {id of an object: its replacement}.
-    """
+    """Copies of objects that hold, directly or not, one that is replaced (known: {its id: its replacement}); others are
+    kept."""
 
     def __init__(self, known):
         self._known, self._alive = known, []

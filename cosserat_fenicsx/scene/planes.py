@@ -49,11 +49,7 @@ class Plane:
 
 
 def find_plane(scene):
-    """The plane of a scene.
-
-    Returns:
-        (`Plane`, "") or (None, why there is none).
-    """
+    """(`Plane`, "") of a scene, or (None, why there is none)."""
     try:
         return _find(scene), ""
     except _Leaves as reason:
@@ -170,11 +166,8 @@ def _normal_of(directions):
 
 
 def _normal_of_a_line(tangent, acting, scene):
-    """The normal of the plane where all rods lie along one line.
-
-    The first load or prescribed motion that is not along the line defines it; without one, the axis of the smaller
-    bending stiffness of the first section.
-    """
+    """The normal of the plane where all rods lie along one line: the first load or prescribed motion that is not along
+    the line defines it; without one, the axis of the smaller bending stiffness of the first section."""
     for inside, across in acting:
         for force in _units(inside):
             normal = np.cross(tangent, force)
@@ -189,11 +182,8 @@ def _normal_of_a_line(tangent, acting, scene):
 
 
 def _check_section(rod, s, frames, normal):
-    """Refuse sections that couple motions in the plane with those out of it.
-
-    A principal axis of every section must be the normal, unless bending and shear stiffnesses are isotropic; a
-    stiffness matrix must not couple strains in the plane with those out of it.
-    """
+    """Refuse sections that couple motions in the plane with those out of it: a principal axis of every section must be
+    the normal, unless bending and shear stiffnesses are isotropic; a stiffness matrix must not couple these strains."""
     if rod.profile.coupled:
         t = frames[:, :, 2]
         axes = np.stack([np.cross(normal, t), np.broadcast_to(normal, t.shape), t], axis=1) @ frames

@@ -17,14 +17,8 @@ from cosserat_fenicsx.scene.stresses import Stress
 
 
 def checked_pieces(where, field, given, length, what):
-    """[(s_end, value)] of pieces whose ends ascend to the rod's length, which the last may write None.
-
-    Args:
-        where, field: the rod and its property, in messages; given: the pieces; length: m; what: a value in messages.
-
-    Raises:
-        SceneError: a piece that is no pair, or ends that do not ascend to the length.
-    """
+    """[(s_end, value)] of pieces whose ends ascend to the rod's length, m, which the last may write None; else a
+    SceneError of `where`, the rod, and `field`, its property; what: a value in messages."""
     pieces, before = [], 0.0
     for i, piece in enumerate(given):
         if not isinstance(piece, list | tuple) or len(piece) != 2:

@@ -227,14 +227,8 @@ class Station:
 
 
 def station_named(where, text, rods):
-    """The station 'rod.start', 'rod.end' or 'rod@s', s in m.
-
-    Args:
-        where: the owner of the text, for error messages; rods: {name: rod}.
-
-    Raises:
-        SceneError: it is none of these, or no rod has this name, or it lies beyond its rod.
-    """
+    """The station 'rod.start', 'rod.end' or 'rod@s', s in m, of rods {name: rod}; a SceneError of `where` for another
+    text, an unknown rod, or a place beyond it."""
     known = ", ".join([*rods][:_NAMED]) + (", ..." if len(rods) > _NAMED else "")
     expected = f"expected 'rod.start', 'rod.end' or 'rod@s' with s in m and the rod one of {known}"
     if not isinstance(text, str):
@@ -283,14 +277,8 @@ RodOrName = Annotated[Rod | str, Rod.by_name]
 
 
 def is_known(owner, field, kind):
-    """Whether a field holds a `Station` or a `Rod`; False where it holds a name, which `Scene` looks up.
-
-    Args:
-        kind: `Station` or `Rod`.
-
-    Raises:
-        SceneError: neither of the two.
-    """
+    """Whether a field holds a `Station` or a `Rod` (kind); False where it holds a name, which `Scene` looks up; a
+    SceneError for neither of the two."""
     return not isinstance(kind.by_name.check(owner, field, getattr(owner, field)), str)
 
 
@@ -300,11 +288,7 @@ def mass_arm(rod, s, side="right"):
 
 
 def require_inertia(rod, user, fields=("mass", "inertia")):
-    """Refuse a rod without mass or inertia, which `user` needs.
-
-    Raises:
-        SceneError: naming the property that the rod lacks.
-    """
+    """Refuse (SceneError) a rod without mass or inertia, which `user` needs."""
     low = rod.profile.range[0]
     for name in fields:
         if getattr(low, name) is None:
@@ -355,14 +339,8 @@ def _look_up(where, name, kind, rods):
 
 
 def with_names(where, item, rods):
-    """A part of a scene with stations and rods in place of their names; the part itself where it has no names.
-
-    Args:
-        where: for error messages; rods: {name: rod}.
-
-    Raises:
-        SceneError: there is none of that name, or the part refuses the station or rod.
-    """
+    """A part of a scene with stations and rods in place of their names, from {name: rod}; the part itself where it has
+    none; a SceneError of `where` if there is none of that name, or the part refuses it."""
     if isinstance(item, type) or not dataclasses.is_dataclass(item):  # refused by `Scene`
         return item
     given = {name: (getattr(item, name), kind) for name, kind in fields_of(type(item)).items()}

@@ -83,14 +83,8 @@ def _force(load, scene, length):
 
 
 def check_magnitudes(scene, load_factor):
-    """Refuse loads and prescribed motions that are so large that rounding errors would dominate.
-
-    Args:
-        scene: a `Scene`; load_factor: the largest one requested.
-
-    Raises:
-        SceneError: naming the load or support, its size and the largest one allowed.
-    """
+    """Refuse (SceneError) loads and prescribed motions that are so large, at the largest load factor requested, that
+    rounding errors would dominate."""
     for share, scaled, words, most in scene.magnitudes:
         factor = abs(load_factor) if scaled else 1.0
         if share * factor > 1:
@@ -102,14 +96,7 @@ def check_magnitudes(scene, load_factor):
 
 
 def check_tensions(scene, load_factors, leg=None):
-    """Refuse load factors that give a thread a negative tension.
-
-    Args:
-        scene: a `Scene`; load_factors: all that are requested; leg: its `Leg`, None of a scene without stages.
-
-    Raises:
-        SceneError: naming the thread and the load factor.
-    """
+    """Refuse (SceneError) load factors, of a `Leg` or a scene without stages, that give a thread negative tension."""
     for load in scene.all_loads:
         for factor in load_factors if load.is_thread else ():
             share = leg.share_of(load, factor) if leg else factor if load.scaled else 1.0

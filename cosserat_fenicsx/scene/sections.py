@@ -92,10 +92,8 @@ def arguments_of(section, material, line, unit):
 
 
 def _principal_shear(found, angle):
-    """GA along the principal axes of bending, which differ from the principal axes of shear, and their coupling.
-
-    The flexibilities along both pairs of axes are the diagonals of one tensor, which gives its product term.
-    """
+    """GA along the principal axes of bending, which differ from the principal axes of shear, and their coupling: the
+    flexibilities along both pairs of axes are the diagonals of one tensor, which gives its product term."""
     (x, y), (one, two) = 1 / np.array(found.shear), 1 / np.array(found.principal_shear)
     product = (math.cos(2 * angle) * (one - two) - (x - y)) / (2 * math.sin(2 * angle))
     stiff = np.linalg.inv([[one, product], [product, two]])
@@ -517,10 +515,8 @@ def isotropic(material, A, I, J, shear_areas, outline):
 
 
 def _rectangle_torsion(b, h):
-    """Saint-Venant's torsion constant, m^4.
-
-    The series of tanh(n x)/n^5 over odd n is the exact sum of 1/n^5 minus the fast series of (1 - tanh(n x))/n^5.
-    """
+    """Saint-Venant's torsion constant, m^4: the series of tanh(n x)/n^5 over odd n is the exact sum of 1/n^5 minus the
+    fast series of (1 - tanh(n x))/n^5."""
     long, short = np.maximum(b, h), np.minimum(b, h)
     x = math.pi * long / (2 * short)
     series = 31 / 32 * _ZETA_5 - sum((1 - np.tanh(n * x)) / n**5 for n in range(1, 15, 2))

@@ -361,10 +361,8 @@ def with_values(item, values):
 
 
 def sample_times(item, until):
-    """Sample times (s) up to `until` for checks of a load or a support; only 0 if it does not depend on time.
-
-    They are its jumps, the midpoints between them, and times spread logarithmically.
-    """
+    """Sample times (s) up to `until` for checks of a load or a support: its jumps, the midpoints between them, and
+    times spread logarithmically; only 0 if it does not depend on time."""
     signals = signals_of(item)
     if not signals:
         return [0.0]
@@ -507,11 +505,8 @@ def values_of(value, s):
 
 
 def read_table(owner, field, file, columns, expected):
-    """The numbers (n, columns) of a .csv file without a heading.
-
-    Args:
-        owner, field: what has the file, for messages. expected: the columns in words, their number first.
-    """
+    """The numbers (n, columns) of a .csv file without a heading; owner, field: what has the file, for messages;
+    expected: the columns in words, their number first."""
     where = f"{name_of(owner)}.{field} = {str(file)!r}"
     try:
         table = np.loadtxt(text_of(file, f"{expected}, as .csv").splitlines(), delimiter=",", comments="#", ndmin=2)

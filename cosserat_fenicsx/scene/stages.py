@@ -134,11 +134,7 @@ class Leg:
 
 
 def refuse_stages(owner, scene):
-    """Refuse a scene with stages where a function would leave them out.
-
-    Raises:
-        SceneError: naming the function.
-    """
+    """Refuse (SceneError) a scene with stages where a function, `owner`, would leave them out."""
     if scene.stages:
         raise SceneError(
             f"Scene.stages: {owner} knows no stages: expected `solve`, or the scene without them, "
@@ -208,11 +204,8 @@ class Places:
 
 
 def legs_of(scene):
-    """The `Leg`s of a scene with stages, in order: of its own loads, where there are such, then of its stages.
-
-    Raises:
-        SceneError: a stage releases what is gone, or not all of a support; or names what no load factor multiplies.
-    """
+    """The `Leg`s of a scene with stages, in order: of its own loads, where there are such, then of its stages; a
+    SceneError where a stage releases what is gone, or not all of a support; or names what no load factor multiplies."""
     always = [Named(f"loads[{i}]", x, 1.0) for i, x in enumerate(scene.loads) if not x.scaled]
     ramped = [Named(f"loads[{i}]", x, 1.0) for i, x in enumerate(scene.loads) if x.scaled]
     supports = [Named(f"supports[{i}]", x, "moving" if x.moves else "fixed") for i, x in enumerate(scene.supports)]
@@ -287,13 +280,8 @@ def _taken_over(supports, others):
 
 @dataclass(frozen=True)
 class _Placed(Support):
-    """A support that holds its station where it was at the begin of a stage, or moves it on from there.
-
-    Args:
-        support: as it was given.
-        displacement_before, rotation_before: of the station there, m, inertial; a unit quaternion, from the reference.
-        moves: whether it moves on.
-    """
+    """A support that holds its station where it was at the begin of a stage (displacement_before, m, inertial;
+    rotation_before, a unit quaternion, from the reference), or moves it on from there."""
 
     support: Support
     displacement_before: tuple
@@ -324,12 +312,8 @@ class _Placed(Support):
 
 
 def scene_of(scene, leg, end=None):
-    """The `Scene` of a leg.
-
-    Args:
-        end: the path up to the end of the leg before, its last state alone, on a scene by this function; None where the
-            leg begins in the reference, or to check the scene there.
-    """
+    """The `Scene` of a leg; end: the path up to the end of the leg before, its last state alone, on a scene by this
+    function; None where the leg begins in the reference, or to check the scene there."""
     loads = [_part(x, permanent=True) for x in leg.standing] + [_part(x, permanent=False) for x in leg.ramped]
     supports = [_placed(x, end) for x in leg.supports]
     for i in leg.released if end else ():

@@ -71,19 +71,14 @@ MOST = 64
 
 
 def null_space(row, column, value, shape):
-    """An orthonormal basis of the vectors that a matrix maps to zero.
+    """(n, k) an orthonormal basis of the vectors that a matrix of a shape maps to zero, and whether it is complete: a
+    matrix that is not small may have more than `MOST` such vectors. row, column, value: entries; those at the same
+    place are added.
 
     A small matrix is decomposed into singular values. For others, the right singular vectors of the smallest singular
     values are found by iterations with the inverse of A^T A + shift I on a block of vectors V. The singular values are
     taken from A V, since forming A^T A would lose half of their digits. The block grows until it holds all singular
     values below `_GAP`, which separates small values from zero as well as a dense decomposition.
-
-    Args:
-        row, column, value: the entries; those at the same place are added.
-        shape: (rows, columns).
-
-    Returns:
-        (n, k) the basis, and whether it is complete: a matrix that is not small may have more than `MOST` such vectors.
     """
     size = shape[1]
     if size <= _DENSE:
@@ -160,14 +155,9 @@ def _key(scene, station):
 
 
 def check_held_once(scene):
-    """Refuse redundant constraints: several that hold the same motion of one station.
-
-    Constraints at different stations of a rod are never redundant, since the rod between them is elastic. So only those
-    may be that connect stations, and the ground, in a closed loop.
-
-    Raises:
-        SceneError: naming the redundant supports and joints.
-    """
+    """Refuse (SceneError) redundant constraints: several that hold the same motion of one station. Constraints at
+    different stations of a rod are never redundant, since the rod between them is elastic. So only those may be that
+    connect stations, and the ground, in a closed loop."""
     joined, grounded, closed, stations = Groups(), set(), [], []
     for holder in _holders(scene):
         if isinstance(holder, Joint):
@@ -219,11 +209,7 @@ def _named(scene):
 
 @functools.lru_cache(maxsize=32)  # scenes are immutable, and often solved repeatedly
 def check_no_mechanism(scene):
-    """Refuse a scene with rigid motions of the rods that no support, joint or elastic action resists.
-
-    Raises:
-        SceneError: naming the motion that is free.
-    """
+    """Refuse (SceneError) a scene with rigid motions of the rods that no support, joint or elastic action resists."""
     free, complete = free_motions(scene)
     if len(free) == 0:
         return
@@ -295,15 +281,10 @@ def _plain_motions(free, spins):
 
 
 def free_motions(scene):
-    """The rigid motions of the rods that no support, joint or elastic action resists.
-
-    Rods that rigid joints connect move as one body, and not at all where it is clamped; the constraints of the other
-    bodies, six unknowns each, are the rows of a matrix, and the motions its null space.
-
-    Returns:
-        (k, rods, 6) an orthonormal basis, of every rod the velocity of its start over the length of the longest rod and
-        its rotation; and whether it is complete, see `null_space`.
-    """
+    """The rigid motions of the rods that no support, joint or elastic action resists: (k, rods, 6) an orthonormal
+    basis, of every rod the velocity of its start over the length of the longest rod and its rotation; and whether it is
+    complete. Rods that rigid joints connect move as one body, and not at all where it is clamped; the constraints of
+    the other bodies, six unknowns each, are the rows of a matrix, and the motions its null space."""
     bodies, size = Groups(), _size(scene)
     for joint in scene.joints:
         if joint.rigid:
@@ -380,14 +361,9 @@ def touching(scene):
 
 
 def without_mechanism(scene):
-    """The scene itself; or, for a mechanism, a copy with joints, then supports, made rigid until it is none.
-
-    If the mechanism is in equilibrium in its reference, except for strains, the copy has the same equilibrium: the
-    added constraints carry no reaction.
-
-    Raises:
-        SceneError: it remains a mechanism.
-    """
+    """The scene itself; or, for a mechanism, a copy with joints, then supports, made rigid until it is none; a
+    SceneError if it remains one. If it is in equilibrium in its reference, except for strains, the copy has the same
+    equilibrium: the added constraints carry no reaction."""
     loose = [("joints", i, Joint(x.first, x.second)) for i, x in enumerate(scene.joints) if not x.rigid]
     loose += [("supports", i, Clamp(x.station)) for i, x in enumerate(scene.supports) if not x.clamps]
     held = scene

@@ -55,17 +55,12 @@ class Fibres:
 
 
 def round_stress(outer, inner, nu, force, moment):
-    """The `Stress` of a tube or, with `inner` = 0, of a circle.
+    """The `Stress` of a tube (radii outer, inner, m) or, with `inner` = 0, of a circle, under force and moment (...,
+    3), N and N m, along d_1, d_2, d_3. Von Mises stresses are taken on rings from the inner radius, or the centre, to
+    the outer one; of a circle they may be larger by 0.3 % between them.
 
-    Von Mises stresses are taken on rings from the inner radius, or the centre, to the outer one. Of a circle they may
-    be larger by 0.3 % between them.
-
-    At the angle theta from d_1 and the radius r, sigma = n_3/A + r (m_1 sin theta - m_2 cos theta)/I,
-    tau_theta = r m_3/J + c (n_2 cos theta - n_1 sin theta)/I and tau_r = e (n_1 cos theta + n_2 sin theta)/I.
-
-    Args:
-        outer, inner: radii, m; nu: Poisson's ratio.
-        force, moment: (..., 3), N and N m, along d_1, d_2, d_3.
+    At the angle theta from d_1 and the radius r, sigma = n_3/A + r (m_1 sin theta - m_2 cos theta)/I, tau_theta = r
+    m_3/J + c (n_2 cos theta - n_1 sin theta)/I and tau_r = e (n_1 cos theta + n_2 sin theta)/I.
     """
     A, I = np.pi * (outer**2 - inner**2), np.pi * (outer**4 - inner**4) / 4
     n, m = force[..., None], moment[..., None]  # the last axis: rings
@@ -82,11 +77,9 @@ def round_stress(outer, inner, nu, force, moment):
 
 
 def _largest_around(sigma, *taus):
-    """The maximum over theta of sqrt(sigma^2 + 3 sum of tau^2), each given by its mean and factors of cos and sin.
-
-    The square is c + a cos x + b cos(2 (x - y)) with a, b >= 0, x from the largest place of the first wave and y, in
-    [-pi/2, pi/2], the nearest largest place of the second one. Its only maximum from 0 to y is the largest of all.
-    """
+    """The maximum over theta of sqrt(sigma^2 + 3 sum of tau^2), each given by its mean and factors of cos and sin. The
+    square is c + a cos x + b cos(2 (x - y)) with a, b >= 0, x from the largest place of the first wave and y, in
+    [-pi/2, pi/2], the nearest largest place of the second one. Its only maximum from 0 to y is the largest of all."""
     mean, first_cos, first_sin, second_cos, second_sin = sum(
         factor
         * np.array(np.broadcast_arrays(p * p + (q * q + r * r) / 2, 2 * p * q, 2 * p * r, (q * q - r * r) / 2, q * r))
@@ -105,13 +98,9 @@ def _largest_around(sigma, *taus):
 
 @functools.lru_cache(maxsize=64)
 def rectangle_fibres(width, height, nu, torsion):
-    """The `Fibres` of a rectangle: corners, points on all sides, denser near the corners, and points inside.
-
-    Between them von Mises stresses may be larger by 0.7 % (sides of 1:1 to 1:300, nu from 0 to 0.49), commonly 0.1 %.
-
-    Args:
-        width, height: along d_1 and d_2, m; nu: Poisson's ratio; torsion: Saint-Venant's constant, m^4.
-    """
+    """The `Fibres` of a rectangle (width, height along d_1 and d_2, m; torsion: Saint-Venant's constant, m^4): corners,
+    points on all sides, denser near the corners, and points inside. Between them von Mises stresses may be larger by
+    0.7 % (sides of 1:1 to 1:300, nu from 0 to 0.49), commonly 0.1 %."""
     a, b = width / 2, height / 2
     A, I1, I2 = 4 * a * b, 4 * a * b**3 / 3, 4 * b * a**3 / 3
     (x, x_inside), (y, y_inside) = _places(a, min(a, b)), _places(b, min(a, b))
@@ -134,14 +123,10 @@ def _places(a, short):
 
 
 def _shear(a, b, nu, x, y):
-    """Shear stresses of a rectangle |x| <= a, |y| <= b with a <= b, at all pairs of x and y.
-
-    The series are those with hyperbolic functions of y, which converge fast save at the short sides.
-
-    Returns:
-        (3, 2, x, y): per force along x, times the second moment of area for its bending (m^2); the same for a force
-        along y; per moment, times the torsion constant (m); of each the components along x and y.
-    """
+    """Shear stresses of a rectangle |x| <= a, |y| <= b with a <= b, at all pairs of x and y, (3, 2, x, y): per force
+    along x, times the second moment of area for its bending (m^2); the same for a force along y; per moment, times the
+    torsion constant (m); of each the components along x and y. The series are those with hyperbolic functions of y,
+    which converge fast save at the short sides."""
     n, poisson = np.arange(1, _TERMS + 1), nu / (1 + nu)
     sign, odd = -((-1.0) ** n), 2 * n - 1
     # odd waves: 1 at x = 0; whole waves: zero slope at x = a

@@ -10,7 +10,7 @@ from cosserat_fenicsx.scene.statical import check_no_mechanism
 
 
 def check_arguments(scene, tol, elements, bound=NAMES, *, owner="solve"):
-    """Refuse (SceneError) arguments of `solve`, or of another function (`owner`) of static scenes, out of their range."""
+    """Refuse (SceneError) arguments of `solve`, or of another function (`owner`) of static scenes, out of range."""
     if not isinstance(scene, Scene):
         hint = ", as in read(file).scene" if hasattr(scene, "scene") else ""
         raise SceneError(f"scene is a {type(scene).__name__}: expected a Scene{hint}")

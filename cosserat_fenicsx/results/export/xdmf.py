@@ -55,12 +55,8 @@ def write_state(path, file, k=None):
 
 
 def write_mesh(file, mesh, known):
-    """Write nodes, lines and fields in a format of meshio.
-
-    Args:
-        file: a `pathlib.Path`; mesh: function that returns nodes (n, 3), lines (elements, 2) and {name: (n, ...)};
-            known: the endings, for the SceneError on an unknown one.
-    """
+    """Write nodes, lines and fields in a format of meshio; mesh: function that returns nodes (n, 3), lines (elements,
+    2) and {name: (n, ...)}; known: the endings, for the SceneError on an unknown one."""
     import meshio
 
     if file.suffix not in meshio.extension_to_filetypes:
@@ -88,17 +84,12 @@ def _blocks(path):
 
 
 def write_blocks(file, name, meshed, along, blocks, units):
-    """Write states on one mesh: the arrays to the .h5 file, and the .xdmf file that refers to them.
+    """Write states on one mesh: the arrays to the .h5 file, and the .xdmf file that refers to them; both appear when
+    they are complete, the .xdmf last.
 
-    Both appear when they are complete, the .xdmf last.
-
-    Args:
-        file: the .xdmf; name: of the series.
-        meshed: a result with the `scene`, `layout` and `rule` of the nodes.
-        along: (states,) their times.
-        blocks: of consecutive states: nodes (n, 3) in m, lines (elements, 2) and fields {name: (states, n) or
-            (states, n, 3)}; nodes and lines are the same in all of them.
-        units: {name of a field: its unit}, for information in the file.
+    name: of the series; meshed: a result with the `scene`, `layout` and `rule` of the nodes; along: (states,) their
+    times; blocks: of consecutive states: nodes (n, 3) in m, lines (elements, 2) and fields {name: (states, n) or
+    (states, n, 3)}; nodes and lines are the same in all of them; units: {name of a field: its unit}.
     """
     numbers, constants, k = file.with_suffix(".h5"), constants_of(meshed), 0
     with replaced(file) as text, replaced(numbers) as fresh:
@@ -128,12 +119,8 @@ def _about(scene, units):
 
 
 def _grid(store, lines, fields, constants):
-    """The text of one state, with {k} for its number and {along} for its load factor or time.
-
-    Args:
-        store: the name of the .h5 file; lines: (elements, 2); fields: {name: (states, nodes, ...)}; constants: {name:
-            (nodes,)} of all states.
-    """
+    """The text of one state, with {k} for its number and {along} for its load factor or time; store: the name of the
+    .h5 file; lines: (elements, 2); fields: {name: (states, nodes, ...)}; constants: {name: (nodes,)} of all states."""
     grid, store = xml.Element("Grid", Name="point {k}", GridType="Uniform"), store.replace("{", "{{").replace("}", "}}")
 
     def item(parent, name, array):
@@ -170,11 +157,7 @@ def _names(path):
 
 
 def meshes_of(path, which):
-    """Nodes, lines and fields of all rods at several points.
-
-    Returns:
-        nodes (points, n, 3), m; lines (elements, 2); {name: (points, n, ...)}.
-    """
+    """Nodes (points, n, 3), m, lines (elements, 2) and fields {name: (points, n, ...)} of rods at several points."""
     names, of_rods = _names(path), []
     for rod in path.scene.rods:
         fields = path.fields_at(which, rod)
