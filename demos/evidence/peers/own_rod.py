@@ -8,22 +8,11 @@ whole call of `simulate` and the query of the ends.
 from itertools import pairwise
 
 import numpy as np
+from problems import scene_of
 from speak import serve
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx import compat
-
-
-def scene_of(problem):
-    """The rod and the scene of a problem."""
-    L, R = problem["length"], problem["radius"]
-    curve = cf.Arc((0, R, 0), (0, 0, 0), L / R, axis=(0, 0, 1)) if R else cf.Line((0, 0, 0), (L, 0, 0))
-    EI, GA = problem["EI"], problem["GA"]
-    section = cf.Stiffness(shear=(GA, GA), axial=problem["EA"], bending=(EI, EI), torsion=problem["GJ"])
-    rod = cf.Rod(curve, section, name="rod")
-    loads = [cf.Force(rod.end, problem["force"])] if any(problem["force"]) else []
-    loads += [cf.Moment(rod.end, problem["moment"])] if any(problem["moment"]) else []
-    return rod, cf.Scene([rod], [cf.Clamp(rod.start)], loads)
 
 
 def prepare(problem, configuration):

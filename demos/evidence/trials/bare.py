@@ -5,7 +5,6 @@ As in a short script: assemble, fix the clamp's rows, solve by PETSc's SNES. The
 """
 
 from contextlib import ExitStack
-from dataclasses import dataclass
 from types import SimpleNamespace
 
 import numpy as np
@@ -21,7 +20,7 @@ from cosserat_fenicsx.models.rod_data import as_matrix, law_of
 from cosserat_fenicsx.models.rodmesh import Layout
 from cosserat_fenicsx.statics.problem import solvers_of
 from trials import problems
-from trials.cells import NO_ROTATION, Answer, NotForIt, Stopped
+from trials.cells import NO_ROTATION, Answer, Method, NotForIt, Stopped
 from trials.own import against_steps
 
 _CLAMPED = (0, 1, 2, 3, 4, 5, 6)
@@ -169,19 +168,14 @@ def weakly_unit(model):
         )
 
 
-@dataclass(frozen=True)
-class Bare:
-    """A column of the table; see `methods`."""
+class Bare(Method):
+    """See `cells.Method`."""
 
-    key: str = "bare"
-    title: str = "bare loop on\ndolfinx, PETSc"
-    what: str = (
+    key, title = "bare", "bare loop on\ndolfinx, PETSc"
+    what = (
         "a short loop on PETSc's SNES over this package's own form of eq. (1), degree 2, 8 elements, one habit at a"
         " time that the package avoids; no count of negative modes"
     )
-    spatial: bool = True
-    own: bool = False
-    turn: tuple = (0.0, 0.0, 0.0)
 
     def solve(self, problem, jump=False):
         """Only problems with `jump`; for all others the answer would be this package's."""

@@ -101,6 +101,21 @@ class NotInstalled(Exception):
     """The method's program is not installed."""
 
 
+class Method:
+    """A column of the table, which is no part of this package.
+
+    key, title, what: its name, its head, what it is in a sentence; own: whether it is part of this package; spatial:
+    whether it supports rods that leave a plane; turn: rotation vector (rad) of the trial of objectivity; solve(problem,
+    jump): an `Answer`; jump: the whole load at once. Raises Stopped, NotForIt, NotInstalled.
+    """
+
+    own, spatial, turn = False, True, (0.8, -0.6, 0.88)
+
+    def numerics(self, key):
+        """(problem, Answer, number or None, unit) of a trial about loops; raises as `solve`."""
+        raise NotForIt("a matter of loops on PETSc")
+
+
 def judged(error, limit, answer, unit, note=""):
     """The cell of an answer whose error may be at most `limit`."""
     if error <= limit:

@@ -10,7 +10,7 @@ from comparison import follow as path
 from comparison.chain import Chain
 
 from trials import problems
-from trials.cells import Answer, NotForIt, Stopped, load_factor_in
+from trials.cells import Answer, Method, NotForIt, Stopped, load_factor_in
 
 ELEMENTS = 64
 #: In place of infinite stiffnesses, which a method does not support, in EI/L^2.
@@ -134,16 +134,14 @@ class Guided:
 
 
 @dataclass(frozen=True)
-class ChainMethod:
-    """A column of the table; see `methods`."""
+class ChainMethod(Method):
+    """See `cells.Method`; law_of: see `LoadedChain`."""
 
     key: str
     title: str
     what: str
     law_of: object
-    spatial: bool = False
-    own: bool = False
-    turn: tuple = (0.0, 0.0, 1.2)
+    spatial, turn = False, (0.0, 0.0, 1.2)
 
     def solve(self, problem, jump=False):
         """An `Answer` under load control."""
@@ -201,9 +199,8 @@ class ChainMethod:
         return Answer(chain.tip_moved(x)[None], _said(chain.negative_modes(x, 1.0)))
 
     def numerics(self, key):
-        """(problem, answer, number, unit)."""
         if key != "residual":
-            raise NotForIt("a matter of loops on PETSc")
+            return super().numerics(key)
         problem = problems.column([0.9], 1e3)
         chain = LoadedChain(problem, ELEMENTS, self.law_of)
         try:
@@ -227,19 +224,11 @@ def _elements(problem):
     return few * problem.get("finer", 1)
 
 
-def _beam(length, axial, shear):
-    return partial(corotational.beam, length=length, axial=axial, shear=shear)
-
-
-def _mcre(length, axial, shear):
-    return partial(mcre.derivatives, mcre.energy(length, axial, shear))
-
-
 CHAINS = (
     ChainMethod("corotational", "co-rotational\nbeam",
                 f"Figure 3's planar two-node co-rotational Timoshenko beam, {ELEMENTS} elements, load control, halving "
-                "steps", _beam),
+                "steps", lambda h, EA, GA: partial(corotational.beam, length=h, axial=EA, shear=GA)),
     ChainMethod("mcre", "MCRE (re-\nconstruction)",
                 f"Figure 3's reconstruction of the Modified Cosserat Rod Element: truncated rotations, {ELEMENTS} "
-                "elements", _mcre),
+                "elements", lambda h, EA, GA: partial(mcre.derivatives, mcre.energy(h, EA, GA))),
 )  # fmt: skip

@@ -1,13 +1,4 @@
-"""The columns of the table, and the cell of a method on a trial.
-
-The attributes and methods of a method:
-    key, title, what        its name, its head, what it is in a sentence
-    own                     whether it is part of this package
-    spatial                 whether it supports rods that leave a plane
-    turn                    rotation vector (rad) of the trial of objectivity
-    solve(problem, jump)    an `Answer`; jump: the whole load at once. Raises Stopped, NotForIt, NotInstalled
-    numerics(key)           (problem, Answer, number or None, unit) of a trial about loops; raises the same
-"""
+"""The columns of the table, each a `cells.Method`, and the cell of a method on a trial."""
 
 import time
 from dataclasses import replace

@@ -9,22 +9,14 @@ import cosserat_fenicsx as cf
 from cosserat_fenicsx.models.formulation import formulation_of
 from cosserat_fenicsx.statics.problem import solvers_of
 from trials import problems
-from trials.cells import Answer, NotForIt, Stopped, load_factor_in
+from trials.cells import Answer, Method, NotForIt, Stopped, load_factor_in
 
 _IN_ONE_STEP = {"steps": cf.StepControl(adaptive=False), "elements": 8}
 
 
 @dataclass(frozen=True)
-class Own:
-    """A column of this package.
-
-    Attributes:
-        key, title, what: its name, its heading and a description.
-        options: of `cosserat_fenicsx.solve`.
-        spatial: whether it supports rods that leave a plane.
-        own: that it is this package's.
-        turn: rotation vector of the trial of objectivity.
-    """
+class Own(Method):
+    """A column of this package, see `cells.Method`; options: of `cosserat_fenicsx.solve`."""
 
     key: str
     title: str

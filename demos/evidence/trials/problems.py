@@ -13,21 +13,15 @@ on the tip, times the `load_factors`. Keys in addition to those of the peers' pr
 """
 
 import math
-import sys
 from functools import cache
-from pathlib import Path
 
 import numpy as np
+from peers.problems import at_rest, column_truth, frames, numbers, roll_up_truth, scene_of, shot
 from peers.problems import problems as peers_problems
 from scipy.integrate import solve_ivp
 from scipy.optimize import fsolve, minimize_scalar
-from scipy.spatial.transform import Rotation
 
-import cosserat_fenicsx as cf
-from cosserat_fenicsx import analytic
-
-#: Eccentricity of the column's load, over its length.
-ECCENTRICITY = 0.01
+__all__ = ["column_truth", "frames", "roll_up_truth", "scene_of", "shot"]
 
 
 def column(load_factors, slenderness=1e2, infinite=False):
@@ -57,134 +51,52 @@ def in_other_units(problem, length=1e3, force=1e-6):
     return found
 
 
-def column_truth(problem):
-    """Displacements of the column's tip, (n, 3) m, by the quadrature of `analytic.reissner`."""
-    stiff = {"bending": problem["EI"], "axial": problem["EA"], "shear": problem["GA"]}
-    tip = analytic.reissner(
-        np.array(problem["load_factors"]), ECCENTRICITY * problem["length"], problem["length"], **stiff
-    )
-    return np.column_stack([-tip.shortening, tip.delta, 0 * tip.delta])
+def _even(steps, upto=1.0):
+    return [upto * (k + 1) / steps for k in range(steps)]
 
 
 def roll_up(turns, steps):
     """A straight rod and an end moment that rolls it up, in equal steps."""
     base = peers_problems()["roll-up 1"]
-    return {
-        **base,
-        "moment": [0, 0, turns * base["moment"][2]],
-        "load_factors": [(k + 1) / steps for k in range(steps)],
-    }
-
-
-def roll_up_truth(problem):
-    """The tip on its circle, (n, 3) m."""
-    L = problem["length"]
-    angle = np.array(problem["load_factors"]) * problem["moment"][2] * L / problem["EI"]
-    return np.column_stack([L * np.sin(angle) / angle - L, L * (1 - np.cos(angle)) / angle, 0 * angle])
+    return {**base, "moment": [0, 0, turns * base["moment"][2]], "load_factors": _even(steps)}
 
 
 def twisted(steps=20):
     """A rod of small torsional stiffness whose tip is twisted by 1.25 turns while a force bends it."""
-    EI = 1.0
-    found = _numbers(
-        1.0, None, EA=1e4, GA=5e3, EI=EI, GJ=0.1 * EI, force=(0.3, 1.0, 0.0), moment=(0.1 * 2.5 * math.pi, 0, 0)
-    )
-    return {**found, "load_factors": [(k + 1) / steps for k in range(steps)]}
+    loads = {"force": (0.3, 1.0, 0.0), "moment": (0.1 * 2.5 * math.pi, 0, 0), "load_factors": _even(steps)}
+    return numbers(1.0, None, EA=1e4, GA=5e3, EI=1.0, GJ=0.1, **loads)
 
 
-def pushed_and_turned(plane, history=None):
-    """A straight rod under a force and a moment, in a plane or in space; (force factor, moment factor) in stages."""
+def pushed_and_turned(plane):
+    """A straight rod under a force and a moment, in a plane or in space."""
     force, moment = ((-0.4, 0.6, 0.0), (0, 0, -0.4)) if plane else ((-1.2, 1.4, 2.0), (0.6, 1.0, -0.8))
-    found = _numbers(1.0, None, EA=3e3, GA=1e3, EI=1.0, GJ=0.8, force=force, moment=moment)
-    return {**found, "load_factors": [(k + 1) / 10 for k in range(10)], **({"history": history} if history else {})}
+    return numbers(1.0, None, EA=3e3, GA=1e3, EI=1.0, GJ=0.8, force=force, moment=moment, load_factors=_even(10))
 
 
 def thin_arc():
     """A quarter of a circle, a thousand times longer than it is thick, bent open by a force in its plane."""
     radius, thickness = 2 / math.pi, 1e-3
     EA = 12 / thickness**2
-    loads = {"force": (0.0, -2.0, 0.0), "moment": (0, 0, 0)}
-    found = _numbers(1.0, radius, EA=EA, GA=EA / 3.12, EI=1.0, GJ=0.8, size=thickness, **loads)
-    return {**found, "load_factors": [(k + 1) / 10 for k in range(10)]}
+    loads = {"force": (0.0, -2.0, 0.0), "moment": (0, 0, 0), "load_factors": _even(10)}
+    return numbers(1.0, radius, EA=EA, GA=EA / 3.12, EI=1.0, GJ=0.8, **loads)
 
 
 def arch(upto):
     """Half of a shallow clamped arch from its crown to its foot, which is displaced vertically without rotation."""
-    found = _numbers(1.0, 2.5, EA=1e4, GA=4e3, EI=1.0, GJ=0.8, force=(0.0, -1.0, 0.0), moment=(0, 0, 0))
-    return {**found, "guided": True, "load_factors": [upto * (k + 1) / 13 for k in range(13)]}
+    found = numbers(1.0, 2.5, EA=1e4, GA=4e3, EI=1.0, GJ=0.8, force=(0.0, -1.0, 0.0), moment=(0, 0, 0))
+    return {**found, "guided": True, "load_factors": _even(13, upto)}
 
 
 def beck(upto=25.0):
     """Beck's column: a compressive force that follows the tip; it flutters from 20.05 EI/L^2 on."""
-    found = _numbers(1.0, None, EA=1e4, GA=5e3, EI=1.0, GJ=0.8, force=(-1.0, 0, 0), moment=(0, 0, 0))
-    return {**found, "follower": True, "load_factors": [upto * (k + 1) / 5 for k in range(5)]}
-
-
-def _numbers(length, radius, *, EA, GA, EI, GJ, force, moment, size=None):
-    height = size or math.sqrt(12 * EI / EA)
-    E = 12 * EI / height**4 if size else EA / height**2
-    return {
-        "length": length, "radius": radius, "EA": EA, "GA": GA, "EI": EI, "GJ": GJ, "E": E, "nu": 0.3,
-        "area": EA / E, "width": EA / E / height, "height": height, "force": list(force), "moment": list(moment),
-        "load_factors": [1.0],
-    }  # fmt: skip
+    found = numbers(1.0, None, EA=1e4, GA=5e3, EI=1.0, GJ=0.8, force=(-1.0, 0, 0), moment=(0, 0, 0))
+    return {**found, "follower": True, "load_factors": _even(5, upto)}
 
 
 def in_a_plane(problem):
     """Whether rod and loads lie in the x-y plane."""
     turn = problem.get("turn", (0, 0, 0))
     return not (problem["force"][2] or problem["moment"][0] or problem["moment"][1] or turn[0] or turn[1])
-
-
-def shot(problem):
-    """The tip's displacement at load factor 1, (1, 3) m, of any rod under dead loads:
-    the strong form, by shooting and collocation to 1e-10 (tests/bvp.py)."""
-    sys.path.append(str(Path(__file__).resolve().parents[3] / "tests"))
-    import bvp
-
-    L, EI, GA, R = (problem[key] for key in ("length", "EI", "GA", "radius"))
-    rod = bvp.Problem(L, lambda s: frames(s, R), (GA, GA, problem["EA"]), (EI, EI, problem["GJ"]),
-                      force=tuple(problem["force"]), moment=tuple(problem["moment"]))  # fmt: skip
-    return (bvp.equilibrium(rod)(L)["r"].reshape(3) - at_rest(problem, L))[None]
-
-
-def frames(s, radius):
-    """[d1 d2 d3] at arc lengths s (n,), (n, 3, 3): d1 along z, d3 along the rod."""
-    angle = s / radius if radius else 0 * s
-    cos, sin, zero = np.cos(angle), np.sin(angle), 0 * s
-    columns = [[zero, zero, zero + 1], [sin, -cos, zero], [cos, sin, zero]]
-    return np.moveaxis(np.array(columns), (0, 1), (2, 1))
-
-
-def at_rest(problem, s):
-    """(3,) m."""
-    R = problem["radius"]
-    return np.array([R * math.sin(s / R), R * (1 - math.cos(s / R)), 0.0] if R else [s, 0.0, 0.0])
-
-
-def scene_of(problem, whole=None):
-    """The rod and the scene, for this package; `whole`: a (3, 3) rotation of everything."""
-    L, R, EI, GA = (problem[key] for key in ("length", "radius", "EI", "GA"))
-    turn = Rotation.from_rotvec(problem.get("turn", (0, 0, 0))).as_matrix()
-    every, Q = (np.eye(3), turn) if whole is None else (whole, whole)
-    d1 = every @ [0, 0, 1]
-    if R:
-        curve = cf.Arc(every @ [0, R, 0], (0, 0, 0), L / R, axis=d1)
-    else:
-        curve = cf.Line((0, 0, 0), every @ [L, 0, 0], d1=d1)
-    section = cf.Stiffness(shear=(GA, GA), axial=problem["EA"], bending=(EI, EI), torsion=problem["GJ"])
-    rod = cf.Rod(curve, section, name="rod")
-    if problem.get("follower"):
-        loads = [cf.FollowerForce(rod.end, (0, 0, problem["force"][0]))]
-    else:
-        loads = [cf.Force(rod.end, Q @ problem["force"])] if any(problem["force"]) else []
-        loads += [cf.Moment(rod.end, Q @ problem["moment"])] if any(problem["moment"]) else []
-    supports = [cf.Clamp(rod.start)]
-    if whole is None and "turn" in problem:
-        supports = [cf.Prescribed(rod.start, displacement=(0, 0, 0), rotation=problem["turn"])]
-    if problem.get("guided"):
-        supports += [cf.Roller(rod.end, (1, 0, 0)), cf.Prescribed(rod.end, rotation=(0, 0, 0))]
-    return rod, cf.Scene([rod], supports, loads)
 
 
 @cache

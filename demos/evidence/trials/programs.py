@@ -12,15 +12,15 @@ from peers.process import Peer
 from scipy.spatial.transform import Rotation
 
 from trials import problems
-from trials.cells import Answer, NotForIt, NotInstalled, Stopped, load_factor_in
+from trials.cells import Answer, Method, NotForIt, NotInstalled, Stopped, load_factor_in
 from trials.chains import NEXT_TO_INFINITE
 
 LIMIT = 16.0  # time limit of an answer, s, unless a program has another
 _EXTENDED = {"Exudyn": "extended_exudyn.py", "OpenSeesPy": "extended_opensees.py"}
 
 
-class Program:
-    """A column of the table; see `methods`. Its process starts at the first request.
+class Program(Method):
+    """See `cells.Method`. Its process starts at the first request.
 
     Args:
         key: the peer's name.
@@ -31,8 +31,6 @@ class Program:
         what: description in the legend.
         limit: time limit of an answer, s.
     """
-
-    own, spatial = False, True
 
     def __init__(self, key, planar, spatial, coarse, can=(), what="", limit=LIMIT):
         self.key, self.title = key, f"{key}"
@@ -98,21 +96,16 @@ class Program:
         return Answer(tip, "", elements)
 
     def numerics(self, key):
-        """(problem, answer, number, unit)."""
         if key != "residual":
-            raise NotForIt("a matter of loops on PETSc")
+            return super().numerics(key)
         if "residual" not in self._can:
             raise NotForIt("its runner's test is its own")
         problem = problems.column([0.3, 0.6, 0.9], 1e3)
         answer = self.solve(problem, residual=1e-6)
         best = self.solve(problem)
         ratio = problems.column_truth(problem)[:, 1] / best.tip[:, 1]
-        return (
-            problem,
-            Answer(answer.tip * [[1, r, 1] for r in ratio], "", "against the same mesh, stopped on the increment"),
-            None,
-            "",
-        )
+        found = Answer(answer.tip * [[1, r, 1] for r in ratio], "", "against the same mesh, stopped on the increment")
+        return problem, found, None, ""
 
 
 def _as_it_takes(problem, free, turns_clamp):

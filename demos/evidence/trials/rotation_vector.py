@@ -6,8 +6,6 @@ on the load steps. The forms are those of this package (forms/equilibrium.py) wi
 EI/L^2.
 """
 
-from dataclasses import dataclass
-
 import basix
 import numpy as np
 import ufl
@@ -22,7 +20,7 @@ from cosserat_fenicsx.forms.law import DiagonalLaw
 from cosserat_fenicsx.forms.spatial import rotation_tests_of
 from cosserat_fenicsx.models.rod_data import gauss_function
 from trials import problems
-from trials.cells import Answer, NotForIt, Stopped
+from trials.cells import Answer, Method, NotForIt, Stopped
 from trials.chains import NEXT_TO_INFINITE
 
 _TINY = 1e-12
@@ -134,19 +132,14 @@ class Rod:
         return self.length * self.U.x.array[self._tip[:3]]
 
 
-@dataclass(frozen=True)
-class RotationVector:
-    """A column of the table; see `methods`."""
+class RotationVector(Method):
+    """See `cells.Method`."""
 
-    key: str = "rotation_vector"
-    title: str = "rotation vector,\nincremental"
-    what: str = (
+    key, title = "rotation_vector", "rotation vector,\nincremental"
+    what = (
         "a rod in space with two-node elements and incremental rotation vectors, 32 elements, one Gauss point each; one"
         " Newton solution a load factor"
     )
-    spatial: bool = True
-    own: bool = False
-    turn: tuple = (0.8, -0.6, 0.88)
 
     def solve(self, problem, jump=False):
         """An `Answer`, with one step per load factor."""
@@ -171,6 +164,3 @@ class RotationVector:
                 raise Stopped(stop, factors[k - 1][0] if k else 0.0) from None
             tips.append(rod.tip.copy())
         return Answer(np.array(tips), "", "no count of negative modes")
-
-    def numerics(self, key):
-        raise NotForIt("it is not this package's loop")

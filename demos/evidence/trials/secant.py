@@ -1,23 +1,17 @@
 """Eq. (8) of the paper as a method: the secant formula of second order."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from cosserat_fenicsx import analytic
-from trials.cells import Answer, NotForIt
+from trials.cells import Answer, Method, NotForIt
 
 
-@dataclass(frozen=True)
-class Secant:
-    """A column of the table; see `methods`."""
+class Secant(Method):
+    """See `cells.Method`."""
 
-    key: str = "secant"
-    title: str = "eq. (8),\nsecant formula"
-    what: str = "the closed form of second order, eq. (8) of the paper: the column's delta alone"
-    spatial: bool = False
-    own: bool = False
-    turn: tuple = (0.0, 0.0, 1.2)
+    key, title = "secant", "eq. (8),\nsecant formula"
+    what = "the closed form of second order, eq. (8) of the paper: the column's delta alone"
+    spatial, turn = False, (0.0, 0.0, 1.2)
 
     def solve(self, problem, jump=False):
         """delta at the load factors; infinite at the pole, nan beyond."""
@@ -31,6 +25,3 @@ class Secant:
         said = "" if np.isfinite(delta[-1]) or np.isinf(delta[-1]) else "no number beyond the pole"
         note = "infinite at the pole" if np.isinf(delta).any() else ""
         return Answer(np.column_stack([np.zeros_like(delta), delta, np.zeros_like(delta)]), said, note)
-
-    def numerics(self, key):
-        raise NotForIt("a closed form")
