@@ -39,10 +39,8 @@ def error(path, truth):
 
 
 def compare(scene, etas, tol, runs, counts=COUNTS):
-    """Rows (name, model, degree, elements, unknowns, seconds, error, estimate): "auto", then the best by hand.
-
-    Also returns the ratio of their times, the median of alternating runs.
-    """
+    """Rows (name, model, degree, elements, unknowns, seconds, error, estimate): "auto", then the best by hand; and the
+    ratio of their times, the median of alternating runs."""
 
     def auto():
         return cf.solve(scene, etas, tol=tol)

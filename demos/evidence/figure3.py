@@ -22,13 +22,8 @@ from mpi4py import MPI
 
 
 class Store:
-    """The file of the curves, rewritten after every curve and every point of the solid.
-
-    Args:
-        folder: where figure3.json is, or will be.
-        settings: a file with other settings or releases, or of a finished run, is not continued.
-        fresh: whether to ignore an existing file.
-    """
+    """The file of the curves, rewritten after every curve and every point of the solid; one with other settings or
+    releases, or of a finished run, is not continued."""
 
     def __init__(self, folder, settings, fresh=False):
         self.folder = Path(folder)

@@ -33,14 +33,8 @@ def in_turns(tasks, runs):
 
 
 def whole_process(words, told="", limit=None, **settings):
-    """Run a command to its end.
-
-    Args:
-        told: its input. limit: s, after which it is killed. settings: of `subprocess.Popen`, such as `env` and `cwd`.
-
-    Returns:
-        (output as bytes, exit code, processor time with that of its own processes, wall clock time), s.
-    """
+    """Run a command to its end: (output as bytes, exit code, processor time with that of its own processes, wall clock
+    time), s. told: its input; limit: s, after which it is killed; settings: of `subprocess.Popen`."""
     began = time.perf_counter()
     pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.DEVNULL}
     process = subprocess.Popen(words, **pipes, **settings)
@@ -94,11 +88,8 @@ def share(number):
 
 
 def judged(found, most, form=None):
-    """The last three cells of a row: what was found, what is asked at most, and whether it is met.
-
-    Args:
-        found: a ratio; or a number of another unit, with the format specification `form`; or None.
-    """
+    """The last three cells of a row: what was found (a ratio; or a number of another unit, with the format `form`; or
+    None), what is asked at most, and whether it is met."""
     verdict = "-" if found is None else "met" if found <= most else "missed"
     number = "-" if found is None else format(found, form) if form else share(found)
     return " | ".join((number, f"{most:g}" if form else share(most), verdict))
@@ -145,11 +136,8 @@ def _cpu():
 
 
 def resumed(file, data, keys, fresh):
-    """The results of an interrupted run in a file of `save`, if a run with this data can continue from them; else None.
-
-    Args:
-        data: with "machine", of `record`. keys: of what must be the same in both. fresh: whether to ignore the file.
-    """
+    """The results of an interrupted run in a file of `save`, if a run with this data (with "machine", of `record`) can
+    continue from them, since `keys` are the same in both; else None."""
     try:
         before = None if fresh else json.loads(Path(file).read_text(encoding="utf-8"))
         same = before and not before["complete"] and all(before[key] == data[key] for key in keys)

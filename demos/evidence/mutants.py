@@ -178,11 +178,7 @@ def state_of(root):
 
 
 def pytest_in(root, *words, limit=None, **variables):
-    """(exit code, what is printed) of pytest in a checkout.
-
-    Raises:
-        subprocess.TimeoutExpired: after `limit`, s.
-    """
+    """(exit code, what is printed) of pytest in a checkout, or subprocess.TimeoutExpired after `limit`, s."""
     environment = {**os.environ, "PYTHONPATH": str(root), **variables}
     words = [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", *words]
     done = subprocess.run(words, cwd=root, env=environment, timeout=limit, capture_output=True, text=True)
@@ -231,11 +227,9 @@ def read_durations(said):
 
 
 def tests_for(mutant, lines, seconds):
-    """The tests that a mutant meets, in order, at most BUDGET seconds of them.
-
-    A function that keeps what it has made runs its lines in one test only: after the tests that run the line come those
-    that run any line of the file. C is run by what runs the Python around it.
-    """
+    """The tests that a mutant meets, in order, at most BUDGET seconds of them. A function that keeps what it has made
+    runs its lines in one test only: after the tests that run the line come those that run any line of the file. C is
+    run by what runs the Python around it."""
     folder = str(Path(mutant.file).parent) + "/"
     around = [name for name in lines if name.startswith(folder)] if mutant.file.endswith(".c") else [mutant.file]
     by_line = lines.get(mutant.file, {})
@@ -295,7 +289,7 @@ def chosen(root, count, seed):
 
 
 def main(count=120, seed=0, out="out", root=ROOT, quick=False):
-    """Print the share of mutants that are killed, by part, and write it to out/mutants.md; returns {mutant: verdict}."""
+    """Print the share of mutants that are killed, by part, and write out/mutants.md; returns {mutant: verdict}."""
     if quick:
         return print(quickly())
     out = Path(out)

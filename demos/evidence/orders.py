@@ -126,8 +126,7 @@ def time_table(steps):
 
 
 def space_table(meshes, fine):
-    """(lines of the table, {degree: the finest order in h}); two fine
-    meshes of degree 4 give reference and rounding."""
+    """(lines of the table, {degree: the finest order in h}); two fine meshes give reference and rounding."""
     rod, scene = pinned()
     other, reference = (at_ends(rod, scene, n, 4) for n in fine)
     floor = _ABOVE * np.abs(other - reference).max()

@@ -75,13 +75,10 @@ def yardstick(elements):
 
 
 def measure(hole, operation, centred, runs, fine):
-    """What one operation takes and how far it is off.
-
-    Returns:
-        dict: load (N, the true one) and, for the default settings and for elements of 2 m in turn, the lists steps,
-        elements, seconds, errors and estimates (of the hook load, relative) and covered (whether hook load and, where
-        the string turns, torque differ from the true ones by no more than estimated); ratio.
-    """
+    """What one operation takes and how far it is off, as a dict: load (N, the true one) and, for the default settings
+    and for elements of 2 m in turn, the lists steps, elements, seconds, errors and estimates (of the hook load,
+    relative) and covered (whether hook load and, where the string turns, torque differ from the true ones by no more
+    than estimated); ratio."""
     counts = (None, round(hole.length / LENGTH))
     true = solved(hole, operation, centred, fine, wall_stiffness=STIFF)
     found = [solved(hole, operation, centred, count) for count in counts]  # compiles

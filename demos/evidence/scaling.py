@@ -42,11 +42,8 @@ def loaded(elements, degree=DEGREE, model="spatial"):
 
 
 def from_rest(problem, newton, clock=time.process_time, meet=lambda: None):
-    """A function that puts the problem at rest, takes one Newton step and returns its seconds.
-
-    Args:
-        clock: which time; meet: called before it is taken, where several ranks take part.
-    """
+    """A function that puts the problem at rest, takes one Newton step and returns its seconds by a clock; meet: called
+    before it is taken, where several ranks take part."""
     newton.allow(1)
     start = problem.numbers()
 
@@ -60,8 +57,7 @@ def from_rest(problem, newton, clock=time.process_time, meet=lambda: None):
 
 
 def measure(elements):
-    """Number of unknowns, time of a Newton step (s), time of a count of negative modes (s), largest memory of this
-    process (MB)."""
+    """Unknowns, times (s) of a Newton step and of a count of negative modes, largest memory of this process (MB)."""
     with loaded(elements) as (problem, newton, stability):
         step = from_rest(problem, newton)
         times = [(step(), timed(stability.count)[1]) for _ in range(max(5, min(100, 20000 // elements)))]

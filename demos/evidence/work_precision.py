@@ -46,13 +46,8 @@ STATICS = Panel(PEERS, problems, error, configurations, kind, model, 3, True)
 
 
 class Record:
-    """The measurements so far, in a file that is complete at any time.
-
-    Args:
-        file: out/work_precision.json.
-        fresh: whether to ignore an existing file.
-        panel: default STATICS.
-    """
+    """The measurements so far of a `Panel`, in a file that is complete at any time; fresh: whether to ignore an
+    existing one."""
 
     def __init__(self, file, fresh=False, panel=None):
         self.panel = panel or STATICS
@@ -136,12 +131,9 @@ def sample(peer, row, found, wanted, limits):
 
 
 def worth(row, rows, whole):
-    """Whether more samples are useful: not if another row of the same kind is clearly better.
-
-    If `whole`, all of this package's rows below SLOW are repeated. Otherwise a row is not repeated if another of its
-    kind (of its peer, if it is slow) has a smaller error and half the time; its point in the chart then has fewer
-    samples.
-    """
+    """Whether more samples are useful: not if another row of the same kind (of its peer, if it is slow) has a smaller
+    error and half the time; its point in the chart then has fewer samples. If `whole`, all of this package's rows below
+    SLOW are repeated."""
     if row["failed"] or not row["seconds"]:
         return not row["failed"]
     slow = min(row["seconds"]) > SLOW

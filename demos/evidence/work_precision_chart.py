@@ -48,8 +48,7 @@ def draw(found, rows, out, stem):
 
 
 def frontier(rows):
-    """Rows that no other beats in both error and time, the most
-    accurate first; slightly smaller errors do not count."""
+    """Rows that none beats in both error and time, the most accurate first; errors slightly smaller do not count."""
     best = []
     for row in sorted(rows, key=lambda row: (median(row), row["error"])):
         if not best or max(row["error"], _ROUND_OFF) < _BETTER * best[-1]["error"]:

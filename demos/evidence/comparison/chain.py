@@ -14,11 +14,7 @@ _BAND = 5  # the half bandwidth of node-by-node numbering
 
 
 class Chain:
-    """A column of equal elements as a problem of `follow`; unknowns: (u, w, theta) of the free nodes.
-
-    Raises:
-        SceneError: a number of elements that is not whole and positive.
-    """
+    """A column of equal elements as a problem of `follow`; unknowns: (u, w, theta) of the free nodes."""
 
     def __init__(self, column, elements, law_of):
         if not isinstance(elements, int | np.integer) or elements < 1:

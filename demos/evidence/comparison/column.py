@@ -8,15 +8,9 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Column:
-    """A clamped circular column under a dead axial tip force F = eta P_cr of eccentricity e.
-
-    Attributes:
-        length, diameter, eccentricity: m.
-        E: Young's modulus, Pa.
-        nu: Poisson's ratio.
-        shear_factor: of the rods; None is 6(1 + nu)/(7 + 6 nu).
-        arm: False for the constant tip moment F e, True for the force on a rigid arm that turns with the tip section.
-    """
+    """A clamped circular column (m, Pa) under a dead axial tip force F = eta P_cr of an eccentricity; shear_factor: of
+    the rods; None is 6(1 + nu)/(7 + 6 nu); arm: False for the constant tip moment F e, True for the force on a rigid
+    arm that turns with the tip section."""
 
     length: float = 20.0
     diameter: float = 0.2
@@ -55,17 +49,9 @@ CRITICAL = math.pi**2 / 4
 
 @dataclass
 class Curve:
-    """Tip of one model along its path; arrays of one entry per point reached.
-
-    Attributes:
-        eta: F/P_cr.
-        delta: transverse displacement of the tip, m.
-        shortening: axial displacement of the tip towards the clamp, m.
-        rotation: of the tip section, rad; nan where the model has none.
-        iterations: Newton iterations since the previous point, rejected steps included.
-        negative_modes: negative eigenvalues of the tangent: 0 where stable.
-        stopped: text why the path ended before the last requested load factor; empty if it did not.
-    """
+    """Tip of one model along its path, one entry per point reached: F/P_cr; its displacements across, and along towards
+    the clamp, m; rotation, rad, nan where the model has none; Newton iterations since the previous point, rejected
+    steps included; negative eigenvalues of the tangent; and why the path stopped before the last load factor, or ""."""
 
     eta: np.ndarray
     delta: np.ndarray

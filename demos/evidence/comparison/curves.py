@@ -20,18 +20,10 @@ from cosserat_fenicsx.progress import Progress
 
 @dataclass(frozen=True)
 class Settings:
-    """Load factors and meshes of the curves.
-
-    Attributes:
-        etas: of the rods.
-        coarse_etas: of the co-rotational beam and the solid.
-        rungs: numbers of elements of the co-rotational beam, each twice the previous one.
-        mcre: elements of the reconstructed MCRE whose limit points are found.
-        along, refinement: of the solid's mesh, see `SolidBar`.
-        finer, finer_etas: elements along the solid's finer mesh, and the load factors at which it is also solved on
-            that.
-        clamped_etas: load factors at which the solid is also solved with all displacements of its foot fixed.
-    """
+    """Load factors of the rods, and of the co-rotational beam and the solid (coarse_etas); elements of that beam
+    (rungs) and of the MCRE; along, refinement: of the solid's mesh, see `SolidBar`; finer, finer_etas: elements along
+    its finer mesh, and where it is solved on that too; clamped_etas: where it is solved with all displacements of its
+    foot fixed."""
 
     etas: tuple
     coarse_etas: tuple

@@ -57,19 +57,12 @@ def newton(problem, x, eta, before=None, most=20, tolerance=TOLERANCE):
 
 
 def follow(problem, etas, *, adaptive=True, points=(), largest=0.25, tolerance=TOLERANCE):
-    """Equilibria at the load factors `etas` under load control; an iterator of `Point`.
+    """Equilibria at the load factors `etas` under load control; an iterator of `Point`, from up to three earlier ones
+    or the unloaded state; largest: step of the load factor; tolerance: of the last step, relative to the state.
 
-    Args:
-        etas: finite; ascending where adaptive.
-        adaptive: False starts Newton's method at the last state, and accepts any state that it converges to; True
-            extrapolates, and halves steps that fail, end far from their prediction or lose stability.
-        points: up to three earlier points to start from instead of the unloaded state.
-        largest: step of the load factor.
-        tolerance: of the last step, relative to the state.
-
-    Raises:
-        SceneError: load factors that are not numbers, or that descend.
-        Stopped: no equilibrium was found that continues the path.
+    adaptive: False starts Newton's method at the last state, and accepts any state that it converges to; True
+    extrapolates, and halves steps that fail, end far from their prediction or lose stability. Raises Stopped where no
+    equilibrium was found that continues the path.
     """
     known = list(points) or [Point(0.0, np.zeros(problem.size))]
     etas = np.asarray(etas, dtype=float)
@@ -191,11 +184,8 @@ class Arc:
 
 
 def limit_point(problem, *, largest=0.02, beyond=10.0):
-    """The first point of the path where the load factor stops growing, to round-off of the arc length.
-
-    Returns:
-        A `Point`, or None where the load factor passes `beyond` without one.
-    """
+    """The first `Point` of the path where the load factor stops growing, to round-off of the arc length, or None where
+    it passes `beyond` without one."""
     arc = Arc(problem)
     for origin, tangent, length, (_, eta), turned in arc.points(largest):
         if turned[1] <= 0:

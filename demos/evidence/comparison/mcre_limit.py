@@ -38,10 +38,8 @@ def unit_mesh(elements):
 
 
 class TruncatedColumn:
-    """The column as a problem of `follow`: (u, w, phi) in P_degree, clamped at s = 0, in units of L and EI/L^2.
-
-    With degree Gauss points an element, which keeps thin rods from locking.
-    """
+    """The column as a problem of `follow`: (u, w, phi) in P_degree, clamped at s = 0, in units of L and EI/L^2, with
+    degree Gauss points an element, which keeps thin rods from locking."""
 
     def __init__(self, elements=32, degree=4, column=None):
         self.column = column = column or Column()

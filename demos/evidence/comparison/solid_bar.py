@@ -27,22 +27,11 @@ _GAUSS_POINTS = {"quadrature_degree": 5}  # three in each direction
 
 
 class SolidBar:
-    """The bar as a problem of `follow`; unknowns: displacements of all nodes, in units of L.
+    """The bar as a problem of `follow`; unknowns: displacements of all nodes, in units of L; along: elements along the
+    bar; refinement: elements along an eighth of the circle.
 
-    Args:
-        column: `Column`.
-        along: elements along the bar.
-        refinement: elements along an eighth of the circle.
-        clamp: "plane" keeps the foot's face plane (u_z = 0, its centre fixed) but lets it contract, as a rod's clamp
-            fixes the position and direction of the section but not its shape; "face" fixes all of it, and the mesh is
-            finer there.
-
-    Attributes:
-        along: elements along the bar, as asked for.
-        elements: hexahedra of the half bar.
-
-    Raises:
-        SceneError: a clamp of another name.
+    clamp: "plane" keeps the foot's face plane (u_z = 0, its centre fixed) but lets it contract, as a rod's clamp fixes
+    the position and direction of the section but not its shape; "face" fixes all of it, and the mesh is finer there.
     """
 
     def __init__(self, column=None, along=40, refinement=2, clamp="plane"):
@@ -149,12 +138,7 @@ class SolidBar:
 
     def carried(self, coarser, x):
         """The state x of a bar with the same mesh of the section and other elements along it, interpolated by splines
-        in z.
-
-        Args:
-            coarser: a `SolidBar` of the same refinement.
-            x: its state.
-        """
+        in z."""
         (theirs, levels), (mine, wanted) = coarser._fibres(), self._fibres()
         found = np.empty((len(mine), 3))
         fibres = x.reshape(-1, 3)[theirs].reshape(-1, len(levels), 3)
@@ -167,8 +151,7 @@ class SolidBar:
         return np.lexsort(places.T[[2, 1, 0]]), np.unique(places[:, 2]) / 1e9
 
     def tip(self, x):
-        """(delta, shortening, rotation) of the end face's centre: m, m,
-        rad (of the material line along x through it)."""
+        """(delta, shortening, rotation) of the end face's centre: m, m, rad (of the line along x through it)."""
         return tuple(x[3 * self._tip : 3 * self._tip + 3][[0, 2]] * self.column.length * (1, -1)) + (np.nan,)
 
 

@@ -68,8 +68,7 @@ def _relax(problem, configuration):
 
 
 def _size(problem, n):
-    """Length of an element: half of the first one lies before the
-    clamp, so that its clamped director is at the clamp."""
+    """Length of an element: half of the first one lies before the clamp, whose director is then at the clamp."""
     return problem["length"] / (n - 0.5)
 
 

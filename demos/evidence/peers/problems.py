@@ -56,7 +56,7 @@ def problems():
 
 
 def scene_of(problem, whole=None):
-    """The rod and the scene of a problem, also with the keys of `trials.problems`; `whole`: a (3, 3) rotation of all."""
+    """The rod and the scene of a problem, with keys of `trials.problems` too; `whole`: a (3, 3) rotation."""
     L, R, EI, GA = (problem[key] for key in ("length", "radius", "EI", "GA"))
     turn = Rotation.from_rotvec(problem.get("turn", (0, 0, 0))).as_matrix()
     every, Q = (np.eye(3), turn) if whole is None else (whole, whole)

@@ -9,12 +9,7 @@ from peers.environments import command, surroundings
 
 
 class Peer:
-    """Started at its first request, and again after it was ended; a context manager.
-
-    Args:
-        name: as in `environments.SCRIPTS`.
-        install: whether its environment may be made first.
-    """
+    """Started at its first request, and again after it was ended; a context manager."""
 
     def __init__(self, name, install=True):
         self.name, self.words, self._process = name, command(name, install), None

@@ -17,13 +17,11 @@ class Stopped(Exception):
 
 
 def serve(prepare, versions):
-    """Answer requests until the input ends.
+    """Answer requests until the input ends; versions: names and versions, for the record.
 
-    Args:
-        prepare: prepare(problem, configuration) builds the model once, outside of every sample, and returns solve();
-            solve() goes from the unloaded state over all load factors and returns the tip's displacements. It may
-            return (tip, seconds) with a processor time of its own if not all of it is to be counted.
-        versions: names and versions, for the record.
+    prepare(problem, configuration) builds the model once, outside of every sample, and returns solve(), which goes from
+    the unloaded state over all load factors and returns the tip's displacements, or (tip, seconds) with a processor
+    time of its own if not all of it is to be counted.
     """
     out = os.fdopen(os.dup(1), "w", encoding="utf-8")
     os.dup2(2, 1)  # other output of a peer goes to stderr

@@ -27,19 +27,10 @@ _CLAMPED = (0, 1, 2, 3, 4, 5, 6)
 
 
 class Loop:
-    """SNES on a clamped rod's forms.
-
-    Args:
-        problem: see `trials.problems`.
-        predict: start from the secant through the last two states.
-        weak: see `weakly_unit`.
-        held: components of the clamped node that are fixed, in the order r, q.
-        line_search: PETSc's name; None for its default.
-        solver: for LU: "klu", or "petsc", which does not pivot.
-        relative: SNES's relative tolerance on the residual; None to stop on the increment, by 1e-11.
-        in_si: whether the rows of the residual are in N, N m and m, instead of this package's units.
-        formulation, degree, points, elements: of the package's model.
-    """
+    """SNES on a clamped rod's forms; predict: start from the secant through the last two states; weak: see
+    `weakly_unit`; held: components of the clamped node that are fixed, in the order r, q; line_search: PETSc's name,
+    None for its default; solver: for LU: "klu", or "petsc", which does not pivot; relative: tolerance on the residual,
+    None to stop on the increment, by 1e-11; in_si: whether the rows of the residual are in N, N m and m."""
 
     def __init__(self, problem, *, held=_CLAMPED, line_search="basic", solver="klu", relative=None, in_si=False,
                  formulation="displacement", degree=2, points=None, elements=8, predict=False, weak=False):  # fmt: skip
@@ -120,11 +111,7 @@ class Loop:
         return reason.DIVERGED_MAX_IT if iteration >= 60 else reason.CONVERGED_ITERATING
 
     def to(self, eta):
-        """Newton's method from the current state to a load factor; the tip's displacement, (3,) m.
-
-        Raises:
-            Stopped: PETSc reports divergence.
-        """
+        """Newton's method from the current state to a load factor; the tip's displacement, (3,) m, or Stopped."""
         self.eta = eta
         self.known.append(None)
         if self.predict and len(self.known) > 2:
@@ -148,8 +135,7 @@ class Loop:
 
 
 def weakly_unit(model):
-    """Residual and tangent of eq. (1) with |q|^2 = 1 integrated with the
-    Gauss points of the other terms, not at the nodes."""
+    """Residual and tangent of eq. (1) with |q|^2 = 1 integrated at the Gauss points of the other terms."""
     U, data = model.state, model.data
     w, trial = ufl.TestFunction(model.space), ufl.TrialFunction(model.space)
     section = equilibrium.Section(law_of(data.K, data.K_inv, data.J, data.G), as_matrix(data.R_R), data.v_R)

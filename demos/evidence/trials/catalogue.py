@@ -16,13 +16,8 @@ _FLUTTER = 20.05095
 
 @dataclass(frozen=True)
 class Trial:
-    """A row of the table.
-
-    Attributes:
-        key, title: its name, in short and for the reader.
-        tried: the problem and the criterion, in a sentence or two.
-        run: from a method to a `Cell`; raises what the method raises.
-    """
+    """A row of the table: its name, in short and for the reader; the problem and the criterion, in a sentence or two;
+    and a function from a method to a `Cell`, which raises what the method raises."""
 
     key: str
     title: str

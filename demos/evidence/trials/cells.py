@@ -18,15 +18,7 @@ VERDICTS = (RIGHT, SAID, STOPPED, SILENT, NOT, MISSING)
 
 @dataclass(frozen=True)
 class Cell:
-    """A number and a verdict.
-
-    Attributes:
-        verdict: one of VERDICTS.
-        value: the number; None where there is none.
-        unit: of the number, as text.
-        note: a short reason.
-        seconds: computing time.
-    """
+    """A verdict, a number (or None) with its unit, a short reason, and the computing time."""
 
     verdict: str
     value: float | None = None
@@ -55,16 +47,9 @@ class Cell:
 
 @dataclass(frozen=True)
 class Answer:
-    """The answer of a method.
-
-    Attributes:
-        tip: displacements of the tip at the load factors, (n, 3) m; nan where the method has none.
-        said: warnings of the method about its answer, as text; empty without any.
-        note: more about the answer.
-        events: load factors of the limit points it reports.
-        iterations: Newton iterations, where known.
-        stable: whether the method reports stability at each load factor, (n,) bool; None if it does not report it.
-    """
+    """The answer of a method: displacements of the tip at the load factors, (n, 3) m, nan where it has none; what it
+    says of doubts, and more about it; load factors of limit points; Newton iterations; and whether it reports stability
+    at each load factor, (n,) bool. The last two are None where unknown."""
 
     tip: np.ndarray
     said: str = ""
@@ -75,12 +60,7 @@ class Answer:
 
 
 class Stopped(Exception):
-    """The method stopped with an error.
-
-    Args:
-        words: its message.
-        reached: the last load factor with an answer; nan if unknown.
-    """
+    """The method stopped with a message; reached: the last load factor with an answer; nan if unknown."""
 
     def __init__(self, words, reached=np.nan):
         super().__init__(" ".join(str(words).split()))

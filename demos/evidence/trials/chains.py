@@ -18,13 +18,8 @@ NEXT_TO_INFINITE = 1e10
 
 
 class LoadedChain(Chain):
-    """A chain along a line or an arc under any tip load, in units of L and EI/L^2.
-
-    Args:
-        problem: see `trials.problems`.
-        elements: their number.
-        law_of: (length, EA, GA) to the element's law.
-    """
+    """A chain along a line or an arc under any tip load, in units of L and EI/L^2; law_of: (length, EA, GA) to the
+    element's law."""
 
     def __init__(self, problem, elements, law_of):
         L = problem["length"]
@@ -83,8 +78,7 @@ class LoadedChain(Chain):
         return band
 
     def negative_modes(self, x, eta):
-        """Number of negative eigenvalues of the tangent; under follower
-        loads of real ones of the unsymmetric tangent."""
+        """Negative eigenvalues of the tangent; under follower loads of real ones of the unsymmetric tangent."""
         if not self.follows:
             return super().negative_modes(x, eta)
         found = np.linalg.eigvals(dense(self._tangent(x, eta)))

@@ -78,8 +78,7 @@ class Own(Method):
         return Answer(tip, "; ".join(said), note, events, int(path.iterations.sum()), path.stable)
 
     def _in_stages(self, problem):
-        """With separate factors of force and moment: Newton's method
-        from state to state, with the solvers of `solve`."""
+        """With factors of force and moment apart: Newton's method from state to state, with the solvers of `solve`."""
         degree, elements = formulation_of(self.options.get("formulation")).default_degree, 6 * problem.get("finer", 1)
         _, scene = problems.scene_of(problem)
         plain = cf.solve(scene, [0.0], elements=elements, progress=False, **self.options)
@@ -145,8 +144,7 @@ def _refusal(refused):
 
 
 def _reached(failure):
-    """The load factor named in the message, which may be beyond the
-    last recorded point; otherwise that of this point."""
+    """The load factor named in the message, which may be beyond the last point; otherwise that of this point."""
     named, path = load_factor_in(failure), failure.path
     return float(path.load_factors[-1]) if np.isnan(named) and path is not None and len(path) else named
 

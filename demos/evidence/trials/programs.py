@@ -20,16 +20,11 @@ _EXTENDED = {"Exudyn": "extended_exudyn.py", "OpenSeesPy": "extended_opensees.py
 
 
 class Program(Method):
-    """See `cells.Method`. Its process starts at the first request.
+    """See `cells.Method`. Its process starts at the first request; planar, spatial: configurations for plane rods and
+    for others; coarse: few elements; limit: of an answer, s.
 
-    Args:
-        key: the peer's name.
-        planar, spatial: its configurations for plane rods and for others; `coarse`: with few elements.
-        can: features of its runner: "history", "guided", "residual", "turned clamp"; "free": stiffnesses need not be
-            those of a rectangle; "relaxes": it answers at the last load factor only; "arcs in space": its planar
-            element is straight.
-        what: description in the legend.
-        limit: time limit of an answer, s.
+    can: features of its runner: "history", "guided", "residual", "turned clamp"; "free": stiffnesses need not be those
+    of a rectangle; "relaxes": it answers at the last load factor only; "arcs in space": its planar element is straight.
     """
 
     def __init__(self, key, planar, spatial, coarse, can=(), what="", limit=LIMIT):
@@ -43,11 +38,7 @@ class Program(Method):
         return (0.8, -0.6, 0.88) if "turned clamp" in self._can else (0.7, 0.0, 0.0)
 
     def process(self):
-        """Its process.
-
-        Raises:
-            NotInstalled: its environment is missing.
-        """
+        """Its process, or NotInstalled."""
         if self._peer is None:
             try:
                 self._peer = Peer(self.key, install=False)

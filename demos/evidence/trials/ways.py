@@ -62,14 +62,9 @@ def objective(method):
 
 
 def _one_and_the_same(tips, length, note=""):
-    """The cell of several ways to one final state: they may differ by 1e-6 of the length; or by more, if the difference
-    vanishes under mesh refinement and is at most a tenth of the discretisation error.
-
-    Args:
-        tips: tips(**more) gives the answers by all ways; `more` goes into the problem.
-        length: of the rod.
-        note: what was solved.
-    """
+    """The cell of several ways to one final state, of which tips(**more) gives the answers: they may differ by 1e-6 of
+    the length; or by more, if the difference vanishes under mesh refinement and is at most a tenth of the
+    discretisation error; `more` goes into the problem."""
 
     def apart(answers):
         ends = [answer.tip[-1] for answer in answers]
