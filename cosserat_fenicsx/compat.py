@@ -403,8 +403,7 @@ def element_nodes(space):
 
 
 def cell_nodes(space):
-    """Local node (block) indices of every local cell of a space, shape (cells, nodes per cell); a rank may have
-    none."""
+    """Local node (block) indices of every local cell of a space, (cells, nodes per cell); a rank may have none."""
     dofmap = space.dofmap
     cells = dofmap.list if hasattr(dofmap, "list") else dofmap.map()  # a space of Python's, or one of C++'s
     cells = cells() if callable(cells) else cells

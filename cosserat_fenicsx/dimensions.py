@@ -115,8 +115,7 @@ _TONS = ("t", "ton", "tons", "tonne", "tonnes")
 
 
 def _like(unit, known):
-    """'did you mean ...?' for a unit that differs in capital letters, is written out, or differs hardly at all, so that
-    its size is the same."""
+    """'did you mean ...?' for a unit that differs in capital letters, is written out, or differs hardly at all."""
     same = [name for name in known if name.lower() == unit.lower()]
     same = same or [name for name in known if unit.startswith(name) and len(unit) > len(name) + 1 > 2]  # "minutes"
     same = same or get_close_matches(unit, list(known), 1, 0.9)

@@ -76,8 +76,8 @@ class ElementRule:
 
     @cached_property
     def from_slopes(self):
-        """(p + 1, gauss) matrix from slopes at the Gauss points (p of them) to the values at the nodes of their
-        integral."""
+        """(p + 1, gauss) matrix from slopes at the Gauss points (p of them) to the values of their integral at the
+        nodes."""
         count = len(self.gauss)
         powers = np.column_stack([(2 * self.nodes - 1) ** (k + 1) - (-1) ** (k + 1) for k in range(count)])
         return powers / (2 * np.arange(1, count + 1)) @ np.linalg.inv(np.vander(2 * self.gauss - 1, increasing=True))
@@ -85,9 +85,7 @@ class ElementRule:
     @cached_property
     def from_ends_and_gauss(self):
         """(p + 1, gauss + 2) matrix from values at 0, the Gauss points and 1 to the values at the nodes."""
-        support = 2 * np.concatenate([[0.0], self.gauss, [1.0]]) - 1
-        vandermonde = np.vander(support, increasing=True)
-        return np.vander(2 * self.nodes - 1, len(support), increasing=True) @ np.linalg.inv(vandermonde)
+        return _interpolating(np.concatenate([[0.0], self.gauss, [1.0]]), self.nodes)
 
     @cached_property
     def contact_from_fields(self):
@@ -105,16 +103,20 @@ class ElementRule:
 
     def between_gauss(self, x):
         """(len(x), gauss) Lagrange polynomials of the Gauss points, at x in [0, 1]."""
-        points, x = 2 * self.gauss - 1, 2 * np.asarray(x) - 1
-        size = len(points)
-        return np.vander(x, size, increasing=True) @ np.linalg.inv(np.vander(points, size, increasing=True))
+        return _interpolating(self.gauss, np.asarray(x))
 
     def locate_all(self, breaks, x, basis=None):
-        """The elements (n,) and basis functions (n, p + 1), or another `basis`, at points x (n,) of a rod whose
-        elements end at `breaks`."""
+        """Elements (n,) and basis functions (n, p + 1), or another `basis`, at x (n,) of a rod with element ends
+        `breaks`."""
         cells = np.clip(np.searchsorted(breaks, x, side="left") - 1, 0, len(breaks) - 2)
         local = (x - breaks[cells]) / np.diff(breaks)[cells]
         return cells, (basis or self.basis)(np.clip(local, 0.0, 1.0))
+
+
+def _interpolating(points, x):
+    """(len(x), len(points)) Lagrange polynomials of points in [0, 1], at x."""
+    points, x = 2 * points - 1, 2 * x - 1
+    return np.vander(x, len(points), increasing=True) @ np.linalg.inv(np.vander(points, increasing=True))
 
 
 def once_each(keys, make):
@@ -155,6 +157,13 @@ def cross(u, v):
     result[:, 1] = u[:, 2] * v[:, 0] - u[:, 0] * v[:, 2]
     result[:, 2] = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
     return result
+
+
+def spun(q, omega):
+    """(.., 4) omega q/2: changes of q (.., 4) by small inertial rotations (.., 3), or rates by angular velocities."""
+    v = q[..., 1:]
+    scalar = -np.einsum("...i,...i->...", omega, v)[..., None]
+    return np.concatenate([scalar, q[..., :1] * omega + np.cross(omega, v)], axis=-1) / 2
 
 
 def small_rotations(q):

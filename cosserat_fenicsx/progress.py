@@ -126,8 +126,7 @@ class MeshProgress(_Clocked):
         self._what, self._tol, self._text = what, tol, what
 
     def on(self, elements, reached):
-        """The computation begins on a mesh of at most so many elements per rod; reached: the estimated relative error
-        so far, infinite where unknown."""
+        """The computation begins on a mesh of at most so many elements per rod; reached: the estimated error so far."""
         error = f", estimated error {reached:.1e} of {self._tol:g}" if math.isfinite(reached) else ""
         self._text = f"{self._what}: {elements} elements per rod{error}"
         self._say()

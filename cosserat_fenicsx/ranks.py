@@ -50,8 +50,7 @@ def launched():
 
 @contextlib.contextmanager
 def apart():
-    """Context manager in which this rank computes without the others, as in a case of a study: the default
-    communicator is this process alone."""
+    """Context manager in which this rank computes without the others, and alone is the default communicator."""
     _count(1)
     try:
         yield
@@ -92,8 +91,7 @@ def world():
 
 
 def on_first(comm, action):
-    """Run `action()` on rank 0; where it fails, every rank raises the same exception, or, where that cannot be sent,
-    a RuntimeError with its text."""
+    """Run `action()` on rank 0; where it fails, all ranks raise the same exception, or a RuntimeError with its text."""
     trouble = None
     if comm.rank == 0:
         try:

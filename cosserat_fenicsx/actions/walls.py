@@ -253,8 +253,7 @@ class TubeWall(_Confined, LineAction):
         return clearance, arm if self.has_arm else np.zeros_like(arm), self._smooth(self.friction, md)
 
     def _smooth(self, given, md):
-        """(n,) values of `Pieces` along the axis, linear over a short length at a jump: the contact there would
-        alternate."""
+        """(n,) values of `Pieces` along the axis, linear over a short length at jumps, where it would alternate."""
         ends, values = np.array([end for end, _ in given[:-1]]), np.array([value for _, value in given])
         half = _RAMP * min(radius for _, radius in self.radius)
         half = min(half, _OF_PIECE * np.diff(ends, prepend=0.0).min(initial=np.inf))

@@ -6,13 +6,21 @@
 #include <math.h>
 #include <string.h>
 
-
-
 static double square(const double *a, int n)
 {
     double sum = 0;
     for (int i = 0; i < n; i++) sum += a[i] * a[i];
     return sum;
+}
+
+/* The largest contact force and moment at the Gauss points. */
+static void largest_contact(const mesh *m, double *force, double *moment)
+{
+    *force = *moment = 0;
+    for (int i = 0; i < m->elements * m->points; i++) {
+        *force = fmax(*force, square(m->gauss + 9 * i, 3)), *moment = fmax(*moment, square(m->gauss + 9 * i + 3, 3));
+    }
+    *force = sqrt(*force), *moment = sqrt(*moment);
 }
 
 /* ---- the state in space ------------------------------------------------------------------------------------------ */
@@ -195,7 +203,7 @@ static void transfer(const comparison *p, double *start)
 /* The sizes that errors are relative to, see `sizes_of`; whether that of positions is a rotation. */
 static int find_sizes(const comparison *p, const mesh *m, double *sizes)
 {
-    double moved = 0, turned = 0, rotation = 0, force = 0, moment = 0;
+    double moved = 0, turned = 0, rotation = 0, force, moment;
     for (int rod = 0; rod < m->rods; rod++) {
         double half = 0;
         for (int i = m->p * m->first[rod] + rod; i <= m->p * m->first[rod + 1] + rod; i++) {
@@ -204,11 +212,9 @@ static int find_sizes(const comparison *p, const mesh *m, double *sizes)
         }
         half = sqrt(half), rotation = fmax(rotation, 2 * half), turned = fmax(turned, sqrt(8) * half * m->gyrations[rod]);
     }
-    for (int i = 0; i < m->elements * m->points; i++) {
-        force = fmax(force, square(m->gauss + 9 * i, 3)), moment = fmax(moment, square(m->gauss + 9 * i + 3, 3));
-    }
-    moved = fmax(sqrt(moved), p->nothing), force = fmax(sqrt(force), p->least_moment * p->held[0]);
-    moment = fmax(sqrt(moment), p->held[1]);
+    largest_contact(m, &force, &moment);
+    moved = fmax(sqrt(moved), p->nothing), force = fmax(force, p->least_moment * p->held[0]);
+    moment = fmax(moment, p->held[1]);
     force = fmax(fmax(force, moment / p->length), p->nothing);
     const double least = moment <= p->vanishing * m->limits[1] ? 1.0 : p->least_moment;
     sizes[0] = fmax(moved, turned), sizes[1] = fmax(rotation, moved / p->length), sizes[2] = force;
@@ -277,12 +283,10 @@ static void estimate(const comparison *p, const double *sizes, int turning, doub
 /* Whether a mesh surely resolves the state, see `surely_resolved`. */
 static int resolves(const comparison *p, const mesh *m)
 {
-    double force = 0, moment = 0;
-    for (int i = 0; i < m->elements * m->points; i++) {
-        force = fmax(force, square(m->gauss + 9 * i, 3)), moment = fmax(moment, square(m->gauss + 9 * i + 3, 3));
-    }
+    double force, moment;
+    largest_contact(m, &force, &moment);
     const double layer = m->longest / p->in_layer;
-    return sqrt(force) * layer * layer <= m->limits[3] && sqrt(moment) * m->longest <= p->turned * m->limits[2];
+    return force * layer * layer <= m->limits[3] && moment * m->longest <= p->turned * m->limits[2];
 }
 
 /* Values and estimated errors of all queries; 0 where the two meshes suffice. */

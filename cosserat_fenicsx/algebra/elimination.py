@@ -55,8 +55,8 @@ class Elimination(Pointers):
         return np.unique(np.concatenate(comm.allgather(needed))) if comm.size > 1 else needed
 
     def _arrange(self, rows, number, inverse, first, last, kept):
-        """Sort the unknowns of every element: those shared with the element before, its own, those shared with the
-        next, and those of the interface."""
+        """Sort every element's unknowns: shared with the element before, its own, shared with the next, the
+        interface's."""
         turn = np.arange(len(rows))[:, None]
         kind = np.where(last[inverse] > turn, 2, 1)
         kind[first[inverse] < turn] = 0
@@ -309,8 +309,7 @@ class _Near:
 
 
 class _Sparse:
-    """A system by its rows, with factors by MUMPS; near: None, or a `_Near`, set before the first factors; counts: how
-    often signs were counted."""
+    """A system by its rows, with factors by MUMPS; near: a `_Near` or None; counts: how often signs were counted."""
 
     near, counts = None, 0
 
@@ -351,8 +350,7 @@ class _Sparse:
 
     @property
     def inverse(self):
-        """A function (unknowns,) -> (unknowns,): the inverse of the last matrix whose signs were counted; None where
-        there is none, or where it is singular."""
+        """(unknowns,) -> (unknowns,): the inverse of the last matrix whose signs were counted; None where singular."""
         return self._symmetric.solve if self._symmetric.regular else None
 
     def signs(self, values):

@@ -242,8 +242,7 @@ class Equations(Called):
         self.numbering.add_up(self._local, vector)
 
     def tie_forces(self):
-        """(ties, 2, 6) force and moment, inertial, that every equation of supports and joints exerts on its two
-        stations, on all ranks; zero for the ground."""
+        """(ties, 2, 6) inertial force and moment of every tie on its stations, on all ranks; zero for the ground."""
         return self.ties.forces(self.tie_load_factor) if self.ties else np.empty((0, 2, 6))
 
     def at_ties(self, x, load_factors):

@@ -163,8 +163,7 @@ class BorderedNewton(Newton):
 
     @property
     def neutral(self):
-        """(owned unknowns,) the neutral motion, or None. The tangent is then singular to rounding, and solved all the
-        same."""
+        """(owned unknowns,) the neutral motion, or None; the tangent is then singular to rounding, yet solved."""
         return self._neutral
 
     @neutral.setter

@@ -199,24 +199,40 @@ static int record_here(sweep *s)
     return record(s, s->points + (size_t)(s->known - 1) * s->numbers, s->known_load_factors[s->known - 1]);
 }
 
+/* Newton's method at a load factor from a start; where it is ACCEPTED, it has converged, to `found`. */
+static int reach(sweep *s, const double *start, double load_factor, double *found)
+{
+    newton *n = s->newton;
+    n->loads = fabs(load_factor) * s->loads;
+    if (put(s, start, load_factor) || equilibrate(n, s->x)) return UNSURE;
+    s->iterations += n->iterations;
+    if (n->verdict != CONVERGED) return REJECTED;
+    take(s, found);
+    return ACCEPTED;
+}
+
+/* The same; whether it does not end within `near` of the start, with as many negative modes as expected. */
+static int strays(sweep *s, const double *start, double load_factor, int expected, double near)
+{
+    int sideways;
+    return reach(s, start, load_factor, s->work) != ACCEPTED || !(largest(s, s->work, start) <= near)
+           || negative_modes(s->stability, &sideways) != expected;
+}
+
 /* A step to a load factor. */
 static int attempt(sweep *s, double goal)
 {
-    newton *n = s->newton;
     double *guess = s->work, *found = s->work + s->numbers, *factors = s->known_load_factors;
     const double *here = s->points + (size_t)(s->known - 1) * s->numbers;
     const double taken = fabs(goal - factors[s->known - 1]);
     int sideways;
     s->control->shrink = 0.5;
-    if (!predict(s, goal, guess) || put(s, guess, goal)) return UNSURE;
-    n->loads = fabs(goal) * s->loads;
-    if (equilibrate(n, s->x)) return UNSURE;
-    s->iterations += n->iterations;
-    if (n->verdict != CONVERGED) return REJECTED;
-    take(s, found);
+    if (!predict(s, goal, guess)) return UNSURE;
+    int judged = reach(s, guess, goal, found);
+    if (judged != ACCEPTED) return judged;
     const double off = largest(s, found, guess);
     if (!isfinite(off)) return REJECTED;
-    int judged = judge(s, here, guess, found, off);
+    judged = judge(s, here, guess, found, off);
     if (judged == UNSURE) judged = jumped(s, here, found, goal);
     if (judged != ACCEPTED) return judged;
     if (negative_modes(s->stability, &sideways) != s->negative) return UNSURE;
@@ -230,7 +246,7 @@ static int attempt(sweep *s, double goal)
     memcpy(s->points + (size_t)(s->known - 1) * s->numbers, found, s->numbers * sizeof *found);
     factors[s->known - 1] = goal;
     s->steps++;
-    accept_step(s->control, taken, step_growth(s->control, off, order, n->iterations));
+    accept_step(s->control, taken, step_growth(s->control, off, order, s->newton->iterations));
     return ACCEPTED;
 }
 
@@ -268,21 +284,11 @@ int run(sweep *s)
 int correct(sweep *s, const double *starts, const int *expected, double near)
 {
     const double began = now();
-    newton *n = s->newton;
-    double *found = s->work;
-    int sideways;
     while (s->next < s->count) {
         const int k = s->next;
-        const double *start = starts + (size_t)k * s->numbers, load_factor = s->load_factors[k];
-        if (put(s, start, load_factor)) return LEFT;
-        n->loads = fabs(load_factor) * s->loads;
-        if (equilibrate(n, s->x)) return LEFT;
-        s->iterations += n->iterations;
-        if (n->verdict != CONVERGED) return LEFT;
-        take(s, found);
-        if (!(largest(s, found, start) <= near) || negative_modes(s->stability, &sideways) != expected[k]) return LEFT;
+        if (strays(s, starts + (size_t)k * s->numbers, s->load_factors[k], expected[k], near)) return LEFT;
         s->next++, s->steps++;
-        if (record(s, found, load_factor)) return FULL;
+        if (record(s, s->work, s->load_factors[k])) return FULL;
         if (now() - began > s->patience) return LATER;
     }
     return DONE;

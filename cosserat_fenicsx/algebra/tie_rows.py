@@ -106,8 +106,7 @@ class TieRows:
 
     @np.errstate(**_WILD)
     def residual_blocks(self, load_factor):
-        """The reactions in the rows of the nodes (all of `rows`, one after the other), and the values of the equations
-        that are added."""
+        """The reactions in the rows of the nodes (all of `rows` in turn), and the values of the equations added."""
         return self._blocks(load_factor)
 
     def _blocks(self, load_factor):
@@ -145,8 +144,7 @@ class TieRows:
         return [np.broadcast_to(part, (len(values), *part.shape[1:])) for part in self.model.tie_maps(values)]
 
     def add_residual(self, b, load_factor):
-        """Add the reactions to the rows of the nodes, and the constraint equations in the rows of the multipliers, in
-        this rank's part of a vector."""
+        """Add reactions and constraint equations to the rows of nodes and multipliers in this rank's vector."""
         forces, c = self.residual_blocks(load_factor)
         np.add.at(b, self._mine_rows, np.concatenate([forces[self._free], c])[self._mine])
 
@@ -170,8 +168,7 @@ class TieRows:
         return np.square(np.einsum("tia,mtia->mt", gradient, of_ends)) @ stiffness
 
     def _springs(self, axes, load_factor, resistance):
-        """Gradients (ties, 2, block) of all equations by the motions of their ends, and stiffnesses (ties,) of their
-        springs."""
+        """Gradients (ties, 2, block) of all equations by the motions of their ends, and their springs' stiffnesses."""
         gradient = self._evaluate(load_factor)[1] @ axes.T
         of_ends = self._pattern.of_ends(resistance.reshape(-1, len(axes)))
         return gradient, _HELD * (gradient * gradient * of_ends).max(axis=(1, 2))
@@ -185,15 +182,13 @@ class TieRows:
         return self._pattern.energy(blocks, motions)
 
     def add_to_matrix(self, A, rows, blocks):
-        """Add what `second_variation` returned to a PETSc matrix on rank 0; rows: (tied nodes, block), -1 where
-        clamped."""
+        """Add what `second_variation` returned to a matrix on rank 0; rows: (tied nodes, block), -1 where clamped."""
         rows, pattern = rows.astype(PETSc.IntType), self._pattern
         for i, j, values in zip(rows[pattern.first], rows[pattern.second], blocks, strict=True):
             A.setValues(i, j, values, PETSc.InsertMode.ADD_VALUES)
 
     def _symmetric_change(self, load_factor):
-        """The symmetric part of the derivative of the reactions, (pairs, 6, 6); evaluated once for all parts of the
-        second variation."""
+        """The symmetric part of the derivative of the reactions, (pairs, 6, 6); evaluated once for all parts."""
         if self._change[0] != load_factor:
             nodal, multipliers = self.seen
             change = self.ties.change(self.model.tied_motion(nodal), load_factor, multipliers)

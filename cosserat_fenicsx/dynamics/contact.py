@@ -56,8 +56,7 @@ class TouchingNodes:
         return self._sum(values)
 
     def of_vector(self, *vectors):
-        """(n, 7) values at the nodes of this rank's part of a solver's vector, or of the first one minus the second;
-        zero where clamped."""
+        """(n, 7) values at the nodes of a solver's vector, or of one minus another; zero where clamped."""
         values = np.zeros((self.count, 7))
         found = [vector[self._rows] for vector in vectors]
         values[self._mine] = found[0] if len(found) == 1 else found[0] - found[1]
@@ -77,8 +76,7 @@ class TouchingNodes:
             b[self._rows] -= rows[self._mine]
 
     def response(self, forces):
-        """Change of this rank's unknowns by forces and moments (n, 6), by the current tangent; valid until the next
-        call."""
+        """Change of this rank's unknowns by forces and moments (n, 6), by the tangent; valid until the next call."""
         self._load.set(0.0)
         self.subtract(-forces, self._load.array_w)
         self._problem.solve(self._load, self._response)

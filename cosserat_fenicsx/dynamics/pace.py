@@ -40,13 +40,12 @@ class Fixed:
         return True
 
     def failed(self, h):
-        """Newton's method failed in a step of length h (s): True to repeat it with the shorter `length`, False to halve
-        it without error tests."""
+        """A step of length h (s) failed: True to repeat it with the shorter `length`, False to halve it without error
+        tests."""
         return False
 
     def watch(self, scene, duration, load_factor, impulse_error):
-        """Take the loads and the prescribed motions of a scene into account, arguments as of `Resolution`; warnings, a
-        list of sentences."""
+        """Take the loads and prescribed motions of a scene into account, see `Resolution`; warnings, sentences."""
         warning = unresolved_by_fixed_steps(scene, duration, self._dt)
         return [warning] if warning else []
 
@@ -296,8 +295,7 @@ class _SampledSignal:
 
 
 def _largest_acceleration(scene, item, field):
-    """The largest acceleration of the end of a free, rigid rod by a load, m/s^2 per unit; None for prescribed
-    motions."""
+    """The largest acceleration of the end of a free, rigid rod by a load, m/s^2 per unit; None for supports."""
     if not hasattr(item, "data"):  # a prescribed motion
         return None
     turns = getattr(item, field).unit.startswith("N m")
@@ -316,8 +314,7 @@ def _largest_acceleration(scene, item, field):
 
 
 def _persistence(scene, duration):
-    """How long a velocity due to a load persists, s: the duration; where clamps hold all rods, about half the period of
-    the slowest mode."""
+    """How long a velocity due to a load persists, s: the duration, or half the slowest mode's period where clamped."""
     clamped = {scene.leader(support.station.rod) for support in scene.supports if support.clamps}
     if not clamped.issuperset(map(scene.leader, scene.rods)) or not all(joint.rigid for joint in scene.joints):
         return duration

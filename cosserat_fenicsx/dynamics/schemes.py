@@ -205,8 +205,7 @@ class EndTies(MovingTies):
 
 
 class CollocationProblem(StepProblem):
-    """See `StepProblem`: eq. (1) at the end of a step, for a model with accelerations; rule: the `Rule` of the next
-    steps."""
+    """See `StepProblem`: eq. (1) at the end of a step, with accelerations; rule: the `Rule` of the next steps."""
 
     ties_class, acting_share, loads_share, takes_momentum = EndTies, 1.0, 1 - _BEFORE_END, False
 

@@ -217,8 +217,7 @@ _MODELS = {
 
 
 def chosen_model(scene, model, scheme, start=None):
-    """The model's name, and the reason for its choice, from arguments of `simulate` (start: None, a Path or (Path, k)),
-    or a SceneError."""
+    """The model's name, and why, from arguments of `simulate` (start: None, a Path or (Path, k)); or a SceneError."""
     if model not in ("auto", "planar", "spatial"):
         raise SceneError(f"model = {model!r}: {nearest(model, ('auto', 'planar', 'spatial'))}")
     if model == "spatial":

@@ -181,8 +181,7 @@ class StepProblem(Equations):
             self._assemble_loads()
 
     def _work_of_law(self, t, until):
-        """The work at the state of actions in the law from the time t to another (s), whose data stay: the change of
-        the strain energy."""
+        """The work of actions in the law from the time t to another (s), whose data stay: its energy's change."""
         if not self._law_moves:
             return 0.0
         energies = []

@@ -95,8 +95,7 @@ class Stepper:
         return solved
 
     def _predicted(self, h):
-        """Predictors of the state at the end of the step: extrapolations of several orders, the best order in the last
-        step first."""
+        """Predictors of the state at the end of the step: of several orders, the best one in the last step first."""
         known, last = self._past[-3:], self._guesses
         steps = [step for step, *_ in known[-2:]]
         self._guesses = guesses = _extrapolated(h, self._start, self._velocity, steps, [x[2][0] for x in known[-2:]])

@@ -230,8 +230,7 @@ class Term:
         return compat.element_nodes(self.weight.function_space)
 
     def fill(self, model, members, time):
-        """Fill in the data of actions of the model's scene; members: (action, index of its rod, element end or None);
-        time: s."""
+        """Fill in the data of actions; members: (action, index of its rod, element end or None); time: s."""
         self._model, self._time = model, time
         scene, layout, rods, x = model.scene, model.layout, self._rods, self._dof_places
         numbers = compat.cell_nodes(self.weight.function_space)  # the same for all Functions of this term

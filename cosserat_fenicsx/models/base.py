@@ -32,8 +32,7 @@ from cosserat_fenicsx.scene.action import powers
 
 @dataclass(frozen=True)
 class Scales:
-    """Units of length (m), force (N) and moment (N m): L, EI/L^2 and EI/L of the longest rod. One tolerance then suits
-    every scene."""
+    """Units of length (m), force (N), moment (N m): L, EI/L^2, EI/L of the longest rod: one tolerance suits all."""
 
     length: float
     force: float
@@ -287,14 +286,12 @@ class RodModel:
 
     @property
     def rows_of_tied(self):
-        """(tied nodes, components) rows in the solver's vector of the nodes in constraint equations, on all ranks; -1
-        where clamped."""
+        """(tied nodes, components) rows in the solver's vector of the tied nodes, on all ranks; -1 where clamped."""
         return self._rows_everywhere(self.numbering, self.nodal)[self.tied_slots]
 
     @property
     def rows_of_nodes(self):
-        """(N, block) rows of all nodes in the second variation (of a model with one part), in the scene's order, on all
-        ranks; -1 where clamped."""
+        """(N, block) rows of all nodes in the only second variation, scene's order, on all ranks; -1 where clamped."""
         (part,) = self._variations
         dofs = np.arange(part.numbering.block * len(self.slots)).reshape(-1, part.numbering.block)
         return self._rows_everywhere(part.numbering, dofs)
@@ -375,8 +372,7 @@ class RodModel:
         return [value for value in vars(self).values() if isinstance(value, fem.Constant)]
 
     def sizes(self, change):
-        """Largest displacement (rod lengths) and rotation (rad) of a node over all ranks, in a change of the solver's
-        vector."""
+        """Largest displacement (rod lengths) and rotation (rad) of a node of all ranks, in a change of the vector."""
         return self._largest_in(self.motion_in(change))
 
     def _largest_in(self, nodal):
@@ -410,8 +406,7 @@ class RodModel:
         return nodal, self.gathered(self.forms.fields, len(self.forms.gauss), self.forms.fields_size)
 
     def snapshots(self, x, fields):
-        """`snapshot` at several states of one process: from its unknowns (k, unknowns), and the values of the fields
-        (k, elements, n) or None."""
+        """`snapshot` at states of one process: from unknowns (k, unknowns), and fields (k, elements, n) or None."""
         numbering = self.numbering
         state = np.tile(self._rest_state, (len(x), 1))
         state[:, numbering.free] = x[:, numbering.of_free]

@@ -242,8 +242,7 @@ def _terms(model, *, in_law):
 
 
 def acting_at(model, point_at):
-    """(number, `Term`, its factor, UFL, and its `Point`) of all actions of a model with a virtual work; point_at: see
-    `action_work`."""
+    """(number, `Term`, its factor, UFL, and `Point`) of all actions with virtual work; point_at: see `action_work`."""
     for number, term, factor in _terms(model, in_law=False):
         yield number, term, factor, point_at(term.kind.place, term.rest, term.frame)
 
@@ -285,8 +284,7 @@ def action_densities(model, point_at):
 
 
 def varied_actions(acting, test, direction):
-    """The derivative of the virtual work of state-dependent actions in a direction of small displacement and rotation,
-    factors included; or 0."""
+    """The derivative of the work of state-dependent actions in a direction of small motions, with factors; or 0."""
     changes = [live.factor * variation(live.work, live.point, test, direction) * live.measure for live in acting.live]
     return sum(changes) if changes else 0
 

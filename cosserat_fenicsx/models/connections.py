@@ -213,8 +213,8 @@ class Ties:
         return self.pattern.by_nodes(multipliers[:, None, None] * gradients)
 
     def change(self, rq, load_factor, multipliers):
-        """The tangent of the reactions, (pairs, 6, 6) of the pattern, at (r, q) (tied nodes, 7), a load factor and
-        multipliers (ties,)."""
+        """The tangent of the reactions, (pairs, 6, 6), at (r, q) (tied nodes, 7), a load factor and multipliers
+        (ties,)."""
         found = np.zeros((len(self._turning), 144))
         self._see(rq, load_factor)
         self._rows[:, eq.PLACES["multiplier"]] = multipliers[:, None]
@@ -284,8 +284,7 @@ class Clamps:
         return total
 
     def of_step(self):
-        """(points, 6) force and moment that balance the stress of a step and the actions along rods, see
-        `moving.virtual_work_of_step`; on all ranks."""
+        """(points, 6) what balances the stress of a step and the actions, see `virtual_work_of_step`; all ranks."""
         model, total = self._model, np.zeros((self.count, 6))
         if self._maps is None:
             self._maps = self._from_expressions()
@@ -294,8 +293,7 @@ class Clamps:
         return model.comm.allreduce(total) if model.comm.size > 1 else total
 
     def _from_expressions(self):
-        """[(expression, matrix)]: `of_step` is the sum of each matrix times the values of its expression on the
-        elements at clamped points."""
+        """[(expression, matrix)]: `of_step` is the sum of matrices times values on the elements at clamped points."""
         model, rule = self._model, self._model.rule
         if not len(self._cells):
             return []

@@ -12,7 +12,6 @@ from cosserat_fenicsx.forms.spatial import parts_of
 from cosserat_fenicsx.models.compiled import along
 from cosserat_fenicsx.models.moving import MovingSpatial, SpatialStep, turned_by, virtual_work_of_step
 from cosserat_fenicsx.models.rod_data import as_matrix
-from cosserat_fenicsx.models.spatial import spun
 
 
 class Turning:
@@ -165,4 +164,4 @@ class ConservingSpatial(Turning, MovingSpatial):
         nodal = self.nodal
         q = self.state.x.array[nodal[:, 3:]]
         omega = np.cross(numerics.directors(q), self.turning.x.array.reshape(-1, 3, 3), axis=1).sum(axis=2) / 2
-        self.velocity.x.array[nodal[:, 3:]] = spun(q, omega)
+        self.velocity.x.array[nodal[:, 3:]] = numerics.spun(q, omega)

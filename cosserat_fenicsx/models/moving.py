@@ -35,8 +35,8 @@ from cosserat_fenicsx.models.rod_data import (
     law_of,
     nodal_inertia,
 )
-from cosserat_fenicsx.models.spatial import SpatialModel, spun
-from cosserat_fenicsx.numerics import cross, small_rotations
+from cosserat_fenicsx.models.spatial import SpatialModel
+from cosserat_fenicsx.numerics import cross, small_rotations, spun
 from cosserat_fenicsx.scene.signals import signals_of
 
 

@@ -249,8 +249,7 @@ class RodMesh:
         self.mesh.geometry.x[:, 0] = np.concatenate(ends)[place]
 
     def fill(self, function, values, at_nodes=False):
-        """Set a function at the Gauss points, or at the nodes of every element, from values (elements, points, k) in
-        the scene's order."""
+        """Set a function at Gauss points, or at elements' nodes, from values (elements, points, k), scene's order."""
         local, space = values[self.cells], function.function_space
         local[self.reversed] = local[self.reversed][:, ::-1]
         if at_nodes:

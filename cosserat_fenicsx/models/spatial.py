@@ -13,19 +13,12 @@ from cosserat_fenicsx.forms.equilibrium import VirtualMotion
 from cosserat_fenicsx.forms.point import NONE
 from cosserat_fenicsx.models.base import RodModel
 from cosserat_fenicsx.models.compiled import CompiledForms, action_work, along, compile_parts, measures, varied_actions
-from cosserat_fenicsx.numerics import small_rotations
+from cosserat_fenicsx.numerics import small_rotations, spun
 
 
 def small_motion_of(w):
     """The `VirtualMotion` of small displacements and rotations (r, theta)."""
     return eq.rotation_tests_of(w, along(w))
-
-
-def spun(q, omega):
-    """(.., 4) omega q/2: changes of q (.., 4) by small inertial rotations (.., 3), or rates by angular velocities."""
-    v = q[..., 1:]
-    scalar = -np.einsum("...i,...i->...", omega, v)[..., None]
-    return np.concatenate([scalar, q[..., :1] * omega + np.cross(omega, v)], axis=-1) / 2
 
 
 _EYE = np.eye(3)
@@ -112,8 +105,7 @@ class SpatialModel(RodModel):
             self.stiffness.value = 1.0
 
     def shape_of(self, change):
-        """(N, 3) displacements of all nodes, in the scene's order on all ranks, from a change of this rank's part of
-        the solver's vector."""
+        """(N, 3) displacements of all nodes, scene's order, on all ranks, from a change of this rank's vector."""
         vector, local = self.numbering.vector(), np.zeros_like(self.state.x.array)
         vector.array_w[:] = change
         self.numbering.to_local(vector, local)

@@ -17,6 +17,7 @@ from cosserat_fenicsx.checks import number, positive, refuse
 from cosserat_fenicsx.errors import LibraryMissing, SceneError
 from cosserat_fenicsx.interrupts import obey
 from cosserat_fenicsx.new_files import replaced
+from cosserat_fenicsx.numerics import spun
 from cosserat_fenicsx.pictures.colours import colour_of, known, peak_of, seen
 from cosserat_fenicsx.pictures.default_colour import default_colour
 from cosserat_fenicsx.pictures.drawing import (
@@ -94,8 +95,7 @@ def pixels(size):
 
 
 def _round_speed(duration):
-    """1 where a film in real time has a suitable duration (s), or the smallest round number that makes it short
-    enough."""
+    """1 where a film in real time has a suitable duration (s), or the smallest round number that is fast enough."""
     if _SHORTEST_REAL_TIME <= duration <= _LONGEST_REAL_TIME:
         return 1.0
     return round_step(duration, _LONGEST)
@@ -207,8 +207,7 @@ class _Stage:
 
 
 class _Gif:
-    """Writes frames to a .gif with the colours of some sample frames, undithered: small and reproducible byte by
-    byte."""
+    """Writes frames to a .gif with the colours of some frames, undithered: small and reproducible byte by byte."""
 
     def __init__(self, file, fps, size, samples):
         self._file, self._pause, self._frames, image = file, round(1000 / fps), [], _pillow()
@@ -329,7 +328,7 @@ class Between:
         """r and q of the saved state k, (N, 7), and their rates, (N, 7), 1/s."""
         record = self._history._records[k]
         rates = record.rates / self._history.time_unit
-        return record.rq, np.concatenate([rates[:, :3], _turning(record.rq[:, 3:], rates[:, 3:])], axis=1)
+        return record.rq, np.concatenate([rates[:, :3], spun(record.rq[:, 3:], rates[:, 3:])], axis=1)
 
     @property
     def smooth(self):
@@ -377,13 +376,6 @@ class Between:
         return (1 - z) * one + z * two
 
 
-def _turning(q, omega):
-    """dq/dt = (0, omega) q/2 of quaternions q (..., 4) with angular velocities omega (..., 3), inertial."""
-    a, v = q[..., :1], q[..., 1:]
-    scalar = -np.einsum("...i,...i->...", omega, v)[..., None]
-    return np.concatenate([scalar, a * omega + np.cross(omega, v)], axis=-1) / 2
-
-
 class Enlarged:
     """Enlarges the clearance of rods in the holes of a scene, for pictures, by a factor of the distance between the
     axes of the hole and of a rod; rods without a wall stay as they are. where: the called function, for messages."""
@@ -400,8 +392,7 @@ class Enlarged:
             refuse(where, "enlarge", factor, "1, since no rod is in a hole with a wall of motions, such as a HoleWall")
 
     def bodies(self, bodies, x):
-        """The `Body` of every rod with its line moved away from the axis of its hole; x: (n,) the arc lengths over the
-        rod's length."""
+        """The `Body` of every rod with its line moved off the axis of its hole; x: (n,) arc lengths over its length."""
         if self.factor == 1:
             return bodies
         return [self._moved(rod, body, x) for rod, body in zip(self._scene.rods, bodies, strict=True)]

@@ -118,8 +118,7 @@ def styled():
 
 
 def unit_of(quantity, *values):
-    """(unit, size) of a `Quantity` in the units of the chart: a unit that suits all the values, and its size in the
-    unit of the quantity."""
+    """(unit, size) of a `Quantity` in a unit of the chart that suits all the values, the size in its own unit."""
     every = np.concatenate([np.ravel(x) for x in values]) if values else ()
     return Units(_units.get()).on_screen(quantity, every)
 
@@ -268,8 +267,7 @@ def draw_quantity(over, shown, title="", file=None, comm=Alone, **look):
 
 
 def arrange(figure):
-    """Break titles and labels into lines that fit, take fewer ticks where their numbers touch, and move texts within
-    panels off each other."""
+    """Break titles and labels into lines that fit, thin out ticks that touch, and move texts within panels apart."""
     for _ in range(_PASSES):
         figure.draw_without_rendering()
         changed = [] if figure._suptitle is None else [_fit(figure._suptitle, 0.96 * figure.bbox.width)]

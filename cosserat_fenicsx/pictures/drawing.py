@@ -92,8 +92,7 @@ def thicker(factors):
 
 @dataclass(frozen=True)
 class Body:
-    """A deformed rod: centreline (n, 3) m, directors (n, 3, 3), outline (n, corners, 2) m, radius m, and the values
-    (n,) that colour it, in SI units."""
+    """A deformed rod, in SI: centreline (n, 3), directors (n, 3, 3), outline (n, corners, 2), radius, values (n,)."""
 
     line: np.ndarray
     directors: np.ndarray
@@ -123,8 +122,7 @@ def swept(path, k, rod, magnify, colour):
 
 
 def body_of(rod, x, line, directors, values, magnify=1.0):
-    """The `Body` of a rod whose centreline (n, 3) m, directors (n, 3, 3) and values (n,) are known at arc lengths x
-    (n,) over its length."""
+    """The `Body` of a rod from centreline (n, 3) m, directors and values (n,) at arc lengths x (n,) over its length."""
     reference = rod.curve.position(x * rod.length)
     outline = outlines(rod, x * rod.length)
     radius = float(np.linalg.norm(outline, axis=2).max())
@@ -132,8 +130,7 @@ def body_of(rod, x, line, directors, values, magnify=1.0):
 
 
 def outlines(rod, s):
-    """(n, corners, 2) corners of the sections at arc lengths s (n,), m; all are resampled to the largest number of
-    corners."""
+    """(n, corners, 2) corners of the sections at arc lengths s (n,), m, all resampled to the largest number."""
     if rod.profile.constant and len(s) > 1:
         return np.repeat(outlines(rod, s[:1]), len(s), axis=0)
     sections = [rod.section_at(x, "left") for x in s]

@@ -247,8 +247,7 @@ def _undrawn(scene, tubes):
 
 
 def _spread(path, most):
-    """Indices of up to `most` points of a path, evenly spaced by the distance that the rods' ends have moved; the last
-    point where that is one."""
+    """Indices of up to `most` points of a path, evenly spaced by how far the rods' ends moved; of one, the last."""
     if most == 1:
         return [len(path) - 1]
     ends = np.hstack([path.position(rod.end) for rod in path.scene.rods])

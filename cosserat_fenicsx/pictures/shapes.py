@@ -183,8 +183,7 @@ def _add(plotter, pyvista, shape, bodies, everywhere):
 
 
 class _Stage:
-    """The scene of a film: `at(share)` is the picture (height, width, 3) at a share of the amplitude, see
-    `Drawn.bodies`."""
+    """The scene of a film: `at(share)` is the picture (height, width, 3) at a share of the amplitude, see `Drawn`."""
 
     def __init__(self, found, k, amplitude, size):
         pyvista = load_pyvista()

@@ -74,8 +74,7 @@ class Resting:
 
 
 class Deformed(Resting):
-    """The rods at point k of a path or a motion, their displacements magnified, and all of it shifted by a vector (3,),
-    m."""
+    """The rods at point k of a path or a motion, with displacements magnified, all shifted by a vector (3,), m."""
 
     def __init__(self, result, k, radii, magnify, shift):
         super().__init__(radii)
@@ -156,8 +155,7 @@ def span_of(scene, shapes, everywhere):
 
 
 def without_sign(scene, tubes, threads=True):
-    """Words for the loads that are not drawn; tubes, threads: whether tubes and obstacles around rods, and threads
-    along them are."""
+    """Words for the loads that are not drawn; tubes, threads: whether obstacles around rods, and threads, are."""
     corner = np.zeros(3)
 
     def drawn(load):

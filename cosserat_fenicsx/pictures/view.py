@@ -224,8 +224,7 @@ class Labels:
         return int(found.sum() + _crosses_boxes(np.array(line), boxes).sum())
 
     def _covers(self, box):
-        """How much a rectangle covers: 1 where a rod is among it, else 0; and a number of cells of lines, of rods
-        `_RODS` times as many."""
+        """How much a rectangle covers: 1 where a rod is, else 0; and cells of lines, of rods `_RODS` times as many."""
         low = np.maximum(np.array(box[:2]) - _CLEAR, 0) // _CELL
         high = np.maximum(np.array(box[2:]) + _CLEAR, 0) // _CELL
         cells = self._covered[int(low[0]) : int(high[0]) + 1, int(low[1]) : int(high[1]) + 1]
@@ -295,8 +294,7 @@ _TICK, _SEEN, _ASIDE = 8, 20, 26
 
 @dataclass(frozen=True)
 class Axis:
-    """An axis of the box around a drawing: its name with the unit; low, high: m; ticks: (position in m, text), none
-    where the drawing is flat."""
+    """An axis of the box around a drawing: name and unit; low, high: m; ticks: (m, text), none where it is flat."""
 
     name: str
     low: float

@@ -141,8 +141,7 @@ def carry_error(fine, coarse, factor, order, before=None):
 
 
 def compare(fine, coarse):
-    """(4, n) differences of the same points on two meshes, relative to the sizes: no error estimate where the meshes
-    are not nested."""
+    """(4, n) differences of points on two meshes, relative to the sizes: no error estimate if these are not nested."""
     return _differences(fine, coarse)[0]
 
 
@@ -236,16 +235,14 @@ def _spread(indicator, sizes, errors, between, which, *, of_mesh):
 
 
 def leading_of(path):
-    """(2, rods, points) the largest leading coefficient of an element's displacement, and of its rotation (twice that
-    of q), dimensionless."""
+    """(2, rods, points) the largest leading coefficient of an element's displacement, and twice that of q."""
     first = [cells.start for cells in cells_of(path.layout)]
     moved, turned = (leading_coefficients(path, path._motion[..., part]) for part in (slice(0, 3), slice(3, 7)))
     return np.array([np.maximum.reduceat(found, first, axis=1).T for found in (moved, 2 * turned)])
 
 
 def leading_coefficients(path, values):
-    """(points, elements) sizes of the leading coefficients of nodal values (points, nodes, k) in the elements of all
-    rods."""
+    """(points, elements) sizes of the leading coefficients of nodal values (points, nodes, k) in all elements."""
     of_elements = values[:, all_cell_nodes(path.layout, path.degree)]
     found = path.rule.leading @ of_elements
     return np.sqrt(np.einsum("kci,kci->kc", found, found))
@@ -372,8 +369,7 @@ def contact_edges(path):
 
 
 def _vanishes(x, p, last, step, beyond):
-    """Where a pressure p at nodes x vanishes between x[last] and `beyond`, from the nodes in contact; `step`: to the
-    next one of these."""
+    """Where a pressure p at nodes x vanishes between x[last] and `beyond`, from the nodes in contact, `step` apart."""
     nodes = [last]
     while len(nodes) < _EXTRAPOLATED and 0 <= nodes[-1] + step < len(x) and p[nodes[-1] + step] > 0:
         nodes.append(nodes[-1] + step)

@@ -102,8 +102,7 @@ def transferred(coarse, fine, rule):
 
 
 def _by_pair(of_pair, coarse, fine):
-    """`of_pair(i)` for every rod, found once for rods whose elements end at the same shares of the length on both
-    meshes."""
+    """`of_pair(i)` for every rod, found once for rods whose elements end at the same shares of the length."""
     return once_each([(a.tobytes(), b.tobytes()) for a, b in zip(coarse.breaks, fine.breaks, strict=True)], of_pair)
 
 
@@ -291,8 +290,7 @@ def _first_nodes(layout, degree):
 
 @per_scene
 def of_sections(scene, scales, layout, p, by_statics):
-    """The radii of gyration of the rods, the longest length, and errors by rounding, (4, 1), of n and of m,
-    dimensionless."""
+    """The radii of gyration of the rods, the longest length, and errors by rounding, (4, 1), of n and m."""
     (least, _), (K, J) = ((x.K / scales.force, x.J / (scales.force * scales.length**2)) for x in scene.extremes)
     gyrations, noise = rounding_of(least, K, J, shortest_of(scene, scales, layout), p, by_statics)
     return gyrations, scene.lengths.max() / scales.length, np.pad(noise[:, None], ((2, 0), (0, 0)))

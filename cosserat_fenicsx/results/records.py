@@ -172,8 +172,7 @@ _LEAST = 1e-2
 
 
 def find_again(fine, coarse):
-    """Set the `error` of the events of a path from the events of the same kind on a coarser mesh, of which those
-    without a counterpart are returned."""
+    """Set the `error` of a path's events from those on a coarser mesh; returns those there without a counterpart."""
     left, least = list(coarse.events), _LEAST * float(np.abs(fine.load_factors).max(initial=0.0))
 
     def apart(event, other):

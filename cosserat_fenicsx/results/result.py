@@ -316,8 +316,7 @@ class OnNodes:
         return i, cell_nodes(self.layout, self.degree)[i][1]
 
     def _between(self, rod, x):
-        """Nodes (n, nodes per element), numbered over all rods, and their weights, at arc lengths x (n,) over a rod's
-        length."""
+        """Nodes (n, nodes per element), numbered over all rods, and weights, at x (n,), arc lengths over the rod's."""
         i, _ = self._rows(rod)
         cells, weights = self.rule.locate_all(self.layout.breaks[i], x)
         return cell_nodes(self.layout, self.degree)[i][0][cells], weights

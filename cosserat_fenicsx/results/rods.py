@@ -46,8 +46,7 @@ def resting(scene, layout, rule):
 
 
 def _of_supports(k):
-    """A function of a result: (supports, n, 3) forces (k = 0) or moments (1) of supports, NaN where they are unknown;
-    None without supports."""
+    """Of a result: (supports, n, 3) forces (k = 0) or moments (1) of supports, NaN where unknown; None without."""
 
     def exerted(result):
         found = []

@@ -94,8 +94,7 @@ class Threads:
         return places, R, v, k
 
     def _carried(self, thread, places, v, k):
-        """T t and p x T t (n, elements, points, 6) for strains v and u - u_R, and their derivatives by these (.., 6,
-        6), material, dimensionless."""
+        """T t and p x T t (n, elements, points, 6) for v and u - u_R, and their derivatives (.., 6, 6), material."""
         arm, along = _along(thread, places, v, k)
         size = np.linalg.norm(along, axis=-1, keepdims=True)
         t, lever = along / size, np.concatenate([np.broadcast_to(np.eye(3), (*arm.shape, 3)), _skew(arm)], axis=-2)

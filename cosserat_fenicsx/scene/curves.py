@@ -108,8 +108,7 @@ def _from_mesh(owner, field, file, closed):
 
 
 def _chain(owner, field, file, segments, closed):
-    """The nodes of segments, ordered along the polyline that they form, from an end that is the first node of a
-    segment."""
+    """The nodes of segments, ordered along the polyline that they form, from an end that begins a segment."""
     neighbours = {}
     for a, b in segments:
         neighbours.setdefault(a, []).append(b)
@@ -288,8 +287,7 @@ class Spline(Curve):
         store(self, _arc=arc[order].T, _turn=turn[order].T)
 
     def _cubic(self, span, t, derivative=0):
-        """The cubics of spans (n,), or a derivative, (..., n, 3), at parameters t (..., n) from the starts of the
-        spans."""
+        """The cubics of spans (n,), or a derivative, (..., n, 3), at parameters t (..., n) from the spans' starts."""
         a, b, c, d = self._cubics[:, span]
         t = t[..., None]
         if derivative == 0:
@@ -297,8 +295,7 @@ class Spline(Curve):
         return (3 * a * t + 2 * b) * t + c if derivative == 1 else 6 * a * t + 2 * b
 
     def _series(self, span, middle, half):
-        """Whether panels are resolved (n,), the tangents at their starts (n, 3), and Legendre series of arc length and
-        frame angle (terms, n)."""
+        """Whether panels are resolved (n,), tangents at their starts, Legendre series of arc length and frame angle."""
         t = middle + half * np.concatenate([[-1.0], _GAUSS.points, [1.0]])[:, None]
         first, second = self._cubic(span, t, 1), self._cubic(span, t, 2)
         speed = np.linalg.norm(first, axis=-1)

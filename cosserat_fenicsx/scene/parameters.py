@@ -143,8 +143,7 @@ def scene_with(scene, names, values):
 
 
 def _changed(numbers):
-    """{id of an object: the same with other numbers}, all numbers of one at once, from (object, its field, indices
-    within the field, value) of each."""
+    """{id of an object: the same with other numbers}, from (object, its field, indices within the field, value)s."""
     owners, fields = {}, {}
     for owner, field, keys, value in numbers:
         owners[id(owner)], of_owner = owner, fields.setdefault(id(owner), {})
@@ -175,8 +174,7 @@ def laws_with(scene, parameters, values):
 
 
 def admitted_laws(scene, parameters, values):
-    """`laws_with` for values that the constructors admit, of all cases at once; raises anything where the formulas of a
-    section take no arrays."""
+    """`laws_with` for values that the constructors admit, of all cases at once; raises if formulas take no arrays."""
     known = {}
     for parameter, column in zip(parameters, values.T, strict=True):
         _, field, *keys = parameter.place
@@ -275,8 +273,7 @@ def _made(item, changes):
 
 
 class _Rebuilding:
-    """Copies of objects that hold, directly or not, one that is replaced (known: {its id: its replacement}); others are
-    kept."""
+    """Copies of objects that hold, directly or not, one that is replaced ({its id: replacement}); others are kept."""
 
     def __init__(self, known):
         self._known, self._alive = known, []

@@ -61,8 +61,7 @@ class _Leaves(Exception):
 
 
 def independent_in(plane, ties):
-    """Indices of linearly independent ties among those for motions in the plane: for a point held in x, y and z two
-    remain."""
+    """Indices of independent ties among those for motions in the plane: for a point held in x, y and z two remain."""
     groups = {}
     for i, tie in enumerate(ties):
         groups.setdefault((tie.a, tie.b), []).append(i)

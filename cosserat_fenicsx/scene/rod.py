@@ -277,8 +277,7 @@ RodOrName = Annotated[Rod | str, Rod.by_name]
 
 
 def is_known(owner, field, kind):
-    """Whether a field holds a `Station` or a `Rod` (kind); False where it holds a name, which `Scene` looks up; a
-    SceneError for neither of the two."""
+    """Whether a field holds a `Station` or a `Rod` (kind); False for a name, which `Scene` looks up; or SceneError."""
     return not isinstance(kind.by_name.check(owner, field, getattr(owner, field)), str)
 
 

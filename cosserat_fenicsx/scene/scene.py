@@ -83,8 +83,7 @@ def _force(load, scene, length):
 
 
 def check_magnitudes(scene, load_factor):
-    """Refuse (SceneError) loads and prescribed motions that are so large, at the largest load factor requested, that
-    rounding errors would dominate."""
+    """Refuse (SceneError) loads and prescribed motions so large that rounding errors would dominate."""
     for share, scaled, words, most in scene.magnitudes:
         factor = abs(load_factor) if scaled else 1.0
         if share * factor > 1:

@@ -182,8 +182,7 @@ class CasesTask:
         return found | {f"{what}{x.label}": _UNITS[x.kind] for x in self.queries for what in ("", _ERROR_OF)}
 
     def many(self, cases):
-        """What each case gives: {label of a query: value, and "error of" it: its estimated error}, or why it has
-        no equilibrium."""
+        """Of each case {label of a query: value, and "error of" it: its estimated error}, or why it has none."""
         found = self.compiled.batch([[case[name] for name in self.names] for case in cases])
         labels = [f"{what}{x.label}" for what in ("", _ERROR_OF) for x in self.queries]
         rows = np.concatenate([found.values, found.errors], axis=1).tolist()

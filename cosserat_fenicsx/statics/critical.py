@@ -67,8 +67,7 @@ def critical_sensitivity(buckling, parameters):
 
 
 def _buckling_modes(buckling, length):
-    """The modes (m, N, 6), dimensionless, then the sums of those of equal load factors; and [(i, j, index of the sum)]
-    of these."""
+    """The modes (m, N, 6), dimensionless, then the sums of those of equal load factors; and their [(i, j, index)]."""
     modes = buckling.shapes / np.repeat([length, 1.0], 3)
     values, pairs, sums = buckling.load_factors, [], []
     for i, j in itertools.combinations(range(len(modes)), 2):
@@ -321,8 +320,7 @@ def _check_perfect(model, parameter, rates):
 
 
 def _modes(direct, crossing):
-    """(N, 6) the mode of all nodes, the mean of those at the two points; of a double bifurcation also the other mode,
-    and their sum."""
+    """(N, 6) the mode of all nodes, the mean of both points; of a double bifurcation also the other, and their sum."""
     bordered = direct.newton.bordered
     found = [0.0] * (1 if crossing.partner is None else 2)
     for load_factor, numbers, _ in direct.points:

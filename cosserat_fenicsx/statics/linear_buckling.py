@@ -319,8 +319,7 @@ def _mixed(values, off):
 
 @contextlib.contextmanager
 def _less_bounded(model):
-    """Context with the stiffnesses b (2 - b/K) instead of the bounded b, by which a mode of b has about the energy of
-    the true mode."""
+    """Context with b (2 - b/K) instead of the bounded b, by which a mode of b has about the true mode's energy."""
     bound = model.bounded_stiffness()
     model.stiffen(bound * (2 - bound / model.section.K))
     try:

@@ -191,8 +191,7 @@ def resolving(scene, layout, degree, parts=4):
 
 
 def _varying(rod, loads):
-    """Functions, of (n,) arc lengths over the rod's length, that vary along a rod, with values (n, m); `loads`: those
-    of loads along it."""
+    """Functions, of (n,) arc lengths over the rod's length, that vary along a rod, also of `loads`, values (n, m)."""
     functions = [lambda s, value=value: value(s * rod.length) for value in loads]
     low, high = rod.profile.range
     twisted = not isinstance(rod.curve, Line) and (low.J[0] != high.J[1] or rod.profile.coupled)
@@ -474,8 +473,7 @@ def _apart(fine, coarse):
 
 
 def _difference_before(scene, on_mesh, numbers, layout):
-    """Relative differences (n,) of the numbers on a mesh to those on one with half as many elements; None where that
-    mesh is too coarse."""
+    """Relative differences (n,) of the numbers to those on half as many elements; None where that is too coarse."""
     try:
         coarse = on_mesh(layout.finer(scene, 0.5))[0]
     except NotConverged:

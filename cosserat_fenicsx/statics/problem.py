@@ -169,8 +169,7 @@ class Problem(Equations):
         return change
 
     def mismatch(self):
-        """The contact force by the strains minus the carried one: rounding of the strains times the stiffness; None
-        where no force is carried."""
+        """The contact force by the strains minus the carried one, rounding; None where no force is carried."""
         return self._advanced(0.0) - self._live[0] if self.c.advance else None
 
     def _advanced(self, step):

@@ -121,8 +121,7 @@ class Direct:
 
     @classmethod
     def along(cls, path, parameters):
-        """Context manager that gives the `Direct` of a path's mesh and model, in space where parameters move its
-        plane."""
+        """Context manager: the `Direct` of a path's mesh and model, in space where parameters move its plane."""
         scenes = [_scenes_near(path.scene, parameter) for parameter in parameters]
         model, plane = path.model, path.scene.plane
         near = [scene.plane for scene in sum(scenes, [])] if plane is not None else []

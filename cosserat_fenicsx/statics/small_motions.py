@@ -90,8 +90,7 @@ class Bodies:
         return block
 
     def _blocks(self, of_centre, of_spin):
-        """(elements, nodes, 6, 6) from matrices for the displacement of the mass centre u + rotation x arm, and for the
-        rotation."""
+        """(elements, nodes, 6, 6) from matrices for the mass centre's u + rotation x arm, and for the rotation."""
         block = np.zeros((*self._slots.shape, 6, 6))
         block[..., :3, :3], block[..., 3:, 3:] = of_centre, of_spin
         if self._arm is not None:

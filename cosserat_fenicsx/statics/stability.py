@@ -142,8 +142,7 @@ class Part:
         return self.factor() - int(not self._zero and self._nearest(1)[0][0] < 0)
 
     def factor(self):
-        """Assemble K at the problem's state and factorise it; its number of negative eigenvalues, by the factors that
-        give eigenvalues and modes."""
+        """Assemble K at the state and factorise it; its negative eigenvalues, by the factors that give modes."""
         self.assemble()
         self.pc.setOperators(self.K)
         self.pc.setUp()

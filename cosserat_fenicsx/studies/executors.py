@@ -61,8 +61,7 @@ def _sentence(problem):
 
 
 def unshared(value):
-    """A case, or a part of one, with lists, dicts and arrays of its own, which a task may change: those given belong to
-    several cases."""
+    """A case, or a part of one, with lists, dicts and arrays of its own, which a task may change."""
     if isinstance(value, np.ndarray):
         return value.copy()
     if type(value) in (list, tuple):

@@ -354,8 +354,7 @@ class TaskPool:
         self._add(_NEXT, self._count)
 
     def meet(self):
-        """Wait until no rank has more to do. Unlike a barrier of MPI it leaves the processor to others, and can be
-        interrupted and called again."""
+        """Wait until no rank has more to do, without keeping the processor; it can be interrupted and called again."""
         if self._window is None:
             return
         self._met = self._met or self._comm.Ibarrier()

@@ -46,8 +46,7 @@ STATICS = Panel(PEERS, problems, error, configurations, kind, model, 3, True)
 
 
 class Record:
-    """The measurements so far of a `Panel`, in a file that is complete at any time; fresh: whether to ignore an
-    existing one."""
+    """The measurements so far of a `Panel`, in a file complete at any time; fresh: ignore an existing one."""
 
     def __init__(self, file, fresh=False, panel=None):
         self.panel = panel or STATICS

@@ -166,8 +166,7 @@ class Follower:
         return self.fork is not None and not self.left
 
     def _watch(self, a, b, plain):
-        """Report the bifurcations within a step of load control; False to leave the path there, None where the step is
-        too long to resolve them."""
+        """Report bifurcations in a step of load control; False to leave the path there, None where it is too long."""
         looks = a.negative_modes != b.negative_modes or (b.negative_modes > 0 and self.track.without_potential)
         if not (looks and (self._on_event or self._branch)):
             return True

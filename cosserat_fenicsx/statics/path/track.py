@@ -237,8 +237,7 @@ class Track:
         return square if square > NOTHING**2 else 0.0
 
     def balance(self, moved, change):
-        """The weight by which a step (dx, d eta) has equal shares of the unknowns and the load factor; 0 without
-        one."""
+        """The weight by which a step (dx, d eta) has equal shares of unknowns and load factor; 0 without one."""
         return self.square(moved) / change**2 if change else 0.0
 
     def product(self, a, b):

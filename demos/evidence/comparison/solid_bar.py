@@ -137,8 +137,7 @@ class SolidBar:
         return self._solver.getPC().getFactorMatrix().getInertia()[0]
 
     def carried(self, coarser, x):
-        """The state x of a bar with the same mesh of the section and other elements along it, interpolated by splines
-        in z."""
+        """The state x of a bar with other elements along it and the same mesh of the section, by splines in z."""
         (theirs, levels), (mine, wanted) = coarser._fibres(), self._fibres()
         found = np.empty((len(mine), 3))
         fibres = x.reshape(-1, 3)[theirs].reshape(-1, len(levels), 3)

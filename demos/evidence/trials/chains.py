@@ -18,8 +18,7 @@ NEXT_TO_INFINITE = 1e10
 
 
 class LoadedChain(Chain):
-    """A chain along a line or an arc under any tip load, in units of L and EI/L^2; law_of: (length, EA, GA) to the
-    element's law."""
+    """A chain along a line or arc under any tip load, in units of L, EI/L^2; law_of: (length, EA, GA) to a law."""
 
     def __init__(self, problem, elements, law_of):
         L = problem["length"]
