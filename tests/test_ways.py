@@ -9,7 +9,7 @@ import pytest
 pytestmark = pytest.mark.serial
 ROOT = Path(__file__).parent.parent
 #: Most files whose functions run in the first call, with compiled code at hand, and in one like it afterwards.
-FIRST, AGAIN = 62, 36
+FIRST, AGAIN = 61, 35
 COLUMN = f"""
 import sys
 import cosserat_fenicsx as cf

@@ -56,24 +56,6 @@ def turned(data, P):
     return data._replace(A_axes=P @ data.A_axes, S_axes=P @ data.S_axes, G=G)
 
 
-def strain(data, n, k):
-    """v - v_R (.., 3) where the contact force n is known, material."""
-    if data.G is None:
-        return n / data.K
-    return _times(spread(1 / data.K, data.A_axes), n) - _times(data.G, k)
-
-
-def moment(data, n, k):
-    """m (.., 3) where the contact force n is known, material."""
-    if data.G is None:
-        return data.J * k
-    return _times(np.swapaxes(data.G, -1, -2), n) + _times(spread(data.J, data.S_axes), k)
-
-
-def _times(matrix, a):
-    return np.einsum("...ij,...j->...i", matrix, a)
-
-
 def field_values(data, stiff):
     """Values of the Functions K, K_inv, K_stiff, J and G, (elements, points, k), of `LawData`: diagonals, or matrices
     row by row; stiff: the bounded K for the second variation."""
