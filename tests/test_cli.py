@@ -254,25 +254,48 @@ def test_a_second_process_compiles_nothing(tmp_path):
     assert counts[0] == counts[1] > 0
 
 
-@pytest.mark.slow
+def many_points(folder):
+    """The file of a scene whose path takes far longer than a test."""
+    head, _, _ = DEMO.read_text(encoding="utf-8").partition("[solve]")
+    factors = [k / 20000 for k in range(1, 20000)]
+    scene = folder / "scene.toml"
+    scene.write_text(f"{head}[solve]\nload_factors = {factors}\nelements = 64\nmodel = 'spatial'\n", encoding="utf-8")
+    return scene
+
+
 def test_ctrl_c_keeps_what_is_done(tmp_path):
     """SIGINT in the middle of a long list of load factors: table, files, exit code."""
-    scene = tmp_path / "scene.toml"
-    head, _, _ = DEMO.read_text(encoding="utf-8").partition("[solve]")
-    scene.write_text(
-        f"{head}[solve]\nload_factors = {[k / 5000 for k in range(1, 5000)]}\nelements = 64\nmodel = 'spatial'\n",
-        encoding="utf-8",
-    )
-    command = [sys.executable, "-m", "cosserat_fenicsx", "run", str(scene), "-o", str(tmp_path), "--no-picture"]
+    words = ["run", str(many_points(tmp_path)), "-o", str(tmp_path), "--no-picture"]
+    command = [sys.executable, "-m", "cosserat_fenicsx", *words]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, encoding="utf-8", cwd=ROOT)
     while "cosserat_chain" not in Path(f"/proc/{process.pid}/maps").read_text():  # nothing is left to compile then
         time.sleep(0.02)
-    time.sleep(1)
+    time.sleep(0.3)
     process.send_signal(signal.SIGINT)
     out, err = process.communicate(timeout=60)
     assert process.returncode == 130 and "interrupted after" in err and "Traceback" not in err
     assert "exception" not in err  # of which the command line has none
     assert "load factor" in out and (tmp_path / "path.csv").is_file() and (tmp_path / "path.xdmf").is_file()
+
+
+def test_a_terminal_that_is_closed(tmp_path):
+    """The path so far is written, although nothing can be printed any more."""
+    at_once = """
+import sys
+from cosserat_fenicsx import __main__, progress
+progress._PATIENCE = 0.1
+sys.exit(__main__.main())"""
+    process, terminal = pty.fork()
+    if not process:
+        signal.signal(signal.SIGHUP, signal.SIG_DFL)
+        os.chdir(ROOT)
+        words = ["run", str(many_points(tmp_path)), "-o", str(tmp_path), "--no-picture"]
+        os.execv(sys.executable, [sys.executable, "-c", at_once, *words])
+    os.read(terminal, 100)  # the progress bar appears
+    os.close(terminal)
+    _, status = os.waitpid(process, 0)
+    assert os.waitstatus_to_exitcode(status) == 130
+    assert {"path.csv", "path.xdmf", "path.h5"} <= {file.name for file in tmp_path.iterdir()}
 
 
 @pytest.mark.parametrize("scene", sorted(DEMO.parent.glob("*.toml")), ids=lambda file: file.stem)
@@ -557,24 +580,3 @@ sys.exit(main())"""
         preexec_fn=lambda: signal.signal(number, signal.SIG_DFL),  # these tests may run under nohup
     )  # fmt: skip
     assert (done.returncode, done.stdout, done.stderr) == (130, "", "cosserat: interrupted\n")
-
-
-@pytest.mark.slow
-def test_a_terminal_that_is_closed(tmp_path):
-    """The path so far is written, although nothing can be printed any more."""
-    head, _, _ = DEMO.read_text(encoding="utf-8").partition("[solve]")
-    scene = tmp_path / "scene.toml"
-    factors = [k / 20000 for k in range(1, 20000)]
-    scene.write_text(f"{head}[solve]\nload_factors = {factors}\nelements = 64\nmodel = 'spatial'\n", encoding="utf-8")
-    process, terminal = pty.fork()
-    if not process:
-        signal.signal(signal.SIGHUP, signal.SIG_DFL)
-        os.chdir(ROOT)
-        command = [sys.executable, "-m", "cosserat_fenicsx", "run", str(scene), "-o", str(tmp_path), "--no-picture"]
-        os.execv(sys.executable, command)
-    os.read(terminal, 100)  # the progress bar appears
-    time.sleep(0.2)
-    os.close(terminal)
-    _, status = os.waitpid(process, 0)
-    assert os.waitstatus_to_exitcode(status) == 130
-    assert {"path.csv", "path.xdmf", "path.h5"} <= {file.name for file in tmp_path.iterdir()}
