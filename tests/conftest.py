@@ -5,6 +5,7 @@ import os
 import re
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 # Compiling takes half the time, and running not noticeably longer on a few elements; what measures speed unsets it.
@@ -61,6 +62,12 @@ def pytest_runtest_makereport(item, call):
             flush=True,
         )
         end_all()
+
+
+def computing(process):
+    """Wait until a process of the command line has all of its compiled code."""
+    while "cosserat_chain" not in Path(f"/proc/{process.pid}/maps").read_text():
+        time.sleep(0.02)
 
 
 @pytest.fixture

@@ -10,7 +10,7 @@ import pytest
 from cosserat_fenicsx import NotConverged, SceneError
 from cosserat_fenicsx.analytic import Tip, elastica, planar_tip, reissner, secant_delta, transverse_tip_force
 
-pytestmark = pytest.mark.once
+pytestmark = [pytest.mark.serial, pytest.mark.once]
 
 # The paper's rod: L = 20 m, d = 0.2 m, E = 210 GPa, nu = 0.3, e = L/100.
 LENGTH, DIAMETER, E, NU = 20.0, 0.2, 210e9, 0.3

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import refused
+from conftest import computing, refused
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx import interrupts
@@ -268,8 +268,7 @@ def test_ctrl_c_keeps_what_is_done(tmp_path):
     words = ["run", str(many_points(tmp_path)), "-o", str(tmp_path), "--no-picture"]
     command = [sys.executable, "-m", "cosserat_fenicsx", *words]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, encoding="utf-8", cwd=ROOT)
-    while "cosserat_chain" not in Path(f"/proc/{process.pid}/maps").read_text():  # nothing is left to compile then
-        time.sleep(0.02)
+    computing(process)
     time.sleep(0.3)
     process.send_signal(signal.SIGINT)
     out, err = process.communicate(timeout=60)

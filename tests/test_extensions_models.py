@@ -84,7 +84,7 @@ def test_a_load():
 HARD = cf.Wall(ROD, (0, 0, 0), (0, 0, 1.0), clearance=1e-3, stiffness=1e3, law=Hardening(0.004))
 
 
-@pytest.mark.parametrize("load", [AcrossRod(ROD, 2.0), HARD])
+@pytest.mark.parametrize("load", [pytest.param(AcrossRod(ROD, 2.0), marks=pytest.mark.serial), HARD])
 def test_stored_and_resumed(load, tmp_path_all):
     """A motion that is ended early and resumed is the one that was not, to the last digit."""
     scene = cf.Scene([ROD], [cf.Clamp(ROD.start)], [cf.LineForce(ROD, (1.0, 0, 0)), load])

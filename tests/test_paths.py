@@ -74,6 +74,7 @@ def test_load_control_alone_says_what_it_met():
     assert pendulum_limits(load)[0] * 0.999 < reached < pendulum_limits(load)[0]
 
 
+@pytest.mark.serial
 def test_load_factors_are_the_next_along_the_path_or_the_next_of_load_control():
     rod, scene, load = torsion_pendulum()
     path = cf.solve(scene, [5.0, 5.0, 5.0, 3.0], elements=8, control="arc")  # 3.0 comes after the turn at 39.3
@@ -105,6 +106,7 @@ def test_shallow_arch(control, far):
     assert {0, 1, 2} == set(cf.solve(scene, [33.0, 25.0, 17.0], elements=8, control="arc").negative_modes.tolist())
 
 
+@pytest.mark.serial
 def test_a_path_through_limit_points_meets_its_tolerance():
     rod, crown, scene = shallow_arch()
     path = cf.solve(scene, (0.0, 45.0), tol=1e-6)
@@ -225,6 +227,7 @@ def test_nearly_perfect_columns_follow_their_own_branch(eccentricity):
     assert path.events == []
 
 
+@pytest.mark.serial
 @pytest.mark.parametrize("arguments, message", [
     (dict(control="arclength"), "control = 'arclength': did you mean"),
     (dict(branch=2), "branch = 2: expected 1, -1 or None"),
@@ -238,6 +241,7 @@ def test_arguments_that_are_refused(arguments, message):
         cf.solve(scene, [0.5], **arguments)
 
 
+@pytest.mark.serial
 def test_step_control_bounds():
     with pytest.raises(cf.SceneError, match="StepControl.most_steps = 0"):
         cf.StepControl(most_steps=0)

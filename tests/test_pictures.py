@@ -316,6 +316,7 @@ def test_supports_touch_what_they_hold(lean):
     assert ((along > -1e-9) & (along < 0.02) & (across < 0.02)).any()
 
 
+@pytest.mark.serial
 def test_a_scene_of_twenty_rods_stays_inside_its_picture():
     rods, loads = [], []
     for i in range(20):

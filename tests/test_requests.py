@@ -17,7 +17,7 @@ import weakref
 from pathlib import Path
 
 import pytest
-from conftest import COMM, column
+from conftest import COMM, column, computing
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx import progress
@@ -43,7 +43,8 @@ def test_long_eigenproblems_end_soon_after_a_signal(command, number, tmp_path):
     file.write_text(DEMO.read_text(encoding="utf-8").rpartition("[[loads]]")[0], encoding="utf-8")
     arguments = [sys.executable, "-m", "cosserat_fenicsx", *command, str(file), "--count", "3000"]
     process = subprocess.Popen(arguments, stdout=subprocess.PIPE, stderr=subprocess.PIPE, encoding="utf-8", cwd=ROOT)
-    time.sleep(8)
+    computing(process)
+    time.sleep(1.5)
     assert process.poll() is None, "it takes minutes"
     process.send_signal(number)
     out, err = process.communicate(timeout=15)

@@ -156,6 +156,7 @@ def test_slender_strings_are_solved():
     assert soft == pytest.approx(stiffer, rel=1e-6)
 
 
+@pytest.mark.serial
 def test_drilling_with_weight_on_a_centred_bit():
     """The soft string's hook load and torque are 661 189 N and 9548 N m; the clearance takes 3.4 % of the torque."""
     path = cf.well.WellPath.from_survey(*np.transpose(WELLS["F-12"]["stations_md_inc_azi"]))
@@ -169,6 +170,7 @@ def test_drilling_with_weight_on_a_centred_bit():
     assert answer.distance[-1] < 1e-5 and answer.negative_modes == 0 and answer.error < 1e-4
 
 
+@pytest.mark.serial
 def test_two_sections_two_frictions_and_rings():
     path = cf.well.WellPath.from_survey(*np.transpose(WELLS["P"]["stations_md_inc_azi"]))
     collar = cf.Stiffness((1e9, 1e9), 5e9, (2e7, 2e7), 1.5e7)
@@ -194,6 +196,7 @@ def test_a_string_on_the_axis_has_no_twist_and_no_jump_of_its_quaternion():
     assert np.linalg.norm(np.diff(q, axis=0), axis=1).max() < 0.001
 
 
+@pytest.mark.serial
 @pytest.mark.parametrize("arguments, word", [
     ({"radius": 0.05}, "contact_radius = 0.0635: expected less than the radius of the tube, 0.05 m"),
     ({"friction": -0.1}, "friction = -0.1"),
@@ -213,6 +216,7 @@ def test_refusals(arguments, word):
         solve_in_hole(path, **{**given, **arguments})
 
 
+@pytest.mark.serial
 @pytest.mark.slow
 def test_what_walls_tell_of_their_work_is_true():
     rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, 10)), PIPE)
@@ -220,6 +224,7 @@ def test_what_walls_tell_of_their_work_is_true():
     assert found_traits(wall, [rod]) == traits_of(wall, [rod])
 
 
+@pytest.mark.serial
 def test_walls_refuse_what_has_no_axis():
     rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, 10)), PIPE)
     with pytest.raises(cf.SceneError, match="the axis of the tube"):
@@ -297,6 +302,7 @@ SOFT_PIPE = cf.well.Component(None, STIFF, 241.13, 0.0635, name="pipe")
 MUD = cf.well.Mud(1200.0)
 
 
+@pytest.mark.serial
 @pytest.mark.parametrize(
     "operation", [cf.well.RotaryDrilling(80e3, 5e3), cf.well.Sliding(50e3), cf.well.TripOut()], ids=str
 )
@@ -318,6 +324,7 @@ def test_a_soft_string_knows_that_bit_and_stabilisers_pry(operation):
             assert abs(getattr(rod, name) - getattr(soft, name)) < soft.model_error * scale
 
 
+@pytest.mark.serial
 @pytest.mark.parametrize(
     "inc, operation", [((60, 60, 60, 60), cf.well.TripIn()), ((0, 0, 90, 90), cf.well.TripOut())], ids=str
 )

@@ -7,7 +7,7 @@ from torsion_scenes import string
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.drilling.linear.lumped import LumpedCutting
 
-pytestmark = pytest.mark.once
+pytestmark = [pytest.mark.serial, pytest.mark.once]
 
 A, EPSILON, ZETA, BLADES, WEIGHT = 0.108, 60e6, 0.6, 4, 5e4
 

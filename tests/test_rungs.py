@@ -34,7 +34,7 @@ def same(found, truth, tolerance):
                 )
 
 
-@pytest.mark.parametrize("seed", [None, 1, 2])
+@pytest.mark.parametrize("seed", [None, 1])
 @pytest.mark.parametrize("name", SCENES)
 def test_rungs_agree(name, seed):
     draw, known = SCENES[name]

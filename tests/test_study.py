@@ -95,7 +95,7 @@ def test_torque_and_drag():
 @pytest.mark.slow
 def test_the_rod_in_contact():
     """It has a communicator of its own."""
-    cases = {"depth": [650.0, 700.0, 900.0], "friction": [0.2], "model": ["rod"]}
+    cases = {"depth": [620.0, 650.0], "friction": [0.2], "model": ["rod"]}
     together, alone = cf.study(hook_load, cases), cf.study(hook_load, cases, comm=MPI.COMM_SELF)
     assert not together.failures and all(map(equal, together.results, alone.results))
     assert together.results[0]["model"] == "rod"

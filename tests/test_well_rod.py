@@ -77,6 +77,7 @@ def test_what_the_answer_of_the_rod_tells(out):
     assert np.isfinite(out.critical_load("He-Kyllingstad")).any() and math.isnan(out.neutral_point)
 
 
+@pytest.mark.serial
 def test_the_difference_is_one_of_clearance():
     """What a string misses that leaves one wall for the other grows like the root of the clearance, T sqrt(4 r/R)."""
     wide, narrow = (
@@ -103,6 +104,7 @@ def test_a_build_section_against_its_strong_form(case):
     assert found.hook_load == pytest.approx(case["hook_load_vertical"], rel=2e-4)
 
 
+@pytest.mark.serial
 @pytest.mark.slow
 def test_a_string_that_would_buckle_is_not_enough():
     """In a vertical hole it stays straight on the axis, far beyond the load at which it buckles."""
@@ -112,6 +114,7 @@ def test_a_string_that_would_buckle_is_not_enough():
     assert not found.enough and found.model_error > 0 and "NOT STABLE without friction" in str(found)
 
 
+@pytest.mark.serial
 def test_of_several_equilibria_the_stable_one_is_taken(monkeypatch):
     """The starts differ: each is tried until one has no negative modes; if there is none, the fewest count."""
     for modes, taken in (([2, 0], 0), ([2, -1, 1], 1), ([0], 0)):
@@ -135,6 +138,7 @@ def test_of_several_equilibria_the_stable_one_is_taken(monkeypatch):
         assert before[0].negative_modes == taken
 
 
+@pytest.mark.serial
 def test_a_rigid_wall_is_approached_as_closely_as_the_accuracy_needs(tmp_path_all):
     """Beside a stabiliser with little clearance a wall of 1e8 N/m^2 is too soft for a hook load to 1e-4."""
     sections = cf.well.HoleSection(500.0, 0.2159, 0.25)
@@ -174,6 +178,7 @@ def test_a_rigid_wall_is_approached_as_closely_as_the_accuracy_needs(tmp_path_al
         assert 0.02 * soft.errors[name] < apart < soft.errors[name]
 
 
+@pytest.mark.serial
 def test_many_pieces_are_solved_on_two_meshes():
     """A string of more components than the first mesh has elements: as of one component."""
     joints = cf.well.DrillString(
@@ -186,6 +191,7 @@ def test_many_pieces_are_solved_on_two_meshes():
     assert cut.solved.path.elements[0] > 512
 
 
+@pytest.mark.serial
 def test_the_survey_below_the_string_changes_nothing():
     md, inc = [0, 100, 300, 500], [10, 10, 60, 60]
     sections = [cf.well.HoleSection(250.0, 0.25, 0.2), cf.well.HoleSection(400.0, 0.2, 0.4)]
@@ -197,6 +203,7 @@ def test_the_survey_below_the_string_changes_nothing():
     assert loads[0] == pytest.approx(loads[1], rel=1e-9)
 
 
+@pytest.mark.serial
 def test_what_is_lost_on_a_finer_mesh_is_looked_for_or_told(monkeypatch):
     """A mesh that is too coarse for a snake is not the last; an answer is not lost where a finer mesh has none."""
 
@@ -225,6 +232,7 @@ class Asked(Exception):
     """With what `solve_in_hole` was asked for."""
 
 
+@pytest.mark.serial
 def test_what_is_handed_on(monkeypatch):
     """A bit and a stabiliser are rings, slip is that of each surface, and nothing below the string counts."""
 
@@ -348,6 +356,7 @@ def test_a_string_in_a_vertical_hole_is_a_helix_and_not_straight():
     assert rate == pytest.approx(np.sqrt(-answer.tension[wound] / (2 * EI)), rel=5e-3)
 
 
+@pytest.mark.serial
 @pytest.mark.slow
 @pytest.mark.parametrize("torque", [6000.0, -6000.0])
 def test_a_helix_has_the_hand_that_torque_favours(torque):
@@ -381,6 +390,7 @@ def test_an_unknown_number_of_negative_modes_is_not_enough(out):
         assert not out.enough
 
 
+@pytest.mark.serial
 def test_a_string_that_stays_straight_where_there_is_a_helix_is_not_enough():
     """In a vertical hole with friction: what the helix rubs is the error of the model."""
     path = cf.well.WellPath.from_survey([0, 400], [0, 0], [0, 0])

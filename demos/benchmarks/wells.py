@@ -242,7 +242,7 @@ def dawson_paslay():
         answer = solve_in_hole(path, [length], PIPE, WEIGHT, RADIUS, bottom_tension=-middle, elements=512, **given)
         low, high = (middle, high) if answer.negative_modes == 0 else (low, middle)
     amplitudes = []
-    for elements in (512, 1024):
+    for elements in (256, 512):
         snake = solve_in_hole(
             path, [length], PIPE, WEIGHT, RADIUS, bottom_tension=-1.2 * formula, helix=True, elements=elements, **given
         )
