@@ -18,7 +18,14 @@ for module in (defaults, scene_keys):  # pages that follow from the code
 project, copyright = "cosserat_fenicsx", "MIT licence"
 version = release = cosserat_fenicsx.__version__
 html_title = f"cosserat_fenicsx {release}"
-extensions = ["sphinx.ext.autodoc", "sphinx.ext.autosummary", "sphinx.ext.napoleon", "myst_nb", "formulas", "responsive"]
+extensions = [
+    "sphinx.ext.autodoc",
+    "sphinx.ext.autosummary",
+    "sphinx.ext.napoleon",
+    "myst_nb",
+    "formulas",
+    "responsive",
+]
 html_theme = "furo"
 html_static_path = ["site.css"]
 html_css_files = ["site.css"]
@@ -34,3 +41,15 @@ autosummary_imported_members = True
 myst_enable_extensions = ["dollarmath", "colon_fence"]
 myst_heading_anchors = 3
 nb_execution_mode = "off"  # the tests run the tutorials, and compare what they print
+
+
+def collapsed(app, pagename, templatename, context, doctree):
+    """The navigation opens where the reader is: all names of the reference on each page of it take most of the time."""
+    if whole := context.get("toctree"):
+        depth = 1 if pagename.startswith("api/") else 2
+        context["toctree"] = lambda **options: whole(**options | {"collapse": True, "maxdepth": depth})
+
+
+def setup(app):
+    """Sphinx's entry point."""
+    app.connect("html-page-context", collapsed, priority=400)  # before the theme, whose is 500

@@ -18,6 +18,7 @@ from cosserat_fenicsx.drilling.pipe_above import DelayLines, TopEnd
 
 pytestmark = pytest.mark.serial
 SMALL = {"elements": 4, "degree": 2}
+LIGHT = cf.drilling.Stribeck(1500.0, 500.0, 3.33)  # the bit slips from 1.4 s on
 
 
 def drilling(law=LAW, *, drag=0.3, inertia=50.0, weight=None, **more):
@@ -42,11 +43,11 @@ def imbalance(history):
 
 @pytest.mark.slow
 def test_stick_slip_of_the_bit_is_that_of_the_string():
-    """The bit slips at 1.9 s, sticks again, and slips once more; its drag is not on the inertia of the bit."""
+    """The bit slips at 3.5 s, sticks at 8.1 s, and slips again at 9.8 s; its drag is not on the inertia of the bit."""
     string = drilling()
     mixed = cf.drilling.mixed_scene(string, 3000.0)
-    history = cf.simulate(mixed.scene, 12.0, dt=0.005, **SMALL)
-    whole = cf.drilling.simulate(string, 12.0, dt=5e-4, model="torsion")
+    history = cf.simulate(mixed.scene, 10.5, dt=0.005, **SMALL)
+    whole = cf.drilling.simulate(string, 10.5, dt=5e-4, model="torsion")
     times, speed = mean_speeds(history, mixed.rod)
     off = np.abs(speed - np.interp(times, whole.times, whole.bit_speed))
     assert off[times < 4].max() < 2e-3 and off.max() < 2e-2
@@ -58,9 +59,10 @@ def test_stick_slip_of_the_bit_is_that_of_the_string():
 
 @pytest.mark.slow
 def test_other_schemes_agree():
-    mixed = cf.drilling.mixed_scene(drilling(), 3000.0)
-    histories = [cf.simulate(mixed.scene, 3.0, dt=0.005, scheme=x, **SMALL) for x in ("momentum", "generalised-alpha")]
+    mixed = cf.drilling.mixed_scene(drilling(LIGHT), 3000.0)
+    histories = [cf.simulate(mixed.scene, 2.4, dt=0.01, scheme=x, **SMALL) for x in ("momentum", "generalised-alpha")]
     (_, one), (_, other) = (mean_speeds(history, mixed.rod) for history in histories)
+    assert one.max() > 5
     np.testing.assert_allclose(other, one, atol=0.02)
 
 
@@ -68,7 +70,7 @@ def test_a_torque_that_drops_at_once():
     """Coulomb: nothing moves until the static torque is reached; then Z om = 2 M_in - T_d."""
     law = cf.drilling.Stribeck(2000.0, 1000.0)
     mixed = cf.drilling.mixed_scene(drilling(law, drag=0.0, inertia=0.0), 3000.0)
-    history = cf.simulate(mixed.scene, 3.0, dt=0.002, **SMALL)
+    history = cf.simulate(mixed.scene, 3.0, dt=0.004, **SMALL)
     whole = cf.drilling.simulate(drilling(law, drag=0.0, inertia=0.0), 3.0, dt=2.5e-4, model="torsion")
     starts = [t[np.argmax(x > 1e-6)] for t, x in (mean_speeds(history, mixed.rod), (whole.times, whole.bit_speed))]
     assert starts[0] == pytest.approx(starts[1], abs=0.01)
@@ -78,16 +80,17 @@ def test_a_torque_that_drops_at_once():
 
 
 def test_resume_gives_identical_digits(tmp_path, monkeypatch):
-    """While the bit sticks, and while it slips."""
-    mixed = cf.drilling.mixed_scene(drilling(), 3000.0)
-    whole = cf.simulate(mixed.scene, 3.6, dt=0.01, **SMALL)
-    stop_at(monkeypatch, 330, 0.0)
-    with pytest.raises(Stopped):
-        cf.simulate(mixed.scene, 3.6, dt=0.01, folder=tmp_path / "kept", **SMALL)
-    history = cf.resume(tmp_path / "kept", mixed.scene)
+    """While the bit sticks, and while it slips: after steps of 2.5 ms."""
+    mixed = cf.drilling.mixed_scene(drilling(LIGHT), 3000.0)
+    whole = cf.simulate(mixed.scene, 1.8, dt=0.01, **SMALL)
     assert np.abs(mean_speeds(whole, mixed.rod)[1]).max() > 0.1
-    for name in ("times", "energy", "work", "dissipated"):
-        assert np.array_equal(getattr(history, name), getattr(whole, name))
+    for steps in (500, 680):
+        stop_at(monkeypatch, steps, 0.0)
+        with pytest.raises(Stopped):
+            cf.simulate(mixed.scene, 1.8, dt=0.01, folder=tmp_path / str(steps), **SMALL)
+        history = cf.resume(tmp_path / str(steps), mixed.scene)
+        for name in ("times", "energy", "work", "dissipated"):
+            assert np.array_equal(getattr(history, name), getattr(whole, name))
 
 
 def inclined(**more):
