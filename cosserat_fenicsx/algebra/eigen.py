@@ -87,14 +87,24 @@ def _above(A, B, least):
 
 
 def _balanced(A, B):
-    """(D A D, D B D, D) with the diagonal D > 0, a vector of powers of two, that makes the diagonal of B about 1. The
-    unknowns of thick and of thin rods then count alike: PETSc's Cholesky factorisation takes small pivots for zero."""
-    A, B, scale = A.copy(), B.copy(), B.getDiagonal()
-    sizes = np.abs(scale.array_r)
-    scale.array_w[:] = np.exp2(np.round(-0.5 * np.log2(np.where(sizes > 0, sizes, 1.0))))
+    """(D A D, D B D, D) with the D of `balance` of B."""
+    A, B, scale = A.copy(), B.copy(), balance(B)
     for matrix in (A, B):
         matrix.diagonalScale(scale, scale)
     return A, B, scale
+
+
+def balance(K):
+    """The diagonal D > 0, a vector, that makes the diagonal of D K D about 1.
+
+    The unknowns of thick and of thin rods then count alike, whatever their units: PETSc's Cholesky factorisation takes
+    small pivots for zero, and Krylov spaces find large eigenvalues slowly. D holds powers of two, so that nothing is
+    rounded.
+    """
+    scale = K.getDiagonal()
+    sizes = np.abs(scale.array_r)
+    scale.array_w[:] = np.exp2(np.round(-0.5 * np.log2(np.where(sizes > 0, sizes, 1.0))))
+    return scale
 
 
 def _in_units(vectors, scale):

@@ -317,7 +317,8 @@ class RodModel:
         self.section = self._section_data(data)
         sizes = layout.sizes(scene) / scales.length
         lengths = bending_lengths(data, [rod.length / scales.length for rod in scene.rods], layout.counts)
-        self.bounded_K = bounded(self.section, self.signature.formulation.force.stiff, sizes, lengths)
+        structures = np.repeat([scene.number(scene.leader(rod)) for rod in scene.rods], layout.counts)
+        self.bounded_K = bounded(self.section, self.signature.formulation.force.stiff, sizes, lengths, structures)
         fill_fields(self.data, rods, self.section, self.bounded_K)
         self.round_off = float(self.round_off_of(self.section, sizes))
         self._rest = self._at_rest()

@@ -99,8 +99,9 @@ def as_matrix(a):
 # `ContactForce.stiff` times EI/L^2, with L from `bending_lengths`. A bound of B EI/L^2 changes the critical load of a
 # mode with n half waves relatively by about (n pi)^2/B. Therefore it is up to _HIGHER times higher where rounding
 # permits: at most _ROOM times the bending stiffness about the weak axis times (element length over rod length)^2. Forms
-# raise it with the contact force (`law.stiffness_for`).
-_HIGHER, _ROOM = 100.0, 1e10
+# raise it with the contact force (`law.stiffness_for`). Where rods of a structure hold each other, as thin guys hold a
+# mast, the stiffest of them decides: its bound holds for all, up to _MOST_ROOM in place of _ROOM.
+_HIGHER, _ROOM, _MOST_ROOM = 100.0, 1e10, 1e13
 
 #: Arrays (elements, points, k) in the scene's order, dimensionless: the fields of `LawData`, frames R_R (3 x 3) and
 #: strains v_R.
@@ -182,13 +183,18 @@ def bending_lengths(data, lengths, counts):
     return np.repeat(lengths / np.maximum(1.0, np.add.reduceat(turned, first)), counts)
 
 
-def bounded(data, stiff, sizes, lengths):
-    """The bounded K of the second variation; sizes of elements and `bending_lengths`, (elements,)."""
+def bounded(data, stiff, sizes, lengths, structures):
+    """The bounded K of the second variation; sizes of elements, `bending_lengths`, and the numbers of the structures
+    that elements belong to, (elements,)."""
     strong, weak = (bend(data.J, axis=2, keepdims=True) for bend in (np.max, np.min))
     lengths, sizes = lengths[:, None, None], sizes[:, None, None]
     least = stiff * strong / lengths**2
-    room = _ROOM * weak * sizes**2 / lengths**4
-    return np.minimum(data.K, np.maximum(least, np.minimum(_HIGHER * least, room)))
+    stiffest = np.zeros(structures.max() + 1)
+    np.maximum.at(stiffest, structures, least.max(axis=(1, 2)))
+    room = weak * sizes**2 / lengths**4
+    alone = np.maximum(least, np.minimum(_HIGHER * least, _ROOM * room))
+    joined = np.minimum(stiffest[structures][:, None, None], _MOST_ROOM * room)
+    return np.minimum(data.K, np.maximum(alone, joined))
 
 
 def fill_fields(fields, rods, data, stiff):

@@ -66,11 +66,19 @@ class NegativeModes(Called):
 
 
 class Part:
-    """A diagonal block of the second variation, decoupled from the others: one of its model's `second_variations`, with
-    its `Packed` form; elimination, interface: for counts; resistance: (tied unknowns,) the last scales of the springs
-    in place of supports and joints."""
+    """A diagonal block of the second variation, decoupled from the others: one of its model's `second_variations`.
 
-    resistance = None
+    Attributes:
+        variation: the model's `SecondVariation`; form: its `Packed` form.
+        elimination, interface: for counts; the latter None where nothing is to be added.
+        resistance: (tied unknowns,) the last scales of the springs in place of supports and joints.
+
+    Eigenvalues and eigenvectors y are those of D K D, with the D of `eigen.balance` at the first state of a scene: as
+    many of them are negative, and D y is the null vector where one vanishes. Those of K would be far apart where rods
+    of very different sections meet, and the small negative ones beside them would not be found.
+    """
+
+    resistance = _scale = None
 
     def __init__(self, problem, index):
         self.problem, self.model, self._index = problem, problem.model, index
@@ -82,7 +90,7 @@ class Part:
 
     def load(self):
         """Take the numbers of the scene that the model was loaded with."""
-        self.variation = self.model.second_variations[self._index]
+        self.variation, self._scale = self.model.second_variations[self._index], None
         self.form.refresh()
 
     @cached_property
@@ -142,8 +150,11 @@ class Part:
         return self.factor() - int(not self._zero and self._nearest(1)[0][0] < 0)
 
     def factor(self):
-        """Assemble K at the state and factorise it; its negative eigenvalues, by the factors that give modes."""
+        """Assemble D K D at the problem's state and factorise it; its number of negative eigenvalues, by the factors
+        that give eigenvalues and modes."""
         self.assemble()
+        self._scale = self._scale or eigen.balance(self.K)
+        self.K.diagonalScale(self._scale, self._scale)
         self.pc.setOperators(self.K)
         self.pc.setUp()
         negative, self._zero, _ = self.pc.getFactorMatrix().getInertia()
@@ -151,7 +162,7 @@ class Part:
         return negative
 
     def _nearest(self, count, side=0):
-        """(eigenvalues nearest zero, their eigenvectors) of K as last factorised; side: 1, -1 or 0 for both."""
+        """(eigenvalues nearest zero, their eigenvectors) of D K D as last factorised; side: 1, -1 or 0 for both."""
         if self._zero:  # MUMPS drops null pivots from solutions
             self._shift_from_zero()
         try:
@@ -187,7 +198,7 @@ class Part:
         return float(self._nearest(1)[0][0])  # zero to rounding: factorisation and eigensolver differ in its sign
 
     def negative_space(self, count):
-        """Orthonormal eigenvectors of the `count` negative eigenvalues at the problem's state, (owned entries, count);
+        """Orthonormal eigenvectors y of the `count` negative eigenvalues at the problem's state, (owned entries, count);
         None where the eigensolver finds another number."""
         if self.factor() != count:
             return None
@@ -200,7 +211,10 @@ class Part:
         """The `oriented` modes of the eigenvalues nearest zero, changes of the unknowns (owned entries); side: 1 or -1
         for positive or negative eigenvalues alone, 0 for both."""
         self.factor()
-        return oriented(self.model, self._nearest(count, side)[1])
+        vectors = self._nearest(count, side)[1]
+        for vector in vectors:
+            vector.pointwiseMult(vector, self._scale)
+        return oriented(self.model, vectors)
 
 
 def oriented(model, vectors):

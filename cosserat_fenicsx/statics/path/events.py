@@ -184,12 +184,12 @@ class Locator:
         found, j = [], first
         while j < last:
             place, point, together = self._vanishing(chord, j, last)
-            found.append((place, point, together))
+            found.append((place, point, together, j))
             j += together
         for limit in limits:  # the nearest zero of an eigenvalue is that of the limit point
             if found:
                 found.remove(min(found, key=lambda item: abs(item[0] - limit.place)))
-        return [(place, point, self._modes(chord, place, point, together)) for place, point, together in found]
+        return [(place, point, self._modes(chord, place, point, *more)) for place, point, *more in found]
 
     def _by_tangent(self, chord, counts, limits):
         """(None, `PathPoint`, [mode]) for each negative mode at one end: under loads without a potential the tangent
@@ -215,21 +215,23 @@ class Locator:
             found.append(Crossing(kind, point, place, direction, residual, null, partner))
         return found
 
-    def _modes(self, chord, place, point, together):
-        """The modes whose eigenvalues change sign at a coordinate. In a structure with a very soft member other
-        eigenvalues may be as close to zero: then the mode is taken from the nearest point where its eigenvalue is
-        negative by the count and by the factors that give modes, which differ by rounding next to a singular point."""
+    def _modes(self, chord, place, point, together, j):
+        """The modes whose eigenvalues, from the j-th on, change sign at a coordinate.
+
+        In a structure with a very soft member other eigenvalues may be as close to zero. Then the mode is taken from
+        the nearest point where its eigenvalue is negative by the count and by the factors that give modes, which
+        differ by rounding next to a singular point.
+        """
         track, stability = self.track, self.track.stability.whole
         track.put(point.numbers, point.load_factor)
         modes = stability.modes(together)
         if together > 1:
             return modes
-        stable = min(known.negative_modes for known in chord.neighbours(place))
         for _, unstable in sorted(chord.known, key=lambda known: abs(known[0] - place)):
-            if unstable.negative_modes <= stable:
+            if unstable.negative_modes != j + 1:
                 continue
             track.put(unstable.numbers, unstable.load_factor)
-            if stability.factor() <= stable:
+            if stability.factor() <= j:
                 continue
             negative = stability.modes(1, side=-1)
             if not modes or not negative:
