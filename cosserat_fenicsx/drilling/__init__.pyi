@@ -18,6 +18,8 @@ from cosserat_fenicsx.drilling.linear.limits import critical_slopes as critical_
 from cosserat_fenicsx.drilling.linear.limits import limit_speed as limit_speed
 from cosserat_fenicsx.drilling.linear.limits import limit_weight as limit_weight
 from cosserat_fenicsx.drilling.linear.lumped import LumpedCutting as LumpedCutting
+from cosserat_fenicsx.drilling.linear.response import FrequencyResponse as FrequencyResponse
+from cosserat_fenicsx.drilling.linear.response import frequency_response as frequency_response
 from cosserat_fenicsx.drilling.linear.stability import Stability as Stability
 from cosserat_fenicsx.drilling.linear.stability import stability as stability
 from cosserat_fenicsx.drilling.mixed import BitTorque as BitTorque

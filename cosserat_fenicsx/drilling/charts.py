@@ -422,3 +422,48 @@ def draw_bounce(answer):
     panel.set(xlabel=along, ylabel=across, yscale="log", xlim=(x[0], x[-1]))
     legend(panel)
     return figure
+
+
+# Highest over lowest frequency from which the axis of unevenly spaced ones is logarithmic.
+_DECADES = 20
+
+
+@_drawn
+def draw_response(answer):
+    """See `FrequencyResponse.plot`."""
+    from cosserat_fenicsx.drilling.linear.response import ENDS, SHOWN
+
+    above, surface, moved, source = ENDS[answer.kind]
+    figure, panels = stacked(8, [2.1, 1.5, 2.1, 2.1])
+    order = np.argsort(answer.frequency)
+    f, torque = answer.frequency[order], answer.transfer(source, surface)[order]
+    panels[0].plot(f, np.abs(torque), color=DRIVE, label=f"{surface} per {source}")
+    panels[0].axhline(1.0, color="black", linewidth=0.8)
+    panels[0].set_ylabel(f"{surface}\nper {source}")
+    phase = np.degrees(np.angle(torque))
+    turned = np.flatnonzero(np.abs(np.diff(phase)) > 180) + 1  # from -180 to 180 degrees
+    panels[1].plot(np.insert(f, turned, np.nan), np.insert(phase, turned, np.nan), color=DRIVE)
+    panels[1].set(ylabel="its phase\n(degrees)", yticks=[-180, -90, 0, 90, 180], ylim=(-190, 190))
+    (turn, turning), (push, pushing) = map(unit_of, SHOWN[answer.kind])
+    for name, colour in ((above, DRIVE), (moved, BIT)):
+        size = np.abs(answer.transfer(source, name)[order]) / turning * pushing
+        if size.any():
+            panels[2].plot(f, size, color=colour, label=name)
+    panels[2].set_ylabel(f"speed per {source}\n({turn} per {push})")
+    unit = "N m s/rad" if answer.kind == "torsion" else "N s/m"
+    panels[3].plot(f, np.abs(answer.impedance[order]), color="tab:green", label="string")
+    if np.isfinite(answer.drive_impedance).any():
+        drive = "drive" if answer.kind == "torsion" else "hook"
+        panels[3].plot(f, np.abs(answer.drive_impedance[order]), "--", color="black", label=drive)
+    panels[3].set_ylabel(f"impedance at the\nsurface ({unit})")
+    for panel in (panels[0], *panels[2:]):
+        panel.set_yscale("log")
+    if f[-1] > _DECADES * f[0] and np.ptp(np.diff(f)) > 1e-6 * f[-1]:
+        panels[-1].set_xscale("log")
+    legend(panels[2], panels[3])
+    panels[-1].set_xlabel("frequency (Hz)")
+    rpm, size = unit_of(SPEED)
+    at = f", {answer.speed / size:.4g} {rpm}" if answer.speed else ""
+    drive = f", {_words_on_drive(answer.scene).partition(' at ')[0]}" if answer.kind == "torsion" else ""
+    figure.suptitle(f"Response of the string in {answer.kind}{at}{drive}" + "".join(f"\n{x}" for x in answer.cautions))
+    return figure

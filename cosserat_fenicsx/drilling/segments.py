@@ -15,7 +15,7 @@ class Segment:
     Attributes:
         length: m. GJ, rhoJ: torsional stiffness, N m^2, and polar inertia per length, kg m, with tool joints, see
             `StringPart.torsion`. EA: N. rhoA: kg/m, with tool joints. radius: of contact, m. weight: in mud, N/m.
-        name: of the component.
+        name: of the component. damping_time: of Kelvin and Voigt, s.
     """
 
     length: float
@@ -26,6 +26,7 @@ class Segment:
     radius: float
     weight: float
     name: str
+    damping_time: float = 0.0
 
     @property
     def torsional_speed(self) -> float:
@@ -64,9 +65,8 @@ def segment_of(place, weight):
     if math.isinf(stiffness.axial):
         refuse(part, "stiffness.axial", stiffness.axial, "a finite axial stiffness (N), for a motion")
     mass = stiffness.mass if part.mass is None else part.mass
-    return Segment(
-        place.bottom - place.top, *part.torsion, stiffness.axial, mass, part.contact_radius, weight, part.name
-    )
+    return Segment(place.bottom - place.top, *part.torsion, stiffness.axial, mass, part.contact_radius, weight,
+                   part.name, part.damping_time)  # fmt: skip
 
 
 @dataclass(frozen=True)

@@ -124,10 +124,20 @@ def static_weight(scene) -> float:
     return 0.0 if scene.bit is None else scene.bit.weight or 0.0
 
 
+class Drills(RotaryDrilling):
+    """What a bit does, which is doubted by the bit's own names."""
+
+    def validate(self):
+        pass
+
+
+Drills.name = RotaryDrilling.name
+
+
 def scene_pieces(scene):
     """The `Pieces` of the string of a `Drilling` with a hole, rotating at its depth."""
     weight = static_weight(scene)
-    operation = RotaryDrilling(weight, 0.0) if weight else RotateOffBottom()
+    operation = Drills(weight, 0.0) if weight else RotateOffBottom()
     mud = Mud(0.0) if scene.mud is None else scene.mud
     return pieces_of(scene.hole, scene.string, operation, mud, scene.bit_depth)[0]
 
@@ -148,6 +158,20 @@ def soft_string_force(pieces, weight, md):
     return np.hypot(here.curvature * tension + here.weight * here.down(u)[1], here.weight * here.b)
 
 
+def loads_between(scene, pieces, cuts, normal_force=None):
+    """(middle (m), friction of a coefficient of 1 (N), contact radius (m)) between cuts, measured depths (m) among
+    which are those of the pieces; `normal_force` as in `wall_of`."""
+    half = np.diff(cuts)[:, None] / 2
+    md = cuts[:-1, None] + half * (1 + _RULE.points)
+    force = soft_string_force(pieces, static_weight(scene), md) if normal_force is None else normal_force(md)
+    middle = md.mean(axis=1)
+    at = np.minimum(np.searchsorted(pieces.bottom, middle), len(pieces.bottom) - 1)
+    load = (force * _RULE.weights).sum(axis=1) * half[:, 0]
+    if law_of(scene.friction)[2]:
+        load = load * scene.hole.at(middle, "friction")
+    return middle, load, pieces.radius[at]
+
+
 def wall_of(scene, depths, normal_force=None):
     """The `Wall` of a `Drilling` at nodes (measured depths, m), each with half of the cells beside it.
 
@@ -160,18 +184,10 @@ def wall_of(scene, depths, normal_force=None):
     pieces = scene_pieces(scene)
     middles = (depths[1:] + depths[:-1]) / 2
     inside = pieces.bottom[pieces.bottom < depths[-1]]
-    cuts = np.unique(np.concatenate([depths, middles, inside]))
-    half = np.diff(cuts)[:, None] / 2
-    md = cuts[:-1, None] + half * (1 + _RULE.points)
-    force = soft_string_force(pieces, static_weight(scene), md) if normal_force is None else normal_force(md)
-    middle = md.mean(axis=1)
-    at = np.minimum(np.searchsorted(pieces.bottom, middle), len(pieces.bottom) - 1)
-    load = (force * _RULE.weights).sum(axis=1) * half[:, 0]
+    middle, load, radius = loads_between(scene, pieces, np.unique([*depths, *middles, *inside]), normal_force)
+    torque = load * radius
     node = np.searchsorted(middles, middle)
-    law, of_rotation, of_hole = law_of(scene.friction)
-    if of_hole:
-        load = load * scene.hole.at(middle, "friction")
-    torque = load * pieces.radius[at]
+    _, of_rotation, _ = law_of(scene.friction)
     grip, force = np.bincount(node, torque, size), np.bincount(node, load, size)
     reach = np.ones(size) if of_rotation else np.divide(grip, force, out=np.ones(size), where=force > 0)
     if scene.bit is not None:  # one law a node: the wall beside the bit acts on the node above it

@@ -22,7 +22,7 @@ from typing import Annotated, ClassVar, Literal
 from cosserat_fenicsx import units
 from cosserat_fenicsx.checks import doubt_width, positive, refuse, store
 from cosserat_fenicsx.errors import SceneError, nearest
-from cosserat_fenicsx.parts import Diameter, ForcePerLength, Length, MassPerLength, Part, between
+from cosserat_fenicsx.parts import DampingTime, Diameter, ForcePerLength, Length, MassPerLength, Part, between
 from cosserat_fenicsx.quantities import Units
 from cosserat_fenicsx.results.screen import InWords
 from cosserat_fenicsx.scene.sections import Circle, Material, Stiffness, Tube
@@ -109,11 +109,13 @@ class StringPart(Part, family="component of a string"):
         contact_radius: where it touches the wall, m.
         outer_diameter, inner_diameter: of the body, m; None where they are not known.
         name: in tables.
+        damping_time: of Kelvin and Voigt, s: of torsion and axial motion along the string.
         touches: whether it touches along its whole length (None), with its `diameter` at its lower end ("bottom"), or
             with that in the middle of its length ("middle").
     """
 
     touches: ClassVar[str | None] = None
+    damping_time = 0.0
 
     @property
     def body_radius(self):
@@ -136,6 +138,8 @@ class Component(StringPart):
         weight: in mud, N/m.
         contact_radius: where it touches the wall, m: of the tool joints, if it has any.
         name: in tables.
+        damping_time: of Kelvin and Voigt, s: torques and forces along the string grow by it times the rates of twist and
+            stretch; a mode of the frequency f gets the damping ratio pi f times it.
 
     Raises:
         SceneError: a number that is missing or not positive.
@@ -146,6 +150,7 @@ class Component(StringPart):
     weight: Annotated[ForcePerLength, between(-1e6, 1e6)] | None = None
     contact_radius: Length | None = None
     name: str = "component"
+    damping_time: DampingTime = 0.0
 
     outer_diameter = inner_diameter = mass = None
 
@@ -169,6 +174,7 @@ class _Tubular(StringPart):
         mass: in air with tool joints, kg/m; None: the body's.
         material: a `Material` with a density.
         name: in tables.
+        damping_time: s, as of `Component`.
 
     Raises:
         SceneError: a dimension that is missing or not positive, an inner diameter that is not below the outer one, or
@@ -183,6 +189,7 @@ class _Tubular(StringPart):
     mass: MassPerLength | None = None
     material: Material = STEEL
     name: str = ""
+    damping_time: DampingTime = 0.0
 
     weight = None
 
@@ -277,7 +284,7 @@ class Stabiliser(StringPart):
         length: m.
         diameter: across the blades, m; at most the hole's.
         outer_diameter, inner_diameter: of the body, m.
-        mass, material, name: as of `DrillPipe`.
+        mass, material, name, damping_time: as of `DrillPipe`.
 
     Raises:
         SceneError: as of `DrillPipe`.
@@ -290,6 +297,7 @@ class Stabiliser(StringPart):
     mass: MassPerLength | None = None
     material: Material = STEEL
     name: str = "stabiliser"
+    damping_time: DampingTime = 0.0
 
     weight, touches = None, "middle"
 
@@ -316,7 +324,7 @@ class Bit(StringPart):
         length: m.
         body_diameter: of the cylinder, m; None for 0.7 of the diameter.
         mass: in air, kg/m; None: the cylinder's.
-        material, name: as of `DrillPipe`.
+        material, name, damping_time: as of `DrillPipe`.
 
     Raises:
         SceneError: a number that is not positive, or a body wider than the bit. A diameter of metres gives a
@@ -329,6 +337,7 @@ class Bit(StringPart):
     mass: MassPerLength | None = None
     material: Material = STEEL
     name: str = "bit"
+    damping_time: DampingTime = 0.0
 
     inner_diameter, weight, touches = 0.0, None, "bottom"
 

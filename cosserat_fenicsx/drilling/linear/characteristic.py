@@ -9,7 +9,8 @@ Where the bit cuts, at the rotation Om and the rate of penetration V, with n bla
     (s Za(s) + ka E) (s Zt(s) - kt rho E) + ka kt rho E^2 = 0,   E = 1 - exp(-s tau),  rho = V/Om,
 
 which is s Za Zt + E (ka Zt - kt rho Za) = 0, Za and Zt with the mass and the inertia of the bit, ka and kt weight and
-torque per depth of cut. Both are written without denominators, as entire functions of s.
+torque per depth of cut. Axially, a bit on rock of the stiffness k that it does not drill adds k/s to Z, and one on
+rigid rock stands. All are written without denominators.
 
 `Steady` makes them from a scene; `box_up_to` is the searched part of the complex plane.
 """
@@ -20,13 +21,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.optimize import brentq
 
-from cosserat_fenicsx.checks import refuse
+from cosserat_fenicsx.checks import number, refuse
 from cosserat_fenicsx.drilling.laws import refuse_several_speeds
+from cosserat_fenicsx.drilling.linear.friction import WallDashpots
 from cosserat_fenicsx.drilling.linear.impedances import Guide, axial, torsional
 from cosserat_fenicsx.drilling.linear.roots import Box
 from cosserat_fenicsx.drilling.signals import doubt_speed
 from cosserat_fenicsx.drilling.steady_start import penetration
-from cosserat_fenicsx.parts import Number, Values, positive
+from cosserat_fenicsx.parts import Number, Values, at_least, positive
 
 
 class Characteristic:
@@ -58,35 +60,60 @@ class Characteristic:
         """Relative motion of the bit in each guide: rotation, and axial velocity where there is some."""
         raise NotImplementedError
 
+    def below(self, s):
+        """The impedance of bit and rock at the lower end of each guide, at s (n,); infinite where the bit stands."""
+        raise NotImplementedError
+
+    def _fastest(self, excess):
+        """The growth (1/s) beyond which a function of it stays above 0."""
+        start, step = max(guide.drive for guide in self.guides), self.spacing
+        low, high = start + 1e-9 * step, start + step
+        if excess(low) >= 0:
+            return low
+        while excess(high) < 0:
+            low, high = high, start + 2 * (high - start)
+        return brentq(excess, low, high)
+
 
 @dataclass(frozen=True)
-class FallingTorque(Characteristic):
-    """The function B + kappa om at the bit; kappa in N m s/rad, negative where the torque falls with the speed."""
+class Alone(Characteristic):
+    """The function B + kappa w + k w/s at the bit of a string that only turns, or only moves along its axis.
 
-    torsion: Guide
-    kappa: float
+    Attributes:
+        kappa: N m s/rad, negative where the torque falls with the speed. rock: k, N/m, infinite for rigid rock.
+    """
+
+    guide: Guide
+    kappa: float = 0.0
+    rock: float = 0.0
 
     def __call__(self, s):
-        om, B, dom, dB = self.torsion.bit(s)
-        return B + self.kappa * om, dB + self.kappa * dom
+        w, B, dw, dB = self.guide.bit(s)
+        if math.isinf(self.rock):
+            return w, dw
+        B, dB = B + self.kappa * w, dB + self.kappa * dw
+        return (s * B + self.rock * w, B + s * dB + self.rock * dw) if self.rock else (B, dB)
 
     @property
     def fastest(self):
-        # drive and string only take energy: Re Z > 0 for Re s > 0. So x Jb < -kappa for the growth x; and Re Z is at
-        # least Z tanh(x T), Z and T impedance and travel time of the lowest part, whatever is above it
-        fall, last = max(-self.kappa, 0.0), self.torsion.parts[-1]
-        inertia = self.torsion.inertia + (last.inertia if last.travel == 0 else 0.0)
-        bounds = [fall / inertia] if inertia else []
-        if last.travel and fall < last.impedance:
-            bounds.append(math.atanh(fall / last.impedance) / last.travel)
-        return 1.5 * min(bounds) + self.spacing / 2
+        # drive, string and rock only take energy, but for friction that falls: Re Z > 0 for Re s > `Guide.drive`. So
+        # x Jb < -kappa for the growth x, and more where the lowest part resists
+        guide = self.guide
+        if math.isinf(self.rock):
+            return guide.drive + self.spacing / 2
+        inertia = guide.inertia + (guide.parts[-1].inertia if guide.parts[-1].travel == 0 else 0.0)
+        fastest = self._fastest(lambda x: x * inertia + guide.least(x) + self.kappa)
+        return 1.5 * fastest + self.spacing / 2
 
     @property
     def guides(self):
-        return (self.torsion,)
+        return (self.guide,)
 
     def motion(self, s):
         return (1.0 + 0j,)
+
+    def below(self, s):
+        return (self.guide.inertia * s + self.kappa + (self.rock / s if self.rock else 0.0),)
 
 
 @dataclass(frozen=True)
@@ -133,18 +160,15 @@ class Regenerative(Characteristic):
 
     @property
     def fastest(self):
-        # s = -E (ka/Za - kt rho/Zt), where E is below 2 and Za and Zt, for a growth x, are at least Z tanh(x T) + m x,
-        # see `FallingTorque.fastest`
+        # s = -E (ka/Za - kt rho/Zt), where E is below 2 and Za and Zt, for a growth x, are at least `least` + m x,
+        # see `Alone.fastest`
         rho = self.penetration / self.speed
 
         def excess(x):
-            least = [y.impedance * math.tanh(x * y.parts[-1].travel) + y.inertia * x for y in self.guides]
+            least = [y.least(x) + y.inertia * x for y in self.guides]
             return x - 2 * (self.kt * rho / least[0] + self.ka / least[1])
 
-        low, high = 1e-6 * self.spacing, self.spacing
-        while excess(high) < 0:
-            low, high = high, 2 * high
-        return 1.2 * brentq(excess, low, high)
+        return 1.2 * self._fastest(excess)
 
     @property
     def guides(self):
@@ -160,44 +184,96 @@ class Regenerative(Characteristic):
             return 1.0 + 0j, complex(self.ka * e[0] * rho / axial[0])
         return 1.0 + 0j, complex(-torsional[0] / (self.kt * e[0]))
 
+    def below(self, s):
+        e, _, q = self._memory(s)
+        e, rho = e / q, self.penetration / self.speed
+        # torque and weight by one motion, with the other one that follows from it
+        (om, T, *_), (v, A, *_) = self.torsion.bit(s), self.axial.bit(s)
+        turned = self.kt * rho * e * A / (A + self.ka * e * v)
+        moved = self.ka * e * T / (T - self.kt * rho * e * om)
+        return self.torsion.inertia * s - turned, self.axial.inertia * s + moved
+
 
 class Steady:
     """Steady rotations of a scene at any speed and weight.
 
+    Args:
+        kind: "axial" for the axial motion of a string whose bit does not cut, else "torsion"; a bit that cuts couples
+            both.
+
     Attributes:
-        torsion, axial: `Guide`s; axial is None where nothing moves axially.
+        guide: the `Guide` without friction at the wall.
 
     Raises:
-        SceneError: discs with a bit that cuts.
+        SceneError: discs with a bit that cuts, or that move along their axis; a hook whose speed depends on time.
     """
 
-    def __init__(self, scene):
-        self.scene = scene
+    def __init__(self, scene, kind="torsion"):
+        self.scene, self.kind = scene, kind
         self.law = scene.bit.law if scene.bit else None
-        self.torsion = torsional(scene)
         self.cuts = self.law is not None and self.law.drills
-        self.axial = axial(scene) if self.cuts else None
+        self.guide = torsional(scene) if kind == "torsion" else axial(scene)
+        if self.cuts:
+            axial(scene)  # refuses discs
+        self._walls, self._guides = {}, {}
 
-    def parameters(self, speed, weight):
-        """Parameters of the equation: (kappa,) or (rotation, rate of penetration), for a weight (N) or None.
+    def walls(self, weight):
+        """The `WallDashpots` under a weight (N) or None; None without a hole."""
+        if self.scene.hole is None:
+            return None
+        if weight not in self._walls:
+            self._walls[weight] = WallDashpots(self.scene if weight is None else self.scene.with_case(weight=weight))
+        return self._walls[weight]
+
+    def guides(self, speed, weight):
+        """(torsional, axial) `Guide` at a speed (rad/s) and weight (N) or None, without what does not move.
 
         Raises:
-            SceneError: a weight that is missing, or borne by wear flats; or a torque that falls too fast.
+            SceneError: friction holds the string; it slides and rotates at once.
         """
+        walls = self.walls(weight)
+        if walls is None:
+            speed = weight = None
+        if (speed, weight) not in self._guides:
+            rates, scene = walls and walls.rates(speed, self.sliding), self.scene
+            turns, moves = self.cuts or self.kind == "torsion", self.cuts or self.kind == "axial"
+            found = turns and torsional(scene, rates), moves and axial(scene, rates)
+            self._guides = {(speed, weight): tuple(x for x in found if x)}  # of the last case alone
+        return self._guides[speed, weight]
+
+    @property
+    def sliding(self):
+        """Speed along the hole, m/s; 0 for a bit that cuts: it is far slower than the surface around."""
+        hook = None if self.cuts else self.scene.hook
+        if hook is None or self.scene.hole is None:
+            return 0.0
+        if not hook.signal().constant:
+            refuse(self.scene, "hook.speed", hook.speed, "a speed that does not depend on time, for steady motion")
+        return hook.signal()(0.0)
+
+    def parameters(self, speed, weight):
+        """Parameters of the equation, for a weight (N) or None: the slope kappa, or the rate of penetration of a bit
+        that cuts; speed; weight or NaN.
+
+        Raises:
+            SceneError: a weight that is missing, or borne by wear flats; a torque that falls too fast; a string at rest
+                with a bit.
+        """
+        rest = np.nan if weight is None else weight
+        if speed == 0 and self.law is not None and self.kind == "torsion":
+            refuse(self.scene, "drive.speed", speed, "above 0 (rad/s): the rock holds a bit at rest")
         if self.cuts:
-            return np.array([speed, self._penetration(speed, weight)])
-        if self.law is None:
-            return np.zeros(1)
+            return np.array([self._penetration(speed, weight), speed, rest])
+        if self.law is None or self.kind == "axial":
+            return np.array([0.0, speed, rest])
         if self.law.needs_weight and weight is None:
             refuse(self.scene.bit, "weight", None, "the weight on bit (N), which the law needs")
         law = self.law.resistance(weight)
-        if law is None:
-            return np.zeros(1)
-        kappa = law.slope(speed)
+        kappa = 0.0 if law is None else law.slope(speed)
         if not self.scene.discs:
             at = f" at {speed:.4g} rad/s" + (f" under {weight / 1e3:.4g} kN" if weight is not None else "")
-            refuse_several_speeds(kappa, self.torsion.impedance, self.torsion.inertia, at)
-        return np.array([kappa])
+            refuse_several_speeds(kappa, self.guide.impedance, self.guide.inertia, at)
+        return np.array([kappa, speed, rest])
 
     def _penetration(self, speed, weight):
         """V from the weight on bit less the load of wear flats; or from the speed of the hook."""
@@ -212,10 +288,29 @@ class Steady:
 
     def equation(self, parameters):
         """The characteristic function of `parameters`."""
+        first, speed, weight = map(float, parameters)
+        guides = self.guides(speed, or_none(weight))
         if self.cuts:
             stiffnesses = self.law.axial_stiffness, self.law.torsional_stiffness
-            return Regenerative(self.torsion, self.axial, *stiffnesses, self.law.blades, *map(float, parameters))
-        return FallingTorque(self.torsion, float(parameters[0]))
+            return Regenerative(*guides, *stiffnesses, self.law.blades, speed, first)
+        if self.kind == "axial":
+            bit = self.scene.bit
+            return Alone(*guides, rock=0.0 if bit is None or or_none(weight) is None else bit.rock_stiffness)
+        return Alone(*guides, first)
+
+
+def speed_of(owner, scene, speed=None):
+    """The speed (rad/s) of the steady rotation: as given, or the one that the drive is asked for.
+
+    Raises:
+        SceneError: a negative speed; a drive without a speed of its own, or with one that depends on time.
+    """
+    if speed is not None:
+        return number(owner, "speed", speed, "a number, not negative (rad/s)", lambda x: 0 <= x < math.inf)
+    drive = scene.drive
+    if drive.speed is None or not drive.signal().constant:
+        refuse(owner, "speed", None, "the speed of the steady rotation (rad/s): that of the drive is not constant")
+    return abs(drive.signal()(0.0))
 
 
 def speeds_and_weights(owner, scene, speeds, weights):
@@ -224,20 +319,20 @@ def speeds_and_weights(owner, scene, speeds, weights):
     Raises:
         SceneError: speeds or weights that are not positive, or weights without a bit.
     """
-    speeds = _numbers(owner, "speeds", speeds, "angular velocity")
+    speeds = _numbers(owner, "speeds", speeds, "angular velocity", at_least(0) if scene.bit is None else positive())
     doubt_speed(owner, "speeds", float(speeds.max()))
     if weights is None:
         own = scene.bit.weight if scene.bit else None
         return speeds, np.array([np.nan if own is None else own])
     if scene.bit is None:
         refuse(scene, "bit", None, "a BitOnRock, whose weight is to change")
-    return speeds, _numbers(owner, "weights", weights, "force")
+    return speeds, _numbers(owner, "weights", weights, "force", positive())
 
 
-def _numbers(owner, field, values, dimension):
-    """(n,) positive numbers, given as one or several."""
+def _numbers(owner, field, values, dimension, limits):
+    """(n,) numbers, given as one or several."""
     several = values if isinstance(values, dict) else list(values) if np.ndim(values) else [values]
-    return np.array(Values(Number(dimension, positive())).check(owner, field, several))
+    return np.array(Values(Number(dimension, limits)).check(owner, field, several))
 
 
 def or_none(weight):
@@ -247,9 +342,13 @@ def or_none(weight):
 
 # Modes that decay by more than exp(-this) while a wave goes down the string once are not listed.
 _DECAY = 4.0
+# Nor are those that decay by more than this over the damping time of the string, where modes accumulate.
+_OWN_RATE = 0.5
 
 
 def box_up_to(steady, top):
     """The box of a characteristic function of a `Steady`, up to a frequency (rad/s)."""
-    left = -_DECAY / steady.torsion.travel
+    # damping of Kelvin and Voigt has all but a few modes decay by its own rate
+    slowest = max((x.damping for x in steady.guide.parts if x.length), default=0.0)
+    left = max(-_DECAY / steady.guide.travel, -_OWN_RATE / slowest if slowest else -math.inf)
     return lambda f: Box(left, f.fastest, 0.0, top)

@@ -3,16 +3,18 @@
 All depends on time like exp(s t), s complex (1/s). The state of a section is the pair (w, P): in torsion the rotation
 om (rad/s) and the torque M (N m) handed down, in axial motion the velocity v (m/s) and the force F (N) handed down,
 both downwards, which is minus the tension. Along a uniform part of length L, with stiffness K (GJ or EA), inertia mu
-(rho J or rho A) and drag rate d, K g^2 = mu s (s + d):
+(rho J or rho A), drag rate d and damping time tau (Kelvin and Voigt), K (1 + tau s) g^2 = mu s (s + d):
 
-    w(L) = cosh(g L) w(0) - s/K sinh(g L)/g P(0)
+    w(L) = cosh(g L) w(0) - s/(K (1 + tau s)) sinh(g L)/g P(0)
     P(L) = cosh(g L) P(0) - mu (s + d) sinh(g L)/g w(0)
 
-which are entire functions of s. States are scaled by positive factors, such that nothing overflows however large s L
-is: phases, ratios and logarithmic derivatives are exact, sizes are not.
+which are entire functions of s, but for s = -1/tau. States are scaled by positive factors, whose logarithms are kept,
+such that nothing overflows however large s L is.
 """
 
 from dataclasses import dataclass
+from itertools import groupby
+from operator import itemgetter
 
 import numpy as np
 
@@ -26,16 +28,17 @@ _SMALL = 1e-2
 
 @dataclass(frozen=True)
 class State:
-    """(w, P) at one section for many s, and the derivatives with respect to s, all by the same positive factors."""
+    """(w, P) at one section for many s, and the derivatives with respect to s, all times exp(-size)."""
 
     w: np.ndarray
     P: np.ndarray
     dw: np.ndarray
     dP: np.ndarray
+    size: np.ndarray | float = 0.0
 
     def times(self, factor):
-        """All of it by positive factors (n,)."""
-        return State(self.w * factor, self.P * factor, self.dw * factor, self.dP * factor)
+        """The same state, held times positive factors (n,)."""
+        return State(*(x * factor for x in (self.w, self.P, self.dw, self.dP)), self.size - np.log(factor))
 
     def scaled(self, impedance):
         """Such that |impedance w|^2 + |P|^2 = 1."""
@@ -45,6 +48,10 @@ class State:
 class _Section:
     """A part of a string between two sections, with `through`, `impedance` and `travel`."""
 
+    def give(self, s):
+        """By which `through` multiplies the state."""
+        return np.ones_like(s)
+
     def down(self, s, state):
         """The state at the lower end."""
         return self.through(s, state).scaled(self.impedance)
@@ -52,13 +59,14 @@ class _Section:
 
 @dataclass(frozen=True)
 class Uniform(_Section):
-    """A uniform part: length (m), stiffness (N m^2 or N), inertia (kg m or kg/m), drag (1/s), name."""
+    """A uniform part: length (m), stiffness (N m^2 or N), inertia (kg m or kg/m), drag (1/s), name, damping time (s)."""
 
     length: float
     stiffness: float
     inertia: float
     drag: float
     name: str
+    damping: float = 0.0
 
     @property
     def impedance(self):
@@ -71,33 +79,34 @@ class Uniform(_Section):
         return self.length * np.sqrt(self.inertia / self.stiffness)
 
     def through(self, s, state, length=None):
-        """The state at a length (m) below the upper end, by default the lower end, times exp(-Re(g length))."""
+        """The state at a length (m) below the upper end, by default the lower end."""
         length = self.length if length is None else length
-        square = self.inertia / self.stiffness * s * (s + self.drag)
+        square, turn, stiff = self._square(s)
         C, S, dC, dS = _hyperbolic(square, length)
-        turn = self.inertia / self.stiffness * (2 * s + self.drag)  # derivative of the square
-        a, b = -s / self.stiffness, -self.inertia * (s + self.drag)
+        a, b = -s / stiff, -self.inertia * (s + self.drag)
+        da = -self.stiffness / stiff**2
         w, P, dw, dP = state.w, state.P, state.dw, state.dP
         return State(
             C * w + a * S * P,
             C * P + b * S * w,
-            C * dw + a * S * dP + dC * turn * w + (a * dS * turn - S / self.stiffness) * P,
+            C * dw + a * S * dP + dC * turn * w + (a * dS * turn + da * S) * P,
             C * dP + b * S * dw + dC * turn * P + (b * dS * turn - self.inertia * S) * w,
+            state.size + (np.sqrt(square) * length).real,
         )
 
+    def _square(self, s):
+        """g^2, its derivative by s, and K (1 + tau s)."""
+        give, move = 1 + self.damping * s, s * (s + self.drag)
+        scale = self.inertia / self.stiffness / give
+        return scale * move, scale * (2 * s + self.drag - self.damping * move / give), self.stiffness * give
+
     def along(self, s, state, points, places):
-        """Places (m) below the upper end, w there, twice the kinetic energy by Gauss's rule with so many points, and
-        the state at the lower end, all but the places by one and the same factor."""
+        """Places (m) below the upper end, w there, and twice the kinetic energy by Gauss's rule with so many points."""
         nodes, weights = np.polynomial.legendre.leggauss(points)
         x = np.concatenate([self.length * (1 + nodes) / 2, np.linspace(0.0, self.length, places)])
-        here = self.through(s, state, x).w * np.exp(self._decay(s, x))
-        twice = self.inertia * self.length / 2 * float(weights @ np.abs(here[:points]) ** 2)
-        below = self.through(s, state).times(np.exp(self._decay(s, self.length)))
-        return x[points:], here[points:], twice, below
-
-    def _decay(self, s, length):
-        """Re(g length)."""
-        return (np.sqrt(self.inertia / self.stiffness * s * (s + self.drag)) * length).real
+        found = self.through(s, state, x)
+        here = found.w * np.exp(found.size - state.size)
+        return x[points:], here[points:], self.inertia * self.length / 2 * float(weights @ np.abs(here[:points]) ** 2)
 
 
 def _hyperbolic(square, length):
@@ -137,20 +146,25 @@ class Disc(_Section):
         return np.sqrt(self.inertia / self.spring) if self.spring else 0.0
 
     def along(self, s, state, points, places):
-        return np.zeros(1), state.w, self.inertia * abs(state.w[0]) ** 2, self.through(s, state)
+        return np.zeros(1), state.w, self.inertia * abs(state.w[0]) ** 2
+
+    def give(self, s):
+        """By which `through` multiplies the state, such that it is entire."""
+        return 1 + self.damping / self.spring * s if self.spring else np.ones_like(s)
 
     def through(self, s, state):
-        """The state above the next disc."""
+        """The state above the next disc, times `give`."""
         own = self.inertia * s + self.drag
         P, dP = state.P - own * state.w, state.dP - own * state.dw - self.inertia * state.w
         if self.spring is None:
-            return State(state.w, P, state.dw, dP)
-        give, dgive = 1 + self.damping / self.spring * s, self.damping / self.spring
+            return State(state.w, P, state.dw, dP, state.size)
+        give, dgive = self.give(s), self.damping / self.spring
         return State(
             give * state.w - s / self.spring * P,
             give * P,
             dgive * state.w + give * state.dw - (P + s * dP) / self.spring,
             dgive * P + give * dP,
+            state.size,
         )
 
 
@@ -186,7 +200,18 @@ class Guide:
 
     def bottom(self, s):
         """The state at the lower end, above its inertia."""
-        state = self.start(s)
+        return self._down(s, self.start(s))
+
+    def factor(self, s):
+        """(n,) by which states below are more than they are, in products of dampers between discs."""
+        return np.prod([part.give(s) for part in self.parts], axis=0)
+
+    def below_top(self, s, w, P):
+        """The state at the lower end of any one (w, P) at the top, whatever the condition there."""
+        zero = np.zeros_like(w)
+        return self._down(s, State(w, P, zero, zero).scaled(self.parts[0].impedance))
+
+    def _down(self, s, state):
         for part in self.parts:
             state = part.down(s, state)
         return state
@@ -200,6 +225,28 @@ class Guide:
         """Z(s) from the bit up, without its inertia: -P/w, N m s/rad or N s/m."""
         end = self.bottom(np.asarray(s, dtype=complex))
         return -end.P / end.w
+
+    @property
+    def drive(self):
+        """The largest rate at which friction that falls with the slip feeds motions, 1/s; 0 where none does."""
+        return max(0.0, *(-part.drag for part in self.parts if part.length), 0.0)
+
+    def least(self, x):
+        """A lower bound of Re Z at the bit for all s of the real part x (1/s) above `drive`, without its inertia.
+
+        In the lowest part, of the impedance Z and the travel time T, the power p = -Re(w* P) handed down and the energy
+        e = mu |w|^2 + |P|^2/K grow as p' >= (x - D) e and e' <= (4/c^2) (x + d/2) p, with the drive D and the largest
+        drag d. So 2 p/(c e) is at least the theta below, and p at least Z tanh(y) |w|^2 with tanh(2 y) = theta: without
+        drag Z tanh(x T), whatever is above. Damping of Kelvin and Voigt adds to it.
+        """
+        lowest, travel, drag = self.parts[-1], 0.0, 0.0
+        for part in reversed(self.parts):
+            if not part.length or not np.isclose(part.impedance, lowest.impedance, rtol=1e-9):
+                break
+            travel, drag = travel + part.travel, max(drag, part.drag)
+        fed, lost = x - self.drive, x + drag / 2
+        theta = np.sqrt(fed / lost) * np.tanh(2 * travel * np.sqrt(fed * lost))
+        return float(lowest.impedance * theta / (1 + np.sqrt(max(1 - theta**2, 0.0))))
 
 
 def _held(s):
@@ -220,8 +267,8 @@ def _drive_top(drive, impedance):
     return lambda s: (1.0, -(inertia * s + Kp), 0.0, -inertia)
 
 
-def torsional(scene) -> Guide:
-    """Torsional waveguide of a `Drilling` scene."""
+def torsional(scene, walls=None) -> Guide:
+    """Torsional waveguide of a `Drilling` scene; `walls`: rates of friction at the wall, see `WallDashpots`."""
     drive, string, bit = scene.drive, scene.discs, scene.bit.inertia if scene.bit else 0.0
     if string:
         lower = zip((*string.stiffnesses, None), (*string.dampings, 0.0), strict=True)
@@ -230,13 +277,12 @@ def torsional(scene) -> Guide:
             for i, (J, c, (k, d)) in enumerate(zip(string.inertias, string.drags, lower, strict=True))
         )
         return Guide("torsion", parts, bit, _drive_top(drive, None), drive.inertia)
-    rate = scene.drag.torsion if scene.drag else 0.0
-    parts = tuple(Uniform(x.length, x.GJ, x.rhoJ, rate, x.name) for x in scene.segments)
+    parts = _uniform(scene, "torsion", walls)
     return Guide("torsion", parts, bit, _drive_top(drive, parts[0].impedance), drive.inertia)
 
 
-def axial(scene) -> Guide:
-    """Axial waveguide of a `Drilling` scene below its hook.
+def axial(scene, walls=None) -> Guide:
+    """Axial waveguide of a `Drilling` scene below its hook; `walls` as in `torsional`.
 
     Raises:
         SceneError: the string is made of discs, which turn alone.
@@ -247,6 +293,16 @@ def axial(scene) -> Guide:
     top = _held if np.isinf(stiffness) else lambda s: (s, -stiffness, 1.0, 0.0)
     if follows_the_bit(scene):
         top = _free
-    rate = scene.drag.axial if scene.drag else 0.0
-    parts = tuple(Uniform(x.length, x.EA, x.rhoA, rate, x.name) for x in scene.segments)
-    return Guide("axial", parts, scene.bit.mass if scene.bit else 0.0, top)
+    return Guide("axial", _uniform(scene, "axial", walls), scene.bit.mass if scene.bit else 0.0, top)
+
+
+def _uniform(scene, kind, walls):
+    """The `Uniform` parts of a string, divided where the friction at the wall changes."""
+    stiffness, inertia = ("GJ", "rhoJ") if kind == "torsion" else ("EA", "rhoA")
+    rate, found = getattr(scene.drag, kind) if scene.drag else 0.0, []
+    for k, x in enumerate(scene.segments):
+        for wall, pieces in groupby(walls[k] if walls else [(x.length, 0.0, 0.0)], itemgetter(1 + (kind == "axial"))):
+            length = sum(piece[0] for piece in pieces)
+            section = getattr(x, stiffness), getattr(x, inertia), rate + wall
+            found.append(Uniform(length, *section, x.name, x.damping_time))
+    return tuple(found)

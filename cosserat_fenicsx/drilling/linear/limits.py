@@ -7,7 +7,7 @@ from numpy.polynomial import chebyshev
 from scipy.optimize import brentq
 
 from cosserat_fenicsx.checks import number, positive, refuse
-from cosserat_fenicsx.drilling.linear.characteristic import Steady, box_up_to
+from cosserat_fenicsx.drilling.linear.characteristic import Steady, box_up_to, speed_of
 from cosserat_fenicsx.drilling.linear.impedances import torsional
 from cosserat_fenicsx.drilling.linear.roots import all_roots
 from cosserat_fenicsx.drilling.scene import Drilling
@@ -15,16 +15,19 @@ from cosserat_fenicsx.errors import NotConverged
 
 # Degree of the polynomials on pieces of the imaginary axis; their largest relative error.
 _DEGREE, _RESOLVED = 24, 1e-11
+# Weight on bit (N) that is as good as infinite.
+_HEAVIEST = 1e8
 
 
-def critical_slopes(scene: Drilling, up_to: float = 10.0) -> tuple[np.ndarray, np.ndarray]:
+def critical_slopes(scene: Drilling, up_to: float = 10.0, speed: float | None = None) -> tuple[np.ndarray, np.ndarray]:
     """All slopes of the bit's torque at which some mode neither grows nor decays.
 
     Falling and rising torques, where Im(Jb s + Z(s)) = 0 at s = i w: kappa = -Re Z.
 
     Args:
-        scene: a `Drilling`; its bit gives the inertia alone.
-        up_to: highest frequency, Hz.
+        scene: a `Drilling`; its bit gives the inertia alone, and its weight on bit the force at the wall.
+        up_to: highest frequency, Hz. speed: rotation, rad/s, on which friction at the wall depends; None for that of
+            the drive.
 
     Returns:
         circular frequencies w (n,), rad/s, ascending, and slopes kappa = dT/dom (n,), N m s/rad, negative for a torque
@@ -32,10 +35,10 @@ def critical_slopes(scene: Drilling, up_to: float = 10.0) -> tuple[np.ndarray, n
         drive without an integral part gives way is the first of them; there the speed itself runs away.
 
     Raises:
-        SceneError: a frequency that is not positive.
+        SceneError: a frequency that is not positive; a speed that is needed, and that the drive does not have.
         NotConverged: the impedance could not be resolved.
     """
-    guide = torsional(scene)
+    guide = _torsion(scene, speed)
     top = 2 * math.pi * positive("critical_slopes", "up_to", up_to, "Hz")
 
     def parts(w):
@@ -52,6 +55,14 @@ def critical_slopes(scene: Drilling, up_to: float = 10.0) -> tuple[np.ndarray, n
     ends, sizes = parts(np.append(0.0, at))
     keep = sizes > 1e-24 * np.abs(ends)
     return np.append(0.0, at)[keep], -(ends.real[keep] / sizes[keep])
+
+
+def _torsion(scene, speed):
+    """The torsional `Guide` of a scene at a speed (rad/s), None for that of its drive."""
+    if scene.hole is None:
+        return torsional(scene)
+    speed = speed_of("critical_slopes", scene, speed)
+    return Steady(scene).guides(speed, scene.bit and scene.bit.weight)[0]
 
 
 def _real_roots(f, a, b, depth=0):
@@ -78,13 +89,13 @@ def _real_roots(f, a, b, depth=0):
     return found
 
 
-def critical_slope(scene: Drilling, up_to: float = 10.0) -> tuple[float, float]:
+def critical_slope(scene: Drilling, up_to: float = 10.0, speed: float | None = None) -> tuple[float, float]:
     """(kappa, w): the largest critical slope (N m s/rad) and its circular frequency (rad/s), see `critical_slopes`.
 
     With a torque that falls less steeply all modes up to that frequency decay. Minus infinity where no slope is
     critical.
     """
-    frequencies, slopes = critical_slopes(scene, up_to)
+    frequencies, slopes = critical_slopes(scene, up_to, speed)
     if not len(slopes):  # nothing to lose in so narrow a band
         return -math.inf, math.nan
     first = int(slopes.argmax())
@@ -115,8 +126,27 @@ def limit_weight(scene: Drilling, speed: float, *, up_to: float = 10.0) -> float
     if not math.isclose(per_newton, per_kilonewton, rel_tol=1e-4):
         refuse("limit_weight", "scene", scene.bit, "a bit whose torque is proportional to the weight on bit; stability "
                "takes any law")  # fmt: skip
-    kappa, _ = critical_slope(scene, up_to)
-    return abs(kappa / per_newton) if per_newton else math.inf
+    if not per_newton:
+        return math.inf
+
+    def excess(weight):  # of the critical slope over the bit's; it grows with the weight
+        return critical_slope(scene.with_case(weight=weight), up_to, speed)[0] - per_newton * weight
+
+    if not _falls_at_wall(scene):
+        return abs(critical_slope(scene, up_to, speed)[0] / per_newton)
+    low, high = 1.0, 1e3
+    if excess(low) > 0:
+        return 0.0
+    while excess(high) < 0:
+        low, high = high, 2 * high
+        if high > _HEAVIEST:
+            return math.inf
+    return brentq(excess, low, high, rtol=1e-12)
+
+
+def _falls_at_wall(scene):
+    """Whether friction at the wall falls with the slip."""
+    return scene.hole is not None and scene.friction is not None and scene.friction.decays
 
 
 def limit_speed(
@@ -132,11 +162,11 @@ def limit_speed(
     Args:
         scene: a `Drilling`. weight: on bit, N; None for that of the scene.
         up_to: highest frequency of modes, Hz.
-        between, points: range (rad/s) and number of the speeds searched for a bit that cuts; a range of growth between
-            two of them is missed.
+        between, points: range (rad/s) and number of the speeds searched for a bit that cuts, or where friction at the
+            wall falls with the slip; a range of growth between two of them is missed.
 
     Returns:
-        rad/s; 0 where all modes decay at every speed, infinite where the string has no losses. With a bit that cuts:
+        rad/s; 0 where all modes decay at every speed, infinite where the string has no losses. Where speeds are searched:
         infinite where some mode grows at the highest of the speeds, 0 where none does at any.
 
     Raises:
@@ -144,22 +174,26 @@ def limit_speed(
         NotConverged: the roots that were found are fewer than those counted.
     """
     up_to = positive("limit_speed", "up_to", up_to, "Hz")
-    if scene.bit is None:
-        refuse(scene, "bit", None, "a BitOnRock with a law")
-    weight = scene.bit.weight if weight is None else positive("limit_speed", "weight", weight, "N")
+    searched = _falls_at_wall(scene)
+    if scene.bit is None and not searched:
+        refuse(scene, "bit", None, "a BitOnRock with a law, or a WallFriction that falls with the slip")
+    if weight is not None:
+        weight = positive("limit_speed", "weight", weight, "N")
+    elif scene.bit is not None:
+        weight = scene.bit.weight
     steady = Steady(scene)
-    if steady.cuts:
-        return _limit_of_cutting(steady, weight, up_to, between, points)
+    if steady.cuts or searched:
+        return _searched_limit(steady, weight, up_to, between, points)
     law = scene.bit.law.resistance(weight)
     if law is None or law.steepest == 0:
         return 0.0
-    kappa, _ = critical_slope(scene, up_to)
+    kappa, _ = critical_slope(scene.with_case(weight=weight), up_to, 1.0)  # nothing falls at the wall
     if -law.steepest >= kappa:
         return 0.0
     return math.inf if kappa >= 0 else law.slowest_with(kappa)
 
 
-def _limit_of_cutting(steady, weight, up_to, between, points):
+def _searched_limit(steady, weight, up_to, between, points):
     number("limit_speed", "points", points, "a number from 2", lambda x: x >= 2 and x == int(x))
     low, high = (positive("limit_speed", "between", x, "rad/s") for x in between)
     box = box_up_to(steady, 2 * math.pi * up_to)

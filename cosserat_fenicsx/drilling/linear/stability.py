@@ -26,6 +26,8 @@ _NEUTRAL = 1e-11
 _STILL = 1e-9
 # Gauss points in a part, beside those for its waves.
 _POINTS = 8
+# Motion of a bit, over the largest one of the string, that is rounding.
+_AT_REST = 1e-9
 # Number of the fastest modes that are listed with their places and drives.
 _LISTED = 12
 _DRIVES = {
@@ -42,15 +44,15 @@ class ModeShape:
 
     Attributes:
         root: s, 1/s. depth: (m,) below the top drive, m; the number of the disc for discs. rotation: (m,) complex, the
-            amplitude of the rotation om, 1 at the bit. velocity: (m,) complex, the axial one in m/s per rad/s of the
-            bit; None where nothing moves axially. shares: {what: share} of the kinetic energy over a period, of the
+            amplitude of the rotation om, 1 at the bit; None where nothing turns. velocity: (m,) complex, the axial one
+            in m/s per rad/s of the bit, without rotation 1 at a bit that moves; None where nothing moves axially. shares: {what: share} of the kinetic energy over a period, of the
             components by name, of the top drive and the bit; "axial motion of ..." for the axial part. lengths: {name:
             m} of the components; empty for discs.
     """
 
     root: complex
     depth: np.ndarray
-    rotation: np.ndarray
+    rotation: np.ndarray | None
     velocity: np.ndarray | None
     shares: dict[str, float]
     lengths: dict[str, float]
@@ -76,10 +78,10 @@ class ModeShape:
 
 def shape_of(equation, s, points=200):
     """The `ModeShape` of a root of a characteristic function, at about so many points."""
-    motions, energies = [], {}
+    motions, energies = {}, {}
     for guide, amplitude in zip(equation.guides, equation.motion(s), strict=True):
         depth, w, energy = _along(guide, s, points)
-        motions.append(amplitude * w)
+        motions[guide.kind] = amplitude * w
         for name, value in energy.items():
             name = name if guide.kind == "torsion" else f"axial motion of {name}"
             energies[name] = energies.get(name, 0.0) + abs(amplitude) ** 2 * value
@@ -89,30 +91,30 @@ def shape_of(equation, s, points=200):
     for part in equation.guides[0].parts:
         if part.length:
             lengths[part.name] = lengths.get(part.name, 0.0) + part.length
-    return ModeShape(complex(s), depth, motions[0], motions[1] if len(motions) > 1 else None, shares, lengths)
+    return ModeShape(complex(s), depth, motions.get("torsion"), motions.get("axial"), shares, lengths)
 
 
 def _along(guide, s, points):
-    """(depth, w, {name: twice the kinetic energy}) of one guide, w = 1 at the bit."""
+    """(depth, w, {name: twice the kinetic energy}) of one guide, w = 1 at the bit, or 1 at most where the bit stands."""
     at = np.array([s], dtype=complex)
-    state, size = guide.start(at), 1.0
-    depth, w, energy, top = [], [], {}, 0.0
-    if guide.top_inertia and state.w[0] != 0:
-        energy["top drive"] = guide.top_inertia * abs(state.w[0]) ** 2
+    state, found, depth, energies, top = guide.start(at), [], [], [], 0.0
+    if guide.top_inertia:
+        energies.append(("top drive", guide.top_inertia * abs(state.w[0]) ** 2, state.size))
     for k, part in enumerate(guide.parts):
         share = max(2, round(points * part.travel / guide.travel))
-        x, here, twice, below = part.along(at, state, _POINTS + 2 * int(abs(s) * part.travel), share)
-        energy[part.name] = energy.get(part.name, 0.0) + size**2 * twice
+        x, here, twice = part.along(at, state, _POINTS + 2 * int(abs(s) * part.travel), share)
+        energies.append((part.name, twice, state.size))
         depth.append(top + x if part.length else np.array([k + 1.0]))
-        w.append(size * here)
+        found.append((here, state.size))
         top += part.length
-        scaled = below.scaled(part.impedance)
-        size *= (abs(below.w) + abs(below.P))[0] / (abs(scaled.w) + abs(scaled.P))[0]
-        state = scaled
-    if guide.inertia:
-        energy["bit"] = guide.inertia * abs(size * state.w[0]) ** 2
-    bit = w[-1][-1]
-    return np.concatenate(depth), np.concatenate(w) / bit, {n: e / abs(bit) ** 2 for n, e in energy.items()}
+        state = part.down(at, state)
+    energies.append(("bit", guide.inertia * abs(state.w[0]) ** 2, state.size))
+    w = np.concatenate([here * np.exp(size - state.size) for here, size in found])
+    largest = np.abs(w).max()
+    unit, energy = w[-1] if abs(w[-1]) > _AT_REST * largest else largest, {}
+    for name, twice, size in energies:
+        energy[name] = energy.get(name, 0.0) + twice * np.exp(2 * (size - state.size))[0] / abs(unit) ** 2
+    return np.concatenate(depth), w / unit, energy
 
 
 def usual_drives(scene):
@@ -141,7 +143,8 @@ class Stability(Result):
         roots: (n, m, k) complex, 1/s: of each mode; NaN where it is not within the limits of the list. Pairs are listed
             by the one with positive frequency; real roots have the frequency 0.
         up_to: highest frequency that was looked for, Hz. Modes that decay more than a factor exp(-4) within the time
-            that a wave takes down the string are not listed.
+            that a wave takes down the string, or exp(-1/2) within its largest damping time, are not listed.
+        kind: "torsion" or "axial"; a bit that cuts couples both.
     """
 
     scene: Drilling
@@ -149,6 +152,7 @@ class Stability(Result):
     weights: np.ndarray
     roots: np.ndarray
     up_to: float
+    kind: str = "torsion"
 
     axis = _rows_axis = "root"
     _quantities = by_name(
@@ -168,7 +172,7 @@ class Stability(Result):
         return np.nonzero(np.isfinite(self.growth))
 
     def _about(self):
-        return {"kind": "Stability", "up_to": self.up_to, "cautions": self.cautions}
+        return {"kind": "Stability", "up_to": self.up_to, "motion": self.kind, "cautions": self.cautions}
 
     @cached_property
     def _growing(self):
@@ -250,13 +254,10 @@ class Stability(Result):
     @property
     def cautions(self) -> list[str]:
         """Sentences on approximations."""
-        friction, hole, left_out = self.scene.friction, self.scene.hole, []
-        if friction is not None and friction.decays:
-            left_out.append(
-                "friction at the wall falls with the slip, which drives torsional modes, too: left out here"
-            )
-        if self.scene.bit is not None and self.scene.bit.law.drills and hole is not None:
-            left_out.append("friction at the wall damps axial motion of a string that rotates: left out here")
+        steady, left_out = Steady(self.scene, self.kind), []
+        walls = steady.walls(or_none(self.weights[0]))
+        if walls is not None and (sliding := walls.caution(float(self.speeds.min()), steady.sliding)):
+            left_out.append(sliding)
         law = self.scene.bit.law if self.scene.bit is not None and not self.scene.bit.law.drills else None
         if law is not None and len(self.weights) > 1:
             at = [law.resistance(float(weight)) for weight in (self.weights.min(), self.weights.max())]
@@ -305,9 +306,11 @@ class Stability(Result):
 
         Returns:
             {name: (k,)}: 1/s, the largest growth of those modes whose frequency is nearest to that of mode k; NaN where
-            the drive leaves none within the limits of the list.
+            the drive leaves none within the limits of the list. Empty for axial motion.
         """
         own, scene, found = self.roots[i, j], self.scene, {}
+        if self.kind == "axial":
+            return found
         for name, drive in (usual_drives(scene) if drives is None else drives).items():
             if (drive.control, drive.inertia) == (scene.drive.control, scene.drive.inertia):  # the modes as they are
                 found[name] = own.real.copy()
@@ -348,7 +351,7 @@ class Stability(Result):
 
     def _steady(self, i, j, scene):
         """The `Steady` of a scene, and its equation in a case."""
-        steady = Steady(scene)
+        steady = Steady(scene, self.kind)
         return steady, steady.equation(steady.parameters(self.speeds[i], or_none(self.weights[j])))
 
 
@@ -359,6 +362,7 @@ def stability(
     *,
     modes: int | None = None,
     up_to: float = 10.0,
+    kind: str = "torsion",
 ) -> Stability:
     """Growth rates and frequencies of all modes of steady rotations.
 
@@ -367,25 +371,33 @@ def stability(
     and weight of the case, and with the string's distributed drag. Where the bit cuts (`Cutting`), torsion and axial
     motion are coupled by the depth of cut with its delay, and the weight sets the rate of penetration; without a weight
     the speed of the hook does. All roots of the transcendental equation up to a frequency are found;
-    their number is that of the argument principle. Friction at the wall is left out, see `Stability.cautions`.
+    their number is that of the argument principle.
+
+    Friction at the wall acts by its slope at the slip of the case. Of a string that rotates it brakes axial motion, and
+    drives torsion where it falls with the slip; the wall force is that of the soft string, in pieces. Components damp
+    by their `damping_time`, Kelvin and Voigt.
 
     Args:
         scene: a `Drilling`; the speed of its drive and its weight on bit are replaced by those of the cases.
-        speeds: rotation, rad/s, (n,). weights: on bit, N, (m,); None for that of the scene.
+        speeds: rotation, rad/s, (n,); 0 for a string without a bit that its hook moves along a hole.
+        weights: on bit, N, (m,); None for that of the scene.
         modes: how many of the lowest modes of the string, counted with the lower end free; None for `up_to`.
-        up_to: highest frequency, Hz.
+        up_to: highest frequency, Hz; some hundred for high-frequency torsional oscillations, see `Stability.hfto`.
+        kind: "torsion", or "axial" for the axial motion of a string whose bit does not cut: with a weight it stands on
+            its rock, without one it is free.
 
     Returns:
         A `Stability`, which has every mode of every case.
 
     Raises:
-        SceneError: numbers out of range; a torque on bit that falls faster than the string can follow without inertia.
+        SceneError: numbers out of range; a torque on bit that falls faster than the string can follow without inertia;
+            a string at rest in its hole, or one that rotates and slides at once; axial motion of a bit that cuts.
         NotConverged: the roots that were found are fewer than those counted.
     """
     instance("stability", "scene", scene, Drilling, "a Drilling(...)")
     speeds, weights = speeds_and_weights("stability", scene, speeds, weights)
-    top = 2 * math.pi * highest(scene, modes, up_to)
-    steady = Steady(scene)
+    steady = steady_of("stability", scene, kind)
+    top = 2 * math.pi * highest(scene, modes, up_to, kind)
     order = [(i, j) for j in range(len(weights)) for i in np.argsort(-speeds, kind="stable")]
     points = np.array([steady.parameters(speeds[i], or_none(weights[j])) for i, j in order])
     n = len(speeds)
@@ -393,24 +405,42 @@ def stability(
         parents = [[k - 1] * (k % n > 0) + [k - n] * (k >= n) for k in range(len(order))]
     else:  # the slope alone decides; modes are counted with a constant torque
         by_slope = np.argsort(-points[:, 0], kind="stable")
-        order, points = [order[k] for k in by_slope], np.concatenate([np.zeros((1, 1)), points[by_slope]])
+        order, points = [order[k] for k in by_slope], points[by_slope]
+        points = np.concatenate([points[:1] * [0.0, 1.0, 1.0], points])
         parents = [[k - 1] * (k > 0) for k in range(len(points))]
     spacing = steady.equation(points[0]).spacing
     found = follow(steady.equation, points, parents, box_up_to(steady, top), spacing)
     found = np.where(np.abs(found.real) < _NEUTRAL * np.maximum(np.abs(found), spacing), 1j * found.imag, found)
+    if kind == "axial":  # a string held at both ends is at rest for s = 0, which is no mode
+        found = np.where(np.abs(found) < _NEUTRAL * spacing, np.nan, found)
     columns = np.argsort(_heights(found, steady.cuts), kind="stable")
     roots = np.full((len(speeds), len(weights), len(columns)), np.nan + 0j)
     for (i, j), row in zip(order, found[-len(order) :], strict=True):
         roots[i, j] = row[columns]
-    return Stability(scene, speeds, weights, roots[:, :, np.isfinite(roots).any(axis=(0, 1))], top / (2 * math.pi))
+    return Stability(
+        scene, speeds, weights, roots[:, :, np.isfinite(roots).any(axis=(0, 1))], top / (2 * math.pi), kind
+    )
 
 
-def highest(scene, modes, up_to):
+def steady_of(owner, scene, kind):
+    """The `Steady` of a scene for a kind of motion that a user gave.
+
+    Raises:
+        SceneError: an unknown kind, or axial motion alone of a bit that cuts; see `Steady`.
+    """
+    if kind not in ("torsion", "axial"):
+        refuse(owner, "kind", kind, "'torsion' or 'axial'")
+    if kind == "axial" and scene.bit is not None and scene.bit.law.drills and owner == "stability":
+        refuse(owner, "kind", kind, f"'torsion': with {type(scene.bit.law).__name__} its modes move axially, too")
+    return Steady(scene, kind)
+
+
+def highest(scene, modes, up_to, kind="torsion"):
     """Hz: `up_to`, or half way from the last of so many modes to the next one."""
     if modes is None:
         return positive("stability", "up_to", up_to, "Hz")
     count = int(number("stability", "modes", modes, "a number from 1", lambda x: x >= 1 and x == int(x)))
-    lowest = natural_frequencies(scene, count + 1)
+    lowest = natural_frequencies(scene, count + 1, kind=kind)
     return float(lowest[count - 1 :].mean()) if len(lowest) > count else 1.5 * float(lowest[-1])
 
 

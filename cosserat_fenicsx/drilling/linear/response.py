@@ -1,0 +1,275 @@
+"""Frequency response of a string that rotates steadily: its impedance at the surface, and what the bit does there.
+
+All varies like exp(i w t), w = 2 pi f, about the steady state. The string is the exact waveguide of `stability`, the
+lower end has the inertia of the bit and the slope of its law; a bit that cuts couples torsion and axial motion.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from rich.table import Table
+
+from cosserat_fenicsx.checks import File, Numbers, instance, refuse
+from cosserat_fenicsx.drilling.linear.characteristic import Characteristic, box_up_to, speed_of
+from cosserat_fenicsx.drilling.linear.roots import all_roots
+from cosserat_fenicsx.drilling.linear.stability import ModeShape, shape_of, steady_of
+from cosserat_fenicsx.drilling.scene import Drilling
+from cosserat_fenicsx.drilling.stick_slip import SPEED, WEIGHT
+from cosserat_fenicsx.errors import SceneError, nearest
+from cosserat_fenicsx.parts import Number, Values, positive
+from cosserat_fenicsx.quantities import Quantities, Quantity
+from cosserat_fenicsx.results.result import Result
+
+#: Names of speed and load at the surface and at the bit, by kind; units of a load and a speed.
+ENDS = {
+    "torsion": ("drive speed", "surface torque", "bit speed", "torque on bit"),
+    "axial": ("top velocity", "hook load", "bit velocity", "weight on bit"),
+}
+UNITS = {"torsion": ("rad/s", "N m"), "axial": ("m/s", "N")}
+#: Quantities of a speed and a load on screens and in charts, by kind.
+SHOWN = {
+    "torsion": (SPEED, Quantity("torque", unit="N m", shown="kN m")),
+    "axial": (Quantity("velocity", unit="m/s"), WEIGHT),
+}
+# Frequencies without given ones: how many, and up to which one, Hz. Peaks that are listed. Growth over the spacing of
+# modes that is rounding.
+_MANY, _HIGHEST, _PEAKS, _NEUTRAL = 2000, 10.0, 12, 1e-9
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class FrequencyResponse(Result):
+    """Result of `frequency_response`.
+
+    Attributes:
+        scene: the `Drilling`. kind: "torsion" or "axial". speed: of the steady rotation, rad/s.
+        frequency: (n,) Hz. impedance: (n,) complex, N m s/rad or N s/m: of the string at the surface, bit and rock
+            included, below the drive or hook: torque handed down over the drive's speed; axially minus the change of
+            the hook load over the velocity downwards. drive_impedance: (n,) complex, of the drive or hook above; NaN
+            where it is rigid.
+        roots: (k,) complex, 1/s, of the modes up to the highest frequency. equation: the characteristic function.
+    """
+
+    scene: Drilling
+    kind: str
+    speed: float
+    frequency: np.ndarray
+    impedance: np.ndarray
+    drive_impedance: np.ndarray
+    roots: np.ndarray
+    equation: Characteristic
+    _ratios: dict[str, dict[str, np.ndarray]]
+
+    axis = _rows_axis = "frequency"
+
+    def transfer(self, source: str, answer: str) -> np.ndarray:
+        """(n,) complex ratio of what answers over what moves the string, at each frequency.
+
+        In torsion the names are "drive speed", "surface torque", "bit speed" and "torque on bit"; axially "top
+        velocity" (downwards), "hook load", "bit velocity" (downwards) and "weight on bit".
+
+        Args:
+            source: a torque or weight on bit is one beside that of the bit's law, with the drive in its place. Speed or
+                load at the surface are given, whatever the drive.
+            answer: as an answer to the surface, torque or weight on bit are those of the law.
+
+        Raises:
+            SceneError: an unknown name, a speed of the bit as the source, or source and answer of the same name.
+        """
+        for name, field, known in (("source", source, self._ratios), ("answer", answer, ENDS[self.kind])):
+            if field not in known:
+                raise SceneError(f"transfer.{name} = {field!r}: {nearest(str(field), known)}")
+        if answer not in self._ratios[source]:
+            refuse("transfer", "answer", answer, f"one of {', '.join(self._ratios[source])} to {source}")
+        return self._ratios[source][answer]
+
+    def mode_of(self, frequency: float) -> ModeShape:
+        """The `ModeShape` of the mode whose frequency (Hz) is nearest.
+
+        Raises:
+            SceneError: there is no mode up to the highest frequency, or a frequency that is not positive.
+        """
+        frequency = Number("frequency", positive()).check("mode_of", "frequency", frequency)
+        if not len(self.roots):
+            raise SceneError(f"mode_of: expected a response that has modes, this one has none up to {self._highest} Hz")
+        return shape_of(self.equation, self.roots[np.abs(self.roots.imag - 2 * math.pi * frequency).argmin()])
+
+    @property
+    def _highest(self):
+        return f"{self.frequency.max():.4g}"
+
+    @property
+    def quantities(self):
+        """See `Result`: sizes, and phases from -180 to 180 degrees, of the impedance and of the answers to the bit."""
+        speed, load = UNITS[self.kind]
+        per = {"N m": "N m s/rad", "N": "N s/m"}[load]
+        values = {"impedance": ("impedance at the surface", per, self.impedance)}
+        source = ENDS[self.kind][3]
+        for name, ratio in self._ratios[source].items():
+            unit = "1" if name in ENDS[self.kind][1] else f"{speed}/({load})"
+            values[name.replace(" ", "_")] = f"{name} per {source}", unit, ratio
+        found = [Quantity("frequency", unit="Hz", axes=("frequency",))]
+        for name, (label, unit, ratio) in values.items():
+            found.append(
+                Quantity(f"{name}_size", label, unit, axes=("frequency",), getter=lambda _, r=ratio: np.abs(r))
+            )
+            found.append(
+                Quantity(f"{name}_phase", f"{label}, phase", "deg", axes=("frequency",),
+                         getter=lambda _, r=ratio: np.degrees(np.angle(r)))
+            )  # fmt: skip
+        known = Quantities(super().quantities)
+        known.update({x.name: x for x in found})
+        return known
+
+    def __len__(self) -> int:
+        return len(self.frequency)
+
+    def _about(self):
+        about = {"kind": "FrequencyResponse", "motion": self.kind, "speed": self.speed, "cautions": self.cautions}
+        return about | {"growth": self.roots.real.tolist(), "mode_frequency": (self.roots.imag / 2 / np.pi).tolist()}
+
+    @property
+    def cautions(self) -> list[str]:
+        """Sentences: modes that grow."""
+        growing = _growing(self.roots, self.equation)
+        return [f"The steady state is unstable: {growing}; the motion leaves it"] if growing else []
+
+    def _answer(self, units):
+        rpm, size = units.on_screen(SPEED)
+        low, high = f"{self.frequency.min():.4g}", self._highest
+        at = f", at {self.speed / size:.4g} {rpm}" if self.speed else ""
+        yield f"Response in {self.kind} to the bit at {len(self)} frequencies from {low} to {high} Hz{at}."
+        yield from (f"{caution}." for caution in self.cautions)
+        surface, peaks = ENDS[self.kind][1], self._peaks
+        if len(peaks):
+            size = np.abs(self.transfer(ENDS[self.kind][3], surface))
+            k = peaks[size[peaks].argmax()]
+            yield f"Most of the bit is seen in the {surface} at {self.frequency[k]:.4g} Hz: {size[k]:.3g} times."
+            yield f"Below: peaks of the {ENDS[self.kind][2]}, the strongest {_PEAKS} at most; phases in degrees."
+
+    @property
+    def _peaks(self):
+        """Indices of the strongest peaks of the bit's speed, by frequency."""
+        size = np.abs(self._ratios[ENDS[self.kind][3]][ENDS[self.kind][2]])
+        inside = np.flatnonzero((size[1:-1] > size[:-2]) & (size[1:-1] >= size[2:])) + 1
+        return np.sort(inside[np.argsort(-size[inside])][:_PEAKS])
+
+    def _table(self, units, rows):
+        _, surface, moved, source = ENDS[self.kind]
+        torque, speed = self.transfer(source, surface), self.transfer(source, moved)
+        (turn, turning), (push, pushing) = map(units.on_screen, SHOWN[self.kind])
+        table = Table()
+        for heading in ("frequency (Hz)", f"{surface} per {source}", "phase", f"{moved} ({turn} per {push})", "phase"):
+            table.add_column(heading, justify="right")
+        for k in self._peaks[:rows]:
+            moves = f"{abs(speed[k]) / turning * pushing:.4g}"
+            phases = (f"{math.degrees(np.angle(x[k])):.0f}" for x in (torque, speed))
+            table.add_row(f"{self.frequency[k]:.4f}", f"{abs(torque[k]):.4g}", next(phases), moves, next(phases))
+        return table if table.row_count else None
+
+    def plot(self, file: File | None = None, *, units: Any = "SI", width: int | None = None):
+        """Bode chart over the frequency: load at the surface per load on bit, its phase, speeds of drive and bit, and
+        the impedance of the string beside that of the drive; they absorb each other's waves where both are equal.
+
+        Args:
+            file: .png, .pdf or another format of matplotlib (rank 0 writes); None returns the Figure.
+            units: "SI", "field" or a dict of units by dimensions. width: of the picture, pixels, or None.
+
+        Raises:
+            SceneError: matplotlib is missing, or the file's ending is unknown.
+            OSError: the file cannot be written.
+        """
+        from cosserat_fenicsx.drilling.charts import draw_response
+
+        return draw_response(self, file, units=units, width=width)
+
+    def __repr__(self):
+        return f"<FrequencyResponse: {self.kind}, {len(self)} frequencies up to {self._highest} Hz>"
+
+
+def frequency_response(
+    scene: Drilling,
+    frequencies: Numbers | None = None,
+    *,
+    kind: str = "torsion",
+    speed: float | None = None,
+    unstable: bool = False,
+) -> FrequencyResponse:
+    """Small forced vibrations about steady drilling, by exact waves: what of the bit is seen at the surface, and which
+    impedance the drive sees.
+
+    Slope of the bit's law, friction at the wall, drag, and the `damping_time` of components are those of `stability`.
+    Axially a bit that does not cut stands on its rock if it has a weight, and is free without one.
+
+    Args:
+        scene: a `Drilling`. frequencies: Hz, (n,); None for 2000, even up to 10 Hz.
+        kind: "torsion", or "axial". speed: of the steady rotation, rad/s; None for that of the drive.
+        unstable: compute the response of a state that is not stable, too: then it is what a bit would do that is held
+            to small motions.
+
+    Raises:
+        SceneError: a mode grows up to the highest frequency; frequencies that are not positive; a speed that is needed
+            and missing; see `stability`.
+        NotConverged: the roots that were found are fewer than those counted.
+    """
+    instance("frequency_response", "scene", scene, Drilling, "a Drilling(...)")
+    if frequencies is None:
+        frequencies = np.linspace(0.0, _HIGHEST, _MANY + 1)[1:]
+    several = [frequencies] if np.ndim(frequencies) == 0 else list(frequencies)
+    given = Values(Number("frequency", positive())).check("frequency_response", "frequencies", several)
+    frequency = np.array(given, dtype=float)
+    steady = steady_of("frequency_response", scene, kind)
+    speed = speed_of("frequency_response", scene, speed)
+    f = steady.equation(steady.parameters(speed, scene.bit and scene.bit.weight))
+    top = 2 * math.pi * float(frequency.max())
+    roots, _ = all_roots(f, box_up_to(steady, top)(f), f.spacing)
+    growing = _growing(roots, f)
+    if growing and not unstable:
+        raise SceneError(f"frequency_response: the steady state is unstable, {growing}: expected a drive, speed or "
+                         "weight at which `stability` finds no such mode, or unstable=True")  # fmt: skip
+    guide = next(guide for guide in f.guides if guide.kind == kind)
+    s = 2j * math.pi * frequency
+    impedance, drive, ratios = _ratios(guide, s, f.below(s)[f.guides.index(guide)], ENDS[kind])
+    return FrequencyResponse(scene, kind, speed, frequency, impedance, drive, roots, f, ratios)
+
+
+def _growing(roots, f):
+    """The modes that grow, in words, or ""."""
+    growing = roots[roots.real > _NEUTRAL * f.spacing]
+    if not len(growing):
+        return ""
+    worst = growing[growing.real.argmax()]
+    text = f"a mode of {worst.imag / 2 / math.pi:.4g} Hz grows by {worst.real:.3g} 1/s"
+    return text + (f", and {len(growing) - 1} more grow" if len(growing) > 1 else "")
+
+
+def _ratios(guide, s, below, names):
+    """Impedance at the surface, that of the drive, and {source: {answer: ratio}} of a guide that ends in the impedance
+    `below` of bit and rock, the bit's inertia included."""
+    speed_above, load_above, speed, load = names
+    sign = 1.0 if guide.kind == "torsion" else -1.0  # a hook load is minus the force handed down
+    stands = np.isinf(below)
+    lower, own = np.where(stands, 1.0, below), guide.factor(s)
+
+    def misfit(state):  # of the condition at the lower end
+        return np.where(stands, state.w, lower * state.w - state.P)
+
+    # moved from the bit, with the drive in its place
+    start, end = guide.start(s), guide.bottom(s)
+    per = np.where(stands, 0.0, -1 / misfit(end))
+    grown = own * np.exp(start.size - end.size)
+    from_bit = {speed_above: per * grown * start.w, load_above: sign * per * grown * start.P, speed: per * end.w}
+    drive = np.where(start.w == 0, np.nan, -start.P / np.where(start.w == 0, 1.0, start.w))
+    # moved from the top: with the states below a unit speed and below a unit load there, the determinant of which is 1
+    one, zero = np.ones_like(s), np.zeros_like(s)
+    by_speed, by_load = guide.below_top(s, one, zero), guide.below_top(s, zero, one)
+    impedance = -misfit(by_speed) / misfit(by_load) * np.exp(by_speed.size - by_load.size)
+    reached = -own / misfit(by_load) * np.exp(-by_load.size)
+    from_speed = {
+        load_above: sign * impedance,
+        speed: np.where(stands, 0.0, reached),
+        load: np.where(stands, reached, (lower - guide.inertia * s) * reached),
+    }
+    by_load = {speed_above: sign / impedance} | {x: from_speed[x] * sign / impedance for x in (speed, load)}
+    return impedance, drive, {load: from_bit, speed_above: from_speed, load_above: by_load}
