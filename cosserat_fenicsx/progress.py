@@ -117,22 +117,41 @@ class _Clocked:
             self._thread.join()
 
 
-class MeshProgress(_Clocked):
-    """Context manager that shows the mesh of an eigenproblem and the elapsed time; the number of meshes is not known.
-    what: name of the computation; tol: its relative accuracy; wanted: see `Progress`."""
+class StageProgress(_Clocked):
+    """Context manager that shows what a computation is at, and the elapsed time; how long it takes is not known.
 
-    def __init__(self, what, tol, wanted, comm):
+    Args:
+        what: name of the computation. wanted, comm: see `Progress`.
+    """
+
+    def __init__(self, what, wanted, comm):
         super().__init__(wanted, comm)
-        self._what, self._tol, self._text = what, tol, what
+        self._what = self._text = what
 
-    def on(self, elements, reached):
-        """The computation begins on a mesh of at most so many elements per rod; reached: the estimated error so far."""
-        error = f", estimated error {reached:.1e} of {self._tol:g}" if math.isfinite(reached) else ""
-        self._text = f"{self._what}: {elements} elements per rod{error}"
+    def at(self, what):
+        """Say what begins, in a few words."""
+        self._text = f"{self._what}: {what}"
         self._say()
 
     def _line(self):
         return f"{self._text}, {time.monotonic() - self._began:.0f} s"
+
+
+class MeshProgress(StageProgress):
+    """`StageProgress` of an eigenproblem on one mesh after the other, whose number is not known.
+
+    Args:
+        what: name of the computation; tol: its relative accuracy. wanted, comm: see `Progress`.
+    """
+
+    def __init__(self, what, tol, wanted, comm):
+        super().__init__(what, wanted, comm)
+        self._tol = tol
+
+    def on(self, elements, reached):
+        """The computation begins on a mesh of at most so many elements per rod; reached: the estimated error so far."""
+        error = f", estimated error {reached:.1e} of {self._tol:g}" if math.isfinite(reached) else ""
+        self.at(f"{elements} elements per rod{error}")
 
 
 class CaseProgress(_Clocked):

@@ -6,6 +6,8 @@ from cosserat_fenicsx.drilling.bit_laws import Cutting as Cutting
 from cosserat_fenicsx.drilling.bit_laws import Lobes as Lobes
 from cosserat_fenicsx.drilling.bit_laws import Stribeck as Stribeck
 from cosserat_fenicsx.drilling.bit_laws import Wear as Wear
+from cosserat_fenicsx.drilling.fitting import DrillingFit as DrillingFit
+from cosserat_fenicsx.drilling.fitting import fit as fit
 from cosserat_fenicsx.drilling.history import DrillingHistory as DrillingHistory
 from cosserat_fenicsx.drilling.linear.excitation import BitBounce as BitBounce
 from cosserat_fenicsx.drilling.linear.excitation import Campbell as Campbell
@@ -27,6 +29,7 @@ from cosserat_fenicsx.drilling.mixed import MixedScene as MixedScene
 from cosserat_fenicsx.drilling.mixed import mixed_scene as mixed_scene
 from cosserat_fenicsx.drilling.motion import simulate as simulate
 from cosserat_fenicsx.drilling.pipe_above import PipeAbove as PipeAbove
+from cosserat_fenicsx.drilling.readings import Readings as Readings
 from cosserat_fenicsx.drilling.scene import Drilling as Drilling
 from cosserat_fenicsx.drilling.scenefile import DrillingScene as DrillingScene
 from cosserat_fenicsx.drilling.segments import Discs as Discs

@@ -213,6 +213,28 @@ def draw_over_time(history, between=None):
     return figure
 
 
+@_drawn
+def draw_fit(fit):
+    """See `DrillingFit.plot`."""
+    readings, quantities = fit.readings, fit.history.quantities
+    times = np.linspace(readings.times[0], readings.times[-1], _SOME)
+    figure, axes = stacked(10, [2.3] * len(readings.values))
+    for panel, (name, values) in zip(axes, readings.values.items(), strict=True):
+        heading, size = scale(quantities[name], values)
+        far = np.isin(readings.times, fit.left_out[name])
+        panel.plot(readings.times, np.where(far, np.nan, values) / size, ".", color="0.45", markersize=4, label="read")
+        if far.any():
+            panel.plot(readings.times[far], values[far] / size, "x", color=BIT, label="read, left out")
+        panel.plot(times, fit.computed(name, times) / size, color=DRIVE, linewidth=1.1, label="with the numbers found")
+        panel.set_ylabel(heading)
+    legend(*axes)
+    axes[-1].set_xlabel("time (s)")
+    told = (f"{name.split('.', 1)[-1]} {x:.5g} ± {e:.2g} {unit}"
+            for name, x, e, unit in zip(fit.names, fit.values, fit.standard_error, fit.units, strict=True))  # fmt: skip
+    figure.suptitle(f"Fit: {', '.join(told)}; misfit {fit.misfit:.3g}")
+    return figure
+
+
 def _shade_rest(panel, t, bit, drive, label):
     """Grey where the bit is at rest."""
     level = AT_REST * max(float(np.abs(drive).mean()), 1e-3)

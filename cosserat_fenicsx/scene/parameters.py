@@ -16,6 +16,7 @@ import numpy as np
 
 from cosserat_fenicsx.checks import instance, number
 from cosserat_fenicsx.errors import SceneError, nearest
+from cosserat_fenicsx.kinds import Number, fields_of
 from cosserat_fenicsx.scene.curves import Curve, Spline
 from cosserat_fenicsx.scene.rod import Station
 from cosserat_fenicsx.scene.scene import Scene
@@ -116,7 +117,7 @@ def parameter_of(scene, given):
         leaf, size = leaf[key], leaf
     if isinstance(leaf, bool) or not isinstance(leaf, numbers.Real):
         raise SceneError(f"parameter '{given}' is {_kind(leaf)}: expected the name of a number{_inside(leaf, given)}")
-    unit = _UNITS.get(f"{type(owner).__name__}.{field}", _UNITS.get(field, "its SI unit"))
+    unit = _UNITS.get(f"{type(owner).__name__}.{field}") or _UNITS.get(field) or _unit_of_field(owner, field)
     if isinstance(owner, Curve) and unit == "m":  # places change by parts of the curve, wherever its origin lies
         size = _extent(owner)
     elif isinstance(owner, Tube) and field != "shear_factor":  # small changes of a diameter remove a thin wall
@@ -133,7 +134,8 @@ def parameter_of(scene, given):
 
 
 def scene_with(scene, names, values):
-    """The scene with other numbers, by their names (see `parameter_of`); those of one object are changed at once."""
+    """The scene, or another dataclass of parts such as a `Drilling`, with other numbers, by their names (see
+    `parameter_of`); those of one object are changed at once."""
     groups = {}
     for name, value in zip(names, values, strict=True):
         groups.setdefault(id(_find(scene, name)[0]), []).append((name, float(value)))
@@ -208,10 +210,11 @@ def _extent(curve):
 def _find(scene, name):
     """(dataclass that holds the number, its field, indices within the field)."""
     tokens = [int(i) if i else word for i, word in _TOKEN.findall(name)]
-    if not tokens or tokens[0] not in _PARTS:
-        raise SceneError(f"parameter '{name}': {nearest(tokens[0] if tokens else '', _PARTS)}")
-    materials = list({id(rod.material): rod.material for rod in scene.rods if rod.material is not None}.values())
-    here = tuple(materials) if tokens[0] == "materials" else getattr(scene, tokens[0])
+    of_rods = isinstance(scene, Scene)
+    parts = _PARTS if of_rods else [x.name for x in dataclasses.fields(scene) if x.init]
+    if not tokens or tokens[0] not in parts:
+        raise SceneError(f"parameter '{name}': {nearest(tokens[0] if tokens else '', parts)}")
+    here = _materials(scene) if of_rods and tokens[0] == "materials" else getattr(scene, tokens[0])
     owner, field, keys = scene, tokens[0], []
     for token in tokens[1:]:
         if dataclasses.is_dataclass(here):
@@ -220,7 +223,7 @@ def _find(scene, name):
                 raise SceneError(f"parameter '{name}': {_kind(here)} has no '{token}': {nearest(token, fields)}")
             owner, field, keys, here = here, token, [], getattr(here, token)
             continue
-        if isinstance(token, str) and owner is scene and not keys and field in ("rods", "materials"):
+        if of_rods and isinstance(token, str) and owner is scene and not keys and field in ("rods", "materials"):
             named = scene.materials if field == "materials" else {rod.name: rod for rod in scene.rods}
             if token not in named:
                 what = "no material of a scene file" if field == "materials" else "no rod"
@@ -237,6 +240,18 @@ def _find(scene, name):
     if not keys and isinstance(leaf, tuple) and len(leaf) == 1 and np.shape(leaf[0]) == (2,):
         keys = [0, 1]  # one number for all of a length, kept as a piece (end, number)
     return owner, field, keys
+
+
+def _unit_of_field(owner, field):
+    """The SI unit that a part declares for a field."""
+    kind = fields_of(type(owner)).get(field)
+    kind = getattr(kind, "inner", kind)
+    return (getattr(kind, "unit", None) or "1") if isinstance(kind, Number) else "its SI unit"
+
+
+def _materials(scene):
+    """The different materials of the rods, in order."""
+    return tuple({id(rod.material): rod.material for rod in scene.rods if rod.material is not None}.values())
 
 
 def _kind(value):

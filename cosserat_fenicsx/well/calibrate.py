@@ -8,8 +8,6 @@ from functools import lru_cache, partial
 from typing import Annotated, Any
 
 import numpy as np
-from scipy.optimize import least_squares
-from scipy.stats import t as student
 
 from cosserat_fenicsx.checks import File, instance, number, refuse, warn
 from cosserat_fenicsx.errors import SceneError, SceneWarning
@@ -17,6 +15,7 @@ from cosserat_fenicsx.parts import Depth, ForceSize, Part, Torque, positive
 from cosserat_fenicsx.quantities import Quantity
 from cosserat_fenicsx.results.result import Result, by_name
 from cosserat_fenicsx.well.components import DrillString
+from cosserat_fenicsx.well.estimation import estimated
 from cosserat_fenicsx.well.hole import Borehole, Mud
 from cosserat_fenicsx.well.operations import Operation
 from cosserat_fenicsx.well.solve import BUCKLED, SOFT, torque_and_drag
@@ -93,8 +92,12 @@ class FrictionFit(Result):
         standard_error: (m,) of the coefficients, and of the block's weight (N) where it was found: the root of the
             diagonal of the covariance, scaled by the misfit.
         residuals: (k,) measured less computed over the standard deviations, hook loads before torques.
-        misfit: root of the sum of their squares over the readings in excess: 1 where the standard deviations are right.
-        doubts: sentences on possible mistakes, where the misfit is far above 1; also given as warnings.
+        kept: (k,) False for outliers, readings that differ by more than five deviations from what all others say, and
+            were left out.
+        misfit: root of the sum of squares of the residuals that are kept, over the readings in excess: 1 where the
+            standard deviations are right.
+        doubts: sentences on readings that were left out, and on possible mistakes where the misfit is far above 1;
+            also given as warnings.
         measurements: as given.
     """
 
@@ -107,6 +110,7 @@ class FrictionFit(Result):
     correlation: np.ndarray
     standard_error: np.ndarray
     residuals: np.ndarray
+    kept: np.ndarray
     misfit: float
     doubts: tuple[str, ...] = ()
     measurements: tuple[RigMeasurement, ...] = ()
@@ -177,6 +181,7 @@ def calibrate_friction(
     model: str = SOFT,
     torque_convention: str = "coulomb",
     confidence: float = 0.95,
+    leave_out: bool = True,
 ) -> FrictionFit:
     """One coefficient of friction for each section of a hole, such that hook loads and torques fit measured ones best.
 
@@ -190,6 +195,8 @@ def calibrate_friction(
             not and it is one more unknown.
         model: "soft", or "buckled". mud, string, torque_convention: see `torque_and_drag`.
         confidence: between 0 and 1.
+        leave_out: whether outliers are left out, which a warning names: readings more than five deviations from what
+            all others say.
 
     Raises:
         SceneError: too few readings, or readings that do not depend on a section's friction (named); see also
@@ -241,35 +248,42 @@ def calibrate_friction(
     bounds = [0.0] * sections + [-x for x in free], [_SET.most] * sections + free
     start = [_SET.start] * sections + [0.5] * unknown_block
     jacobian = slopes if model == SOFT else "2-point"  # of buckled strings no derivative is known
-    found = least_squares(residuals, start, jacobian, bounds, xtol=1e-10, ftol=1e-12, gtol=1e-12)
-    _check_determined(hole, found.jac, unknown_block)
-    misfit = float(np.sqrt(2 * found.cost / excess))
-    covariance = np.linalg.inv(found.jac.T @ found.jac) * misfit**2
-    spread = np.sqrt(np.diag(covariance))
-    half = student.ppf((1 + confidence) / 2, excess) * spread
+    found = estimated(residuals, jacobian, start, bounds, leave_out)
+    _check_determined(hole, found.jacobian, unknown_block)
+    misfit, half = found.misfit, found.half_widths(confidence)
     scale = np.array([1.0] * sections + [_SET.block] * unknown_block)
-    values, half = found.x * scale, half * scale
+    values, half = found.values * scale, half * scale
     ends = np.stack([values - half, values + half], axis=1)
     friction = values[:sections]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        correlation = covariance / np.outer(spread, spread)
     block = float(values[-1]) if unknown_block else float(block_weight)
-    doubts = ()
+    doubts = tuple(_left_out(readings, found))
     if misfit > _SET.bad:
         with_block = partial(calibrate_friction, hole, string, measurements, mud=mud, block_weight=None, model=model,
                              torque_convention=torque_convention)  # fmt: skip
-        doubts = (
+        doubts += (
             f"misfit {misfit:.3g} where 1 is as the standard deviations say: neither coefficients nor intervals are to "
             "be relied on",
-            *_causes(readings, found.fun * sd, misfit, None if unknown_block else with_block),
+            *_causes(readings, found.residuals * sd, misfit, None if unknown_block else with_block),
         )
+    if doubts:
         warn(f"calibrate_friction: {'; '.join(doubts)}")
     return FrictionFit(
         hole.with_friction(friction), friction, np.maximum(ends[:sections], 0.0), block,
-        ends[-1] if unknown_block else np.full(2, np.nan), confidence, correlation,
-        spread * scale, found.fun, misfit, doubts,
-        tuple(measurements),
+        ends[-1] if unknown_block else np.full(2, np.nan), confidence, found.correlation,
+        found.spread * scale, found.residuals, found.kept, misfit, doubts, tuple(measurements),
     )  # fmt: skip
+
+
+def _left_out(readings, found):
+    """Sentences on the outliers of an `Estimate`."""
+    for x, residual, kept in zip(readings, found.residuals, found.kept, strict=True):
+        if not kept:
+            unit = {"hook_load": "N"}.get(x.query, "N m")
+            yield (
+                f"left out: the {x.query.replace('_', ' ')} {x.value:g} {unit} of {x.at.operation.name} at "
+                f"{x.at.depth:g} m, {residual * x.sd:+.3g} {unit} from what the other readings say; leave_out=False "
+                "keeps it"
+            )
 
 
 def _causes(readings, apart, misfit, with_block):
