@@ -18,7 +18,7 @@ export VTK_DEFAULT_OPENGL_WINDOW = vtkEGLRenderWindow
 # A numpy in the user's own site directory would hide the distribution's.
 export PYTHONNOUSERSITE = 1
 
-.PHONY: help setup packages demo animation motion gallery well string whirl recipes test docs tutorials tables figure3 work-precision benchmarks cosseratbench failures rods-in-wells folders random random-wells imperfect mutants release clean
+.PHONY: help setup packages demo animation motion gallery well string whirl recipes test docs tutorials tables figure3 work-precision benchmarks cosseratbench failures rods-in-wells folders truths random random-wells imperfect mutants release clean
 
 help:
 	@echo "Times are those of two cores and an empty cache of compiled forms, after \`make setup\`."
@@ -40,6 +40,7 @@ help:
 	@echo "make cosseratbench  the scenarios of a public suite, cosseratbench, beside the results of other solvers (git gets it; half a minute)"
 	@echo "make failures where methods fail: a map of methods against trials; writes out/ (at most a quarter of an hour)"
 	@echo "make rods-in-wells  the exact rod in three wells: Newton steps, processor time, errors (about 5 minutes)"
+	@echo "make truths  errors against closed forms and numbers of other programs, beside what was asked for (a few minutes)"
 	@echo "make random  200 random scenes against the strong form, at three tolerances (about 5 minutes)"
 	@echo "make random-wells  100 random wells, strings and operations against finer meshes in a stiffer wall (about half an hour)"
 	@echo "make imperfect  60 symmetric structures with small imperfections against paths in small steps (about 20 minutes)"
@@ -123,6 +124,10 @@ benchmarks: setup
 rods-in-wells: setup
 	$(PYTHON) demos/evidence/rods_in_wells.py
 	$(PYTHON) demos/evidence/put_in_docs.py rods_in_wells
+
+truths: setup
+	$(PYTHON) demos/evidence/truths.py
+	$(PYTHON) demos/evidence/put_in_docs.py truths
 
 folders: setup
 	$(PYTHON) -m pytest tests/test_store.py -k damaged_folders --mutations 200

@@ -11,6 +11,7 @@ from pathlib import Path
 # Compiling takes half the time, and running not noticeably longer on a few elements; what measures speed unsets it.
 os.environ.setdefault("COSSERAT_FENICSX_CFLAGS", "-O1")
 
+import numpy as np
 import pytest
 from mpi4py import MPI
 
@@ -24,6 +25,7 @@ sys.path += [str(DEMOS), str(DEMOS / "evidence")]
 
 def pytest_addoption(parser):
     parser.addoption("--mutations", type=int, default=12, help="damaged folders of each kind of computation")
+    parser.addoption("--truths", action="store_true", help="only what is compared with independent truths by `truth`")
 
 
 @pytest.hookimpl(trylast=True)
@@ -43,7 +45,9 @@ def pytest_xdist_setupnodes():
         os.putenv(name, value)
 
 
-def pytest_collection_modifyitems(items):
+def pytest_collection_modifyitems(config, items):
+    if config.getoption("--truths"):
+        items[:] = [item for item in items if "truth" in item.fixturenames]
     if COMM.size > 1:
         for item in items:
             if "serial" in item.keywords:
@@ -62,6 +66,27 @@ def pytest_runtest_makereport(item, call):
             flush=True,
         )
         end_all()
+
+
+@pytest.fixture
+def truth(record_property):
+    """Compare with an independent truth, and record a row for `make truths` (demos/evidence/truths.py)."""
+
+    def compare(what, found, exact, asked, *, of=None, most=None):
+        """Assert that numbers are those of a truth.
+
+        Args:
+            what: the problem and the quantity. found, exact: numbers of the same shape.
+            asked: the largest error that is asked for, over `of`: a scale, None for each exact number's own size.
+            most: the largest error that the test allows, where what is asked for is missed.
+        """
+        exact = np.asarray(exact)
+        scale = np.abs(exact) if of is None else of
+        error = float(np.max(np.abs(np.asarray(found) - exact) / scale))
+        record_property("truth", json.dumps([what, error, asked]))
+        assert error <= (most or asked), (what, found, exact)
+
+    return compare
 
 
 def computing(process):

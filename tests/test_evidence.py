@@ -601,3 +601,13 @@ def test_ratios_that_are_asked_for():
     assert deciding(rows) == [rows[i] for i in (0, 3, 4, 2, 5, 1)]
     assert called(rows[0]) == "auto, tol 1e-02" and judged(None, 0.5) == "- | 1/2 | -"
     assert judged(1 / 4, 1 / 5) == "1/4 | 1/5 | missed" and judged(0.4, 0.5, ".2f") == "0.40 | 0.5 | met"
+
+
+def test_truths_are_told_with_their_errors(tmp_path):
+    import truths
+
+    (row,) = truths.main("lifted_from", tmp_path)
+    assert row[0] == "obstacles" and 0 < row[2] < 1e-6 and row[3] == 1e-5
+    assert "| obstacles | rod lifted from a plane, moment at its level end |" in (tmp_path / "truths.md").read_text()
+    with pytest.raises(RuntimeError, match="the tests fail"):
+        truths.compared("no test has this name")

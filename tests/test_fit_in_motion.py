@@ -21,11 +21,12 @@ def scene():
     return cf.drilling.Drilling(discs, drive, cf.drilling.BitOnRock(cf.drilling.Stribeck(5000.0, 3000.0, 2.0)))
 
 
-def test_a_stribeck_bit_as_another_program_fits_it():
+def test_a_stribeck_bit_as_another_program_fits_it(truth):
     readings = cf.drilling.Readings.from_csv(READ, NOISE)
     fit = cf.drilling.fit(scene(), readings, RANGES, dt=2e-3)
-    assert np.abs(fit.values - OWN).max() < 1e-2 and (np.abs(fit.values - TRUE) < 3 * BOUNDS).all()
-    assert fit.standard_error == pytest.approx(BOUNDS, rel=0.1) and fit.misfit == pytest.approx(0.99, abs=0.01)
+    truth("fit of a Stribeck bit, true numbers, over Cramer and Rao's bounds", fit.values, TRUE, 3.0, of=BOUNDS)
+    truth("fit of a Stribeck bit, standard errors", fit.standard_error, BOUNDS, 0.1)
+    assert np.abs(fit.values - OWN).max() < 1e-2 and fit.misfit == pytest.approx(0.99, abs=0.01)
     assert fit.correlation[0, 2] == pytest.approx(-0.9948, abs=2e-3) and not fit.doubts
     assert fit.scene.bit.law.static == fit.values[0] and "bit.law.speed and bit.law.static (-0.99" in str(fit)
 

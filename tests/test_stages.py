@@ -26,27 +26,27 @@ def tip(path):
     return path.position("rod.end")[-1]
 
 
-def test_the_order_of_loads_on_a_buckled_column():
+def test_the_order_of_loads_on_a_buckled_column(truth):
     thrust, side = cf.Force("rod.end", (0, 0, -P)), cf.Force("rod.end", (-0.05, 0, 0))
     path = cf.solve(column([thrust], [cf.Stage([side])]), tol=1e-9, branch=1)
-    np.testing.assert_allclose(tip(path)[[0, 2]], THRUST_FIRST, rtol=0, atol=1e-8)
+    truth("buckled column, thrust before side load, end over length", tip(path)[[0, 2]], THRUST_FIRST, 1e-8, of=1.0)
     assert path.stage.tolist() == sorted(path.stage) and set(path.stage) == {-1, 0} and path.error.max() <= 1e-9
     path = cf.solve(column([side], [cf.Stage([thrust])]), tol=1e-9)
-    np.testing.assert_allclose(tip(path)[[0, 2]], SIDE_FIRST, rtol=0, atol=1e-8)
+    truth("buckled column, side load before thrust, end over length", tip(path)[[0, 2]], SIDE_FIRST, 1e-8, of=1.0)
 
 
-def test_a_stage_has_events_and_is_followed_in_arc_length():
+def test_a_stage_has_events_and_is_followed_in_arc_length(truth):
     path = cf.solve(
         column([cf.Force("rod.end", (0, 0, -P))], [cf.Stage([cf.Force("rod.end", (-0.3, 0, 0))], name="side")]),
         branch=1, elements=24,
     )  # fmt: skip
     snap = next(event for event in path.events if event.stage == 0)
     assert snap.kind == "limit" and path.control == "arc" and path.stage[snap.after] == 0
-    assert -0.3 * snap.load_factor == pytest.approx(SNAP, rel=1e-8)
+    truth("buckled column, side load at which it snaps", -0.3 * snap.load_factor, SNAP, 1e-8)
     assert path.load_factors[-1] == 1 and path.stage[-1] == 0
 
 
-def test_a_ring_that_is_bent_and_then_twisted():
+def test_a_ring_that_is_bent_and_then_twisted(truth):
     """A straight rod becomes a ring that a twist of 2 pi sqrt(3) EI/GJ makes unstable (Michell, Zajac)."""
     EI, GJ, most = 0.02, 0.016, 14.5
     rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, 0.3), d1=(1, 0, 0)), cf.Stiffness((inf, inf), inf, (EI, EI), GJ), name="rod")
@@ -59,7 +59,8 @@ def test_a_ring_that_is_bent_and_then_twisted():
     scene = cf.Scene([rod], [cf.Clamp(rod.start), cf.Roller("rod@0.15", (0, 1, 0))], stages=stages)
     path = cf.solve(scene, elements=8)
     at = [most * event.load_factor for event in path.events if event.stage == 1]
-    np.testing.assert_allclose(at, 2 * pi * sqrt(3) * EI / GJ, rtol=1e-5)
+    for angle in at:
+        truth("twist at which a bent ring becomes unstable (Michell, Zajac)", angle, 2 * pi * sqrt(3) * EI / GJ, 1e-5)
     closed = np.flatnonzero(path.stage == 1)[0]
     np.testing.assert_allclose(path.position(end)[closed:], np.zeros((len(path) - closed, 3)), rtol=0, atol=1e-12)
     force, moment = path.reaction(end)

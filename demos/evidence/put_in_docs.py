@@ -42,6 +42,7 @@ PAGES = {
     "rods_in_wells": ("evidence/wells.md",),
     "benchmarks": ("benchmarks.md",),
     "mutants": ("evidence/tests.md",),
+    "truths": ("evidence/truths.md",),
 }
 #: The tables with a page of their own: its title and pictures.
 ALONE = {
