@@ -317,8 +317,9 @@ class RodModel:
         self.section = self._section_data(data)
         sizes = layout.sizes(scene) / scales.length
         lengths = bending_lengths(data, [rod.length / scales.length for rod in scene.rods], layout.counts)
-        structures = np.repeat([scene.number(scene.leader(rod)) for rod in scene.rods], layout.counts)
-        self.bounded_K = bounded(self.section, self.signature.formulation.force.stiff, sizes, lengths, structures)
+        self.structures = np.repeat([scene.number(scene.leader(rod)) for rod in scene.rods], layout.counts)
+        stiff = self.signature.formulation.force.stiff
+        self.bounded_K = bounded(self.section, stiff, sizes, lengths, self.structures)
         fill_fields(self.data, rods, self.section, self.bounded_K)
         self.round_off = float(self.round_off_of(self.section, sizes))
         self._rest = self._at_rest()

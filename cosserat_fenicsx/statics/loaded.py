@@ -170,7 +170,8 @@ class Loaded(Pointers):
         force, cases, sizes = model.signature.formulation.force, len(K), self._lengths[0]
         along, turning = ((x.reshape(cases, -1) / unit)[:, order] for x, unit in self._in_units(K, J))
         flat = model._in_space._replace(K=along.reshape(-1, 1, 3), J=turning.reshape(-1, 1, 3))
-        stiff = bounded(flat, force.stiff, *(np.tile(x, cases) for x in self._lengths))
+        apart = np.add.outer((model.structures.max() + 1) * np.arange(cases), model.structures).ravel()
+        stiff = bounded(flat, force.stiff, *(np.tile(x, cases) for x in self._lengths), apart)
         found = dict(zip(("K", "K_inv", "K_stiff", "J"), field_values(flat, stiff), strict=False))
         of_cases = flat._replace(K=along[:, :, None], J=turning[:, :, None])
         rounding = model.round_off_of(of_cases, sizes)
