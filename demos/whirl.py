@@ -55,17 +55,17 @@ def first_contact(turn):
     return float(solve_ivp(rates, (0, RUN_UP), start, events=outside, rtol=1e-9, atol=1e-12).t_events[0][0])
 
 
-def main(out="out/whirl", film=False, duration=DURATION):
+def main(out="out/whirl", film=False, duration=DURATION, run_up=RUN_UP):
     """Simulate the run-up and draw it.
 
     Args:
-        duration: of the simulation (s); the collar rolls from 8 s on.
+        duration, run_up: of the simulation and of the run-up (s); after 6 s of it the collar rolls from 8 s on.
         out: folder for pictures, or None; film: whether to write a film there.
 
     Returns:
         [Check].
     """
-    collar, wall, scene = spun_up(SPEED, RUN_UP, FRICTION)
+    collar, wall, scene = spun_up(SPEED, run_up, FRICTION)
     history = cf.simulate(scene, duration, dt=1e-3, save_every=4e-3, **MESH)
     middle = collar.at(LENGTH / 2)
     orbit, late = history.orbit(middle), history.whirl(middle, since=duration - 1.0)

@@ -152,7 +152,7 @@ def main(quick=False, out="out"):
     Returns:
         [(well, operation, what `measure` found)], and [(well, operation, s, largest estimated error)].
     """
-    runs, fine, depths = (1, 2048, 1) if quick else (5, FINE, DEPTHS)
+    runs, fine, depths = (1, 1024, 1) if quick else (5, FINE, DEPTHS)
     rows, sweeps = [], []
     for name in WELLS[:1] if quick else WELLS:
         hole = well(name)

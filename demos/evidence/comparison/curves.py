@@ -52,7 +52,7 @@ FULL = Settings(
 )
 QUICK = Settings(
     etas=tuple(np.union1d(_WHOLE[1::2], 0.9).tolist()),
-    coarse_etas=(0.5, 0.9, 1.5),
+    coarse_etas=(0.5, 0.9, 1.0, 1.5, 2.0),
     rungs=(16, 32, 64),
     mcre=(1, 2, 32),
     along=16,
