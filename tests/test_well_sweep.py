@@ -513,9 +513,9 @@ def test_tension_beyond_what_a_pipe_carries_is_told():
 
 
 def test_a_random_well():
-    """`make random-wells` compares 100 of them; here the rod's answers in one."""
+    """`make random-wells` compares 100 of them; here the rod's answer in one."""
     drawn = random_wells.draw(2)
-    for operation in drawn.operations[:2]:
+    for operation in drawn.operations[:1]:
         said, _, _, errors = random_wells.compare(drawn, operation)
         assert said == "rod" and len(errors) == 3 and all(true <= told for told, true in errors.values())
 

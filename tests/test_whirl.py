@@ -307,7 +307,7 @@ def test_a_coarse_map_agrees_with_the_theory(capsys):
 
     assert all(deviation(check) == 0 for check in whirl_map.main(quick=True))
     told = capsys.readouterr().out
-    assert "2 simulations of 2.5 s on 1 rank(s)" in told and "rolling backward in 1" in told
+    assert "2 simulations of 1.5 s on 1 rank(s)" in told and "rolling backward in 1" in told
 
 
 SOFT = cf.Stiffness((1e5, 1e5), 1e5, (1e3, 1e3), 1e3, mass=2.0, inertia=(0.1, 0.15, 0.2))

@@ -96,7 +96,7 @@ def _largest_around(sigma, *taus):
     return np.sqrt(mean + a * np.cos(x) + b * np.cos(2 * (y - x)))
 
 
-@functools.lru_cache(maxsize=64)
+@functools.lru_cache(maxsize=512)  # all nodes of a tapering rod
 def rectangle_fibres(width, height, nu, torsion):
     """The `Fibres` of a rectangle (width, height along d_1 and d_2, m; torsion: Saint-Venant's constant, m^4): corners,
     points on all sides, denser near the corners, and points inside. Between them von Mises stresses may be larger by
