@@ -108,7 +108,7 @@ def test_a_build_section_against_its_strong_form(case):
 @pytest.mark.slow
 def test_a_string_that_would_buckle_is_not_enough():
     """In a vertical hole it stays straight on the axis, far beyond the load at which it buckles."""
-    path = cf.well.WellPath.from_survey([0, 300], [0, 0], [0, 0])
+    path = cf.well.WellPath.from_survey([0, 600], [0, 0], [0, 0])
     found = cf.well.torque_and_drag(hole(path), STRING, cf.well.RotaryDrilling(12e3, 2e3), model="rod")
     assert found.error < 1e-9 and found.solved.negative_modes > 0
     assert not found.enough and found.model_error > 0 and "NOT STABLE without friction" in str(found)
@@ -393,12 +393,12 @@ def test_an_unknown_number_of_negative_modes_is_not_enough(out):
 @pytest.mark.serial
 def test_a_string_that_stays_straight_where_there_is_a_helix_is_not_enough():
     """In a vertical hole with friction: what the helix rubs is the error of the model."""
-    path = cf.well.WellPath.from_survey([0, 300], [0, 0], [0, 0])
-    given = {"depth": 300.0, "tol": 1e-3}
+    path = cf.well.WellPath.from_survey([0, 400], [0, 0], [0, 0])
+    given = {"depth": 400.0, "tol": 1e-3}
     lean, operation = hole(path, mu=0.3), cf.well.Sliding(90e3)
     answer = cf.well.torque_and_drag(lean, STRING, operation, model="rod", **given)
     buckled = cf.well.torque_and_drag(lean, STRING, operation, model="buckled", **given)
-    assert answer.solved.negative_modes > 10 and answer.hook_load == pytest.approx(300 * 241.13 - 90e3, rel=1e-6)
+    assert answer.solved.negative_modes > 10 and answer.hook_load == pytest.approx(400 * 241.13 - 90e3, rel=1e-6)
     apart = buckled.hook_load - answer.hook_load
     assert abs(apart) > 100 and not answer.enough
     assert answer.model_error == pytest.approx(abs(apart) / 90e3, rel=1e-3)
