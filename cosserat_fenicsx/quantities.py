@@ -203,6 +203,12 @@ def _named(key, unit):
     return found
 
 
+def span_in_words(values: Any, unit: str) -> str:
+    """Numbers (n,) as text: the first and the last one with their unit, "0 .. 2.5 N"."""
+    ends = [f"{x:.4g}" for x in np.atleast_1d(values)[[0, -1] if np.size(values) > 1 else slice(1)].tolist()]
+    return f"{' .. '.join(ends)} {unit}" if ends else "none"
+
+
 def as_text(value: Any, digits: int = 6, noise: float = 0.0) -> str:
     """A value in a table: with some digits, 0 where it is noise, "-" where it is unknown, texts as they are."""
     if isinstance(value, bool | np.bool_):

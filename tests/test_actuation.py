@@ -187,7 +187,7 @@ REFUSED = {
     "shrunk": (lambda: cf.Growth(ROD, 0.0), "Growth.factor"),
     "out of the plane": (
         lambda: cf.solve(cantilever(cf.Actuation(ROD, curvature=HELIX)), model="planar"),
-        r"load 1 \(Actuation on rod\) points out of the plane",
+        r"loads\[0\] \(Actuation on rod\) points out of the plane",
     ),
     "too few elements": (
         lambda: cf.solve(cantilever(cf.Actuation(ROD, curvature=HELIX)), [1.0], elements=2),

@@ -159,10 +159,7 @@ def test_pictures_are_asked_for(tmp_path, here):
     assert code == 0 and (tmp_path / "rods.png").stat().st_size > 10_000, trouble
     scene = cf.read(DEMO).scene
     path = solve(scene, [0.01, 0.02, 0.03])
-    assert (
-        plot._small(path, [0, 2], 20.0, 1.0)
-        == "displacements are at most 0.0076 m, magnify=100 (--magnify 100) shows them"
-    )
+    assert plot._small(path, [0, 2], 20.0, 1.0) == "displacements are at most 0.0076 m: magnify=100"
     assert plot._small(path, [0, 2], 20.0, 100.0) == ""
     code, _, trouble = here("run", DEMO, "--load-factors", "0.01", "-o", tmp_path, "--magnify", "-2")
     assert code == 2 and "plot.magnify = -2.0" in trouble
@@ -327,12 +324,7 @@ def test_modes(capsys):
     assert [float(row[2]) for row in rows] == pytest.approx(found.frequencies, rel=1e-6)
     for row in rows:
         along = [float(x) for x in row[-4:-1]]
-        assert (
-            "oscillates" in row[5]
-            and "column.end" in row[-5]
-            and along[2] == 0
-            and np.hypot(*along[:2]) == pytest.approx(1, abs=0.01)
-        )
+        assert "column.end" in row[-5] and along[2] == 0 and np.hypot(*along[:2]) == pytest.approx(1, abs=0.01)
 
 
 def test_soft_materials_are_asked_about(tmp_path, capsys):

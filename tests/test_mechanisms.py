@@ -273,9 +273,9 @@ def leaves(kind):
 
 
 @pytest.mark.parametrize("kind, words", [
-    ("force", "load 3 (Force at column@10) points out of the plane of the rods"),
-    ("moment", "load 3 (Moment at column@10) does not turn in the plane of the rods"),
-    ("support", "support 2 (Roller at column.end) constrains motions oblique to the plane of the rods"),
+    ("force", "loads[2] (Force at column@10) points out of the plane of the rods"),
+    ("moment", "loads[2] (Moment at column@10) does not turn in the plane of the rods"),
+    ("support", "supports[1] (Roller at column.end) constrains motions oblique to the plane of the rods"),
     ("section", "a section of rod 'column' has its principal axes (EI) oblique to the plane"),
 ])  # fmt: skip
 def test_what_leaves_the_plane_is_named(kind, words):

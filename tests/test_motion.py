@@ -252,7 +252,7 @@ def test_the_choice_of_the_model():
     _, scene = flying_in_space()
     assert cf.simulate(scene, 0.1, dt=0.1).model == "spatial"
     with pytest.raises(
-        cf.SceneError, match=r"model = 'planar': load 2 \(Moment at spaghetti.start\) does not turn in the plane"
+        cf.SceneError, match=r"model = 'planar': loads\[1\] \(Moment at spaghetti.start\) does not turn in the plane"
     ):
         cf.simulate(scene, 0.1, dt=0.1, model="planar")
     rod, flat = flying_in_a_plane()

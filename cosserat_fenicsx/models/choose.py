@@ -115,19 +115,19 @@ def _live(scene):
         if not traits.turns:
             return _names_components(i, load)
         if load.in_law:
-            return f"load {i + 1}, {describe(load)}, changes the strains without stress, which the model does not know"
+            return f"loads[{i}], {describe(load)}, changes the strains without stress, which the model does not know"
         known = traits.dead or (traits.known_force and load.station is not None)
         if not known or load.refreshed is not None:
             how = "turns with the rod" if load.follows else "depends on the motion"
             added = i >= len(scene.loads)  # `Action.companions`
-            load_and_why = f"{describe(load) if added else f'load {i + 1}, a {type(load).__name__},'} {how}"
+            load_and_why = f"{describe(load) if added else f'loads[{i}], a {type(load).__name__},'} {how}"
             return f"{load_and_why}, so that statics alone does not give the contact force"
     return ""
 
 
 def _names_components(i, load):
     return (
-        f"load {i + 1}, a {type(load).__name__}, has a virtual work that names components: "
+        f"loads[{i}], a {type(load).__name__}, has a virtual work that names components: "
         "expected one that takes its directions as vectors of its data"
     )
 
@@ -142,7 +142,7 @@ def not_flat(scene):
         if not traits.turns:
             return _names_components(i, load)
         if not traits.flat:
-            return f"load {i + 1}, a {type(load).__name__}, may drive the rods out of their plane"
+            return f"loads[{i}], a {type(load).__name__}, may drive the rods out of their plane"
     return ""
 
 

@@ -109,10 +109,9 @@ def _draw(path, points, magnify, color, side_by_side):
         bodies, factors = ({key: of[key] for key in of if key[0] == shown[0]} for of in (bodies, factors))
     span = span_of(path.scene, [Deformed(path, k, {}, magnify, 0.0) for k in shown], everywhere)
     moved, apart = dict.fromkeys(shown, np.zeros(3)), _apart(path.scene, shown, bodies, span, side_by_side)
-    title = _title(path, shown, magnify, _small(path, shown, size, magnify))
+    small = _small(path, shown, size, magnify)
     if apart:
         moved, (*_, up) = apart, view_of(span)
-        title.append("(shapes side by side, the axes beside the first)")
         everywhere = around([bodies[shown[0], rod].line for rod in path.scene.rods], everywhere, up)
         bodies = {(k, rod): replace(body, line=body.line + moved[k]) for (k, rod), body in bodies.items()}
         size = float(np.ptp(np.concatenate([body.line for body in bodies.values()]), axis=0).max())
@@ -131,7 +130,7 @@ def _draw(path, points, magnify, color, side_by_side):
     symbols = signs_of(
         pyvista, path.scene, shapes, np.concatenate([everywhere, *(body.line for body in bodies.values())]), span
     )
-    title += [*_thicker(factors.values()), *_undrawn(path.scene, magnify == 1)]
+    title = _title(path, shown, magnify, small, apart, factors.values())
     _finish(plotter, pyvista, everywhere, symbols, lines, title,
             lambda labels: _label(labels, path, shown, bodies, span, apart, letters(plotter)),
             4 if apart else 6)  # fmt: skip
@@ -171,11 +170,14 @@ def _draw_scene(scene):
     shapes = [Resting(radii)]
     symbols = signs_of(pyvista, scene, shapes, everywhere, span_of(scene, shapes, everywhere))
     named = len(scene.rods) <= _NAMED
-    title = [scene.title or "Scene", *_thicker(factors), *([] if named else [f"({len(scene.rods)} rods, not named)"])]
+    title = scene.title or "Scene"
     if any(load.scaled for load in scene.loads):
-        title[0] += ": loads at load factor 1"
-    title += ["(with the loads of all its stages)"] if scene.stages else []
-    _finish(plotter, pyvista, everywhere, symbols, at_rest(scene), title + _undrawn(scene, True),
+        title += ": loads at load factor 1"
+    notes = _noted(
+        *thicker(factors), "" if named else f"{len(scene.rods)} rods, not named",
+        "with the loads and supports of all its stages" if scene.stages else "", _undrawn(scene, True),
+    )  # fmt: skip
+    _finish(plotter, pyvista, everywhere, symbols, at_rest(scene), [title, *notes],
             lambda labels: _name(labels, scene, letters(plotter)) if named else None)  # fmt: skip
     return plotter
 
@@ -219,31 +221,31 @@ def _small(path, shown, size, magnify):
     if magnify * largest > VISIBLE * size or largest < 1e-12 * size:
         return ""
     decade = 10.0 ** math.floor(math.log10(0.1 * size / largest))
-    return f"displacements are at most {largest:.2g} m, magnify={decade:g} (--magnify {decade:g}) shows them"
+    return f"displacements are at most {largest:.2g} m: magnify={decade:g}"
 
 
-def _title(path, shown, magnify, small):
-    """The lines of the title: the points shown, and notes on displacements."""
+def _title(path, shown, magnify, small, apart, factors):
+    """The lines of the title: the points shown, and notes in parentheses."""
     some = "" if len(shown) == len(path) else f" (of {len(path)})"
     values = ", ".join(path.label(k) for k in shown)
     title = f"{path.scene.title or 'Deformed rods'}:"
     several = "s" if len(shown) > 1 else ""
     shapes = f"shape{several} at {path.axis}{several} {values}{some}"
     lines = [f"{title} {shapes}"] if len(title) + len(shapes) < _TITLE_WIDTH else [title, shapes]
-    if magnify != 1:
-        lines.append(f"(displacements magnified {magnify:g} times)")
-    if small:
-        lines.append(f"({small})")
-    return lines
+    magnified = f"displacements magnified {magnify:g} times" if magnify != 1 else ""
+    beside = "shapes side by side, the axes beside the first" if apart else ""
+    return [*lines, *_noted(magnified, small, beside, *thicker(factors), _undrawn(path.scene, magnify == 1))]
 
 
-def _thicker(factors):
-    return [f"({words})" for words in thicker(factors)]
+def _noted(*notes):
+    """Notes under a title as one text in parentheses, without those that are empty."""
+    told = "; ".join(filter(None, notes))
+    return [f"({told})"] if told else []
 
 
 def _undrawn(scene, tubes):
     words = without_sign(scene, tubes)
-    return [f"(not drawn: {textwrap.shorten(words, _TITLE_WIDTH, placeholder=' ...')})"] if words else []
+    return f"not drawn: {textwrap.shorten(words, _TITLE_WIDTH, placeholder=' ...')}" if words else ""
 
 
 def _spread(path, most):

@@ -30,6 +30,8 @@ _MOST_PANELS, _IN_A_ROW = 6, 3
 _WIDTH, _HEIGHTS, _TITLE, _LINE = 640, (560, 680), 90, 38
 # Largest rotation that is drawn, as the tangent of its angle.
 _STEEPEST = 1.0
+# Largest displacement in a picture, over the structure's size, that could not be seen; least share of it that moves.
+_SEEN, _MOVES = 0.02, 0.2
 # Memory for frames of a film, which are drawn once, bytes.
 _MEMORY = 200_000_000
 # Phases, as exp(i phase), that a picture has to hold.
@@ -87,8 +89,11 @@ class Drawn:
             angle = math.degrees(math.atan(self.factor * turned))
             self.note = f"largest rotation drawn as {angle:.0f} degrees"
         else:
-            share = 100 * self.factor * moved / size
-            self.note = f"largest displacement drawn as {share:.2g} % of the structure's size"
+            share = self.factor * moved / size
+            self.note = f"largest displacement drawn as {100 * share:.2g} % of the structure's size"
+        self._unseen = not self._by_turning and share < _SEEN
+        if self._unseen:
+            self.note += ", around the rods that move"
 
     def bodies(self, share=1.0):
         """The `Body` of every rod, displaced by `share` of the amplitude, from -1 to 1, or exp(i phase) of a complex
@@ -104,6 +109,15 @@ class Drawn:
             directors = _turned(frames, self.factor * turned)
             made.append(body_of(rod, x, line + self.factor * moved, directors, values))
         return made
+
+    def shown(self, everywhere):
+        """The points (n, 3) that a picture of points `everywhere` shows: those of the rods that move, where their
+        motion could not be seen in all."""
+        if not self._unseen:
+            return everywhere
+        rods = zip(self.lines, *(self.bodies(share) for share in _EXTREMES), strict=True)
+        moving = [(line, *bodies) for line, *bodies in rods if max(body.values.max() for body in bodies) > _MOVES]
+        return np.concatenate([points for line, *bodies in moving for points in (line, *(x.line for x in bodies))])
 
     def everywhere(self):
         """(n, 3) points of the equilibrium and of the shape on both sides."""
@@ -141,11 +155,18 @@ def _panels(found, shown, amplitude):
     plotter.add_text(head, position="upper_edge", color="black", font_size=14)
     for i, (k, shape) in enumerate(zip(shown, drawn, strict=True)):
         plotter.subplot(1 + i // across, i % across)
-        _add(plotter, pyvista, shape, shape.bodies(), everywhere)
-        text = f"k = {k}: {found.label(k)}\n{_below(shape, shape.bodies(), everywhere, _WIDTH)}"
+        seen = shape.shown(everywhere)
+        _add(plotter, pyvista, shape, shape.bodies(), seen)
+        text = f"k = {k}: {found.label(k)}{_most_at(found, k)}\n{_below(shape, shape.bodies(), seen, _WIDTH)}"
         plotter.add_text(text, position="upper_edge", color="black", font_size=11)
-        frame(plotter, everywhere, panel=True)
+        frame(plotter, seen, panel=True)
     return plotter
+
+
+def _most_at(found, k):
+    """Where a mode moves most, in words; nothing of one rod alone."""
+    place, _ = found.farthest(k)
+    return f", most at {place}" if place is not None and len(found.scene.rods) > 1 else ""
 
 
 def _height(everywhere):
@@ -188,14 +209,14 @@ class _Stage:
     def __init__(self, found, k, amplitude, size):
         pyvista = load_pyvista()
         self._shape = Drawn(found, k, amplitude)
-        self._everywhere = self._shape.everywhere()
+        self._everywhere = self._shape.shown(self._shape.everywhere())
         bodies = self._shape.bodies()
         self._plotter = stage(pyvista, size)
         self._surfaces = _add(self._plotter, pyvista, self._shape, bodies, self._everywhere)
         extent = float(np.ptp(self._everywhere, axis=0).max())
         self._factors = [thickening(body, extent, len(bodies)) for body in bodies]
         below = _below(self._shape, bodies, self._everywhere, size[0])
-        text = f"{_head(found, size[0])}\nk = {k}: {found.label(k)}\n{below}"
+        text = f"{_head(found, size[0])}\nk = {k}: {found.label(k)}{_most_at(found, k)}\n{below}"
         self._plotter.add_text(text, position="upper_edge", color="black", font_size=10)
         frame(self._plotter, self._everywhere, panel=True)
         self.at = lru_cache(maxsize=max(1, _MEMORY // (3 * size[0] * size[1])))(self._draw)

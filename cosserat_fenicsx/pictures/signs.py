@@ -28,7 +28,7 @@ class Resting:
     """The rods of a scene at rest, with its loads at load factor 1, and at their largest if they depend on time; radii:
     {rod: the radius that it is drawn with, m}."""
 
-    time = None
+    time, rests = None, True
 
     def __init__(self, radii):
         self._radii = radii
@@ -38,8 +38,8 @@ class Resting:
         return 1.0
 
     def supports(self, scene):
-        """The supports that hold."""
-        return scene.supports
+        """The supports that hold, of a scene at rest those of all stages."""
+        return scene.all_supports
 
     def line(self, rod):
         """(n, 3) the centreline of a rod, m."""
@@ -76,6 +76,8 @@ class Resting:
 class Deformed(Resting):
     """The rods at point k of a path or a motion, with displacements magnified, all shifted by a vector (3,), m."""
 
+    rests = False
+
     def __init__(self, result, k, radii, magnify, shift):
         super().__init__(radii)
         self._result, self._k, self._magnify, self._shift = result, k, magnify, shift
@@ -110,10 +112,11 @@ def signs_of(pyvista, scene, shapes, everywhere, span):
     size = sign_size(span, count)
     symbols = Symbols(pyvista, span, size, [shape.line(rod) for shape in shapes for rod in scene.rods])
     for mark in supports:
-        symbols.support(mark, last.pose(mark.station))
+        told = last.rests and mark.kind == "moved" and mark.vector is not None and mark.vector.any()
+        symbols.support(mark, last.pose(mark.station), quantity(np.linalg.norm(mark.vector), "m") if told else "")
     for mark in joints_of(scene):
         symbols.joint(mark, last.pose(mark.station))
-    for thread in (load for load in scene.loads if load.is_thread):
+    for thread in (load for load in scene.all_loads if load.is_thread):
         s = np.linspace(0, thread.rod.length, _ALONG_THREAD)
         _, arms, _ = at(thread, 0.0).data(thread.rod, s)
         symbols.thread(last.beside(thread.rod, arms.value))
@@ -162,8 +165,11 @@ def without_sign(scene, tubes, threads=True):
         shaped = tubes and (load.tube() is not None or load.drawn(corner, corner + 1) is not None)
         return shaped or (threads and load.is_thread) or has_sign(load, scene)
 
-    left_out = [load for load in scene.loads if not drawn(load)]
-    return ", ".join(dict.fromkeys(map(describe, left_out)))
+    kinds = {}
+    for load in scene.all_loads:
+        if not drawn(load):
+            kinds.setdefault(type(load).__name__, []).append(load)
+    return ", ".join(describe(same[0]) if len(same) == 1 else f"{len(same)} {name}s" for name, same in kinds.items())
 
 
 def _acting(scene, shapes):
@@ -225,8 +231,8 @@ def _support(support):
     if support.clamps:
         return Mark("clamp", support.station)
     if isinstance(support, Prescribed):
-        now = at(support, 0.0)
-        return Mark("moved", support.station, vector=None if now.displacement is None else np.array(now.displacement))
+        moved = at(support, 0.0).displacement
+        return Mark("moved", support.station, vector=None if moved is None else np.array(moved, dtype=float))
     if isinstance(support, Hinge):
         return Mark("hinge", support.station, vector=np.array(support.axis))
     if isinstance(support, Roller):

@@ -17,7 +17,7 @@ COLOURS = {
     "moments": "#e8710a",
     "springs": "#1f77b4",
     "masses": "#222222",
-    "tendons": "#0f8b6d",
+    "tendons": "#e0218a",
 }
 GROUPS = {
     "clamp": "supports", "pin": "supports", "hinge": "supports", "roller": "supports", "moved": "moved supports",
@@ -90,13 +90,22 @@ class Symbols:
 
     # -- supports and joints -----------------------------------------------------------------------------------------
 
-    def support(self, mark, pose):
-        """A plate for a clamp, a cone for a pin, a cone with the axis for a hinge, a cone on balls for a roller."""
+    def support(self, mark, pose, text=""):
+        """A plate for a clamp, a cone for a pin, a cone with the axis for a hinge, a cone on balls for a roller; with an
+        arrow for a prescribed displacement.
+
+        Args:
+            text: the label of that arrow; without one it is not drawn.
+        """
         a = self._size
         if mark.kind in ("clamp", "moved"):
             across = max(1.2 * a, 2.6 * pose.radius)
             out = np.zeros(3) if pose.inwards is None else -pose.inwards
             self._add(mark, self._box(pose.place + 0.17 * a * out, pose.directors, (across, across, 0.34 * a)))
+            if text:
+                along = mark.vector / np.linalg.norm(mark.vector)
+                away = self._placed(mark, pose.place, along, _ARROW * a, pose.radius + 0.2 * a, True)
+                self.texts.append((text, *away, COLOURS[GROUPS[mark.kind]]))
             return
         down = self._below(mark, pose)
         leaves = pose.inwards is not None and down @ pose.inwards < -1e-6  # beyond the end there is no rod

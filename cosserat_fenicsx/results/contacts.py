@@ -141,7 +141,7 @@ def contacts_in_words(path):
     part of estimated errors; and what touches without pressing, which may lift off."""
     if path.scene.stages:
         for stage, part in path.parts.items():
-            yield from (f"Stage {stage}: {sentence}" for sentence in contacts_in_words(part))
+            yield from (f"{path.stage_label(stage)}: {sentence}" for sentence in contacts_in_words(part))
         return
     largest = path.largest_displacement().max(initial=0.0)
     for obstacle in path.scene.actions:

@@ -186,6 +186,10 @@ class History(RodResult):
         """(n,) the times, s."""
         return self.times
 
+    def when(self, k: int, form: str = ".6g") -> str:
+        """Time k in words."""
+        return f"time {self.times[k]:{form}} s"
+
     def label(self, k: int) -> str:
         """The label of time k in pictures."""
         return f"{self.times[k]:.3g} s"

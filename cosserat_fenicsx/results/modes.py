@@ -182,7 +182,6 @@ class Modes(Shapes):
     rounding: np.ndarray | float = 0.0
 
     title = "Natural vibrations"
-    _on_screen = ("k", "frequency", "damping_ratio", "growth_rate", "motion", "error", "place", "direction")
     _quantities = by_name(
         Quantity("frequency", unit="Hz", axes=("mode",), getter="frequencies", digits=7),
         Quantity("period", unit="s", axes=("mode",), getter="periods", digits=5),
@@ -192,6 +191,17 @@ class Modes(Shapes):
         Quantity("error", "estimated relative error", axes=("mode",), digits=2, short="est. error"),
         Quantity("squares", "squared angular frequency", "rad^2/s^2", axes=("mode",)),
     )
+
+    @property
+    def _on_screen(self):
+        """Damping and growth only where there are such: the directions of modes need the room."""
+        growth = ("damping_ratio", "growth_rate") if self._grows else ()
+        motion = ("motion",) if set(self.kind) - {"oscillates"} else ()
+        return ("k", "frequency", *growth, *motion, "error", "place", "direction")
+
+    @property
+    def _grows(self):
+        return self.complex or bool(self.growth_rates.any())
 
     @property
     def complex(self) -> bool:
@@ -352,4 +362,5 @@ class Modes(Shapes):
     def _caption(self):
         of = "the eigenvalue" if self.complex else "the square of the frequency"
         frame = " Frequencies are those seen in the rotating frame." if self.rate is not None else ""
-        return f"est. error: relative, of {of}. Modes grow as exp(growth_rate t).{frame}"
+        grows = " Modes grow as exp(growth_rate t)." if self._grows else ""
+        return f"est. error: relative, of {of}.{grows}{frame}"

@@ -174,7 +174,7 @@ class Path(RodResult):
         station = self._most_displaced()
         turned = np.where((angle := self.rotation_angle(station)) > 1e-12, angle, 0.0)[-1]
         yield (
-            f"{title} the load factor {self.load_factors[-1]:.6g}, {_STATES[np.sign(self.negative_modes[-1])]}, "
+            f"{title} the load factor {self.load_factors[-1]:.6g}{self._of_stage(self.stage[-1])}, {_STATES[np.sign(self.negative_modes[-1])]}, "
             f"{station} is displaced by {self._moved_in_words(station, units)} and turned by {turned:.6g} rad."
         )
         for doubt in self.scene.doubts:
@@ -192,7 +192,26 @@ class Path(RodResult):
             )
 
     def _events_in_words(self):
-        return [f"{_KINDS[event.kind]} at the load factor {event.load_factor:.7g}" for event in self.events]
+        return [
+            f"{_KINDS[event.kind]} at the load factor {event.load_factor:.7g}{self._of_stage(event.stage)}"
+            for event in self.events
+        ]
+
+    def _of_stage(self, stage):
+        """The name of a stage after one of its load factors, in sentences."""
+        return f" of {self.stage_label(stage)}" if self.scene.stages else ""
+
+    def when(self, k: int, form: str = ".6g") -> str:
+        """The load factor of point k in words, with its stage."""
+        return f"load factor {self.load_factors[k]:{form}}{self._of_stage(self.stage[k])}"
+
+    def stage_label(self, stage: int) -> str:
+        """The name of a stage, or its number, in tables and pictures; empty of a scene without stages."""
+        return ""
+
+    @property
+    def _reasons(self):
+        return [sentence for sentence in self.why if sentence not in self.scene.doubts]  # which are in the answer
 
     def _more(self, units):
         yield from self._events_in_words()[_EVENTS:]
@@ -205,16 +224,19 @@ class Path(RodResult):
         known, stable = self.quantities, [stability(count) for count in self.negative_modes]
         title = f"{self.scene.title}\n" if self.scene.title else ""
         which, digits = None, 9 if rows == screen.ROWS else 6
+        ends = np.append(np.flatnonzero(np.diff(self.stage)), len(self) - 1)
         if rows == screen.ROWS:
-            beside = {k for event in self.events for k in (event.after, event.after + 1)}
+            beside = {k for event in self.events for k in (event.after, event.after + 1)} | {*ends.tolist()}
             which = [k for k in range(len(self)) if k < rows // 2 or k >= len(self) - rows // 2 or k in beside]
+        elif len(ends) > 1:
+            which = np.union1d(ends[-rows:], screen.rows_of(len(self), rows - len(ends)))
         shown = min(rows, len(self)) if which is None else len(which)
         left_out = ""
         if shown < len(self):
             left_out = f"{shown} of {len(self)} points: path.csv has all (-o DIR; path.write('path.csv') in Python).\n"
         return screen.table(
             [
-                *([(known["stage"], self.stage)] if self.scene.stages else []),
+                *([(known["stage"], [self.stage_label(k) for k in self.stage])] if self.scene.stages else []),
                 (known["load_factor"], self.load_factors),
                 (Quantity("displacement", unit="m", parts="xyz", short="d", digits=digits), self.displacement(station)),
                 (Quantity("rotation", unit="rad", noise=1e-12, digits=digits), self.rotation_angle(station)),
@@ -229,6 +251,7 @@ class Path(RodResult):
             f"iterations: Newton's, since the row above. est. error: the largest of {_bounded(self)}. "
             f"{actions_in_words(self.scene)}",
             which,
+            gaps=rows == screen.ROWS,
         )
 
     @property

@@ -31,13 +31,21 @@ _UNITS = {
 _BLOCK = 64
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Largest:
-    """The largest value of a quantity: its size (N m, N or Pa), its station, and the index of the point or time."""
+    """The largest value of a quantity: its size (N m, N or Pa) and its unit, its station, and the index of the point or
+    time. `print` shows the size."""
 
     size: float
     station: Station
     point: int
+    unit: str = ""
+
+    def __str__(self):
+        return f"{self.size:.4g} {self.unit}"
+
+    def __repr__(self):
+        return f"<{self} at {self.station}, point {self.point}>"
 
 
 class Extremes(OnNodes):
@@ -56,7 +64,7 @@ class Extremes(OnNodes):
             "compression" (N) and, of the rods that know them, "normal stress" (its size) and "von Mises stress" (Pa,
             see `stress`), without those that are zero up to rounding.
         """
-        found = dict.fromkeys(_UNITS, Largest(0.0, None, 0))
+        found = {what: Largest(0.0, None, 0, unit) for what, unit in _UNITS.items()}
         inside = np.linspace(0, 1, _PLACES * self.degree + 1)
         for first in range(0, len(self), _BLOCK):
             which = range(first, min(first + _BLOCK, len(self)))
@@ -67,7 +75,7 @@ class Extremes(OnNodes):
                     k, place = np.unravel_index(np.argmax(sizes >= most - _ROUNDING * abs(most)), sizes.shape)
                     if sizes[k, place] > (1 + _ROUNDING) * found[what].size:
                         s = self._places(i, inside).ravel()[place]
-                        found[what] = Largest(float(sizes[k, place]), rod.at(s), first + int(k))
+                        found[what] = Largest(float(sizes[k, place]), rod.at(s), first + int(k), _UNITS[what])
         most = {unit: max(x.size for what, x in found.items() if _UNITS[what] == unit) for unit in _UNITS.values()}
         return {what: x for what, x in found.items() if x.size > _ROUNDING * most[_UNITS[what]]}
 
@@ -112,13 +120,8 @@ class Extremes(OnNodes):
 
 def largest_in_words(path):
     """`Extremes.largest` as a line of text, and which rods' stresses it cannot know."""
-    moves = path.axis == "time"
-    unit = " s" if moves else ""
-    told = [
-        f"{what} {x.size:.4g} {_UNITS[what]} ({x.station}, {path.axis} {path.along_axis[x.point]:.4g}{unit})"
-        for what, x in path.largest().items()
-    ]
-    limits = " (tol limits errors of positions only)" if moves else ""
+    told = [f"{what} {x} ({x.station}, {path.when(x.point, '.4g')})" for what, x in path.largest().items()]
+    limits = " (tol limits errors of positions only)" if path.axis == "time" else ""
     line = f"Largest on this mesh{limits}: {'; '.join(told) or 'no force or moment'}."
     return "\n".join([line, *_unknown_in_words(path)])
 
@@ -208,8 +211,7 @@ def reactions_in_words(result):
     contact = result._contact_of(len(result) - 1)
     n = np.linalg.norm(contact[..., :3], axis=-1).max() * result.scales.force
     m = np.linalg.norm(contact[..., 3:], axis=-1).max() * result.scales.moment
-    at = result.along_axis[-1]
-    when = f"at the {result.axis} {at:.6g}" if result.axis != "time" else f"in the step that ends at t = {at:.6g} s"
+    when = f"{'in the step that ends at the' if result.axis == 'time' else 'at the'} {result.when(-1)}"
     for support in result.scene.all_supports:
         try:
             force, moment = (values[-1] for values in result.reaction(support))

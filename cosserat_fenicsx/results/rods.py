@@ -505,9 +505,14 @@ class RodResult(Result, Extremes, Reactions, Stresses, States):
 
     def _more(self, units):
         if len(self):
-            yield largest_in_words(self)
-            yield from reactions_in_words(self)
-        yield f"{self.model} model: {'; '.join(self.why)}."
+            yield units.sentence(largest_in_words(self))
+            yield from map(units.sentence, reactions_in_words(self))
+        yield units.sentence(f"{self.model} model: {'; '.join(self._reasons)}.")
+
+    @property
+    def _reasons(self):
+        """What `details` tells of `why`."""
+        return self.why
 
     # -- files and pictures ------------------------------------------------------------------------------------------
 

@@ -30,15 +30,15 @@ def rows_of(count, most):
     return np.unique(np.linspace(0, count - 1, min(most, count)).round().astype(int)) if count else np.arange(0)
 
 
-def table(given, units, rows, title=None, caption=None, which=None):
+def table(given, units, rows, title=None, caption=None, which=None, gaps=True):
     """A table of quantities.
 
     Args:
         given: pairs of a `Quantity` and its values (n,) or (n, components).
         units: the `Units`. rows: the most of them; those in between are left out.
-        which: indices of rows instead, with dots for those between.
+        which: indices of rows instead; gaps: with dots for those between.
     """
-    count, gaps = len(given[0][1]), which is not None
+    count, gaps = len(given[0][1]), gaps and which is not None
     which = rows_of(count, rows) if which is None else which
     found = Table(title=title, caption=caption)
     texts = []

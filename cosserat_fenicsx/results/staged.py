@@ -34,7 +34,13 @@ class StagedPath(Path):
     def __init__(self, scene, parts: Mapping[int, Path]):
         first, *_ = found = list(parts.values())
         general = max(found, key=lambda part: _MODELS.index(part.model))
-        why = [f"stage {stage}: {sentence}" for stage, part in parts.items() for sentence in part.why]
+        told = {}
+        for stage, part in parts.items():
+            for sentence in part.why:
+                told.setdefault(sentence, []).append(stage)
+        labels = {leg.stage: leg.label for leg in scene.legs}
+        why = [sentence if len(of) == len(found) else f"{', '.join(labels[k] for k in of)}: {sentence}"
+               for sentence, of in told.items()]  # fmt: skip
         super().__init__(
             scene, first.layout, first.scales, first.rule, comm=first.comm, model=general.model,
             formulation=general.formulation, degree=first.degree, unknowns=max(part.unknowns for part in found),
@@ -68,7 +74,11 @@ class StagedPath(Path):
         return self._stage + self.load_factors / np.array([ends[stage] for stage in self._stage.tolist()])
 
     def label(self, k):
-        return f"{self._stage[k]}: {super().label(k)}"
+        return f"{self.stage_label(self._stage[k])}: {super().label(k)}"
+
+    def stage_label(self, stage):
+        """See `Path`."""
+        return self._legs[stage].label
 
     def share_of(self, load, k):
         return self._legs[self._stage[k]].share_of(load, self.load_factors[k])

@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cosserat_fenicsx.numerics import conjugate_product, directors
+from cosserat_fenicsx.quantities import span_in_words
 from cosserat_fenicsx.results.compared import cell_nodes
 from cosserat_fenicsx.scene.action import without_stress
 from cosserat_fenicsx.scene.signals import at
@@ -16,10 +17,14 @@ _INSIDE = 1e-9
 
 
 class TendonState(NamedTuple):
-    """A tendon in several states: its tension (n,), N, and its length along the rod (n,), m."""
+    """A tendon in several states: its tension (n,), N, and its length along the rod (n,), m; `print` shows the first
+    and the last."""
 
     tension: np.ndarray
     length: np.ndarray
+
+    def __str__(self):
+        return f"tension {span_in_words(self.tension, 'N')}, length {span_in_words(self.length, 'm')}"
 
 
 class Threads:

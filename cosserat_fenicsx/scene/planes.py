@@ -97,7 +97,7 @@ def _find(scene):
         bent = [np.linalg.norm(np.cross(v, normal)) for v in _units(across)]
         if max([*np.abs(_units(inside) @ normal), *bent], default=0.0) > _SMALLEST_ANGLE:
             what = "does not turn in" if across and not inside else "points out of"
-            raise _Leaves(f"load {i + 1} ({describe(load)}) {what} the plane of the rods")
+            raise _Leaves(f"loads[{i}] ({describe(load)}) {what} the plane of the rods")
     for rod, (s, frames) in zip(scene.rods, tangents, strict=True):
         _check_section(rod, s, frames, normal)
         if rod.mass_centre:
@@ -206,9 +206,9 @@ def _check_section(rod, s, frames, normal):
 
 def _check_supports(scene, plane):
     """Refuse supports and joints whose constraints do not split into those in the plane and those out of it."""
-    for what, holders in (("support", scene.supports), ("joint", [j for j in scene.joints if not j.rigid])):
+    for what, holders in (("supports", scene.supports), ("joints", scene.joints)):
         for i, holder in enumerate(holders):
-            ties = holder.ties()
+            ties = () if what == "joints" and holder.rigid else holder.ties()
             if not ties:
                 continue
             rows = [rows_of(tie)[0][1] for tie in ties]
@@ -220,4 +220,4 @@ def _check_supports(scene, plane):
             if apart > np.linalg.matrix_rank(np.array(rows), tol=_PARALLEL) or max(out, default=0.0) > _SMALLEST_ANGLE:
                 where = getattr(holder, "station", None) or f"{holder.first} with {holder.second}"
                 name = type(holder).__name__
-                raise _Leaves(f"{what} {i + 1} ({name} at {where}) constrains motions oblique to the plane of the rods")
+                raise _Leaves(f"{what}[{i}] ({name} at {where}) constrains motions oblique to the plane of the rods")

@@ -106,8 +106,10 @@ def check_tensions(scene, load_factors, leg=None):
                 )
 
 
-# Young's moduli below this, Pa, are probably mistakes in units.
-_SOFTEST = 1e6
+# Young's moduli below this, Pa, are probably mistakes in units; of materials of these densities, kg/m^3, below this.
+_SOFTEST, _RUBBER, _SOFTEST_RUBBER = 1e6, (900.0, 1500.0), 1e4
+# Places along a rod at which tendons are compared with its surface.
+_ALONG_TENDON = 33
 # Densities, kg/m^3, and moduli, Pa, of steel and cast iron; rolled profiles are of these.
 _STEEL, _METAL = (7000.0, 8200.0), (5e10, 5e11)
 # Solid bars of metal that are thicker, m, are probably given in mm.
@@ -354,7 +356,7 @@ class Scene(Part):
     @property
     def cautions(self) -> list[str]:
         """Warnings that belong to every result, a list of sentences."""
-        return [*self.doubts, *self._following()]
+        return [*self.doubts, *self._following(), *self._outside()]
 
     @cached_property
     def doubts(self):
@@ -401,7 +403,7 @@ class Scene(Part):
                     steel = steel or "of a rolled profile"
                 if steel and not _METAL[0] <= E <= _METAL[1]:
                     asked[E] = f"{steel} is {'less' if E < _METAL[0] else 'more'} than that of steel or cast iron"
-                elif E < _SOFTEST:
+                elif E < (_SOFTEST_RUBBER if _RUBBER[0] <= (density or 0) <= _RUBBER[1] else _SOFTEST):
                     asked[E] = "is softer than most rubbers"
         return [
             f'E = {E:g} Pa {why}: are the units SI (N, m, Pa; steel has 210e9, or "210 GPa")?'
@@ -440,6 +442,22 @@ class Scene(Part):
             "part, do not decide on stability: an equilibrium with some may be stable (Beck's column from pi^2 to "
             "20.05 EI/L^2), one with none may flutter, which only dynamics can show"
         ]
+
+    def _outside(self):
+        """Sentences on tendons that run outside their rods."""
+        for load in self.all_loads:
+            if not load.is_thread:
+                continue
+            s = np.linspace(0, load.rod.length, _ALONG_TENDON)
+            _, arms, _ = at(load, 0.0).data(load.rod, s)
+            arms = np.linalg.norm(arms.value, axis=1)
+            radii = [load.rod.section_at(x).round_radius or np.inf for x in s.tolist()]
+            far = int(np.argmax(arms / radii))
+            if arms[far] > (1 + 1e-9) * radii[far]:
+                yield (
+                    f"{describe(load)} runs {arms[far]:.3g} m from the axis at {load.rod.at(s[far])}, outside the rod "
+                    f"of radius {radii[far]:.3g} m there: discs or guides have to hold it"
+                )
 
     def plot(self, file=None, *, units="SI"):
         """Picture of the rods at rest with their names, supports, joints and loads (at load factor 1).

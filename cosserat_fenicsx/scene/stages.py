@@ -106,7 +106,7 @@ class Leg:
         ramped: those times the load factor; released ones with the opposite of what they have in `standing`.
         supports: `Named`.
         released: the released supports, indices into `supports` of the leg before.
-        words: its name in messages.
+        words: its name in messages; name: that of its stage, which may be empty.
     """
 
     stage: int
@@ -116,6 +116,12 @@ class Leg:
     supports: tuple
     released: tuple = ()
     words: str = "the scene's own loads"
+    name: str = ""
+
+    @property
+    def label(self):
+        """Its name in pictures and tables."""
+        return "own loads" if self.stage < 0 else self.name or f"stage {self.stage}"
 
     @property
     def last(self):
@@ -137,8 +143,9 @@ def refuse_stages(owner, scene):
     """Refuse (SceneError) a scene with stages where a function, `owner`, would leave them out."""
     if scene.stages:
         raise SceneError(
-            f"Scene.stages: {owner} knows no stages: expected `solve`, or the scene without them, "
-            "dataclasses.replace(scene, stages=())"
+            f"Scene.stages: {owner} knows no stages: expected `solve`, whose path.events tell where a stage loses its "
+            "stability (also beyond its loads, Stage(load_factors=(0, 5))), path.part(stage).modes() for vibrations, or "
+            "the scene without stages, dataclasses.replace(scene, stages=())"
         )
 
 
@@ -241,7 +248,9 @@ def legs_of(scene):
         begins = "moving" if legs else "fixed"  # in the reference every support is where it is
         added = [Named(f"stages[{i}].supports[{j}]", x, begins if x.moves else "held" if legs else "fixed")
                  for j, x in enumerate(stage.supports)]  # fmt: skip
-        legs.append(Leg(i, stage.load_factors, tuple(always), tuple(ramped), (*kept, *added), released, words))
+        legs.append(
+            Leg(i, stage.load_factors, tuple(always), tuple(ramped), (*kept, *added), released, words, stage.name)
+        )
     return legs
 
 

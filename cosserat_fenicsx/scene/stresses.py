@@ -12,9 +12,19 @@ from collections import namedtuple
 
 import numpy as np
 
-#: Stresses at sections (...), Pa. von_mises: the largest of the section, sqrt(sigma^2 + 3 tau^2); axial_max, axial_min:
-#: the largest and the smallest normal stress sigma of the section, tension positive.
-Stress = namedtuple("Stress", "von_mises axial_max axial_min")
+from cosserat_fenicsx.quantities import span_in_words
+
+
+class Stress(namedtuple("Stress", "von_mises axial_max axial_min")):
+    """Stresses at sections (...), Pa. von_mises: the largest of the section, sqrt(sigma^2 + 3 tau^2); axial_max,
+    axial_min: the largest and the smallest normal stress sigma of the section, tension positive. `print` shows the
+    first and the last."""
+
+    __slots__ = ()
+
+    def __str__(self):
+        return ", ".join(f"{name} {span_in_words(np.ravel(x), 'Pa')}" for name, x in self._asdict().items())
+
 
 # Newton iterations for the largest von Mises stress around a circle; intervals along the radius.
 _ITERATIONS, _RINGS = 6, 8
