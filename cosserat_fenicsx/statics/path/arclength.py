@@ -47,6 +47,13 @@ _CHANGED = (
 )
 
 
+def plain(track, a, b, weight, scale):
+    """Whether a step between two points with tangents is so short and straight that it cannot have changed to another
+    path; scale: the length of the path from the unloaded state."""
+    found = bends(track, a, b, weight)
+    return found.length < _STEPS.short * scale and found.turn < _STEPS.straight and found.corner < _STEPS.straight / 10
+
+
 class ArcLength:
     """Advances a `Track` in steps of arc length, by a `StepControl` and a `Locator`; `on_event` is called with every
     `Crossing`, and the continuation ends there where it returns True."""
@@ -117,12 +124,7 @@ class ArcLength:
 
     def _plain(self, point):
         """Whether a step is so short and straight that it cannot have changed to another path."""
-        found = bends(self.track, self.track.here, point, self._weight)
-        return (
-            found.length < _STEPS.short * self._scale
-            and found.turn < _STEPS.straight
-            and found.corner < _STEPS.straight / 10
-        )
+        return plain(self.track, self.track.here, point, self._weight, self._scale)
 
     def _accept(self, point, end):
         """Accept a point, within the step from the last point to `end` or at its end."""

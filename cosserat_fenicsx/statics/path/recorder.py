@@ -23,10 +23,11 @@ from cosserat_fenicsx.results.records import Event, Record, Records
 from cosserat_fenicsx.results.staged import StagedPath
 from cosserat_fenicsx.scene.action import rubs
 from cosserat_fenicsx.statics.critical import derivatives_of
+from cosserat_fenicsx.statics.path.arclength import plain
 from cosserat_fenicsx.statics.path.chord import Chord
 from cosserat_fenicsx.statics.path.events import Lost
 from cosserat_fenicsx.statics.path.follower import Follower
-from cosserat_fenicsx.statics.path.track import NEAR, NOTHING
+from cosserat_fenicsx.statics.path.track import NEAR, NOTHING, between
 from cosserat_fenicsx.statics.problem import Promoted, record_of
 
 # Loads over EA (about the axial strain) above which messages ask for the units.
@@ -37,6 +38,8 @@ _SHORTER = 1e-3
 _RESOLVED = 100.0
 #: Newton iterations allowed for a point corrected from a coarser mesh.
 CORRECTIONS = 6
+# Times that the way between two points is halved to find the events there.
+_HALVINGS = 5
 # Largest distance of a point from the same one on a coarser mesh, over the distance of the latter's neighbours.
 _ASIDE = 0.3
 
@@ -312,16 +315,24 @@ class Tracing:
         self.path.control, self.path.left = "arc", coarse.left
         return self.path
 
-    def _meet_between(self, a, b, weight):
-        """Report the events between two points of a path on a coarser mesh that were found on this one."""
+    def _meet_between(self, a, b, weight, halvings=_HALVINGS):
+        """Report the events between two points of a path on a coarser mesh that were found on this one: in halves of
+        the way where they cannot be resolved in all of it."""
+        scale = self.track.length(between(self.track.origin, a), weight)
+        chord = Chord(self.track, a, b, weight, short=plain(self.track, a, b, weight, scale))
         try:
-            crossings = self._follower.locator.crossings(Chord(self.track, a, b, weight))
+            crossings = self._follower.locator.crossings(chord)
         except Lost as lost:
-            raise NotConverged(
-                f"an event of the path was not found on a finer mesh: {lost.reason}", self.path
-            ) from None
-        for crossing in crossings:
-            self._meet(crossing)
+            middle = chord.at(0.5) if halvings else None
+            if middle is None:
+                raise NotConverged(
+                    f"an event of the path was not found on a finer mesh: {lost.reason}", self.path
+                ) from None
+            self._meet_between(a, middle[1], weight, halvings - 1)
+            self._meet_between(middle[1], b, weight, halvings - 1)
+        else:
+            for crossing in crossings:
+                self._meet(crossing)
 
     def _to_fork(self, coarse):
         """Locate the events up to the bifurcation where the path was left; index of the last point before that."""
