@@ -18,7 +18,8 @@ from cosserat_fenicsx.storage.store import Store, holds
 
 _TAKEN = ("duration", "dt", "elements", "model", "save_every")
 # Files that may be written.
-_NAMES = ("drilling.csv", "drilling.png", "energy.png", "phase.png", "map.png", "stability.csv", "stability.png")
+_NAMES = ("drilling.csv", "drilling.png", "energy.png", "phase.png", "map.png", "stability.csv", "stability.png",
+          "response.csv", "response.png")  # fmt: skip
 
 
 def _scene(options, found):
@@ -36,18 +37,19 @@ def run(options, found, tables):
     if found.title:
         say(found.title, file=sys.stdout)
     _check_folder(options.folder, found.scene)
-    code = DONE
-    if "duration" in found.settings or not found.speeds:
+    code, linear = DONE, {"stability": found.speeds and found.map, "response": found.response and found.respond}
+    if "duration" in found.settings or not any(linear.values()):
         code = deliver_motion(lambda: found.run(folder=options.folder), options, tables)
-    if code != DONE or not found.speeds:
-        return code
-
-    def files_of(answer):
-        chart = not options.no_picture and partial(answer.plot, units=options.units or "SI")
-        return {"stability.csv": partial(answer.write, units=options.units or "SI"), "stability.png": chart}
-
     of_output = Namespace(output=options.output, scene=options.scene, units=options.units)
-    return deliver(found.map, of_output, ("stability.csv", "stability.png"), files_of, tables)
+    for name, computed in linear.items():
+        if code == DONE and computed:
+
+            def files_of(answer, name=name):
+                chart = not options.no_picture and partial(answer.plot, units=options.units or "SI")
+                return {f"{name}.csv": partial(answer.write, units=options.units or "SI"), f"{name}.png": chart}
+
+            code = deliver(computed, of_output, (f"{name}.csv", f"{name}.png"), files_of, tables)
+    return code
 
 
 def _check_folder(folder, scene):

@@ -86,7 +86,7 @@ def _outputs(parser):
     _output(parser, "path.xdmf, path.h5, path.csv, rods.png and rods.html, or of a motion motion.xdmf, .h5, .csv, "
             "rods.png, rods.html and energy.png, and result.h5, which read_result of Python reads; of a "
             "string in a well a .csv and pictures for each operation and for the depth_sweep; of a drill-string in "
-            "motion drilling.csv, charts and stability.csv")  # fmt: skip
+            "motion drilling.csv, charts, stability.csv and response.csv")  # fmt: skip
     parser.add_argument("--color", metavar="FIELD",
                         help="rods.png and films: field that colours the rods, such as shear_force or m.x "
                         "[tension of cables, else what stores most energy and varies]")  # fmt: skip

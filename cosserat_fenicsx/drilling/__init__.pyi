@@ -16,6 +16,7 @@ from cosserat_fenicsx.drilling.linear.excitation import campbell as campbell
 from cosserat_fenicsx.drilling.linear.frequencies import SoftSpeed as SoftSpeed
 from cosserat_fenicsx.drilling.linear.frequencies import SoftTorque as SoftTorque
 from cosserat_fenicsx.drilling.linear.frequencies import natural_frequencies as natural_frequencies
+from cosserat_fenicsx.drilling.linear.hfto import Hfto as Hfto
 from cosserat_fenicsx.drilling.linear.limits import critical_slopes as critical_slopes
 from cosserat_fenicsx.drilling.linear.limits import limit_speed as limit_speed
 from cosserat_fenicsx.drilling.linear.limits import limit_weight as limit_weight

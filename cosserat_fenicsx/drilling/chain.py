@@ -142,7 +142,7 @@ def _chain_of_string(drilling, dt, elements, axial):
     def of(name):
         return np.array([getattr(s, name) for s in segments])[which]
 
-    drag = drilling.drag
+    drag, damping_time = drilling.drag, of("damping_time")
     rates = (0.0, 0.0) if drag is None else (drag.axial, drag.torsion)
     kinds = [("rhoA", "EA", rates[0])] * axial + [("rhoJ", "GJ", rates[1])]
     columns = []
@@ -150,10 +150,11 @@ def _chain_of_string(drilling, dt, elements, axial):
         mass, spring = of(inertia) * lengths, of(stiffness) / lengths
         courant = dt * np.sqrt(spring / mass)
         share = np.minimum(_SET.coupling[0] + courant**2 / 6, _SET.coupling[1])
-        diagonal = np.zeros(len(depths))
-        diagonal[:-1] += (0.5 - share) * mass
-        diagonal[1:] += (0.5 - share) * mass
-        columns.append((diagonal, share * mass, rate * diagonal, rate * share * mass, spring))
+        diagonal, damped, damper = np.zeros(len(depths)), np.zeros(len(depths)), damping_time * spring
+        for at_ends, ends in ((diagonal, (0.5 - share) * mass), (damped, damper)):
+            at_ends[:-1] += ends
+            at_ends[1:] += ends
+        columns.append((diagonal, share * mass, rate * diagonal + damped, rate * share * mass - damper, spring))
     return Chain(depths, *_stacked(columns), *_against_the_wall(drilling, depths))
 
 

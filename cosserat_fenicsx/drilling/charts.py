@@ -453,9 +453,7 @@ _DECADES = 20
 @_drawn
 def draw_response(answer):
     """See `FrequencyResponse.plot`."""
-    from cosserat_fenicsx.drilling.linear.response import ENDS, SHOWN
-
-    above, surface, moved, source = ENDS[answer.kind]
+    above, surface, moved, source = answer.ends
     figure, panels = stacked(8, [2.1, 1.5, 2.1, 2.1])
     order = np.argsort(answer.frequency)
     f, torque = answer.frequency[order], answer.transfer(source, surface)[order]
@@ -466,7 +464,7 @@ def draw_response(answer):
     turned = np.flatnonzero(np.abs(np.diff(phase)) > 180) + 1  # from -180 to 180 degrees
     panels[1].plot(np.insert(f, turned, np.nan), np.insert(phase, turned, np.nan), color=DRIVE)
     panels[1].set(ylabel="its phase\n(degrees)", yticks=[-180, -90, 0, 90, 180], ylim=(-190, 190))
-    (turn, turning), (push, pushing) = map(unit_of, SHOWN[answer.kind])
+    (turn, turning), (push, pushing) = map(unit_of, answer.shown)
     for name, colour in ((above, DRIVE), (moved, BIT)):
         size = np.abs(answer.transfer(source, name)[order]) / turning * pushing
         if size.any():
@@ -488,4 +486,25 @@ def draw_response(answer):
     at = f", {answer.speed / size:.4g} {rpm}" if answer.speed else ""
     drive = f", {_words_on_drive(answer.scene).partition(' at ')[0]}" if answer.kind == "torsion" else ""
     figure.suptitle(f"Response of the string in {answer.kind}{at}{drive}" + "".join(f"\n{x}" for x in answer.cautions))
+    return figure
+
+
+@_drawn
+def draw_hfto(answer):
+    """See `Hfto.plot`."""
+    if not len(answer):
+        raise SceneError("plot: expected at least one oscillation, this state keeps up none")
+    figure, panels = stacked(8, [2.4, 2.4])
+    shown = (SPEED, answer.amplitude, "bit speed +-", BIT), (TORQUE, answer.torque, "largest torque +-", DRIVE)
+    for panel, (quantity, values, label, colour) in zip(panels, shown, strict=True):
+        unit, size = unit_of(quantity, values)
+        panel.vlines(answer.frequency, 0, values / size, color=colour, linewidth=0.9)
+        panel.plot(answer.frequency, values / size, "o", color=colour, markersize=4)
+        panel.set_ylabel(f"{label} ({unit})")
+        panel.set_ylim(bottom=0)
+    rpm, size = unit_of(SPEED)
+    panels[0].axhline(answer.speed / size, color="black", linestyle="--", label="mean speed of the bit")
+    legend(panels[0])
+    panels[-1].set_xlabel("frequency (Hz)")
+    figure.suptitle(f"Torsional oscillations that the bit keeps up, {answer.speed / size:.4g} {rpm}")
     return figure

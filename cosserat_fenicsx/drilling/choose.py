@@ -134,7 +134,7 @@ def with_step(scene, name, model, factor: float):
     Raises:
         SceneError: a step that the laws of friction do not allow, or a mesh that is as coarse as it can be.
     """
-    if name == TORSION or scene.discs:
+    if isinstance(model, TorsionWaves) or scene.discs:
         return model_of(scene, name, factor * model.dt)
     asked = max(2, round((len(model.depths) - 1) / factor))
     other = model_of(scene, name, factor * model.dt, asked)
@@ -155,8 +155,8 @@ def model_of(scene, name, dt=None, elements=None):
     """
     if scene.discs and elements is not None:
         refuse("simulate", "elements", elements, "None for Discs, which are not divided")
-    if scene.discs or name == BOTH:
-        return AxialTorsional(scene, dt, elements)
+    if scene.discs or name == BOTH or scene.damped:
+        return AxialTorsional(scene, dt, elements, axial=name == BOTH)
     if dt is not None and elements is not None:
         refuse("simulate", "elements", elements, "None beside dt: waves of torsion have cells of one step")
     return TorsionWaves(scene, dt, elements)

@@ -8,7 +8,6 @@ import numpy as np
 from cosserat_fenicsx.checks import File, number
 from cosserat_fenicsx.drilling.protocol import LEDGER, PROFILE, SERIES
 from cosserat_fenicsx.drilling.scene import Drilling
-from cosserat_fenicsx.drilling.segments import Discs
 from cosserat_fenicsx.drilling.stick_slip import SPEED, TORQUE, StickSlip, alias, stick_slip_of
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.quantities import Quantity, as_text
@@ -152,7 +151,7 @@ class DrillingHistory(Result):
     @property
     def mean_times(self) -> np.ndarray:
         """(n,) s: the middles of the steps over which forces, torques and some speeds are means, see the class."""
-        over_two = self.model == "torsion" and not isinstance(self.scene.string, Discs)
+        over_two = self.model == "torsion" and not (self.scene.discs or self.scene.damped)
         return self.times - (self.dt if over_two else self.dt / 2)
 
     @property

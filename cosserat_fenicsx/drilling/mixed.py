@@ -120,6 +120,9 @@ def _line(drilling, top):
 
 
 def _damping(drilling):
+    if drilling.damped:
+        refuse("mixed_scene", "drilling.string", drilling.string, "components without damping_time: the pipe above the "
+               "rod has none")  # fmt: skip
     drag = drilling.drag
     if drag is None or drag.torsion == drag.axial == 0:
         return None

@@ -24,7 +24,7 @@ SERIES = (
 )  # fmt: skip
 #: Energies and, since the start, works and losses, J, of the string above the rock with drive and bit. Up to the loss
 #: of the scheme: kinetic + strain = work_of_drive + work_of_hook + work_of_weight - lost_at_bit - lost_at_wall -
-#: lost_in_mud. work_of_drive is done by the torque that the control asks for.
+#: lost_in_mud. work_of_drive is done by the torque that the control asks for; lost_in_mud is that of dampers, too.
 LEDGER = (
     "kinetic", "strain", "work_of_drive", "work_of_hook", "work_of_weight", "lost_at_bit", "lost_at_wall",
     "lost_in_mud",

@@ -88,6 +88,11 @@ class Drilling(InWords, Part):
         mud = self.mud if self.mud is not None or self.hole is not None else Mud(0.0)
         return tuple(segment_of(place, weight_in_mud(place.component, mud)) for place in reversed(self.laid))
 
+    @property
+    def damped(self) -> bool:
+        """Whether a component has a damping time: its motion is then computed by elements, in torsion too."""
+        return not self.discs and any(part.damping_time for part in self.segments)
+
     def with_case(self, speed: float | None = None, weight: float | None = None) -> "Drilling":
         """The same scene at another speed of the drive (rad/s) or another static weight on bit (N).
 

@@ -22,7 +22,8 @@ law = { type = "Stribeck", static = "6 kN m", dynamic = "4 kN m", speed = "3 rad
 [simulate]                       # duration, and what else `simulate` takes
 duration = 60.0
 
-[stability]                      # optional: speeds, weights
+[stability]                      # optional: speeds, weights, and what else `stability` takes
+[response]                       # optional: frequencies, and what else `frequency_response` takes
 
 Numbers are in SI, or text with a unit (`dimensions`).
 """
@@ -36,6 +37,7 @@ from cosserat_fenicsx.drilling.bit_laws import BitOnRock
 from cosserat_fenicsx.drilling.choose import chosen
 from cosserat_fenicsx.drilling.history import DrillingHistory
 from cosserat_fenicsx.drilling.linear import frequencies
+from cosserat_fenicsx.drilling.linear.response import FrequencyResponse, frequency_response
 from cosserat_fenicsx.drilling.linear.stability import Stability, stability
 from cosserat_fenicsx.drilling.motion import check_arguments as check_simulation
 from cosserat_fenicsx.drilling.motion import simulate
@@ -44,7 +46,18 @@ from cosserat_fenicsx.drilling.segments import Discs
 from cosserat_fenicsx.drilling.top_drive import DriveControl, Hook, TopDrive
 from cosserat_fenicsx.drilling.wall_friction import FrictionLaw, ViscousDrag, WallFriction
 from cosserat_fenicsx.errors import SceneError
-from cosserat_fenicsx.parts import Depth, Number, Part, Time, Values, misplaced, positive
+from cosserat_fenicsx.parts import (
+    AngularVelocity,
+    Depth,
+    Frequency,
+    Number,
+    Part,
+    Time,
+    Values,
+    at_least,
+    misplaced,
+    positive,
+)
 from cosserat_fenicsx.quantities import Units
 from cosserat_fenicsx.results.screen import InWords
 from cosserat_fenicsx.well.components import DrillString
@@ -89,12 +102,30 @@ class SimulateDrilling(Part):
 
 @dataclass(frozen=True)
 class StabilityMap(Part):
-    """Speeds (rad/s) and weights on bit (N) of a map of stability: lists, or equally spaced ones."""
+    """Speeds (rad/s) and weights on bit (N) of a map of stability: lists, or equally spaced ones.
+
+    Args:
+        up_to, kind: as for `stability`.
+    """
 
     speeds: Annotated[Sequence[float], Values(Number("angular velocity", positive()))]
     weights: Annotated[Sequence[float], Values(Number("force", positive()))] | None = None
+    up_to: Annotated[Frequency, positive()] = 10.0
+    kind: Literal["torsion", "axial"] = "torsion"
 
     called = "stability"
+
+
+@dataclass(frozen=True)
+class ResponseAt(Part):
+    """Frequencies (Hz), a list or equally spaced ones, and other arguments of `frequency_response`."""
+
+    frequencies: Annotated[Sequence[float], Values(Number("frequency", positive()))] | None = None
+    kind: Literal["torsion", "axial"] = "torsion"
+    speed: Annotated[AngularVelocity, at_least(0)] | None = None
+    unstable: bool = False
+
+    called = "response"
 
 
 @dataclass(frozen=True)
@@ -105,7 +136,8 @@ class DrillingScene(InWords, Part):
         drive: the `TopDrive`.
         string: the `DrillString`; or discs: `Discs`.
         bit, hook, mud, drag, depth, start: as for `Drilling`. well: its hole. wall_friction: its friction.
-        simulate: arguments of `simulate`. stability: a map of stability, or None.
+        simulate: arguments of `simulate`. stability: a map of stability, or None. response: a frequency response, or
+            None.
         title: for tables and charts.
 
     Attributes:
@@ -128,6 +160,7 @@ class DrillingScene(InWords, Part):
     start: Literal["rest", "steady"] = "rest"
     simulate: SimulateDrilling | None = None
     stability: StabilityMap | None = None
+    response: ResponseAt | None = None
     title: str = ""
 
     def validate(self):
@@ -160,6 +193,8 @@ class DrillingScene(InWords, Part):
         if self.speeds:
             weights = f" and {len(self.weights)} weights on bit" if self.weights else ""
             yield f"Asked for: stability at {len(self.speeds)} speeds{weights}."
+        if self.response:
+            yield f"Asked for: frequency response in {self.response.kind}."
 
     @property
     def settings(self) -> dict[str, Any]:
@@ -194,4 +229,16 @@ class DrillingScene(InWords, Part):
         Raises:
             SceneError, NotConverged: see `stability`.
         """
-        return stability(self.scene, self.speeds, self.weights or None) if self.speeds else None
+        if not self.speeds:
+            return None
+        return stability(
+            self.scene, self.speeds, self.weights or None, up_to=self.stability.up_to, kind=self.stability.kind
+        )
+
+    def respond(self) -> FrequencyResponse | None:
+        """The `frequency_response` of the file; None where it asks for none.
+
+        Raises:
+            SceneError, NotConverged: see `frequency_response`.
+        """
+        return frequency_response(self.scene, **self.response.arguments()) if self.response else None

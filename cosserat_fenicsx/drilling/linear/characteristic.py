@@ -319,17 +319,17 @@ def speeds_and_weights(owner, scene, speeds, weights):
     Raises:
         SceneError: speeds or weights that are not positive, or weights without a bit.
     """
-    speeds = _numbers(owner, "speeds", speeds, "angular velocity", at_least(0) if scene.bit is None else positive())
+    speeds = numbers(owner, "speeds", speeds, "angular velocity", at_least(0) if scene.bit is None else positive())
     doubt_speed(owner, "speeds", float(speeds.max()))
     if weights is None:
         own = scene.bit.weight if scene.bit else None
         return speeds, np.array([np.nan if own is None else own])
     if scene.bit is None:
         refuse(scene, "bit", None, "a BitOnRock, whose weight is to change")
-    return speeds, _numbers(owner, "weights", weights, "force", positive())
+    return speeds, numbers(owner, "weights", weights, "force", positive())
 
 
-def _numbers(owner, field, values, dimension, limits):
+def numbers(owner, field, values, dimension, limits):
     """(n,) numbers, given as one or several."""
     several = values if isinstance(values, dict) else list(values) if np.ndim(values) else [values]
     return np.array(Values(Number(dimension, limits)).check(owner, field, several))

@@ -9,23 +9,24 @@ from scipy.optimize import brentq
 
 from cosserat_fenicsx.checks import File, Numbers, number, positive, refuse
 from cosserat_fenicsx.drilling.bit_laws import Lobes
-from cosserat_fenicsx.drilling.linear.characteristic import speeds_and_weights
+from cosserat_fenicsx.drilling.linear.characteristic import Steady, speeds_and_weights
 from cosserat_fenicsx.drilling.linear.frequencies import natural_frequencies
-from cosserat_fenicsx.drilling.linear.impedances import axial
 from cosserat_fenicsx.drilling.scene import Drilling
 from cosserat_fenicsx.drilling.stick_slip import SPEED, WEIGHT
 from cosserat_fenicsx.quantities import Quantity, Units
 from cosserat_fenicsx.results.result import Result, by_name
 
 
-class _Drawn(Result):
+class Drawn(Result):
     """A result with one chart, drawn by the function of `drilling.charts` of the name `_chart`."""
 
     _chart = ""
 
     def plot(self, file: File | None = None, *, units: Any = "SI", width: int | None = None):
         """Draw the chart: of `Campbell` natural frequencies as lines and excitations as rays, of `BitBounce` the
-        amplitude over speed beside the static weight. With a file it is written, otherwise the Figure is returned.
+        amplitude over speed beside the static weight, of `FrequencyResponse` a Bode chart of what the surface and the bit
+        feel of a load on bit, with the impedances of string and drive, which absorb each other's waves where both are
+        equal; of `Hfto` amplitudes over the frequency. With a file it is written, otherwise the Figure is returned.
 
         Args:
             file: .png, .pdf or another format of matplotlib (rank 0 writes).
@@ -41,7 +42,7 @@ class _Drawn(Result):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Campbell(_Drawn):
+class Campbell(Drawn):
     """Result of `campbell`.
 
     Attributes:
@@ -142,7 +143,7 @@ def _up_to(scene, kind, end, up_to):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class BitBounce(_Drawn):
+class BitBounce(Drawn):
     """Result of `bit_bounce`.
 
     Attributes:
@@ -206,9 +207,10 @@ def bit_bounce(scene: Drilling, speeds: Numbers) -> BitBounce:
     """Forced axial vibration of a string whose bit follows the lobes of the rock.
 
     The bit moves by amplitude sin(count theta); the weight on bit shakes by the modulus of i w Z(i w) - m w^2, times
-    the amplitude, with w = count Om, the axial impedance Z of the string below its hook and the mass m of the bit. Rock
-    of the stiffness k takes a part of the motion: of that dynamic stiffness D there acts D k/(D + k). It is linear: it
-    holds while the weight shakes by less than the static one.
+    the amplitude, with w = count Om, the axial impedance Z of the string below its hook (braked by drag,
+    damping and friction at the wall) and the mass m of the bit. Rock of the stiffness k takes a part of the motion: of
+    that dynamic stiffness D there acts D k/(D + k). It is linear: it holds while the weight shakes by less than the
+    static one.
 
     Args:
         scene: a `Drilling` whose bit has the law `Lobes`.
@@ -225,8 +227,10 @@ def bit_bounce(scene: Drilling, speeds: Numbers) -> BitBounce:
 
 
 def _amplitude(scene, speeds):
-    law, guide = scene.bit.law, axial(scene)
-    s = 1j * law.count * speeds
+    bit, steady = scene.bit, Steady(scene, "axial")
+    s = 1j * bit.law.count * speeds
+    guides = [steady.guides(float(speed), bit.weight)[0] for speed in speeds]
     with np.errstate(divide="ignore"):
-        stiffness, rock = s * (guide.impedance_at_bit(s) + guide.inertia * s), scene.bit.rock_stiffness
-        return np.abs(stiffness if math.isinf(rock) else 1 / (1 / stiffness + 1 / rock)) * law.amplitude
+        impedance = np.array([guide.impedance_at_bit(x) for guide, x in zip(guides, s, strict=True)])
+        stiffness, rock = s * (impedance + bit.mass * s), bit.rock_stiffness
+        return np.abs(stiffness if math.isinf(rock) else 1 / (1 / stiffness + 1 / rock)) * bit.law.amplitude

@@ -6,30 +6,29 @@ lower end has the inertia of the bit and the slope of its law; a bit that cuts c
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from rich.table import Table
 
-from cosserat_fenicsx.checks import File, Numbers, instance, refuse
-from cosserat_fenicsx.drilling.linear.characteristic import Characteristic, box_up_to, speed_of
+from cosserat_fenicsx.checks import Numbers, instance, refuse
+from cosserat_fenicsx.drilling.linear.characteristic import Characteristic, box_up_to, numbers, speed_of
+from cosserat_fenicsx.drilling.linear.excitation import Drawn
 from cosserat_fenicsx.drilling.linear.roots import all_roots
 from cosserat_fenicsx.drilling.linear.stability import ModeShape, shape_of, steady_of
 from cosserat_fenicsx.drilling.scene import Drilling
 from cosserat_fenicsx.drilling.stick_slip import SPEED, WEIGHT
 from cosserat_fenicsx.errors import SceneError, nearest
-from cosserat_fenicsx.parts import Number, Values, positive
+from cosserat_fenicsx.parts import Number, positive
 from cosserat_fenicsx.quantities import Quantities, Quantity
-from cosserat_fenicsx.results.result import Result
 
-#: Names of speed and load at the surface and at the bit, by kind; units of a load and a speed.
-ENDS = {
+# Names of speed and load at the surface and at the bit, by kind; units of a speed and a load.
+_ENDS = {
     "torsion": ("drive speed", "surface torque", "bit speed", "torque on bit"),
     "axial": ("top velocity", "hook load", "bit velocity", "weight on bit"),
 }
-UNITS = {"torsion": ("rad/s", "N m"), "axial": ("m/s", "N")}
-#: Quantities of a speed and a load on screens and in charts, by kind.
-SHOWN = {
+_UNITS = {"torsion": ("rad/s", "N m"), "axial": ("m/s", "N")}
+# Quantities of a speed and a load on screens and in charts, by kind.
+_SHOWN = {
     "torsion": (SPEED, Quantity("torque", unit="N m", shown="kN m")),
     "axial": (Quantity("velocity", unit="m/s"), WEIGHT),
 }
@@ -39,7 +38,7 @@ _MANY, _HIGHEST, _PEAKS, _NEUTRAL = 2000, 10.0, 12, 1e-9
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class FrequencyResponse(Result):
+class FrequencyResponse(Drawn):
     """Result of `frequency_response`.
 
     Attributes:
@@ -61,7 +60,18 @@ class FrequencyResponse(Result):
     equation: Characteristic
     _ratios: dict[str, dict[str, np.ndarray]]
 
+    _chart = "draw_response"
     axis = _rows_axis = "frequency"
+
+    @property
+    def ends(self) -> tuple[str, str, str, str]:
+        """Names for `transfer`: speed and load at the surface, speed and load at the bit."""
+        return _ENDS[self.kind]
+
+    @property
+    def shown(self) -> tuple[Quantity, Quantity]:
+        """Quantities of a speed and a load, for tables and charts."""
+        return _SHOWN[self.kind]
 
     def transfer(self, source: str, answer: str) -> np.ndarray:
         """(n,) complex ratio of what answers over what moves the string, at each frequency.
@@ -77,7 +87,7 @@ class FrequencyResponse(Result):
         Raises:
             SceneError: an unknown name, a speed of the bit as the source, or source and answer of the same name.
         """
-        for name, field, known in (("source", source, self._ratios), ("answer", answer, ENDS[self.kind])):
+        for name, field, known in (("source", source, self._ratios), ("answer", answer, self.ends)):
             if field not in known:
                 raise SceneError(f"transfer.{name} = {field!r}: {nearest(str(field), known)}")
         if answer not in self._ratios[source]:
@@ -102,12 +112,12 @@ class FrequencyResponse(Result):
     @property
     def quantities(self):
         """See `Result`: sizes, and phases from -180 to 180 degrees, of the impedance and of the answers to the bit."""
-        speed, load = UNITS[self.kind]
+        speed, load = _UNITS[self.kind]
         per = {"N m": "N m s/rad", "N": "N s/m"}[load]
         values = {"impedance": ("impedance at the surface", per, self.impedance)}
-        source = ENDS[self.kind][3]
+        source = self.ends[3]
         for name, ratio in self._ratios[source].items():
-            unit = "1" if name in ENDS[self.kind][1] else f"{speed}/({load})"
+            unit = "1" if name in self.ends[1] else f"{speed}/({load})"
             values[name.replace(" ", "_")] = f"{name} per {source}", unit, ratio
         found = [Quantity("frequency", unit="Hz", axes=("frequency",))]
         for name, (label, unit, ratio) in values.items():
@@ -141,24 +151,24 @@ class FrequencyResponse(Result):
         at = f", at {self.speed / size:.4g} {rpm}" if self.speed else ""
         yield f"Response in {self.kind} to the bit at {len(self)} frequencies from {low} to {high} Hz{at}."
         yield from (f"{caution}." for caution in self.cautions)
-        surface, peaks = ENDS[self.kind][1], self._peaks
+        surface, peaks = self.ends[1], self._peaks
         if len(peaks):
-            size = np.abs(self.transfer(ENDS[self.kind][3], surface))
+            size = np.abs(self.transfer(self.ends[3], surface))
             k = peaks[size[peaks].argmax()]
             yield f"Most of the bit is seen in the {surface} at {self.frequency[k]:.4g} Hz: {size[k]:.3g} times."
-            yield f"Below: peaks of the {ENDS[self.kind][2]}, the strongest {_PEAKS} at most; phases in degrees."
+            yield f"Below: peaks of the {self.ends[2]}, the strongest {_PEAKS} at most; phases in degrees."
 
     @property
     def _peaks(self):
         """Indices of the strongest peaks of the bit's speed, by frequency."""
-        size = np.abs(self._ratios[ENDS[self.kind][3]][ENDS[self.kind][2]])
+        size = np.abs(self._ratios[self.ends[3]][self.ends[2]])
         inside = np.flatnonzero((size[1:-1] > size[:-2]) & (size[1:-1] >= size[2:])) + 1
         return np.sort(inside[np.argsort(-size[inside])][:_PEAKS])
 
     def _table(self, units, rows):
-        _, surface, moved, source = ENDS[self.kind]
+        _, surface, moved, source = self.ends
         torque, speed = self.transfer(source, surface), self.transfer(source, moved)
-        (turn, turning), (push, pushing) = map(units.on_screen, SHOWN[self.kind])
+        (turn, turning), (push, pushing) = map(units.on_screen, self.shown)
         table = Table()
         for heading in ("frequency (Hz)", f"{surface} per {source}", "phase", f"{moved} ({turn} per {push})", "phase"):
             table.add_column(heading, justify="right")
@@ -167,22 +177,6 @@ class FrequencyResponse(Result):
             phases = (f"{math.degrees(np.angle(x[k])):.0f}" for x in (torque, speed))
             table.add_row(f"{self.frequency[k]:.4f}", f"{abs(torque[k]):.4g}", next(phases), moves, next(phases))
         return table if table.row_count else None
-
-    def plot(self, file: File | None = None, *, units: Any = "SI", width: int | None = None):
-        """Bode chart over the frequency: load at the surface per load on bit, its phase, speeds of drive and bit, and
-        the impedance of the string beside that of the drive; they absorb each other's waves where both are equal.
-
-        Args:
-            file: .png, .pdf or another format of matplotlib (rank 0 writes); None returns the Figure.
-            units: "SI", "field" or a dict of units by dimensions. width: of the picture, pixels, or None.
-
-        Raises:
-            SceneError: matplotlib is missing, or the file's ending is unknown.
-            OSError: the file cannot be written.
-        """
-        from cosserat_fenicsx.drilling.charts import draw_response
-
-        return draw_response(self, file, units=units, width=width)
 
     def __repr__(self):
         return f"<FrequencyResponse: {self.kind}, {len(self)} frequencies up to {self._highest} Hz>"
@@ -216,9 +210,7 @@ def frequency_response(
     instance("frequency_response", "scene", scene, Drilling, "a Drilling(...)")
     if frequencies is None:
         frequencies = np.linspace(0.0, _HIGHEST, _MANY + 1)[1:]
-    several = [frequencies] if np.ndim(frequencies) == 0 else list(frequencies)
-    given = Values(Number("frequency", positive())).check("frequency_response", "frequencies", several)
-    frequency = np.array(given, dtype=float)
+    frequency = numbers("frequency_response", "frequencies", frequencies, "frequency", positive())
     steady = steady_of("frequency_response", scene, kind)
     speed = speed_of("frequency_response", scene, speed)
     f = steady.equation(steady.parameters(speed, scene.bit and scene.bit.weight))
@@ -230,7 +222,7 @@ def frequency_response(
                          "weight at which `stability` finds no such mode, or unstable=True")  # fmt: skip
     guide = next(guide for guide in f.guides if guide.kind == kind)
     s = 2j * math.pi * frequency
-    impedance, drive, ratios = _ratios(guide, s, f.below(s)[f.guides.index(guide)], ENDS[kind])
+    impedance, drive, ratios = _ratios(guide, s, f.below(s)[f.guides.index(guide)], _ENDS[kind])
     return FrequencyResponse(scene, kind, speed, frequency, impedance, drive, roots, f, ratios)
 
 

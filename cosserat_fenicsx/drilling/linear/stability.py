@@ -11,6 +11,7 @@ from rich.table import Table
 from cosserat_fenicsx.checks import File, Numbers, instance, number, positive, refuse
 from cosserat_fenicsx.drilling.linear.characteristic import Steady, box_up_to, or_none, speeds_and_weights
 from cosserat_fenicsx.drilling.linear.frequencies import SoftSpeed, SoftTorque, natural_frequencies, own_rule, with_rule
+from cosserat_fenicsx.drilling.linear.hfto import Hfto, oscillations
 from cosserat_fenicsx.drilling.linear.roots import all_roots, follow
 from cosserat_fenicsx.drilling.scene import Drilling
 from cosserat_fenicsx.drilling.stick_slip import SPEED, WEIGHT
@@ -321,6 +322,19 @@ class Stability(Result):
             growth = [roots.real[nearest == k].max(initial=-np.inf) for k in range(len(own))]
             found[name] = np.where(np.isneginf(growth), np.nan, growth)
         return found
+
+    def hfto(self, i: int = 0, j: int = 0) -> Hfto:
+        """How far the modes grow at `speeds[i]` and `weights[j]`, by the balance of power between bit and string.
+
+        Raises:
+            SceneError: the torque of the bit does not follow from its speed; axial motion.
+        """
+        if self.kind != "torsion":
+            refuse("Stability", "hfto", self.kind, "a stability of torsion")
+        known = np.isfinite(self.growth[i, j])
+        drive = TopDrive(float(self.speeds[i]), self.scene.drive.inertia, self.scene.drive.control)
+        scene = replace(self.scene, drive=drive).with_case(weight=or_none(self.weights[j]))
+        return oscillations(scene, self.up_to, self.frequency[i, j][known], self.growth[i, j][known])
 
     def plot(self, file: File | None = None, mode: int | None = None, *, units: Any = "SI", width: int | None = None):
         """Maps of the growth over speed and weight, of each mode that grows somewhere, or of one; over the speed alone
