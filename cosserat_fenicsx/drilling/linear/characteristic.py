@@ -113,7 +113,9 @@ class Alone(Characteristic):
         return (1.0 + 0j,)
 
     def below(self, s):
-        return (self.guide.inertia * s + self.kappa + (self.rock / s if self.rock else 0.0),)
+        if math.isinf(self.rock):
+            return (np.full_like(s, math.inf),)
+        return (self.guide.inertia * s + self.kappa + self.rock / s,)
 
 
 @dataclass(frozen=True)
