@@ -74,6 +74,9 @@ def mixed_scene(drilling: Drilling, depth: float | None = None) -> MixedScene:
     below = [
         (max(place.top, top), place.bottom, place.component, x) for place, x in parts if place.bottom > top + _NOTHING
     ]
+    for _, _, part, _ in below:
+        if part.bend:
+            refuse(part, "bend", part.bend, "None in mixed_scene, whose rod is straight where it is free of stress")
     above = [replace(x, length=min(place.bottom, top) - place.top) for place, x in parts if place.top < top - _NOTHING]
     start, end, t = _line(drilling, top)
     ends = [bottom - top for _, bottom, _, _ in below]

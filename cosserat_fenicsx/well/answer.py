@@ -48,6 +48,8 @@ _QUANTITIES = by_name(
     Quantity("stretch", unit="m", axes=()),
     Quantity("twist", unit="rad", axes=(), noise=1e-8),
     Quantity("neutral_point", unit="m", axes=()),
+    Quantity("bit_side_force", unit="N", parts=("build", "turn"), frame="across the hole", axes=()),
+    Quantity("bit_tilt", unit="rad", parts=("build", "turn"), frame="across the hole", axes=()),
     Quantity("md", unit="m", axes=_ALONG),
     Quantity("north", unit="m", axes=_ALONG, getter=_axis_of_hole(0)),
     Quantity("east", unit="m", axes=_ALONG, getter=_axis_of_hole(1)),
@@ -149,6 +151,19 @@ class TorqueAndDrag(Differentiated, Result):
     def surface_torque(self) -> float:
         """N m."""
         return float(self.solved.torque[-1, -1])
+
+    @property
+    def bit_side_force(self) -> np.ndarray:
+        """(2,) force with which the bit presses on the wall, N: to the high side of the hole, which builds inclination
+        where it is above 0 (north where the hole is vertical), and to the right of it looking down the hole, where it
+        turns. NaN of a soft string, and of one without a bit."""
+        return np.full(2, np.nan)
+
+    @property
+    def bit_tilt(self) -> np.ndarray:
+        """(2,) angle of the bit's axis against the hole's, rad: towards the high side, and to the right of it, see
+        `bit_side_force`. NaN of a soft string, which lies on the axis."""
+        return np.full(2, np.nan)
 
     @cached_property
     def drag(self) -> float:

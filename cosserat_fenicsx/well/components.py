@@ -22,7 +22,17 @@ from typing import Annotated, ClassVar, Literal
 from cosserat_fenicsx import units
 from cosserat_fenicsx.checks import doubt_width, positive, refuse, store
 from cosserat_fenicsx.errors import SceneError, nearest
-from cosserat_fenicsx.parts import DampingTime, Diameter, ForcePerLength, Length, MassPerLength, Part, between
+from cosserat_fenicsx.parts import (
+    DampingTime,
+    Diameter,
+    ForcePerLength,
+    Length,
+    MassPerLength,
+    Number,
+    Part,
+    at_least,
+    between,
+)
 from cosserat_fenicsx.quantities import Units
 from cosserat_fenicsx.results.screen import InWords
 from cosserat_fenicsx.scene.sections import Circle, Material, Stiffness, Tube
@@ -116,6 +126,7 @@ class StringPart(Part, family="component of a string"):
 
     touches: ClassVar[str | None] = None
     damping_time = 0.0
+    bend: float | None = None
 
     @property
     def body_radius(self):
@@ -128,8 +139,46 @@ class StringPart(Part, family="component of a string"):
         return self.stiffness.torsion, self.stiffness.inertia[2]
 
 
+# The largest bend of a housing, degrees.
+_MOST_BENT = 5.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Bendable(StringPart):
+    """Base of components with a bend, such as the housing of a mud motor: straight pieces at an angle, free of stress.
+
+    Args:
+        bend: degrees, up to 5; None for none.
+        bend_at: its distance from the component's lower end, m.
+        tool_face: the side that the bend points its lower end to where the string is in its hole: degrees clockwise
+            from the high side looking down the hole, from north where that is vertical; by default 0, the high side.
+
+    Raises:
+        SceneError: a bend without its place or beyond the component, a place or a tool face without a bend.
+    """
+
+    bend: Annotated[float, between(0, _MOST_BENT, "a bend (degrees)")] | None = None
+    bend_at: Annotated[float, Number("length", at_least(0, "a distance from the lower end (m)"))] | None = None
+    tool_face: Annotated[float, between(-360, 360, "an angle from the high side (degrees)")] | None = None
+
+    def validate(self):
+        """Refuse a bend without its place, or with a place outside, and what belongs to a bend without one."""
+        if self.bend is None:
+            for field in ("bend_at", "tool_face"):
+                if getattr(self, field) is not None:
+                    refuse(self, field, getattr(self, field), "a bend, too: bend=1.15 (degrees)")
+            return
+        if self.length is None:
+            refuse(self, "bend", self.bend, "a component with a length: the uppermost one, which fills up, has none")
+        if self.bend_at is None or not 0 < self.bend_at < self.length:
+            expected = f"its distance (m) from the lower end, between 0 and the length, {self.length:g} m"
+            refuse(self, "bend_at", self.bend_at, expected)
+        if self.tool_face is None:
+            store(self, tool_face=0.0)
+
+
 @dataclass(frozen=True)
-class Component(StringPart):
+class Component(_Bendable):
     """A part of a string by its numbers, with its weight in mud.
 
     Args:
@@ -140,9 +189,10 @@ class Component(StringPart):
         name: in tables.
         damping_time: of Kelvin and Voigt, s: torques and forces along the string grow by it times the rates of twist and
             stretch; a mode of the frequency f gets the damping ratio pi f times it.
+        bend, bend_at, tool_face: as of `Collar`.
 
     Raises:
-        SceneError: a number that is missing or not positive.
+        SceneError: a number that is missing or not positive; a bend as of `Collar`.
     """
 
     length: Length | None = None
@@ -156,6 +206,7 @@ class Component(StringPart):
 
     def validate(self):
         """Refuse a missing weight or contact radius."""
+        super().validate()
         if self.weight is None:
             refuse(self, "weight", None, "the weight in mud (N/m): a component without weight cannot be placed")
         if self.contact_radius is None:
@@ -163,7 +214,7 @@ class Component(StringPart):
 
 
 @dataclass(frozen=True)
-class _Tubular(StringPart):
+class _Tubular(_Bendable):
     """Base of the components of steel, by their dimensions or by the name of a standard size.
 
     Args:
@@ -175,10 +226,13 @@ class _Tubular(StringPart):
         material: a `Material` with a density.
         name: in tables.
         damping_time: s, as of `Component`.
+        bend: of its housing, degrees, up to 5: two straight pieces at an angle, free of stress. bend_at: its distance
+            from the component's lower end, m. tool_face: the side of the hole that the bend points its lower end to,
+            degrees clockwise from the high side looking down the hole (from north where it is vertical), by default 0.
 
     Raises:
         SceneError: a dimension that is missing or not positive, an inner diameter that is not below the outer one, or
-            an unknown size.
+            an unknown size; a bend without its place or beyond the component, a place or a tool face without a bend.
     """
 
     length: Length | None = None
@@ -215,6 +269,7 @@ class _Tubular(StringPart):
 
     def validate(self):
         """Fill in missing fields from the standard size or from the body."""
+        super().validate()
         store(self, name=self.name or type(self)._called)
         if self.size is not None:
             known = standard_size(type(self).__name__, self.size)
@@ -389,7 +444,11 @@ def in_words(part, where, weight, units):
     if S is not None and S.matrix is None:
         stiff = f"EI = {units.told(min(S.bending), 'N m^2', form='.4g')}"
     wide = units.told(2 * part.contact_radius, "m", "diameter", ".5g")
-    return f"String, {part.name}: {where}, {weight}, {wide} wide where it touches the wall, {stiff}."
+    bent = ""
+    if part.bend:
+        place = units.told(part.bend_at, "m")
+        bent = f", bent by {part.bend:g} deg {place} above its lower end, tool face {part.tool_face:g} deg"
+    return f"String, {part.name}: {where}, {weight}, {wide} wide where it touches the wall, {stiff}{bent}."
 
 
 @dataclass(frozen=True)

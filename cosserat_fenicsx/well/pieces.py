@@ -5,6 +5,7 @@ stiff one rests on its rings: they carry the load of the spans beside them, on a
 each other pry, one on the low and one on the high side, where a longer span beside them bends the string between them.
 """
 
+import math
 from collections import namedtuple
 from itertools import pairwise
 
@@ -98,6 +99,12 @@ def ring_of(place, hole):
     radius = place.component.contact_radius
     clearance = max(0.0, float(hole.at(s, "diameter")) / 2 - radius)
     return Ring(s, clearance, radius, place.component.outer_diameter / 2)
+
+
+def bend_of(place):
+    """Of a bent component in its place: (md (m), angle (rad), side (rad clockwise from the hole's high side))."""
+    part = place.component
+    return place.bottom - part.bend_at, math.radians(part.bend), math.radians(part.tool_face)
 
 
 def free_span(EI, d, q):

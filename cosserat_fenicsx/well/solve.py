@@ -134,13 +134,21 @@ def _flexible(given, model, tol, torque_convention, pieces, laid):
         why.append(f"BEYOND WHAT ANY PIPE CARRIES: the tension strains it by {100 * strain:.3g} %")
     beyond = [what for what, part in shares.items() if part > tol - error]
     whole = [*why, *(f"NOT ENOUGH for tol = {tol:g} in the {what}" for what in beyond)]
-    if model == AUTO:
+    if model == AUTO and beyond:
         exceeding = " and the ".join(beyond)
         why.append(f"the {used} string's error in the {exceeding} exceeds tol = {tol:g}: solving the rod in contact")
     ends = [(x.tension[-1, -1], x.torque[-1, -1]) for x in (solved, soft)]
     differences = {SOFT: tuple(float(a - b) for a, b in zip(*ends, strict=True))} if buckled else {}
     answer = TorqueAndDrag(*given, used, tol, torque_convention, tuple(whole), error, max(shares.values()),
                            tuple(parts.total for parts in left_out), differences, laid, pieces, solved)  # fmt: skip
+    bent = [place.component.name for place in laid if place.component.bend]
+    if bent:
+        unknown = (
+            f"THE BEND of {' and '.join(bent)} IS NOT IN IT: a string on the axis of the hole has none, and what it "
+            "adds to the wall's forces is not estimated; model='rod' has it"
+        )
+        answer = replace(answer, why=(*answer.why, unknown), model_error=np.inf, left_out=(np.inf, np.inf))
+        why.append(f"{' and '.join(bent)} is bent: solving the rod in contact, which has the bend")
     return answer, why
 
 

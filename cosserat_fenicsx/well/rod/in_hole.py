@@ -11,7 +11,7 @@ from functools import cached_property
 import numpy as np
 
 from cosserat_fenicsx.numerics import directors
-from cosserat_fenicsx.well.contacts import ROUGH, side_in_space
+from cosserat_fenicsx.well.contacts import ROUGH, high_side, side_in_space
 from cosserat_fenicsx.well.rod.resultants import along_elements, apart_mostly, contacts_along, with_errors
 from cosserat_fenicsx.well.rod.string_scene import is_round
 
@@ -185,7 +185,7 @@ class InHole:
         """(n, 3) tangents of the rod: its third director."""
         q = self._record.rq[:, 3:7]
         q = q / np.linalg.norm(q, axis=1, keepdims=True)
-        return directors(q) @ self.string.rod.curve.frame(np.zeros(1))[0, :, 2]
+        return np.einsum("nij,nj->ni", directors(q), self.string.rod.curve.frame(self.s)[:, :, 2])
 
     def _between_gauss(self, part, scale):
         """(n, 3) of n or m at the nodes, by the polynomials through the Gauss points of each element: where a force at
@@ -280,6 +280,26 @@ class InHole:
         """(rings,) N: across the hole, without friction; of the size of rounding where a ring does not touch."""
         friction = [ring.friction * np.hypot(*ring.slip[0][1]) for ring in self.string.rings]
         return np.linalg.norm(self.ring_forces, axis=1) / np.hypot(1.0, friction)
+
+    @cached_property
+    def on_bit(self):
+        """Of the lower end: the force (N) with which its ring presses on the wall, and the tilt (rad) of the string
+        against the hole; each (2,): to the high side of the hole (north where it is vertical), and to the right of it
+        looking down the hole. NaN forces where no ring is at the lower end."""
+        tangent = self._near.tangent[-1]
+        high = high_side(tangent[None], north=True)[0]
+        across = np.array([high, np.cross(tangent, high)])
+        at_end = [i for i, ring in enumerate(self.string.rings) if ring.station.s == self.string.rod.length]
+        force = -across @ self.ring_forces[at_end].sum(axis=0) if at_end else np.full(2, np.nan)
+        return force, np.arcsin(across @ self._along[-1])
+
+    @cached_property
+    def tool_faces(self):
+        """(bends,) rad: the sides of the hole to which the string's bends point its lower end, as in `string_in`."""
+        curve, at = self.string.rod.curve, [int(np.argmin(np.abs(self.s - s))) for s in self.string.rod.curve.breaks]
+        q = self._record.rq[at, 3:7]
+        sides = directors(q / np.linalg.norm(q, axis=1, keepdims=True)) @ curve.sides[..., None] if at else np.zeros(0)
+        return side_in_space(self._near.tangent[at], sides[..., 0]) if at else sides
 
     @cached_property
     def wall_force(self):

@@ -6,6 +6,7 @@ Their bodies, and all other components, touch with their contact radius along th
 """
 
 import contextlib
+import math
 from dataclasses import dataclass, fields
 from functools import cached_property
 from operator import attrgetter
@@ -19,7 +20,7 @@ from cosserat_fenicsx.well import criteria
 from cosserat_fenicsx.well.answer import TorqueAndDrag, scales_of, share
 from cosserat_fenicsx.well.components import weight_in_mud
 from cosserat_fenicsx.well.contacts import VERTICAL, WallContact, name_of_side
-from cosserat_fenicsx.well.pieces import is_ring, ring_of
+from cosserat_fenicsx.well.pieces import bend_of, is_ring, ring_of
 from cosserat_fenicsx.well.rod.resultants import MOSTLY
 from cosserat_fenicsx.well.rod.string_scene import energy_of_helix, turns_of_helix
 
@@ -91,6 +92,16 @@ class RodInContact(TorqueAndDrag):
     offset = _of_rod("offset", "(n, 3) from the hole's axis to the string, m.")
     position = _of_rod("position")
 
+    @property
+    def bit_side_force(self):
+        """See `TorqueAndDrag`."""
+        return self.solved.on_bit[0]
+
+    @property
+    def bit_tilt(self):
+        """See `TorqueAndDrag`."""
+        return self.solved.on_bit[1]
+
     @cached_property
     def _gravity(self):
         z = np.interp([0.0, *(place.bottom for place in self.laid[::-1])], self.solved.s, self.position[:, 2])
@@ -153,6 +164,11 @@ def _found(flexible, solved, differences):
     )
     if flexible.hole.wall_stiffness is not None:
         yield "forces at points are those of a rigid wall; side force is that of the wall with wall_stiffness"
+    bent = [place.component for place in flexible.laid[::-1] if place.component.bend]
+    for part, side in zip(bent, solved.tool_faces, strict=True):
+        yield f"the bend of {part.name} points its lower end {math.degrees(side):.2f} deg clockwise from the high side"
+        if flexible.operation.direction(part.contact_radius)[1]:
+            yield f"ONE MOMENT of a turn: {part.name} rotates, and its bend with it"
     scales = scales_of(flexible.solved, flexible.pieces)
     for name, apart in differences.items():
         shares = ", ".join(f"{value:+.4g} {unit}, {share(abs(value), scale):.1e}, in the {what}"
@@ -209,6 +225,7 @@ def rod_in_contact(flexible, decided, progress=None, exact=True):
                 bottom_tension=-operation.weight,
                 bottom_torque=operation.torque,
                 rings=[ring_of(place, hole)[:3] for place in laid if is_ring(place.component)],
+                bends=[bend_of(place) for place in laid if place.component.bend],
                 wall_stiffness=hole.wall_stiffness,
                 helix=helix,
                 tol=flexible.tol,

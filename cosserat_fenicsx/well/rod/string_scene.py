@@ -6,7 +6,7 @@ m; q is the rotation from the rod's straight reference, without a jump of sign.
 
 import math
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -21,6 +21,7 @@ from cosserat_fenicsx.scene.sections import Stiffness
 from cosserat_fenicsx.scene.signals import AlongPieces
 from cosserat_fenicsx.scene.supports import Clamp, Hinge
 from cosserat_fenicsx.well.criteria import snake_load
+from cosserat_fenicsx.well.rod.bent_line import bent_line
 
 
 @dataclass(frozen=True)
@@ -138,7 +139,7 @@ class StringScene:
 
 def string_in(path, lengths, stiffness, weight, contact_radius, wall_stiffness, *, radius, friction=0.0,
               slip=(0.0, 0.0), bottom_tension=0.0, bottom_torque=0.0, rings=(), hinge=None, extensible=False,
-              has_arm=True):  # fmt: skip
+              has_arm=True, bends=()):  # fmt: skip
     """The `StringScene` of a string in a hole.
 
     Args:
@@ -159,6 +160,8 @@ def string_in(path, lengths, stiffness, weight, contact_radius, wall_stiffness, 
         hinge: None; or the direction about which the top turns freely, in place of a clamp.
         extensible: whether the axial stiffness counts in the equilibrium; the lengths are then without stretch.
         has_arm: whether friction acts on the surface; False: on the centreline.
+        bends: [(s, angle, side)] stations (m from the top, ascending) at which the string is bent where it is free of
+            stress: by an angle (rad) to a side of the hole (rad clockwise from its high side, looking down it).
 
     Raises:
         SceneError: naming the argument, its value and the expected one.
@@ -176,8 +179,9 @@ def string_in(path, lengths, stiffness, weight, contact_radius, wall_stiffness, 
     top, bottom = (path.nearest(None, np.array([x])) for x in (0.0, length))
     start = tuple(top.position[0])
     held = [_in_place(x, extensible) for x in sections]
+    straight = Line(start, tuple(top.position[0] + length * top.tangent[0]))
     rod = Rod(
-        Line(start, tuple(top.position[0] + length * top.tangent[0])),
+        bent_line(straight, path, bends, partial(_carried, straight)) if bends else straight,
         held[0] if len(held) == 1 else [*zip(ends[:-1].tolist(), held[:-1], strict=True), (None, held[-1])],
         name="string",
     )
@@ -197,8 +201,14 @@ def string_in(path, lengths, stiffness, weight, contact_radius, wall_stiffness, 
     stiffest = _SET.per_bending * max(bending_of(section) for section in sections) / length**3
     ring_stiffness = min(_SET.of_rings * wall.stiffness, max(wall.stiffness, stiffest))
     around = tuple(
-        TubeRing(rod.at(s), path, clearance, ring_radius, ring_stiffness,
-                 *(value_at(given, [s]).tolist()[0] for given in (wall.friction, wall.slip)))
+        TubeRing(
+            rod.at(s),
+            path,
+            clearance,
+            ring_radius,
+            ring_stiffness,
+            *(value_at(given, [s]).tolist()[0] for given in (wall.friction, wall.slip)),
+        )
         for s, clearance, ring_radius in rings
     )
     for ring in around:
@@ -240,7 +250,7 @@ def bending_of(section):
 def on_axis(rod, path, s):
     """Of a rod that lies on the axis without twist, from the path's start."""
     near = path.nearest(None, s)
-    return _untwisted(rod, near.position, near.tangent)
+    return _untwisted(rod, s, near.position, near.tangent)
 
 
 def turns_of_helix(EI, compression, torque, hand):
@@ -278,16 +288,24 @@ def in_helix(string, s):
     held = np.array([0.0, string.ends[-1], *(ring.station.s for ring in string.rings)])
     turned = rate * np.abs(s[:, None] - held).min(axis=1)
     share = np.clip(compression / snake_load(EI, clearance, weight, side) - 1, 0, 1) * np.clip(turned / np.pi, 0, 1)
-    d = directors(on_axis(string.rod, string.path, s)[:, 3:]) @ string.rod.curve.frame(np.zeros(1))[0]
+    d = directors(on_axis(string.rod, string.path, s)[:, 3:]) @ string.rod.curve.frame(s)
     away = np.cos(angle)[:, None] * d[:, :, 0] + string.hand * np.sin(angle)[:, None] * d[:, :, 1]
     r = near.position + (share * clearance)[:, None] * away
     along = np.gradient(r, s, axis=0)
-    return _untwisted(string.rod, r, along / np.linalg.norm(along, axis=1, keepdims=True))
+    return _untwisted(string.rod, s, r, along / np.linalg.norm(along, axis=1, keepdims=True))
 
 
-def _untwisted(rod, position, tangent):
-    """Along a line (n, 3), m, with unit tangents (n, 3), without twist."""
-    before = np.concatenate([rod.curve.frame(np.zeros(1))[:, :, 2], tangent[:-1]])
+def _untwisted(rod, s, position, tangent):
+    """Along a line (n, 3), m, with unit tangents (n, 3), without twist; at arc lengths s (n,), its bends straightened."""
+    q = _carried(rod.curve, tangent)
+    if rod.curve.breaks:
+        q = product_conjugate(q, rod.curve.turned(s))
+    return np.column_stack([position, q])
+
+
+def _carried(curve, tangent):
+    """(n, 4) rotations without twist from the first frame of a curve to unit tangents (n, 3) along a line."""
+    before = np.concatenate([curve.frame(np.zeros(1))[:, :, 2], tangent[:-1]])
     cos = np.einsum("ni,ni->n", before, tangent)
     q = np.column_stack([1 + cos, np.cross(before, tangent)])
     q /= np.linalg.norm(q, axis=1, keepdims=True)
@@ -295,4 +313,4 @@ def _untwisted(rod, position, tangent):
     while done < len(q):
         q[done:] = product_conjugate(q[done:], q[:-done] * (1.0, -1.0, -1.0, -1.0))
         done *= 2
-    return np.column_stack([position, q / np.linalg.norm(q, axis=1, keepdims=True)])
+    return q / np.linalg.norm(q, axis=1, keepdims=True)
