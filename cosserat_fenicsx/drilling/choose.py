@@ -5,10 +5,10 @@ import numpy as np
 from cosserat_fenicsx.checks import refuse
 from cosserat_fenicsx.drilling.elements import AxialTorsional
 from cosserat_fenicsx.drilling.torsion import TorsionWaves
-from cosserat_fenicsx.drilling.wall_friction import Drills, law_of, static_weight
+from cosserat_fenicsx.drilling.wall_friction import law_of, rotating, static_weight
 from cosserat_fenicsx.errors import NotConverged, SceneError, nearest
 from cosserat_fenicsx.well import criteria
-from cosserat_fenicsx.well.operations import RotateOffBottom, TripIn, TripOut, doubt_on_bit
+from cosserat_fenicsx.well.operations import TripIn, TripOut, doubt_on_bit
 from cosserat_fenicsx.well.solve import torque_and_drag
 
 TORSION, BOTH = "torsion", "axial and torsional"
@@ -108,7 +108,7 @@ def _operations(scene):
         if not bit.law.needs_weight:  # a torque by the weight may be small without a mistake in units
             called = f"The torque of {type(bit.law).__name__}(...)"
             doubt_on_bit(called, torque, "torque", "; coefficients of friction need radius= (m)")
-    yield Drills(weight, torque) if weight > 0 else RotateOffBottom()
+    yield rotating(weight, torque)
     if scene.hook is not None:
         signal = scene.hook.signal()
         speeds = [signal(t) for t in (0.0, *signal.jumps)]

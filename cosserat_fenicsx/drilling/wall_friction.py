@@ -124,22 +124,25 @@ def static_weight(scene) -> float:
     return 0.0 if scene.bit is None else scene.bit.weight or 0.0
 
 
-class Drills(RotaryDrilling):
+class _Drills(RotaryDrilling):
     """What a bit does, which is doubted by the bit's own names."""
 
     def validate(self):
         pass
 
 
-Drills.name = RotaryDrilling.name
+_Drills.name = RotaryDrilling.name
+
+
+def rotating(weight, torque=0.0):
+    """The operation of a string that rotates under a weight on bit (N), or off bottom for none."""
+    return _Drills(weight, torque) if weight > 0 else RotateOffBottom()
 
 
 def scene_pieces(scene):
     """The `Pieces` of the string of a `Drilling` with a hole, rotating at its depth."""
-    weight = static_weight(scene)
-    operation = Drills(weight, 0.0) if weight else RotateOffBottom()
     mud = Mud(0.0) if scene.mud is None else scene.mud
-    return pieces_of(scene.hole, scene.string, operation, mud, scene.bit_depth)[0]
+    return pieces_of(scene.hole, scene.string, rotating(static_weight(scene)), mud, scene.bit_depth)[0]
 
 
 def soft_string_force(pieces, weight, md):
