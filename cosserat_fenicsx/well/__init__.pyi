@@ -5,6 +5,8 @@ from cosserat_fenicsx.actions.walls import HoleWall as HoleWall
 from cosserat_fenicsx.actions.walls import TubeRing as TubeRing
 from cosserat_fenicsx.actions.walls import TubeWall as TubeWall
 from cosserat_fenicsx.well.answer import TorqueAndDrag as TorqueAndDrag
+from cosserat_fenicsx.well.between_joints import PipeBetweenJoints as PipeBetweenJoints
+from cosserat_fenicsx.well.between_joints import bending_between_joints as bending_between_joints
 from cosserat_fenicsx.well.calibrate import FrictionFit as FrictionFit
 from cosserat_fenicsx.well.calibrate import RigMeasurement as RigMeasurement
 from cosserat_fenicsx.well.calibrate import calibrate_friction as calibrate_friction
@@ -27,7 +29,11 @@ from cosserat_fenicsx.well.operations import Static as Static
 from cosserat_fenicsx.well.operations import TripIn as TripIn
 from cosserat_fenicsx.well.operations import TripOut as TripOut
 from cosserat_fenicsx.well.path import WellPath as WellPath
+from cosserat_fenicsx.well.reserves import MarginOfOverpull as MarginOfOverpull
+from cosserat_fenicsx.well.reserves import MostWeightOnBit as MostWeightOnBit
 from cosserat_fenicsx.well.scenefile import WellScene as WellScene
 from cosserat_fenicsx.well.solve import torque_and_drag as torque_and_drag
+from cosserat_fenicsx.well.strength import PipeStrength as PipeStrength
 from cosserat_fenicsx.well.sweep import DepthSweep as DepthSweep
 from cosserat_fenicsx.well.sweep import depth_sweep as depth_sweep
+from cosserat_fenicsx.well.utilisation import Utilisation as Utilisation

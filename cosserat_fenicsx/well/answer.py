@@ -1,6 +1,7 @@
 """The answer of `torque_and_drag`: surface loads, and the state along the string."""
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from types import MappingProxyType
 from typing import Any, ClassVar
@@ -18,7 +19,9 @@ from cosserat_fenicsx.well.differentiated import Differentiated
 from cosserat_fenicsx.well.hole import Borehole, Mud
 from cosserat_fenicsx.well.operations import Operation
 from cosserat_fenicsx.well.pieces import Sections, down_along, sections_of, stretch, true_tension, von_mises
+from cosserat_fenicsx.well.reserves import MarginOfOverpull, MostWeightOnBit, most_weight_of, overpull_of
 from cosserat_fenicsx.well.softstring import UP_TO
+from cosserat_fenicsx.well.utilisation import Utilisation, strengths_of
 
 # A torque below this share of the largest tension times the contact radius is nothing that errors are compared with.
 _LITTLE = 1e-2
@@ -296,7 +299,8 @@ class TorqueAndDrag(Differentiated, Result):
     @cached_property
     def von_mises(self) -> np.ndarray:
         """The largest von Mises stress in the body of the pipe, Pa. NaN without mud, or without diameters."""
-        return von_mises(self._sections, self.tension, self.torque, self.bending_moment, *self._pressures)
+        moment = self.bending_moment
+        return von_mises(self._sections, self.true_tension, self.torque, moment, *self._pressures).max(axis=0)
 
     def _integral(self, values):
         """Of values at `md` along the string: by the points of pieces."""
@@ -334,15 +338,20 @@ class TorqueAndDrag(Differentiated, Result):
     def buckling(self) -> np.ndarray:
         """State at `md`: 0 straight, 1 sinusoidal, 2 helical, by the loads of `well/criteria.py`. 0 where EI is not
         known, or there is no clearance."""
+        with np.errstate(invalid="ignore"):
+            snake, helix = self.buckling_loads < -self.tension
+        return np.where(helix, criteria.HELIX, np.where(snake, criteria.SNAKE, criteria.STRAIGHT))
+
+    @cached_property
+    def buckling_loads(self) -> np.ndarray:
+        """(2, n) compression, N, above which it is a snake, and a helix, at `md`; NaN where that is not known."""
         S, F = self._sections, -self.tension
         loose = np.where(self.clearance > 1e-9, self.clearance, np.nan)
         k, across, b = self._loads()
         plain = np.hypot(across - k * F, b)
         weight = self._of_piece(self.pieces.weight)
         with np.errstate(invalid="ignore"):
-            snake = criteria.snake_load(S.EI, loose, weight, plain) < F
-            helix = criteria.helix_load(S.EI, loose, weight, plain) < F
-        return np.where(helix, criteria.HELIX, np.where(snake, criteria.SNAKE, criteria.STRAIGHT))
+            return np.array([load(S.EI, loose, weight, plain) for load in (criteria.snake_load, criteria.helix_load)])
 
     @cached_property
     def helical(self) -> np.ndarray:
@@ -368,6 +377,61 @@ class TorqueAndDrag(Differentiated, Result):
         return criteria.load_of(
             criterion, self._sections.EI, self.clearance, weight, self.inclination, along, across, k
         )
+
+    def utilisation(
+        self, grade: str | float | Mapping[str, Any] = "E75", wear: float | Mapping[str, float] = 1.0
+    ) -> Utilisation:
+        """Loads over what the body of the string bears: von Mises, tension, torsion, burst, collapse, fatigue.
+
+        Args:
+            grade: of the drill pipe: "E75", "X95", "G105", "S135" or a yield strength, Pa or text such as "135 ksi";
+                or a dict of these by names of components. Heavy-weight pipe (55 ksi), collars and stabilisers (110 ksi,
+                100 ksi above 6 7/8 in) have their usual yield strengths where they are not in it.
+            wear: share of the wall of the drill pipe that is left, 1 of new pipe, 0.8 of "premium"; or a dict.
+
+        Raises:
+            SceneError: an unknown grade or name, a component without diameters, no mud.
+        """
+        if self.mud is None:
+            raise SceneError("utilisation: mud = None: expected the answer of a string in Mud(density); Mud(0) for air")
+        return Utilisation(self, strengths_of("utilisation", self.laid, grade, wear))
+
+    def margin_of_overpull(
+        self, grade: str | float | Mapping[str, Any] = "E75", wear: float | Mapping[str, float] = 1.0, *,
+        safety: float = 1.1,
+    ) -> MarginOfOverpull:  # fmt: skip
+        """How much more the surface may pull than the hook load of this answer, if the string is stuck.
+
+        Args:
+            grade, wear: see `utilisation`. safety: factor on the tension.
+
+        Raises:
+            SceneError: see `utilisation`; a safety below 1.
+        """
+        return overpull_of(self, strengths_of("margin_of_overpull", self.laid, grade, wear), safety)
+
+    def most_weight_on_bit(
+        self, grade: str | float | Mapping[str, Any] = "E75", wear: float | Mapping[str, float] = 1.0, *,
+        safety: float = 1.1, buckling: str = "helical", model: str = "buckled",
+    ) -> MostWeightOnBit:  # fmt: skip
+        """The largest weight on bit of this operation, with its torque on bit, and what limits it: buckling, lock-up,
+        strength (von Mises), or the weight of the string, whose hook load is then 0.
+
+        Args:
+            grade, wear: see `utilisation`. safety: factor on the von Mises stress.
+            buckling: "helical" or "sinusoidal": which of them limits it.
+            model: "soft" or "buckled", whose helix also holds the string back; this answer may be of another model.
+
+        Raises:
+            SceneError: see `utilisation`; an operation without a weight on bit; a string that bears none.
+        """
+        return most_weight_of(self, grade, wear, safety, buckling, model)
+
+    def of_flexible(self, operation, model, solved):
+        """The `TorqueAndDrag` of the same string with another operation and what was found for it, of a flexible string;
+        its estimates of errors are those of this one."""
+        given = {field.name: getattr(self, field.name) for field in fields(TorqueAndDrag)}
+        return TorqueAndDrag(**{**given, "operation": operation, "model": model, "solved": solved})
 
     # -- tables and pictures -----------------------------------------------------------------------------------------
 

@@ -226,9 +226,9 @@ def answer_figure(answer, between=None):
     noise = answer.quantities["torque"].noise
     turns = np.abs(answer.torque).max() > noise
     bends = np.nanmax(answer.bending_moment, initial=0.0) > 0
-    draws = [_string, _tension, *([_torque] if turns else []), _side_force]
+    draws = [string_in_hole, _tension, *([_torque] if turns else []), _side_force]
     draws += [*([_at_points] if points else []), *([_bending] if bends else [])]
-    widths = [2.7 * {_string: 0.8, _at_points: 1.15}.get(drawn, 1.0) for drawn in draws]
+    widths = [2.7 * {string_in_hole: 0.8, _at_points: 1.15}.get(drawn, 1.0) for drawn in draws]
     figure, panels, _, length = over_depth(widths, DEPTH)
     room = 0.01 * (bottom - top)
     panels[0].set_ylim((bottom + room) / length, (top - room) / length)
@@ -287,7 +287,7 @@ def _to_next(where):
     return where | np.append(False, where[:-1])
 
 
-def _string(panel, answer, rows, depth):
+def string_in_hole(panel, answer, rows, depth):
     """The string in the hole, seen across its plane of high and low side, or across north where it is vertical."""
     unit, size = unit_of(_ACROSS)
     md, hole = answer.md[rows], answer.hole.at(answer.md[rows], "diameter") / 2 / size

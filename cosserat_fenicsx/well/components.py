@@ -229,6 +229,8 @@ class _Tubular(_Bendable):
         bend: of its housing, degrees, up to 5: two straight pieces at an angle, free of stress. bend_at: its distance
             from the component's lower end, m. tool_face: the side of the hole that the bend points its lower end to,
             degrees clockwise from the high side looking down the hole (from north where it is vertical), by default 0.
+        joint_spacing: of the tool joints, m, such as 9.45 of range 2: the pipe between them bends more than the hole,
+            see `bending_between_joints`. It counts in `TorqueAndDrag.utilisation` alone.
 
     Raises:
         SceneError: a dimension that is missing or not positive, an inner diameter that is not below the outer one, or
@@ -244,6 +246,7 @@ class _Tubular(_Bendable):
     material: Material = STEEL
     name: str = ""
     damping_time: DampingTime = 0.0
+    joint_spacing: Length | None = None
 
     weight = None
 
@@ -287,6 +290,8 @@ class _Tubular(_Bendable):
             store(self, mass=self.material.density * math.pi / 4 * (self.outer_diameter**2 - self.inner_diameter**2))
         if self.tool_joint is not None and self.tool_joint < self.outer_diameter:
             refuse(self, "tool_joint", self.tool_joint, f"at least the body's diameter, {self.outer_diameter:g} m")
+        if self.joint_spacing is not None and not (self.tool_joint or 0) > self.outer_diameter:
+            refuse(self, "joint_spacing", self.joint_spacing, "tool_joint as well, wider than the body")
 
     @property
     def contact_radius(self):

@@ -52,25 +52,25 @@ def stretch(sections, tension, outside, inside):
     return np.where(np.isnan(force), tension, force) / sections.EA
 
 
-def von_mises(sections, tension, torque, moment, outside, inside):
-    """The largest von Mises stress of the body, Pa: of tension, bending, torsion and pressures (Lame), at the outer and
-    the inner surface."""
+def von_mises(sections, true_tension, torque, moment, outside, inside):
+    """(4, ...) von Mises stress of the body, Pa, at the outer surface on the two sides of bending, that in tension
+    first, and so at the inner surface: of tension, bending, torsion and pressures (Lame)."""
     bore, whole = areas(sections)
     area = whole - bore
     second = np.pi / 4 * (sections.outer**4 - sections.inner**4)
-    axial = true_tension(sections, tension, outside, inside) / area
+    axial = true_tension / area
     mean = (inside * bore - outside * whole) / area
     rises = (inside - outside) * whole * bore / (np.pi * area)
-    largest = 0.0
+    found = []
     for radius in (sections.outer, sections.inner):
         with np.errstate(divide="ignore", invalid="ignore"):
             differs = np.where(radius > 0, rises / radius**2, 0.0)
         hoop, radial, shear = mean + differs, mean - differs, torque * radius / (2 * second)
-        for side in (-1, 1):
+        for side in (1, -1):
             along = axial + side * moment * radius / second
             squares = (along - hoop) ** 2 + (hoop - radial) ** 2 + (radial - along) ** 2
-            largest = np.maximum(largest, np.sqrt(squares / 2 + 3 * shear**2))
-    return largest
+            found.append(np.sqrt(squares / 2 + 3 * shear**2))
+    return np.array(np.broadcast_arrays(*found))
 
 
 #: Of a place: measured depth s (m), clearance (m), radius of contact (m), radius of the body beside it (m).

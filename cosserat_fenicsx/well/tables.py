@@ -17,7 +17,7 @@ _WARNS = re.compile(r"\b[A-Z]{4,}\b")
 
 def along(answer, units, rows):
     """The table of the state along the string: the ends of components, and about every tenth of the depth between."""
-    known, which = answer.quantities, np.array(_shown(answer))
+    known, which = answer.quantities, np.array(shown_rows(answer))
     which = which[screen.rows_of(len(which), rows)]
     still = np.abs(answer.torque).max() <= known["torque"].noise
     names = [name for name in answer._on_screen if not (name == "torque" and still)]
@@ -57,7 +57,7 @@ def parts_at(answer, contact):
     return " to ".join(dict.fromkeys(answer.string.components[i].name for i in answer.component[at]))
 
 
-def _shown(answer):
+def shown_rows(answer):
     """Indices of rows: the ends of components, and about every tenth of the depth between."""
     md, ends = answer.md, [answer.depth, *(place.top for place in answer.laid)]
     rows = {0, len(md) - 1, *(i + side for i in np.flatnonzero(np.diff(answer.component)) for side in (0, 1))}

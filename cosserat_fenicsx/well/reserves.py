@@ -1,0 +1,244 @@
+"""What a string bears beyond its loads: overpull of a stuck string, and the largest weight on bit."""
+
+from dataclasses import dataclass, fields, replace
+from functools import cache, partial
+
+import numpy as np
+from scipy.optimize import brentq
+
+from cosserat_fenicsx.checks import number, refuse
+from cosserat_fenicsx.errors import SceneError
+from cosserat_fenicsx.quantities import Quantity
+from cosserat_fenicsx.results.result import Result, by_name
+from cosserat_fenicsx.well.buckled import LockUp, buckled_string
+from cosserat_fenicsx.well.pieces import sections_of
+from cosserat_fenicsx.well.softstring import chain_of, soft_string
+from cosserat_fenicsx.well.utilisation import Utilisation, strengths_of
+
+_PARTS, _LIMITS = ("component",), ("limit",)
+# Relative accuracy of weights on bit; a string that locks up under this much more weight than uses up its hook load is
+# said to lock up.
+_ACCURATE, _BEYOND = 3e-4, 1.05
+
+
+def _safety(owner, safety):
+    return number(owner, "safety", safety, "a factor from 1 to 10", lambda x: 1 <= x <= 10)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class MarginOfOverpull(Result):
+    """Margin of overpull by component, from `TorqueAndDrag.margin_of_overpull`; `float` gives the smallest, N.
+
+    What the surface pulls beyond the hook load is taken to arrive at every place in full, as without friction: exact at
+    the surface, and on the safe side below. The tension at yield is that with the torque at the place (API RP 7G).
+
+    Attributes:
+        margins: (components,) N, from the surface down; negative where the limit is exceeded. md: of the weakest place
+            of each, m. tension: effective, there, N. allowed: there, N. safety: the factor in it.
+        component: its name.
+    """
+
+    component: np.ndarray
+    md: np.ndarray
+    tension: np.ndarray
+    allowed: np.ndarray
+    safety: float
+    operation: str
+
+    _rows_axis = "component"
+    _quantities = by_name(
+        Quantity("margin", "margin of overpull", "N", axes=()),
+        Quantity("component", axes=_PARTS),
+        Quantity("margins", "margin", "N", axes=_PARTS, digits=5),
+        Quantity("md", "weakest at md", "m", axes=_PARTS),
+        Quantity("tension", "tension there", "N", axes=_PARTS, digits=5),
+        Quantity("allowed", "allowed there", "N", axes=_PARTS, digits=5),
+    )
+
+    margins = property(lambda self: self.allowed - self.tension, doc="(components,) N.")
+
+    @property
+    def margin(self) -> float:
+        """The smallest, N."""
+        return float(self.margins.min())
+
+    __float__ = margin.fget
+
+    def __len__(self):
+        return len(self.md)
+
+    def _about(self):
+        return {"kind": "MarginOfOverpull", "operation": self.operation, "safety": self.safety}
+
+    def _answer(self, units):
+        i = int(np.argmin(self.margins))
+        yield (
+            f"{self.operation}: margin of overpull {self._told('margin', units, form='.5g')}, by the "
+            f"{self.component[i]} at md = {self._told('md', units, self.md[i])}, with a safety factor of {self.safety:g}."
+        )
+
+    def __repr__(self):
+        return f"MarginOfOverpull({self.margin:.6g} N)"
+
+
+def overpull_of(answer, strengths, safety):
+    """The `MarginOfOverpull` of an answer."""
+    safety, rows = _safety("margin_of_overpull", safety), []
+    for i in range(len(strengths))[::-1]:
+        here = answer.component == i
+        if strengths[i] is None or not here.any():
+            continue
+        allowed, tension = strengths[i].tension_at(answer.torque[here]) / safety, answer.tension[here]
+        k = int(np.argmin(allowed - tension))
+        rows.append((answer.laid[i].component.name, answer.md[here][k], tension[k], allowed[k]))
+    if not rows:
+        raise SceneError("margin_of_overpull: the string is a bit alone: expected drill pipe or collars above it")
+    return MarginOfOverpull(*map(np.array, zip(*rows, strict=True)), safety, answer.operation.name)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class MostWeightOnBit(Result):
+    """The largest weight on bit by each of its limits, from `TorqueAndDrag.most_weight_on_bit`; `float` gives the
+    smallest, N.
+
+    Attributes:
+        limits: names, such as "helical buckling". weights: (limits,) N; NaN where the string has not enough weight to
+            reach the limit. md: where it is reached first, m. component: there.
+        counts: (limits,) whether it counts: the kind of buckling that was not asked for does not.
+    """
+
+    limits: np.ndarray
+    weights: np.ndarray
+    md: np.ndarray
+    component: np.ndarray
+    counts: np.ndarray
+    operation: str
+    safety: float
+
+    _rows_axis = "limit"
+    _quantities = by_name(
+        Quantity("weight", "most weight on bit", "N", axes=()),
+        Quantity("limits", "limit", axes=_LIMITS),
+        Quantity("weights", "weight on bit", "N", axes=_LIMITS, digits=5),
+        Quantity("md", "reached at md", "m", axes=_LIMITS),
+        Quantity("component", axes=_LIMITS),
+        Quantity("counts", axes=_LIMITS),
+    )
+
+    @property
+    def _first(self):
+        return int(np.argmin(np.where(self.counts & np.isfinite(self.weights), self.weights, np.inf)))
+
+    weight = property(lambda self: float(self.weights[self._first]), doc="N.")
+    limit = property(lambda self: str(self.limits[self._first]), doc="What limits it.")
+
+    def __float__(self):
+        return self.weight
+
+    def __len__(self):
+        return len(self.limits)
+
+    def _about(self):
+        return {"kind": "MostWeightOnBit", "operation": self.operation, "safety": self.safety}
+
+    def _answer(self, units):
+        i = self._first
+        where = (
+            f" at md = {self._told('md', units, self.md[i])}, {self.component[i]}" if self.md[i] == self.md[i] else ""
+        )
+        yield (
+            f"{self.operation}: at most {self._told('weight', units, form='.4g')} on bit, limited by {self.limit}{where}; "
+            f"strength with a safety factor of {self.safety:g}."
+        )
+        yield "'-': the hook load is 0 before this limit is reached."
+
+    def __repr__(self):
+        return f"MostWeightOnBit({self.weight:.6g} N, {self.limit})"
+
+
+def most_weight_of(answer, grade, wear, safety, buckling, model):
+    """The `MostWeightOnBit` of an answer's string and operation, see `TorqueAndDrag.most_weight_on_bit`."""
+    who = "most_weight_on_bit"
+    safety = _safety(who, safety)
+    if buckling not in ("helical", "sinusoidal"):
+        refuse(who, "buckling", buckling, "'helical' or 'sinusoidal'")
+    if model not in ("soft", "buckled"):
+        refuse(who, "model", model, "'soft' or 'buckled'")
+    if "weight" not in {field.name for field in fields(answer.operation)}:
+        refuse(who, "operation", answer.operation.name, "one with a weight on bit, such as Sliding(weight)")
+    strengths = strengths_of(who, answer.laid, grade, wear)
+    soft, solved = (cache(partial(_solved, answer, x)) for x in ("soft", model))
+    high, least = float(answer.pieces.weight @ (answer.pieces.bottom - answer.pieces.top)), soft(0.0)
+    if not 0 < least.hook_load < np.inf:
+        raise SceneError(
+            f"{who}: the string cannot go down by its own weight even without weight on bit: expected less friction, or "
+            "heavier pipe in the upper part"
+        )
+    # up to the first helix the buckled string is the soft one
+    high = _first_zero(lambda w: soft(w).hook_load, 0.0, high)
+    begin = _first_zero(lambda w: float(np.nanmin(_to_load(soft(w), 1), initial=1.0)), 0.0, high)
+    if np.isnan(begin):
+        solved, begin = soft, high
+    most = high
+    if solved is not soft:
+        most = np.nan_to_num(_first_zero(lambda w: max(_hook_load(solved(w)), -least.hook_load), begin, high), nan=high)
+    beyond = solved(_BEYOND * most)
+    locks = isinstance(beyond, LockUp)
+    rows = [("lock-up" if locks else "weight of the string", most, beyond.md if locks else 0.0, True)]
+    margins = {
+        "sinusoidal buckling": (lambda found: _to_load(found, 0), buckling == "sinusoidal"),
+        "helical buckling": (lambda found: _to_load(found, 1), True),
+        "strength": (lambda found: 1 - safety * Utilisation(found, strengths).von_mises, True),
+    }
+    for name, (margin, counts) in margins.items():
+
+        def least_of(w, at, margin=margin):
+            return float(np.nanmin(margin(at(w)), initial=1.0))
+
+        weight, at = _first_zero(partial(least_of, at=soft), 0.0, begin), soft
+        if np.isnan(weight) and solved is not soft:
+            if name.startswith("helical"):
+                weight = begin
+            else:
+                at = solved
+                weight = _first_zero(partial(least_of, at=at), begin, most * (1 - 2 * _ACCURATE))
+        md = np.nan if np.isnan(weight) else at(weight).md[np.nanargmin(margin(at(weight)))]
+        rows.append((name, weight, md, counts))
+    limits, weights, md, counts = map(np.array, zip(*rows, strict=True))
+    place = np.searchsorted(least.md, md).clip(max=len(least.md) - 1)
+    part = np.where(np.isnan(md), "", least.value("component_name")[place])
+    return MostWeightOnBit(limits, weights, md, part, counts, answer.operation.name, safety)
+
+
+def _solved(answer, model, weight):
+    """The `TorqueAndDrag` of the flexible string with another weight on bit (N), without estimates of errors of its own;
+    or the `LockUp`."""
+    operation = replace(answer.operation, weight=weight)
+    chain = chain_of(answer.pieces, answer.torque_convention == "coulomb")
+    solved = soft_string(chain, -weight, operation.torque, _ACCURATE)
+    if model == "buckled":
+        sections = sections_of([place.component for place in answer.laid])
+        try:
+            solved = buckled_string(solved, answer.pieces, sections, _ACCURATE) or solved
+        except LockUp as locked:
+            return locked
+    return answer.of_flexible(operation, model, solved)
+
+
+def _hook_load(found):
+    return -np.inf if isinstance(found, LockUp) else found.hook_load
+
+
+def _to_load(found, which):
+    """(n,) tension above that of buckling, over its size: 0 where the string begins to buckle."""
+    load = found.buckling_loads[which]
+    return 1 + found.tension / load
+
+
+def _first_zero(margin, low, high):
+    """The weight (N) at which a margin, a function of the weight, vanishes; NaN where it is above 0 up to `high`."""
+    if margin(high) > 0:
+        return np.nan
+    if margin(low) <= 0:
+        return low
+    return brentq(margin, low, high, xtol=_ACCURATE * high, rtol=_ACCURATE)

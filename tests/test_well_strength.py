@@ -1,0 +1,244 @@
+"""Strength of strings: limits of pipe bodies, bending between tool joints, fatigue, overpull, most weight on bit."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import cosserat_fenicsx as cf
+from cosserat_fenicsx import units as u
+
+pytestmark = [pytest.mark.serial, pytest.mark.once]
+TRUTHS = json.loads((Path(__file__).parent / "reference" / "strength.json").read_text(encoding="utf-8"))
+SPANS = [(name, i) for name in TRUTHS if name.startswith("pipe") for i in range(len(TRUTHS[name]["truth"]["pipe"]))]
+W = cf.well
+
+
+def pipe_of(given, **more):
+    """The pipe of a problem, with its tool joints."""
+    joint = given["od"] + 2 * given["joint_over_body"]
+    return W.DrillPipe(outer_diameter=given["od"], inner_diameter=given["id"], tool_joint=joint,
+                       joint_spacing=2 * given["half_length"], **more)  # fmt: skip
+
+
+@pytest.mark.parametrize("name, i", SPANS)
+def test_pipe_between_tool_joints(name, i):
+    given, exact = TRUTHS[name]["input"], TRUTHS[name]["truth"]["pipe"][i]
+    found = W.bending_between_joints(pipe_of(given), exact["T"], given["kh"])
+    assert found.mode == exact["mode"]
+    keys = {"at_joint": "curvature at the joint", "in_middle": "in the middle", "factor": "over the hole's",
+            "bending_stress": "bending stress (Pa)", "wall_force": "wall force in the middle (N)",
+            "deviation": "deviation in the middle (m)"}  # fmt: skip
+    for field, key in keys.items():
+        if key in exact:
+            assert getattr(found, field) == pytest.approx(exact[key], rel=1e-9), field
+
+
+def test_pipe_between_tool_joints_is_continuous_and_safe_where_it_is_unknown():
+    pipe = pipe_of(TRUTHS["pipe between tool joints, thin joints, steep"]["input"])
+    found = [W.bending_between_joints(pipe, T, 0.007) for T in np.geomspace(1.0, 3e6, 1000)]
+    factors, modes = np.array([x.factor for x in found]), [x.mode for x in found]
+    assert list(dict.fromkeys(modes)) == ["free", "point", "wrapped"] and np.abs(np.diff(factors)).max() < 0.02
+    assert W.bending_between_joints(pipe, 0.0, 0.007).factor == 1.0
+    with pytest.raises(cf.SceneError, match="touches the wall or buckles.*Centraliser"):
+        W.bending_between_joints(pipe, -100e3, 0.007)  # it would touch
+    with pytest.raises(cf.SceneError, match="touches the wall or buckles"):
+        W.bending_between_joints(pipe, -1e6, 0.0)
+    with pytest.raises(cf.SceneError, match="joint_spacing"):
+        W.bending_between_joints(W.DrillPipe(size="5 in 19.50"), 1e5, 0.01)
+
+
+@pytest.mark.parametrize("i", range(3))
+def test_the_utilisation_of_a_section(i):
+    problem = TRUTHS["utilisation, grade E75"]
+    given, case = problem["input"], problem["truth"]["cases"][i]
+    pipe = W.PipeStrength(W.DrillPipe(outer_diameter=given["od"], inner_diameter=given["id"]), "E75")
+    loads = [case[x] for x in ("true_tension", "torque", "moment", "inside", "outside")]
+    assert pipe.utilisation(*loads) == pytest.approx(case["utilisation: outer +, outer -, inner +, inner -"], rel=1e-12)
+
+
+def test_the_limits_of_a_section():
+    problem = TRUTHS["utilisation, grade E75"]
+    given, limits = problem["input"], list(problem["truth"]["limits"].values())
+    pipe = W.PipeStrength(W.DrillPipe(outer_diameter=given["od"], inner_diameter=given["id"]), "E75")
+    found = pipe.tension, pipe.torque, pipe.torque_at(limits[2][0]), pipe.tension_at(limits[3][0]), pipe.burst
+    assert found == pytest.approx([*limits[:2], limits[2][1], limits[3][1], limits[4][0]], rel=1e-12)
+
+
+#: API RP 7G, tables of drill pipe, 5 in 19.50 lb/ft: lbf, ft-lbf, psi, psi.
+API = {
+    ("E75", 1.0): (395595, 41167, 9503, 9962),
+    ("X95", 1.0): (501087, 52144, 12037, 12026),
+    ("G105", 1.0): (553833, 57633, 13304, 12999),
+    ("S135", 1.0): (712070, 74100, 17105, 15672),
+    ("E75", 0.8): (311535, 32285, 8688, 7041),
+    ("S135", 0.8): (560764, 58113, 15638, 10029),
+}
+
+
+@pytest.mark.parametrize("grade, wear", API)
+def test_the_tables_of_api(grade, wear):
+    pipe = W.PipeStrength(W.DrillPipe(size="5 in 19.50 lb/ft"), grade, wear)
+    found = pipe.tension / u.lbf, pipe.torque / u.ft_lbf, pipe.burst / u.psi, float(pipe.collapse()) / u.psi
+    assert found == pytest.approx(API[grade, wear], abs=0.7)
+
+
+@pytest.mark.parametrize("slender", [5.0, 10.0, 13.6, 14.5, 22.9, 24.0, 32.05, 40.0])
+def test_collapse_has_no_jumps(slender):
+    """Across the ends of its four formulas (of E75 at 13.60, 22.91, 32.05), and of the strength where they end."""
+    from cosserat_fenicsx.well.strength import collapse_pressure
+
+    strength = np.linspace(1e3, 160e3, 20001) * u.psi
+    pressure = collapse_pressure(slender, strength)
+    assert (np.diff(pressure) > -1e-4 * pressure.max()).all() and np.abs(
+        np.diff(pressure)
+    ).max() < 2e-3 * pressure.max()
+
+
+@pytest.mark.parametrize("name", [name for name in TRUTHS if name.startswith("pipe")])
+def test_fatigue_and_the_allowed_dogleg(name):
+    given = TRUTHS[name]["input"]
+    steel = cf.Material(E=30e6 * u.psi, nu=0.3, density=7850.0)
+    for exact in TRUTHS[name]["truth"]["API RP 7G fatigue"]:
+        for grade, (stress, dogleg) in zip(("E75", "S135"), list(exact.values())[1:], strict=True):
+            pipe, T = W.PipeStrength(pipe_of(given, material=steel), grade), exact["T_lbf"] * u.lbf
+            assert pipe.fatigue_stress(T) / u.psi == pytest.approx(stress, rel=1e-12)
+            assert pipe.allowed_dogleg(T) / u.deg_per_100ft == pytest.approx(dogleg, rel=1e-7)
+
+
+@pytest.fixture(scope="module")
+def well():
+    """A hole that builds to horizontal, with a turn, and its string."""
+    md, inc, azi = [0, 500, 1100, 1900, 2600, 3700], [0, 0, 40, 40, 90, 90], [30, 30, 30, 30, 100, 100]
+    hole = W.Borehole(
+        W.WellPath.from_survey(md, inc, azi),
+        [W.HoleSection(2000.0, 0.2224, 0.2, "casing"), W.HoleSection(3700.0, 0.2159, 0.3, "open hole")],
+    )
+    parts = [W.Bit(0.2159), W.Collar(90.0, "NC46-65"), W.HeavyWeight(120.0, "5 in"),
+             W.DrillPipe(size="5 in 19.50 lb/ft", joint_spacing=9.45)]  # fmt: skip
+    return hole, W.DrillString(parts)
+
+
+def solved(well, operation=W.RotaryDrilling(60e3, 5e3), **more):
+    return W.torque_and_drag(*well, operation, mud=W.Mud(1200.0), model="soft", **more)
+
+
+def test_the_utilisation_of_a_string(well):
+    answer = solved(well)
+    use = answer.utilisation("S135")
+    # at the surface, where nothing bends and no pressure acts
+    pipe = W.PipeStrength(well[1].components[-1], "S135")
+    surface = pipe.utilisation(answer.hook_load, answer.surface_torque).max()
+    assert use.von_mises[0] == pytest.approx(surface, rel=1e-12)
+    assert use.tension[0] == pytest.approx(answer.hook_load / pipe.tension)
+    # in the bend the tool joints carry the pipe: the stress is that of `bending_between_joints`
+    k = int(np.searchsorted(answer.md, 700.0))
+    one = W.bending_between_joints(well[1].components[-1], answer.tension[k], answer.dogleg_severity[k])
+    assert use.bending_stress[k] == pytest.approx(one.bending_stress) and use.contact_mode[k] == one.mode
+    assert use.joint_factor[k] == pytest.approx(one.factor)
+    assert use.fatigue[k] == pytest.approx(one.bending_stress / pipe.fatigue_stress(answer.tension[k]))
+    # without tool joints and worn by nothing it is the answer's own von Mises stress
+    plain = W.DrillString([*well[1].components[:-1],
+                           W.DrillPipe(outer_diameter=0.127, inner_diameter=0.10861, mass=31.1)])  # fmt: skip
+    answer = solved((well[0], plain))
+    use, pipes = answer.utilisation("S135"), answer.component == 3
+    stress = (use.von_mises * 135 * u.ksi)[pipes]
+    straight = answer.buckling[pipes] == 0
+    assert stress[straight] == pytest.approx(answer.von_mises[pipes][straight], rel=1e-12)
+    assert (stress >= answer.von_mises[pipes] * (1 - 1e-12)).all()  # a buckled string bends more
+
+
+def test_a_worn_pipe_bears_less_and_grades_go_by_component(well):
+    answer = solved(well)
+    new, worn = answer.utilisation("E75"), answer.utilisation("E75", 0.8)
+    assert worn.largest > 1.2 * new.largest
+    both = answer.utilisation({"drill pipe": "S-135", "heavy-weight": "80 ksi"})
+    assert both.largest == pytest.approx(new.largest * 75 / 135, rel=1e-9)
+    heavy = answer.component == 2
+    assert both.von_mises[heavy] == pytest.approx(new.von_mises[heavy] * 55 / 80)
+
+
+@pytest.mark.parametrize("grade, words", [
+    ("S13", "did you mean 'S135'"), ("W900", "known: E75, G105, S135, X95"), ({"pipe": "S135"}, "did you mean 'drill"),
+    ({"collar": "110 ksi"}, "grade\\['drill pipe'\\]"), (135.0, "yield strength"), ("135 kN", "unit"),
+])  # fmt: skip
+def test_grades_are_refused_by_name(well, grade, words):
+    with pytest.raises(cf.SceneError, match=words):
+        solved(well).utilisation(grade)
+
+
+def test_strength_needs_diameters_mud_and_numbers(well):
+    hole, string = well
+    plain = W.DrillString([W.Component(300.0, weight=300.0, contact_radius=0.08), string.components[-1]])
+    with pytest.raises(cf.SceneError, match="component has no diameters.*DrillPipe"):
+        solved((hole, plain)).utilisation()
+    with pytest.raises(cf.SceneError, match="mud = None"):
+        W.torque_and_drag(hole, W.DrillString([W.Component(weight=300.0, contact_radius=0.08)]), W.TripIn(),
+                          model="soft").utilisation()  # fmt: skip
+    with pytest.raises(cf.SceneError, match="wear"):
+        solved(well).utilisation("E75", 80.0)
+    with pytest.raises(cf.SceneError, match="safety"):
+        solved(well).margin_of_overpull(safety=0.9)
+    with pytest.raises(cf.SceneError, match="tool_joint as well"):
+        W.Collar(90.0, "NC46-65", joint_spacing=9.0)
+
+
+def test_unknown_bending_is_said_and_left_out(well):
+    """In compression beyond what a span bears between its joints."""
+    use = solved(well, W.Sliding(250e3)).utilisation("E75")
+    assert "NOT KNOWN: bending" in use.summary() and np.isnan(use.von_mises[use.contact_mode == "not known"]).all()
+    assert "does not rotate" in str(use)
+
+
+def test_the_margin_of_overpull(well):
+    answer = solved(well, W.TripOut())
+    margin = answer.margin_of_overpull("E75", safety=1.25)
+    pipe = W.PipeStrength(well[1].components[-1], "E75")
+    assert float(margin) == pytest.approx(pipe.tension / 1.25 - answer.hook_load, rel=1e-12)
+    assert margin.md[0] == 0 and margin.component[0] == "drill pipe" and len(margin) == 3
+    # with a torque: API RP 7G
+    turning = solved(well)
+    torque = turning.surface_torque
+    assert float(turning.margin_of_overpull("E75", safety=1.0)) <= pipe.tension_at(torque) - turning.hook_load + 1e-6
+
+
+@pytest.mark.parametrize("operation", [W.RotaryDrilling(10e3, 5e3), W.Sliding(10e3)])
+def test_the_most_weight_on_bit(well, operation):
+    from dataclasses import replace
+
+    most = solved(well, operation).most_weight_on_bit("S135")
+    rows = dict(zip(most.limits, most.weights, strict=True))
+    assert most.weight == min(x for x, counts in zip(most.weights, most.counts, strict=True) if counts and x == x)
+
+    def at(share):
+        return W.torque_and_drag(*well, replace(operation, weight=share * most.weight), mud=W.Mud(1200.0), model="soft")
+
+    below, above = at(0.999), at(1.001)
+    if most.limit == "helical buckling":
+        assert (below.buckling < 2).all() and (above.buckling == 2).any()
+    else:
+        assert below.hook_load > 0 > above.hook_load
+    snake = rows["sinusoidal buckling"] / most.weight
+    assert (at(0.999 * snake).buckling == 0).all() and (at(1.001 * snake).buckling > 0).any()
+
+
+def test_strength_limits_the_weight_on_bit_of_a_weak_string(well):
+    answer = solved(well)
+    most = answer.most_weight_on_bit("290 MPa", safety=1.1)
+    assert most.limit == "strength"
+    use = solved(well, W.RotaryDrilling(most.weight, 5e3)).utilisation("290 MPa")
+    assert use.largest == pytest.approx(1 / 1.1, rel=1e-3)
+
+
+def test_results_of_strength_are_stored_and_shown_in_field_units(well, tmp_path):
+    answer = solved(well)
+    use, margin, most = answer.utilisation("S135"), answer.margin_of_overpull("S135"), answer.most_weight_on_bit("S135")
+    for result, name in ((use, "von_mises"), (margin, "margins"), (most, "weights")):
+        result.save(tmp_path / "result.h5")
+        assert np.array_equal(cf.read_result(tmp_path / "result.h5").value(name), result.value(name), equal_nan=True)
+        result.write(tmp_path / "result.csv", units="field")
+        assert "(ft)" in (tmp_path / "result.csv").read_text() and "klbf" in margin.summary("field")
+    figure = use.plot(units="field")
+    labels = " ".join(axes.get_xlabel() + axes.get_ylabel() for axes in figure.axes)
+    assert all(x in labels for x in ("(ft)", "(klbf)", "(psi)", "(deg/100ft)", "share of the limit"))
