@@ -39,7 +39,7 @@ from cosserat_fenicsx.quantities import Quantity as Quantity
 from cosserat_fenicsx.results.history import History as History
 from cosserat_fenicsx.results.modes import Buckling as Buckling
 from cosserat_fenicsx.results.modes import Modes as Modes
-from cosserat_fenicsx.results.modes_along import ModesAlong as ModesAlong
+from cosserat_fenicsx.results.modes import ModesAlong as ModesAlong
 from cosserat_fenicsx.results.path import Path as Path
 from cosserat_fenicsx.results.records import Event as Event
 from cosserat_fenicsx.results.sensitivity import Sensitivity as Sensitivity

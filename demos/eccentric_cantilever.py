@@ -23,8 +23,7 @@ from rich.table import Table
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx import analytic
-from cosserat_fenicsx.pictures.charts import draw_chart, empty_figure, legend
-from cosserat_fenicsx.pictures.two_widths import draw_both
+from cosserat_fenicsx.pictures.charts import draw_both, draw_chart, empty_figure, legend
 from cosserat_fenicsx.results.path import stability
 from cosserat_fenicsx.results.screen import as_text
 

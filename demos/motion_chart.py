@@ -5,9 +5,8 @@ from functools import partial
 
 import numpy as np
 
-from cosserat_fenicsx.pictures.charts import draw_chart, draw_energies, empty_figure, legend, room_for
+from cosserat_fenicsx.pictures.charts import draw_both, draw_chart, draw_energies, empty_figure, legend, room_for
 from cosserat_fenicsx.pictures.motion_charts import energies_of
-from cosserat_fenicsx.pictures.two_widths import draw_both
 
 #: The first panel: axes ("xy", "xz" or "xyz"), the station whose track is drawn, the last time (s) or None, and whether
 #: the axes have different scales.

@@ -14,7 +14,7 @@ import shutil
 import sys
 from pathlib import Path
 
-from cosserat_fenicsx.pictures.two_widths import draw_both
+from cosserat_fenicsx.pictures.charts import draw_both
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGES = {page.stem.removeprefix("recipes_"): page for page in sorted((ROOT / "docs").glob("recipes_*.md"))}

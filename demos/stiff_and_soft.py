@@ -5,8 +5,7 @@ from functools import partial
 import numpy as np
 
 import cosserat_fenicsx as cf
-from cosserat_fenicsx.pictures.charts import beside, draw_chart, legend
-from cosserat_fenicsx.pictures.two_widths import draw_both
+from cosserat_fenicsx.pictures.charts import beside, draw_both, draw_chart, legend
 
 #: Operations of the hook loads, their colours, and for how many depths of the bit the rod is solved.
 OPERATIONS, COLOURS, DEPTHS = (cf.well.TripOut(), cf.well.TripIn()), ("tab:blue", "tab:orange"), 9

@@ -15,7 +15,7 @@ from mpi4py import MPI
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.drilling.torsion import TorsionWaves
-from cosserat_fenicsx.pictures.two_widths import draw_both
+from cosserat_fenicsx.pictures.charts import draw_both
 
 SCENES = Path(__file__).parent / "strings"
 _WAVES = "characteristics, extrapolated"

@@ -19,8 +19,7 @@ from known_numbers import Check, report, verdict
 from mpi4py import MPI
 
 import cosserat_fenicsx as cf
-from cosserat_fenicsx.pictures.charts import draw_chart, empty_figure, legend
-from cosserat_fenicsx.pictures.two_widths import draw_both
+from cosserat_fenicsx.pictures.charts import draw_both, draw_chart, empty_figure, legend
 
 FOUND = cf.read(Path(__file__).parent / "strings" / "stability_map.toml")
 #: A bit whose speed has this severity at the end does not rotate steadily; modes that grow faster than this (1/s) have

@@ -18,7 +18,7 @@ from scipy.integrate import trapezoid
 from stiff_and_soft import stiff_and_soft
 
 import cosserat_fenicsx as cf
-from cosserat_fenicsx.pictures.two_widths import draw_both
+from cosserat_fenicsx.pictures.charts import draw_both
 
 SCENES = Path(__file__).parent / "wells"
 

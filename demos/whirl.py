@@ -21,7 +21,7 @@ from scipy.integrate import solve_ivp
 from whirling_collar import ARM, CLEARANCE, DRAG, EI, LENGTH, MESH, MUD_MASS, OFFSET, STEEL_MASS, spun_up
 
 import cosserat_fenicsx as cf
-from cosserat_fenicsx.pictures.two_widths import draw_both
+from cosserat_fenicsx.pictures.charts import draw_both
 
 #: Drive, friction of the wall, and duration of the run-up and of the whole.
 SPEED, FRICTION, RUN_UP, DURATION = 130 * cf.units.rpm, 0.5, 6.0, 11.0

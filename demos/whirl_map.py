@@ -20,8 +20,7 @@ from mpi4py import MPI
 from whirling_collar import LENGTH, MESH, least_friction, rolling
 
 import cosserat_fenicsx as cf
-from cosserat_fenicsx.pictures.charts import draw_chart, empty_figure, legend
-from cosserat_fenicsx.pictures.two_widths import draw_both
+from cosserat_fenicsx.pictures.charts import draw_both, draw_chart, empty_figure, legend
 
 SPEEDS = [rpm * cf.units.rpm for rpm in (40, 60, 80, 100, 120, 150)]
 FRICTIONS = [0.02, 0.03, 0.045, 0.07, 0.12, 0.3]

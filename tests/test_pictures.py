@@ -16,11 +16,10 @@ import cosserat_fenicsx as cf
 from cosserat_fenicsx import interrupts, progress
 from cosserat_fenicsx.cli import main as cli
 from cosserat_fenicsx.pictures.charts import asked
-from cosserat_fenicsx.pictures.colours import colour_of, known, peak_of, seen
-from cosserat_fenicsx.pictures.default_colour import default_colour
+from cosserat_fenicsx.pictures.colours import colour_of, default_colour, known, peak_of, seen
 from cosserat_fenicsx.pictures.drawing import quantity
+from cosserat_fenicsx.pictures.plot import tangled
 from cosserat_fenicsx.pictures.shapes import Drawn
-from cosserat_fenicsx.pictures.side_by_side import tangled
 from cosserat_fenicsx.pictures.signs import Resting, has_sign, loads_of, signs_of, without_sign
 from cosserat_fenicsx.pictures.view import Labels, View, axes_of, view_of
 

@@ -18,8 +18,7 @@ from cosserat_fenicsx.errors import LibraryMissing, SceneError
 from cosserat_fenicsx.interrupts import obey
 from cosserat_fenicsx.new_files import replaced
 from cosserat_fenicsx.numerics import spun
-from cosserat_fenicsx.pictures.colours import colour_of, known, peak_of, seen
-from cosserat_fenicsx.pictures.default_colour import default_colour
+from cosserat_fenicsx.pictures.colours import colour_of, default_colour, known, peak_of, seen
 from cosserat_fenicsx.pictures.drawing import (
     add_bodies,
     add_lines,

@@ -13,7 +13,7 @@ from cosserat_fenicsx.results import screen
 from cosserat_fenicsx.results.accuracy import leading_of
 from cosserat_fenicsx.results.compared import NAMES, Errors, all_cell_nodes, of_sections, sizes_of, words_of
 from cosserat_fenicsx.results.contacts import Contacts, contacts_in_words, contacts_of
-from cosserat_fenicsx.results.modes_along import ModesAlong
+from cosserat_fenicsx.results.modes import ModesAlong
 from cosserat_fenicsx.results.records import Event, Records
 from cosserat_fenicsx.results.recovery import element_contact
 from cosserat_fenicsx.results.result import by_name

@@ -10,7 +10,7 @@ from mpi4py import MPI
 from cosserat_fenicsx.checks import instance, number, refuse, whole
 from cosserat_fenicsx.errors import NotConverged, SceneError
 from cosserat_fenicsx.interrupts import obey
-from cosserat_fenicsx.results.modes_along import ModesAlong
+from cosserat_fenicsx.results.modes import ModesAlong
 from cosserat_fenicsx.results.records import Event
 from cosserat_fenicsx.scene.scene import Scene
 from cosserat_fenicsx.statics.natural_modes import admit, assigned, at_state, modes

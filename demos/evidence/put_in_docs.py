@@ -7,7 +7,7 @@
 
 A table replaces what stands between <!-- name --> and <!-- /name --> in a page of docs/; one that is too long for that
 has a page of its own in docs/tables/. Pictures are cut to what is drawn, reduced to few colours and put in
-docs/pictures/, those for pages of 400 pixels, which demos write beside them (pictures/two_widths.py), in its folder narrow/.
+docs/pictures/, those for pages of 400 pixels, which demos write beside them (pictures/charts.py), in its folder narrow/.
 """
 
 import argparse
@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from cosserat_fenicsx.pictures.two_widths import narrow
+from cosserat_fenicsx.pictures.charts import narrow
 
 ROOT = Path(__file__).resolve().parents[2]
 #: The tables that stand in a page, each with its page and pictures.

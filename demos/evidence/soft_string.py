@@ -20,8 +20,7 @@ from peers.environments import Missing
 from peers.process import Peer
 
 import cosserat_fenicsx as cf
-from cosserat_fenicsx.pictures.charts import beside, draw_chart, legend
-from cosserat_fenicsx.pictures.two_widths import draw_both
+from cosserat_fenicsx.pictures.charts import beside, draw_both, draw_chart, legend
 
 SCENES = Path(__file__).resolve().parents[1] / "wells"
 #: Hook loads out and in, N, by a differential equation at 1e-13.

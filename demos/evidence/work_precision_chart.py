@@ -9,8 +9,7 @@ from peers.environments import OWN
 from peers.problems import TITLES
 from work_precision_table import answered, median
 
-from cosserat_fenicsx.pictures.charts import SMALL, draw_chart, empty_figure, legend
-from cosserat_fenicsx.pictures.two_widths import draw_both
+from cosserat_fenicsx.pictures.charts import SMALL, draw_both, draw_chart, empty_figure, legend
 
 #: (problem, file, subtitle, whether only the spatial model of this package is shown).
 _VIEWS = (

@@ -20,8 +20,7 @@ from work_precision import SAMPLES, Panel, Record, run
 from work_precision_chart import in_time, plot
 from work_precision_table import answered, at_accuracies, cheapest, median, milliseconds
 
-from cosserat_fenicsx.pictures.charts import SMALL, beside, draw_chart, legend
-from cosserat_fenicsx.pictures.two_widths import draw_both
+from cosserat_fenicsx.pictures.charts import SMALL, beside, draw_both, draw_chart, legend
 
 PANEL = Panel(
     motions.PEERS, motions.problems, motions.error, motions.configurations, motions.kind, motions.model, 1, False

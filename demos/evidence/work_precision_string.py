@@ -23,8 +23,7 @@ import cosserat_fenicsx as cf
 from cosserat_fenicsx.drilling.elements import AxialTorsional
 from cosserat_fenicsx.drilling.protocol import SERIES
 from cosserat_fenicsx.drilling.torsion import TorsionWaves
-from cosserat_fenicsx.pictures.charts import SMALL, draw_chart, empty_figure, legend, room_for
-from cosserat_fenicsx.pictures.two_widths import draw_both
+from cosserat_fenicsx.pictures.charts import SMALL, draw_both, draw_chart, empty_figure, legend, room_for
 
 #: Mean of the last four periods (s), largest speed of the bit after 60 s (rad/s); and how far these may be wrong, as
 #: relative errors: the differences of meshes, and of the levels at which a period is measured.

@@ -7,8 +7,7 @@ import numpy as np
 from comparison.column import Column
 from comparison.curves import MANY, exact
 from cosserat_fenicsx import analytic
-from cosserat_fenicsx.pictures.charts import SMALL, draw_chart, empty_figure, room_for
-from cosserat_fenicsx.pictures.two_widths import draw_both
+from cosserat_fenicsx.pictures.charts import SMALL, draw_both, draw_chart, empty_figure, room_for
 
 _GREEN = {"1": "#98d594", "2": "#4daf4a", str(MANY): "#1b7837"}
 # Width, inches, for panels beside each other.
