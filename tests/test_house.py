@@ -79,21 +79,18 @@ ROOMS = {
 #: results.
 FITTERS = {
     "statics": {
-        "circulatory",
         "critical",
         "meshes",
         "legs",
         "linear_buckling",
         "natural_modes",
         "small_motions",
-        "arguments",
         "vibrating",
         "refinement",
         "sensitivity",
         "solve",
         "problem",
         "cases",
-        "loaded",
         "pair",
         "path/recorder",
     },

@@ -25,8 +25,8 @@ from cosserat_fenicsx.algebra.pool import ProblemPool
 from cosserat_fenicsx.dynamics import simulate as of_motions
 from cosserat_fenicsx.models.rodmesh import RodMesh
 from cosserat_fenicsx.ranks import on_first
-from cosserat_fenicsx.statics import circulatory
 from cosserat_fenicsx.statics import problem as of_equilibria
+from cosserat_fenicsx.statics import small_motions
 
 ROOT = Path(__file__).parent.parent
 DEMO = ROOT / "demos" / "eccentric_cantilever.toml"
@@ -167,9 +167,9 @@ CODE = """
 import sys
 from mpi4py import MPI
 from cosserat_fenicsx import compat, cli, errors
-from cosserat_fenicsx.cli import main, say
+from cosserat_fenicsx.cli import main, output
 from cosserat_fenicsx.statics import solve as statics
-say._PATIENCE = 0.5
+output._PATIENCE = 0.5
 def solve(*scene, **settings):
     if MPI.COMM_WORLD.rank in {ranks}:
         raise {problem}
@@ -328,7 +328,7 @@ def resident():
 @pytest.fixture
 def small_cache(monkeypatch):
     pool = ProblemPool(most_idle=KEPT)
-    for module in (of_equilibria, of_motions, circulatory):
+    for module in (of_equilibria, of_motions, small_motions):
         monkeypatch.setattr(module, "PROBLEMS", pool)
 
 

@@ -222,7 +222,7 @@ typedef struct {
     query *query;
 } comparison;
 
-/* Many cases, see cases.c. */
+/* Many cases, see compared.c. */
 typedef struct {
     comparison *meshes;
     written *written;

@@ -18,8 +18,8 @@ from cosserat_fenicsx.scene.rolled import Profile
 from cosserat_fenicsx.scene.scene import check_magnitudes
 from cosserat_fenicsx.scene.sections import Rectangle, Stiffness
 from cosserat_fenicsx.scene.signals import signals_of
-from cosserat_fenicsx.statics.arguments import check_arguments
 from cosserat_fenicsx.statics.meshes import first_layout, meshes_for, resolving_turns, turning_in_law
+from cosserat_fenicsx.statics.problem import check_arguments
 
 #: The unknowns of a model, in a plane (True) or in space.
 _UNKNOWNS = {

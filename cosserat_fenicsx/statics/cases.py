@@ -29,12 +29,11 @@ from cosserat_fenicsx.results.compared import NAMES
 from cosserat_fenicsx.scene.action import path_dependent
 from cosserat_fenicsx.scene.parameters import admitted_laws, check_once, laws_with, parameter_of, scene_with
 from cosserat_fenicsx.scene.scene import Scene, check_tensions
-from cosserat_fenicsx.statics.arguments import check_arguments
-from cosserat_fenicsx.statics.loaded import Loaded
+from cosserat_fenicsx.statics.pair import Loaded
 from cosserat_fenicsx.statics.meshes import meshes_for, resolving_turns, turning_in_law
 from cosserat_fenicsx.statics.pair import Pair
 from cosserat_fenicsx.statics.path.recorder import CORRECTIONS, NEAR
-from cosserat_fenicsx.statics.problem import make_solvers
+from cosserat_fenicsx.statics.problem import check_arguments, make_solvers
 from cosserat_fenicsx.statics.solve import solve
 
 #: What a case may be asked for: {name of a method of `Path`: the estimated error that bounds its own}.

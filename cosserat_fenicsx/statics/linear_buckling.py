@@ -16,12 +16,11 @@ from cosserat_fenicsx.results.modes import Buckling
 from cosserat_fenicsx.results.shapes import Equilibrium
 from cosserat_fenicsx.scene.action import has_permanent
 from cosserat_fenicsx.scene.scene import Scene, check_magnitudes, check_tensions
-from cosserat_fenicsx.statics.arguments import check_arguments
-from cosserat_fenicsx.statics.circulatory import circulatory_part, static_bifurcations
 from cosserat_fenicsx.statics.critical import Energies, critical_sensitivity
 from cosserat_fenicsx.statics.meshes import layers_of, until_two_meshes_agree
 from cosserat_fenicsx.statics.path.follower import standing
-from cosserat_fenicsx.statics.problem import solvers_of
+from cosserat_fenicsx.statics.problem import check_arguments, solvers_of
+from cosserat_fenicsx.statics.small_motions import circulatory_part, static_bifurcations
 from cosserat_fenicsx.statics.stability import shapes_of
 
 _MOST_ELEMENTS = 256

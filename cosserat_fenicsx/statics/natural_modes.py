@@ -26,12 +26,10 @@ from cosserat_fenicsx.scene.scene import Scene, check_magnitudes, check_tensions
 from cosserat_fenicsx.scene.signals import at
 from cosserat_fenicsx.scene.stages import refuse_stages
 from cosserat_fenicsx.scene.statical import without_mechanism
-from cosserat_fenicsx.statics.arguments import check_arguments
-from cosserat_fenicsx.statics.circulatory import circulatory_part
 from cosserat_fenicsx.statics.meshes import layers_of, until_two_meshes_agree
 from cosserat_fenicsx.statics.path.follower import standing
-from cosserat_fenicsx.statics.problem import solvers_of
-from cosserat_fenicsx.statics.small_motions import Bodies, resisting, stiffness
+from cosserat_fenicsx.statics.problem import check_arguments, solvers_of
+from cosserat_fenicsx.statics.small_motions import Bodies, circulatory_part, resisting, stiffness
 from cosserat_fenicsx.statics.stability import shapes_of
 
 _MOST_ELEMENTS = 128

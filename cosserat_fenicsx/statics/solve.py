@@ -27,13 +27,12 @@ from cosserat_fenicsx.results.path import Path
 from cosserat_fenicsx.scene.action import path_dependent, rubs
 from cosserat_fenicsx.scene.describe import describe
 from cosserat_fenicsx.scene.scene import Scene, check_magnitudes, check_tensions
-from cosserat_fenicsx.statics.arguments import check_arguments, check_static
 from cosserat_fenicsx.statics.legs import Followed, Legs
 from cosserat_fenicsx.statics.meshes import first_layout, meshes_for, resolving, resolving_turns, turning_in_law
 from cosserat_fenicsx.statics.path.follower import CONTROLS
 from cosserat_fenicsx.statics.path.load_control import StepControl
 from cosserat_fenicsx.statics.refinement import refine
-from cosserat_fenicsx.statics.problem import Promoted
+from cosserat_fenicsx.statics.problem import Promoted, check_arguments, check_static
 
 # Rods of a frame from which on the BLAS decides on the time that the equations where rods meet take.
 _MANY = 1000

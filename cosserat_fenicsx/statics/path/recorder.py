@@ -45,7 +45,9 @@ _ASIDE = 0.3
 
 
 def _conservative_along(path):
-    from cosserat_fenicsx.statics.circulatory import conservative_along  # late: scipy is slow to import, few ask for it
+    from cosserat_fenicsx.statics.small_motions import (
+        conservative_along,  # late: scipy is slow to import, few ask for it
+    )
 
     return conservative_along(path)
 

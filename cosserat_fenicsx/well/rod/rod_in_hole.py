@@ -15,9 +15,9 @@ from cosserat_fenicsx.progress import Progress
 from cosserat_fenicsx.ranks import communicator
 from cosserat_fenicsx.results.accuracy import on_mesh
 from cosserat_fenicsx.results.path import Path
-from cosserat_fenicsx.statics.circulatory import conservative_along
 from cosserat_fenicsx.statics.problem import record_of, solvers_of
 from cosserat_fenicsx.statics.settling import BACK, DECADES, LAST, LAST_TWO, settle, stages_from
+from cosserat_fenicsx.statics.small_motions import conservative_along
 from cosserat_fenicsx.well.rod.in_hole import NAMES, UNSEEN, InHole
 from cosserat_fenicsx.well.rod.string_scene import in_helix, on_axis, string_in
 
