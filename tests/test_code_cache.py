@@ -257,7 +257,7 @@ def test_the_command_line_says_so_without_the_place_in_the_code(cache):
     cache.mkdir(0o770)
     cache.chmod(0o770)
     code = (
-        "import warnings\nfrom cosserat_fenicsx.cli.say import warnings_in_words\nfrom cosserat_fenicsx import "
+        "import warnings\nfrom cosserat_fenicsx.cli.output import warnings_in_words\nfrom cosserat_fenicsx import "
         "code_cache\nwith warnings_in_words():\n    import cosserat_fenicsx.compat\n    code_cache.folder()"
     )
     done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, encoding="utf-8", cwd=ROOT)

@@ -6,8 +6,7 @@ from argparse import Namespace
 from dataclasses import replace
 from functools import partial
 
-from cosserat_fenicsx.cli.output import deliver, given, refuse_of_rods, units_of
-from cosserat_fenicsx.cli.say import DONE, say
+from cosserat_fenicsx.cli.output import DONE, deliver, given, refuse_of_rods, say, units_of
 from cosserat_fenicsx.drilling.choose import chosen, model_of
 from cosserat_fenicsx.drilling.motion import KIND, check_arguments
 from cosserat_fenicsx.drilling.scenefile import SimulateDrilling

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from cosserat_fenicsx import interrupts
 from cosserat_fenicsx.cli.options import parser
-from cosserat_fenicsx.cli.say import BAD_INPUT, DONE, INTERRUPTED, in_words, say, together, warnings_in_words
+from cosserat_fenicsx.cli.output import BAD_INPUT, DONE, INTERRUPTED, in_words, say, together, warnings_in_words
 from cosserat_fenicsx.errors import CosseratError, SceneError
 
 

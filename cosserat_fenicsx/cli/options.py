@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 
 from cosserat_fenicsx import __version__
-from cosserat_fenicsx.cli.say import say
+from cosserat_fenicsx.cli.output import say
 
 
 class _Parser(argparse.ArgumentParser):

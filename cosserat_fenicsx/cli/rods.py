@@ -3,8 +3,7 @@
 import warnings
 from functools import partial
 
-from cosserat_fenicsx.cli.output import deliver, given
-from cosserat_fenicsx.cli.say import say
+from cosserat_fenicsx.cli.output import deliver, given, say
 from cosserat_fenicsx.errors import SceneError, SceneWarning
 
 # Options of a motion, of an equilibrium path and of both: names of arguments of `simulate` and `solve`.

@@ -4,8 +4,7 @@ import sys
 from dataclasses import replace
 from functools import partial
 
-from cosserat_fenicsx.cli.output import deliver, given, output_of, refuse_of_rods, units_of
-from cosserat_fenicsx.cli.say import DONE, say
+from cosserat_fenicsx.cli.output import DONE, deliver, given, output_of, refuse_of_rods, say, units_of
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.quantities import Units
 from cosserat_fenicsx.ranks import on_first, world

@@ -19,7 +19,7 @@ from cosserat_fenicsx.models.choose import not_flat
 from cosserat_fenicsx.models.collocated import CollocatedPlanar, CollocatedSpatial
 from cosserat_fenicsx.models.directors import ConservingSpatial, EccentricSpatial
 from cosserat_fenicsx.models.moving import MovingSpatial
-from cosserat_fenicsx.models.moving_planar import MovingPlanar
+from cosserat_fenicsx.models.moving import MovingPlanar
 from cosserat_fenicsx.models.rodmesh import Layout
 from cosserat_fenicsx.models.signature import Signature
 from cosserat_fenicsx.ranks import communicator

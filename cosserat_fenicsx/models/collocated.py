@@ -10,7 +10,7 @@ from cosserat_fenicsx.forms.rotation import rotation_matrix
 from cosserat_fenicsx.forms.spatial import parts_of
 from cosserat_fenicsx.models.compiled import along
 from cosserat_fenicsx.models.moving import MovingSpatial, SpatialStep, virtual_work_of_step
-from cosserat_fenicsx.models.moving_planar import MovingPlanar, PlanarStep
+from cosserat_fenicsx.models.moving import MovingPlanar, PlanarStep
 from cosserat_fenicsx.models.rod_data import gauss_function
 from cosserat_fenicsx.numerics import conjugate_product
 

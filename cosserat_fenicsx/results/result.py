@@ -222,9 +222,7 @@ class Result:
         return "\n".join([*text, *self._answer(units), *self._more(units)])
 
     def _repr_html_(self) -> str:
-        from cosserat_fenicsx.results.export.notebook import as_html
-
-        return as_html(self)
+        return screen.as_html(self)
 
     def _answer(self, units: Units) -> Iterable[str]:
         """Sentences: the answer first, whether it is enough, and why."""
