@@ -17,6 +17,7 @@ from cosserat_fenicsx.actions.obstacles import Cylinder as Cylinder
 from cosserat_fenicsx.actions.obstacles import Plane as Plane
 from cosserat_fenicsx.actions.obstacles import Sphere as Sphere
 from cosserat_fenicsx.actions.obstacles import Wall as Wall
+from cosserat_fenicsx.actions.rod_contact import RodContact as RodContact
 from cosserat_fenicsx.actions.springs import Dashpot as Dashpot
 from cosserat_fenicsx.actions.springs import Foundation as Foundation
 from cosserat_fenicsx.actions.springs import PointMass as PointMass

@@ -51,6 +51,12 @@ class ElementRule:
         """(len(x), p + 1) nodal basis functions at x in [0, 1]."""
         return np.vander(2 * np.asarray(x) - 1, len(self.nodes), increasing=True) @ self._to_coefficients
 
+    def derivative(self, x, order):
+        """(len(x), p + 1) derivatives of an order of the nodal basis at x in [0, 1]."""
+        k, x = np.arange(len(self.nodes)), 2 * np.asarray(x)[:, None] - 1
+        factor = np.prod([2.0 * (k - i) for i in range(order)], axis=0)
+        return factor * x ** np.maximum(k - order, 0) @ self._to_coefficients
+
     @cached_property
     def at_gauss(self):
         """(gauss, p + 1) nodal basis functions at the Gauss points."""
@@ -69,10 +75,7 @@ class ElementRule:
     @cached_property
     def slopes(self):
         """(gauss, p + 1) d/dx of the nodal basis at the Gauss points."""
-        p = len(self.nodes) - 1
-        x = 2 * self.gauss - 1
-        powers = np.column_stack([np.zeros_like(x)] + [k * x ** (k - 1) for k in range(1, p + 1)])
-        return 2 * powers @ self._to_coefficients
+        return self.derivative(self.gauss, 1)
 
     @cached_property
     def from_slopes(self):

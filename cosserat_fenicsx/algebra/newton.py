@@ -14,8 +14,8 @@ import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from cosserat_fenicsx.algebra.elimination import ZERO_PIVOT
 from cosserat_fenicsx.algebra.building import Pointers
+from cosserat_fenicsx.algebra.elimination import ZERO_PIVOT
 from cosserat_fenicsx.errors import NotConverged
 
 #: Newton stops when the increment, or the remaining error estimated from the contraction, is below this (root mean
@@ -301,11 +301,17 @@ class LimitedNewton:
 
     def step(self, share=1.0):
         """Take one step, or a share of it; None where the tangent is singular or the residual is not a number."""
-        problem, x = self._problem, self._problem.x
         self._residual()
         self._factor()
-        if not problem.solve(problem.b, self._change):
-            return None
+        return self.take(share) if self._direction() else None
+
+    def _direction(self):
+        """Find the change that a full step subtracts from the unknowns; False where the tangent is singular."""
+        return self._problem.solve(self._problem.b, self._change)
+
+    def take(self, share=1.0):
+        """Take a share of the last change; None where that is not a number."""
+        problem, x = self._problem, self._problem.x
         moved, turned = problem.model.sizes(self._change.array_r)
         if not math.isfinite(moved + turned):
             return None

@@ -26,6 +26,7 @@ class Record:
         clamp_loads: (points, 6) force and moment of the loads at every clamped point. Both are in the order of
             `Connections`.
         steps: see `Path`.
+        rod_forces: (elements, p + 1, 3) forces at the nodes of elements, by other rods that touch them; or None.
     """
 
     load_factor: float
@@ -39,6 +40,7 @@ class Record:
     tie_forces: np.ndarray | None = None
     clamp_loads: np.ndarray | None = None
     steps: int = 0
+    rod_forces: np.ndarray | None = None
 
 
 #: Energies (J), work and dissipation since the start (J), linear and angular momentum (kg m/s, kg m^2/s), inertial, the

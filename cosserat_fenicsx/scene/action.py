@@ -112,6 +112,8 @@ class Action(Part, family="load or action", homes=("cosserat_fenicsx.scene.loads
             the rod's surface and the obstacle, m, and unit normals (n, 3) towards the free side. It then has
             `stiffness` (N/m^2), `friction`, with it `sticks` (N/m^2), `law` and `largest_step`, how far (m) a rod may
             move at once without passing through it unseen.
+        rods_touch: whether it keeps rods from passing through each other (`actions.rod_contact.RodContact`), without a
+            virtual work.
         in_law: whether it is no load but a part of the law along a rod. Its `data` are then what sections have without
             stress beyond the reference, inertial in the reference: curvature and twist, rad/m, and strain, 1.
         is_thread: whether it is the tension of a thread along a rod, which is no part of the rod's contact force. Its
@@ -122,6 +124,7 @@ class Action(Part, family="load or action", homes=("cosserat_fenicsx.scene.loads
 
     at_nodes, scaled, permanent, follows, memory, evolve, traits = False, True, False, False, (), None, None
     delayed, resists, touches, presses, gaps, in_law, is_thread = None, None, False, False, None, False, False
+    rods_touch = False
     amplitude = 1.0
 
     def acts_on(self, rod):
@@ -145,6 +148,13 @@ class Action(Part, family="load or action", homes=("cosserat_fenicsx.scene.loads
 
         Raises:
             SceneError: naming the property that the rod lacks.
+        """
+
+    def check_scene(self, scene):
+        """Refuse a scene that it cannot act in.
+
+        Raises:
+            SceneError: naming what the scene lacks.
         """
 
     def inertia(self, rod):

@@ -192,6 +192,8 @@ class Scene(Part):
                 )
         check_held_once(self)
         store(self, _leaders=self._find_leaders())
+        for load in self.all_loads:
+            load.check_scene(self)
         if self.stages:
             store(self, _places=Places(self))
             store(self, stages=named_stages(self, self._places))
@@ -372,6 +374,11 @@ class Scene(Part):
     def has_obstacles(self):
         """Whether there is an obstacle that rods may touch, see `Action.gaps`."""
         return any(load.gaps is not None for load in self.all_loads)
+
+    @cached_property
+    def rod_contact(self):
+        """The action that keeps rods from passing through each other, see `Action.rods_touch`; or None."""
+        return next((load for load in self.all_loads if load.rods_touch), None)
 
     @cached_property
     def has_threads(self):

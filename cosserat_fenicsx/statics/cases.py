@@ -29,9 +29,8 @@ from cosserat_fenicsx.results.compared import NAMES
 from cosserat_fenicsx.scene.action import path_dependent
 from cosserat_fenicsx.scene.parameters import admitted_laws, check_once, laws_with, parameter_of, scene_with
 from cosserat_fenicsx.scene.scene import Scene, check_tensions
-from cosserat_fenicsx.statics.pair import Loaded
 from cosserat_fenicsx.statics.meshes import meshes_for, resolving_turns, turning_in_law
-from cosserat_fenicsx.statics.pair import Pair
+from cosserat_fenicsx.statics.pair import Loaded, Pair
 from cosserat_fenicsx.statics.path.recorder import CORRECTIONS, NEAR
 from cosserat_fenicsx.statics.problem import check_arguments, make_solvers
 from cosserat_fenicsx.statics.solve import solve
@@ -453,6 +452,8 @@ def _obstacle(scene):
     """Why a scene has no fast way; "" where it may have one."""
     if path_dependent(scene):
         return "a load has memory"
+    if scene.rod_contact:
+        return "rods touch each other"
     for action in scene.actions:
         if action.refreshed is not None or action.presses or action.touches:
             return f"the {type(action).__name__} depends on the position"

@@ -6,7 +6,7 @@ import contextlib
 import numpy as np
 
 from cosserat_fenicsx.algebra.elimination import ZERO_PIVOT
-from cosserat_fenicsx.algebra.equations import STATE, Equations
+from cosserat_fenicsx.algebra.equations import RESIDUAL, STATE, Equations
 from cosserat_fenicsx.algebra.newton import Newton
 from cosserat_fenicsx.algebra.packed import Packed, PackedExpression
 from cosserat_fenicsx.algebra.pool import PROBLEMS
@@ -25,6 +25,7 @@ from cosserat_fenicsx.scene.scene import Scene
 from cosserat_fenicsx.scene.stages import refuse_stages
 from cosserat_fenicsx.scene.statical import check_no_mechanism
 from cosserat_fenicsx.statics.stability import NegativeModes
+from cosserat_fenicsx.statics.touching import RodContacts
 
 
 def check_arguments(scene, tol, elements, bound=NAMES, *, owner="solve"):
@@ -36,6 +37,8 @@ def check_arguments(scene, tol, elements, bound=NAMES, *, owner="solve"):
         check_static(scene)
     elif owner != "solve":
         refuse_stages(owner, scene)
+    if owner != "solve":
+        refuse_rod_contact(owner, scene)
     tolerance(owner, tol)
     criteria_of(bound)
     if elements is not None:
@@ -66,6 +69,18 @@ def check_static(scene):
     check_no_mechanism(scene)
 
 
+def refuse_rod_contact(owner, scene, comm=None):
+    """Refuse (SceneError) rods that touch each other where a function, the `owner` of the message, has no such contact;
+    comm: of `solve`, which has it for scenes without stages, on one rank; None elsewhere."""
+    if scene.rod_contact and comm is None:
+        raise SceneError(
+            f"{owner}: RodContact acts in `solve` alone: expected a scene without it, or the equilibrium by solve"
+        )
+    if scene.rod_contact and (scene.stages or comm.size > 1):
+        raise SceneError(f"{owner}: a RodContact is solved for on one rank and in one stage: expected a scene without "
+                         "stages, and one process")  # fmt: skip
+
+
 #: Change of the load factor for central differences, whose error is of second order in that of prescribed rotations.
 CHANGE = 1e-4
 
@@ -74,11 +89,11 @@ class Problem(Equations):
     """Residual and tangent of a model in statics; see `Equations`.
 
     load_factor: of loads and prescribed motions; while `begins`, that of permanent loads, from 0 to 1, before all
-    others. fields: the `PackedExpression` of `CompiledForms.fields`, or None; load_norm: Euclidean norm of the dead
+    others. touching: the `RodContacts` of the scene, or None. fields: the `PackedExpression` of `CompiledForms.fields`, or None; load_norm: Euclidean norm of the dead
     loads at load factor 1, dimensionless; sweep: the `Sweep` that finds points in C, once it was asked for.
     """
 
-    ties_class, sweep = TieRows, None
+    ties_class, sweep, touching = TieRows, None, None
 
     def __init__(self, model):
         self._refreshes, self._remembers = bool(model.actions.refreshed), bool(model.actions.memory)
@@ -102,7 +117,7 @@ class Problem(Equations):
         if forms.fields and model.comm.size == 1:
             size = len(forms.gauss) * forms.fields_size
             self.fields = PackedExpression(forms.fields, model.mesh, len(model.cell_dofs), size)
-        self._loaded, self.begins = None, False
+        self._loaded, self.begins, self._hooks = None, False, self.c.hooks
 
     def load(self, scene, layout):
         """Set the data of a scene, in its reference configuration; False where the same data were loaded already."""
@@ -127,6 +142,8 @@ class Problem(Equations):
         self.set_load_factor(0.0)
         self.numbering.from_local(self._state, self.x)
         self.set_state(self.x)
+        self.touching = RodContacts(self) if scene.rod_contact else None
+        self.c.hooks = self._hooks | RESIDUAL * bool(self.touching)
         return anew
 
     def forget(self):
@@ -239,6 +256,11 @@ class Problem(Equations):
             np.add.at(self._local, dofs, np.einsum("eij,ej->ei", self.tangent_form.matrices(), clamped[dofs]))
         self.numbering.add_up(self._local, vector)
 
+    def _change_residual(self, x, b):
+        super()._change_residual(x, b)
+        if self.touching:
+            b += self.touching.force
+
     def _refresh(self):
         if self._refreshes:
             self.model.actions.refresh()
@@ -318,4 +340,5 @@ def record_of(problem, load_factor, negative_modes, iterations, steps, neutral=F
     """The `Record` of a problem's state, an equilibrium."""
     model = problem.model
     return Record(load_factor, *model.snapshot(), negative_modes, iterations, problem.multipliers(), neutral,
-                  model.densities.here(), problem.tie_forces(), model.clamps.loads(load_factor), steps)  # fmt: skip
+                  model.densities.here(), problem.tie_forces(), model.clamps.loads(load_factor), steps,
+                  problem.touching and problem.touching.nodal_forces())  # fmt: skip

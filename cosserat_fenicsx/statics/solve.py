@@ -32,7 +32,7 @@ from cosserat_fenicsx.statics.meshes import first_layout, meshes_for, resolving,
 from cosserat_fenicsx.statics.path.follower import CONTROLS
 from cosserat_fenicsx.statics.path.load_control import StepControl
 from cosserat_fenicsx.statics.refinement import refine
-from cosserat_fenicsx.statics.problem import Promoted, check_arguments, check_static
+from cosserat_fenicsx.statics.problem import Promoted, check_arguments, check_static, refuse_rod_contact
 
 # Rods of a frame from which on the BLAS decides on the time that the equations where rods meet take.
 _MANY = 1000
@@ -114,10 +114,13 @@ def solve(
         scene.warn()
     discretised = {"formulation": formulation, "degree": degree, "points": gauss_points}
     steps = _STEPS if steps is None else instance("solve", "steps", steps, StepControl, "a StepControl")
-    if _rubs(scene):
+    if _rubs(scene) or scene.rod_contact:
         if branch or control == "arc":
-            raise SceneError("control, branch: expected load control and no branch, since an obstacle has friction")
+            why = "rods touch each other" if scene.rod_contact else "an obstacle has friction"
+            raise SceneError(f"control, branch: expected load control and no branch, since {why}")
         control = "load"
+    if scene.rod_contact:
+        refuse_rod_contact("solve", scene, comm)
     follow = _follow_options(steps, control, branch)
     if until is not None and not (callable(until) and free):
         raise SceneError("until: expected a function of the Path, with a pair of load factors (a, b)")
@@ -153,7 +156,7 @@ def solve(
     oscillates = elements is None and gauss_points is not None and gauss_points > degree
     if oscillates:
         bound = [name for name in bound if name in _MOTION] or _MOTION
-    bounded, in_order = criteria_of(bound), _in_order(scene)
+    bounded, in_order = criteria_of(bound), _in_order(scene) or scene.rod_contact is not None
     simple = not (branch or control == "arc" or until or in_order) and steps.adaptive
 
     def prepare(path):

@@ -126,7 +126,7 @@ class Follower:
         unsure = track.here.negative_modes and track.without_potential
         return (
             self.in_c and self._steps.adaptive and self._control != "arc" and track.neutral is None
-            and not (unsure or track.watches_steps)
+            and not (unsure or track.watches_steps or track.touching)
         )  # fmt: skip
 
     def sweep(self, load_factors, *, every, counted):

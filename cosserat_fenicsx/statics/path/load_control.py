@@ -184,6 +184,8 @@ class Continuation:
             beside = move - increment
             sizes = [track.product(*pair) for pair in ((move, increment), (increment, increment), (beside, beside))]
         judged, lib = self._lib.judge_step(self.c, len(track.history), off, *sizes), self._lib
+        if track.touching and judged != lib.TOO_FAR:  # a contact bends the path at once
+            return True
         change = load_factor - track.here.load_factor
         if judged == lib.ACCEPTED or (judged == lib.UNSURE and not self._jumped(move, change)):
             return True

@@ -71,9 +71,9 @@ class Tracing:
         self.model, self._options, self._choice, self._bar = self.problem.model, follow, choice, bar
         why = [*choice.why, self.model.signature.formulation.words]
         self.path = Path.of(self.model, why, _conservative_along, derivatives_of, _modes_along)
-        if choice.model == "spatial":
+        if choice.model == "spatial" and not self.problem.touching:
             self._follower = Follower(*solvers, on_event=self._meet, **follow)
-        else:  # planar models: load control without events; the spatial model takes over where more is needed
+        else:  # load control without events: of planar models, which the spatial one follows, and of rods that touch
             self._follower = Follower(*solvers, **{**follow, "control": "load"})
         self.track, self._start = self._follower.track, start
         self._counted, self._until, self._stable_at = 0, None, 0.0
@@ -209,6 +209,7 @@ class Tracing:
                 model.clamps.loads(swept.load_factors[:, None, None]), (count, model.clamps.count, 6)
             ),
             "steps": swept.steps.astype(int),
+            "rod_forces": None,
         }
         self.path.extend(Records(Record, columns))
 

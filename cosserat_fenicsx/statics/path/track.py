@@ -51,7 +51,8 @@ class PathPoint:
     `negative_modes`.
 
     iterations: Newton's, of its solution; rise, along: d eta/d arc and the owned entries of dx/d arc; logarithm: see
-    `NegativeModes`; space: see `Part.negative_space`. The last four are None or NaN until they are computed.
+    `NegativeModes`; space: see `Part.negative_space`. These four are None or NaN until they are computed. touches: see
+    `RodContacts.memory`; None without them.
     """
 
     load_factor: float
@@ -62,6 +63,7 @@ class PathPoint:
     along: np.ndarray | None = field(default=None, repr=False)
     logarithm: float = math.nan
     space: np.ndarray | None = field(default=None, repr=False)
+    touches: tuple | None = field(default=None, repr=False)
 
 
 class Track:
@@ -69,6 +71,7 @@ class Track:
 
     origin: the first `PathPoint`, from `begin_here` on; history: the last points, at most three; iterations, steps: so
     far, those of rejected steps included, and accepted ones; failure: why the last step was rejected, in words;
+    touching: the problem's `RodContacts`, or None;
     neutral: owned entries of a motion that leaves the energy unchanged (of a buckled round column about its axis), or
     None.
     """
@@ -79,13 +82,14 @@ class Track:
         self.iterations, self.steps, self.failure, self.neutral = 0, 0, "", None
         self.origin, self.history = None, []
         actions = self.model.scene.actions
-        self._touches = any(action.presses for action in actions)
+        self._touches, self.touching = any(action.presses for action in actions), problem.touching
         longest = min((action.largest_step for action in actions if action.gaps is not None), default=math.inf)
         self._longest = longest / self.model.scales.length
 
     def begin_here(self):
         """Begin the path at the problem's state and load factor."""
-        self.origin = PathPoint(self.problem.load_factor, self.problem.numbers(), self.stability.count(), 0)
+        self.origin = PathPoint(self.problem.load_factor, self.problem.numbers(), self._negative_modes(), 0)
+        self.origin.touches = self.touching and self.touching.memory
         self.history = [self.origin]
 
     @property
@@ -110,6 +114,8 @@ class Track:
 
     def restore(self):
         """Return to the last accepted point. Always False, the result of a rejected step."""
+        if self.touching:
+            self.touching.recall(self.here.touches)
         self.put(self.here.numbers, self.here.load_factor)
         return False
 
@@ -119,6 +125,12 @@ class Track:
         """Newton's method from `numbers` at a fixed load factor; returns a `Solved` and sets `failure`."""
         if self.neutral is not None:
             return self.on_plane(numbers, load_factor, None, 0.0)
+        if self.touching:
+            self.touching.recall(self.here.touches)
+            solved = self.touching.solve(numbers, load_factor, self.here.numbers)
+            self.iterations += solved.iterations
+            self.failure = "" if solved.converged else solved.reason
+            return solved
         self.put(numbers, load_factor)
         solved = self._solve(self.newton)
         return solved if solved.converged or not self._touches else self._by_shares(numbers, load_factor, solved)
@@ -176,10 +188,15 @@ class Track:
 
     def point(self, solved):
         """The state as a `PathPoint`, with its negative modes."""
-        negative = self.stability.count(neutral=self.neutral is not None)
+        negative = self._negative_modes(neutral=self.neutral is not None)
         point = PathPoint(self.problem.load_factor, self.problem.numbers(), negative, solved.iterations)
-        point.logarithm = self.stability.logarithm
+        point.logarithm, point.touches = self.stability.logarithm, self.touching and self.touching.memory
         return point
+
+    def _negative_modes(self, *, neutral=False):
+        """See `NegativeModes.count`; of rods that touch, those of motions in which they go on to touch."""
+        found = self.stability.count(neutral=neutral)
+        return found + self.touching.removed if self.touching and found >= 0 else found
 
     def set_tangent(self, point, slope, step, weight):
         """Set the unit tangent (`along`, `rise`) of a `PathPoint` from dx/d eta there, oriented along a step of the

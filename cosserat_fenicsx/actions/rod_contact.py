@@ -1,0 +1,126 @@
+"""Rods that touch each other and themselves. Nearest points and their derivatives are in strands.py, the laws are solved
+in statics/touching.py."""
+
+import math
+from dataclasses import dataclass
+from typing import Annotated
+
+import numpy as np
+
+from cosserat_fenicsx.checks import refuse
+from cosserat_fenicsx.errors import SceneError, nearest
+from cosserat_fenicsx.parts import Length, at_least
+from cosserat_fenicsx.scene.action import LineAction
+from cosserat_fenicsx.strands import Apart, closest_segments
+
+# Length of the sides of the polygons that are compared at rest, over the radius; most sides of a rod; depth over the
+# radius that is rounding.
+_SIDE, _MOST, _NOTHING = 0.25, 4000, 1e-7
+
+
+@dataclass(frozen=True)
+class RodContact(LineAction):
+    """Rods that do not pass through each other or themselves: hard surfaces, without friction.
+
+    It stands among the loads, once in a scene, and is not multiplied by the load factor. Where strands cross at more
+    than 11.5 degrees they touch in one point, between the nearest points of both centrelines; otherwise along a line,
+    at the nodes of the strand with the shorter elements. Ends of rods are hemispheres. For `solve` alone.
+
+    Args:
+        radius: of the rods' surfaces, m; None for that of their sections, which are `Circle` or `Tube`.
+        pairs: names of two rods each that may touch, one name twice for a rod that may touch itself; None for all.
+        itself: whether rods may touch themselves, where `pairs` is None.
+        exclude: arc length next to a point, or to a joint, within which rods do not touch, m; None for pi times the
+            radius: on less, a rod cannot bend back onto itself without folding its surface.
+
+    Raises:
+        SceneError: no radius known, or none that is the same all along a rod; one above the radius of curvature at
+            rest; a pair of rods that are not in the scene; rods that overlap at rest.
+    """
+
+    radius: Annotated[Length, at_least(0)] | None = None
+    pairs: tuple[tuple[str, ...], ...] | None = None
+    itself: bool = True
+    exclude: Length | None = None
+
+    rod, work, scaled, rods_touch = None, None, False, True
+    #: It depends on the positions of rods, and drives them out of planes.
+    traits = {"dead": False, "known_force": False, "rates": False, "turns": True, "flat": False}
+
+    def validate(self):
+        if self.radius == 0:
+            refuse(self, "radius", self.radius, "a positive length, m")
+        for pair in self.pairs or ():
+            if len(pair) != 2:
+                refuse(self, "pairs", self.pairs, "two names of rods each")
+
+    def acts_on(self, rod):
+        return self.pairs is None or any(rod.name in pair for pair in self.pairs)
+
+    def radius_of(self, rod):
+        """The radius of a rod's surface, m."""
+        if self.radius is not None:
+            return self.radius
+        found = {rod.section_at(x).round_radius for x in np.linspace(0, rod.length, 9).tolist()}
+        if None in found or len(found) > 1:
+            raise SceneError(
+                f"RodContact.radius is missing: the section of rod '{rod.name}' is not "
+                f"{'round' if None in found else 'the same along it'}, expected the radius of its surface (m), or one "
+                "Circle or Tube"
+            )
+        return found.pop()
+
+    def apart(self, scene):
+        """The `Apart` of a scene, in m."""
+        rods = scene.rods
+        allowed = np.full((len(rods), len(rods)), self.pairs is None)
+        if self.pairs is None:
+            allowed[np.diag_indices(len(rods))] = self.itself
+        for pair in self.pairs or ():
+            a, b = (scene.number(scene.rod(name)) for name in pair)
+            allowed[a, b] = allowed[b, a] = True
+        exclude = [math.pi * self.radius_of(rod) if self.exclude is None else self.exclude for rod in rods]
+        joints = [(scene.number(x.first.rod), x.first.s, scene.number(x.second.rod), x.second.s) for x in scene.joints]
+        return Apart(joints, exclude, allowed)
+
+    def polygons(self, rods, at):
+        """Points (n, 3), m, the rods (n,), arc lengths and radii there, of polygons as fine as rods are thick; at: a
+        function (rod, arc lengths (k,)) -> (k, 3) points."""
+        found = []
+        for i, rod in enumerate(rods):
+            radius = self.radius_of(rod)
+            s = np.linspace(0, rod.length, 2 + min(_MOST, math.ceil(rod.length / (_SIDE * radius))))
+            found.append((at(rod, s), np.full(len(s), i), s, np.full(len(s), radius)))
+        return [np.concatenate(part) for part in zip(*found, strict=True)]
+
+    def check_scene(self, scene):
+        """See `Action`."""
+        if sum(load.rods_touch for load in scene.all_loads) > 1:
+            raise SceneError("Scene.loads: expected one RodContact, with the `pairs` of all rods that touch")
+        names = [rod.name for rod in scene.rods]
+        for name in {name for pair in self.pairs or () for name in pair} - set(names):
+            raise SceneError(f"RodContact.pairs: no rod is named {name!r}, {nearest(name, names)}")
+        for rod in scene.rods_of(self):
+            s = np.linspace(0, rod.length, 257)
+            turns = np.linalg.norm(np.diff(rod.curve.frame(s)[..., 2], axis=0), axis=1) / (s[1] - s[0])
+            if turns.max() * self.radius_of(rod) > 1:
+                raise SceneError(
+                    f"RodContact: the radius of rod '{rod.name}', {self.radius_of(rod):g} m, is larger than its radius "
+                    f"of curvature at rest, {1 / turns.max():.4g} m: its surface overlaps itself"
+                )
+        points = self.polygons(scene.rods, lambda rod, s: rod.curve.position(s))
+        radius = points[3].min()
+        gap, sag, *places = closest_segments(*points, self.apart(scene), 0.0)
+        deep = gap + sag + _NOTHING * radius
+        if len(gap) and deep.min() < 0:
+            k = int(np.argmin(deep))
+            (a, s), (b, t) = (place[k] for place in places)
+            first, second = (scene.rods[int(i)] for i in (a, b))
+            raise SceneError(
+                f"RodContact: rod '{first.name}' at s = {s:.6g} m overlaps rod '{second.name}' at s = {t:.6g} m by "
+                f"{-gap[k]:.3g} m at rest: expected rods that touch at most; `exclude` is the arc length next to a "
+                "point, or to a joint, within which rods do not touch"
+            )
+
+    def breaks(self, rod):
+        return ()

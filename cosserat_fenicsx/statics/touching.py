@@ -1,0 +1,293 @@
+"""Equilibria of rods that touch each other: the laws of all contacts, solved exactly on the compliance of the rods.
+
+In every iteration the step dx and the contact forces l follow from
+
+    (K - sum l d2g) dx + r - G^T l = 0,    g + G dx >= 0,    l >= 0,    l (g + G dx) = 0,
+
+with the rods' tangent K and residual r without contact, the gaps g, their derivatives G, and their second derivatives
+d2g, in which the nearest points slide. K is never assembled: the columns of G^T and of the few eigenvectors of d2g are
+solved with its factors, and what is left is a small complementarity problem.
+
+No rod passes through another: a step moves points by so little that two strands, which are never nearer than half the
+sum of their radii, cannot cross in it.
+"""
+
+import numpy as np
+
+from cosserat_fenicsx.algebra.newton import LimitedNewton, Solved
+from cosserat_fenicsx.interrupts import obey
+from cosserat_fenicsx.strands import Strands
+
+# Largest movement of a node in a step over the smallest radius and the gap (a point between nodes moves up to 1.3 times
+# as far, so that two strands approach each other by less than the sum of their radii); largest rotation, rad.
+_SHARE, _WIDEST = 0.35, 0.5
+# Gaps of contacts that are looked for, over the largest radius.
+_REACH = 8.0
+# Least distance of two centrelines, over the sum of the radii.
+_CLOSEST = 0.5
+# Size of a full step (rod lengths, rad) at which it ends, and below which it may end where steps shrink tenfold.
+_SETTLED, _SMALL = 1e-12, 1e-9
+# Iterations allowed, and those after which shares of steps are taken in turn.
+_MOST, _PATIENCE, _SHARES = 200, 25, (1.0, 0.5, 0.7)
+# Eigenvalues of d2g over the largest that are zero; a contact of the iteration before is the same up to this sliding,
+# over the radius; added to the diagonal of the compliance, over its mean.
+_ZERO, _SAME, _REGULAR = 1e-10, 4.0, 1e-12
+# First stiffness of springs that keep the tangent stable, over that of the rods at a contact; factor of the next one.
+_SPRING, _STIFFER = 1e-3, 10.0
+
+
+def complementary(A, b):
+    """l >= 0 with A l + b >= 0 and l (A l + b) = 0, for a positive definite A: by the method of active sets."""
+    from scipy.optimize import nnls  # late: scipy is slow to import
+
+    size = np.sqrt(np.diag(A))
+    L = np.linalg.cholesky(A / size / size[:, None])
+    found, _ = nnls(L.T, -np.linalg.solve(L, b / size), maxiter=50 * len(b) + 100)
+    return found / size
+
+
+class _Steps(LimitedNewton):
+    """Newton steps of a problem whose direction `RodContacts` completes."""
+
+    def __init__(self, problem, contacts):
+        super().__init__(problem, 1.0, _WIDEST)
+        self._contacts = contacts
+
+    def _direction(self):
+        return super()._direction() and self._contacts.complete(self._change)
+
+    def limit(self, longest):
+        """Set the longest displacement of a node, in the model's unit of length."""
+        self._longest = longest
+
+
+class RodContacts:
+    """The contacts of a scene's rods at the state of a `Problem`.
+
+    Args:
+        problem: a `Problem`, loaded with a scene that has a `RodContact`.
+
+    Attributes:
+        force: (unknowns,) what the contacts add to the residual.
+    """
+
+    def __init__(self, problem):
+        model = problem.model
+        action, scene, layout, length = model.scene.rod_contact, model.scene, model.layout, model.scales.length
+        self._problem, self._model, self._length = problem, model, length
+        order = np.argsort(model.slots)
+        self._nodal = model.nodal[order][:, :3]
+        self._rows = model.numbering.rows[self._nodal]
+        rods = np.repeat(np.arange(len(layout.counts)), layout.counts)
+        p = model.signature.degree
+        cells = (p * np.arange(len(rods)) + rods)[:, None] + np.arange(p + 1)
+        radii = np.array([action.radius_of(rod) if action.acts_on(rod) else 0.0 for rod in scene.rods]) / length
+        starts = np.concatenate([b[:-1] * rod.length for b, rod in zip(layout.breaks, scene.rods, strict=True)])
+        apart = action.apart(scene).scaled(length)
+        self.strands = Strands(cells, rods, layout.sizes(scene) / length, starts / length, radii[rods], model.rule, apart)
+        self._origins = np.repeat(scene.origins / length, np.bincount(rods) * p + 1, axis=0)
+        self._radius, self._largest = radii[radii > 0].min(), radii.max()
+        self._newton = _Steps(problem, self)
+        self._negative = problem.numbering.vector(), problem.numbering.vector()
+        self.force = np.zeros(problem.numbering.size)
+        self._take(self.strands.near(self._x, 0.0)[0], None, 0)
+
+    def _take(self, touches, forces, removed):
+        self._touches, self._forces = touches, np.zeros(len(touches)) if forces is None else forces
+        self.removed = removed
+        self.force[:] = 0.0
+        rows, gradients = self._gradients(touches)
+        np.add.at(self.force, np.maximum(rows, 0), np.where(rows < 0, 0.0, -gradients * self._forces[:, None]))
+
+    @property
+    def memory(self):
+        """What `recall` takes: the contacts and their forces."""
+        return self._touches, self._forces, self.removed
+
+    def recall(self, memory):
+        """Return to contacts and forces of another state."""
+        self._take(*memory)
+
+    @property
+    def _x(self):
+        return self._model.state.x.array[self._nodal] + self._origins
+
+    def _gradients(self, touches):
+        """Rows of the unknowns (m, n), -1 where clamped, and derivatives of the gaps by them."""
+        nodes = self.strands.nodes_of(touches)
+        shape = len(touches), 3 * nodes.shape[1]
+        return self._rows[nodes].reshape(shape), self.strands.gradients(touches).reshape(shape)
+
+    # -- equilibrium -------------------------------------------------------------------------------------------------
+
+    def solve(self, numbers, load_factor, accepted):
+        """Newton's method to an equilibrium at a load factor, by steps in which no rod passes through another.
+
+        Args:
+            numbers: `Problem.numbers` to start from, where no strand is passed on the way to them from the last
+                accepted state, `accepted`, from which it starts otherwise.
+
+        Returns:
+            Solved.
+        """
+        problem, newton = self._problem, self._newton
+        problem.set_load_factor(load_factor)
+        newton.iterations, spring, sizes, why = 0, 0.0, [], ""
+        problem.put(accepted)
+        found, closest = self._look()
+        moved, _ = problem.model.sizes(numbers[0] - accepted[0])
+        if moved <= self._allowed(found):
+            problem.put(numbers)
+            found, closest = self._look()
+            if closest < _CLOSEST:
+                problem.put(accepted)
+                found, closest = self._look()
+        self._spring = spring
+        while newton.iterations < _MOST:
+            obey()
+            self.force[:] = 0.0
+            self._touches_now = found
+            newton.limit(self._allowed(found))
+            before, share = problem.numbers(), _SHARES[newton.iterations % 3] if len(sizes) > _PATIENCE else 1.0
+            step = newton.step(share)
+            if step is None:
+                why = "the tangent is singular or the residual is not a number"
+                break
+            forces, touches = self._found, found
+            found, closest = self._look()
+            while closest < _CLOSEST:
+                share = 0.5 * min(step.share, share)
+                if share < 1e-6:
+                    break
+                problem.put(before)
+                newton.take(share)
+                found, closest = self._look()
+            self._touches, self._forces = touches, forces
+            size = max(step.moved, step.turned)
+            whole = step.share == 1.0
+            if whole and (size < _SETTLED or (sizes and size < _SMALL and size < 0.1 * sizes[-1])):
+                self._take(touches, forces, 0)
+                return self._confirmed(newton.iterations)
+            sizes = [*sizes, size] if whole else []
+            self._spring = self._spring / _STIFFER if self._spring > 1e-14 else 0.0
+        why = why or f"Newton's iterations ran out, {self._in_words(found)}"
+        return Solved(False, newton.iterations, why)
+
+    def _confirmed(self, iterations):
+        """`Solved`, where the contacts of the last step are those of the state, with its negative modes."""
+        A, removed = self._last
+        active = self._forces > 0
+        self.removed = removed - np.count_nonzero(np.linalg.eigvalsh(A[np.ix_(active, active)]) < 0)
+        return Solved(True, iterations, "converged")
+
+    def _look(self):
+        return self.strands.near(self._x, _REACH * self._largest)
+
+    def _allowed(self, touches):
+        """The longest displacement of a node in a step."""
+        return _SHARE * (self._radius + max(touches.gap.min(initial=_REACH * self._largest), 0.0))
+
+    def _in_words(self, touches):
+        if not len(touches):
+            return "without a contact of rods"
+        k, rods = int(np.argmin(touches.gap)), self._model.scene.rods
+        (a, s), (b, t) = (
+            (rods[self.strands.rods[touches.element[k, i]]],
+             self.strands.s(touches.element[:, i], touches.place[:, i])[k] * self._length) for i in (0, 1)
+        )  # fmt: skip
+        return (
+            f"with rod '{a.name}' at s = {s:.6g} m next to rod '{b.name}' at s = {t:.6g} m, at a gap of "
+            f"{touches.gap[k] * self._length:.3g} m"
+        )
+
+    def _known_forces(self, touches):
+        """The forces of the iteration before at the same contacts; 0 at new ones."""
+        forces, old = np.zeros(len(touches)), self._touches
+        if not len(old) or not len(touches):
+            return forces
+        (rods, s), (old_rods, old_s) = ((self.strands.rods[x.element], self._s(x)) for x in (touches, old))
+        off = np.abs(s[:, None] - old_s).max(axis=2)
+        same = (rods[:, None] == old_rods).all(axis=2) & (touches.node[:, None] == old.node)
+        off = np.where(same & (off < _SAME * self._largest), off, np.inf)
+        nearest = off.argmin(axis=1)
+        here = np.isfinite(off[np.arange(len(touches)), nearest])
+        forces[here] = self._forces[nearest[here]]
+        return forces
+
+    def _s(self, touches):
+        return np.column_stack([self.strands.s(touches.element[:, k], touches.place[:, k]) for k in (0, 1)])
+
+    def complete(self, change):
+        """Complete Newton's change without contact, K^-1 r, by the contacts; False where the tangent is singular."""
+        touches, largest = self._touches_now, self._newton._longest
+        near = touches.gap < 2.7 * max(largest, self._radius)
+        self._found = np.zeros(len(touches))
+        if not near.any():
+            self._last = np.zeros((len(touches),) * 2), 0
+            return True
+        touches = touches.of(near)
+        known = self._known_forces(touches)
+        rows, gradients = self._gradients(touches)
+        columns, factors = [], []  # of the second derivatives
+        pressed = known > 0
+        for k, H in zip(np.flatnonzero(pressed), self.strands.curvatures(self._x, touches.of(pressed)), strict=True):
+            values, vectors = np.linalg.eigh(H)
+            kept = np.abs(values) > _ZERO * np.abs(values).max()
+            columns += [(rows[k], v) for v in vectors[:, kept].T]
+            factors += (known[k] * values[kept]).tolist()
+        m, q = len(touches), len(columns)
+        columns = [*columns, *zip(rows, gradients, strict=True)]
+        solved = np.empty((len(change.array_r), len(columns)))
+        at, values = np.array([c[0] for c in columns]), np.array([c[1] for c in columns])
+        values = np.where(at < 0, 0.0, values)
+        at = np.maximum(at, 0)
+        load, answer = self._negative
+        for k in range(len(columns)):
+            load.array_w[:] = 0.0
+            np.add.at(load.array_w, at[k], values[k])
+            if not self._problem.solve(load, answer):
+                return False
+            solved[:, k] = answer.array_r
+        S = np.einsum("kj,kjl->kl", values, solved[at])
+        d = -np.einsum("kj,kj->k", values, change.array_r[at])
+        S = (S + S.T) / 2
+        D = np.concatenate([factors, np.zeros(m)])
+        typical = np.abs(np.diag(S))[q:].mean()
+        while True:
+            E = D - self._spring / typical
+            M = np.linalg.solve(np.eye(q + m) - E[:, None] * S, np.diag(E)) if self._spring or q else np.zeros_like(S)
+            A = S[q:, q:] + S[q:] @ M @ S[:, q:]
+            A = (A + A.T) / 2 + _REGULAR * typical * np.eye(m)
+            if np.linalg.eigvalsh(A)[0] > 0 or self._spring > 1e6:
+                break
+            self._spring = max(self._spring * _STIFFER, _SPRING)
+        if np.linalg.eigvalsh(A)[0] <= 0:
+            return False
+        forces = complementary(A, touches.gap + d[q:] + S[q:] @ M @ d)
+        spread = M @ (d + S[:, q:] @ forces)
+        spread[q:] += forces
+        change.array_w[:] -= solved @ spread
+        self._found[near] = forces
+        removed = 0
+        if q:
+            inner = np.diag(1 / np.array(factors)) - S[:q, :q]
+            removed = np.count_nonzero(np.linalg.eigvalsh(inner) < 0) - np.count_nonzero(np.array(factors) < 0)
+        whole = np.zeros((len(near),) * 2)
+        M = np.linalg.solve(np.eye(q) - np.array(factors)[:, None] * S[:q, :q], np.diag(factors)) if q else np.zeros((0, 0))
+        whole[np.ix_(near, near)] = S[q:, q:] + S[q:, :q] @ M @ S[:q, q:]
+        self._last = whole, removed
+        return True
+
+    # -- for records -------------------------------------------------------------------------------------------------
+
+    def nodal_forces(self):
+        """(elements, p + 1, 3) forces of the contacts at the nodes of the elements that touch, inertial."""
+        strands, touches = self.strands, self._touches
+        found = np.zeros((*strands.cells.shape, 3))
+        for k, sign in ((0, -1.0), (1, 1.0)):
+            element = touches.element[:, k]
+            basis = strands.basis(element, touches.place[:, k])
+            push = (sign * self._forces)[:, None] * touches.normal
+            for neighbour, part in zip(strands.neighbours, np.split(basis, 3, axis=1), strict=True):
+                np.add.at(found, neighbour[element], part[..., None] * push[:, None, :])
+        return found

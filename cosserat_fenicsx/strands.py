@@ -1,0 +1,362 @@
+"""Centrelines of rods as curves in space that may come close to each other: nearest points of two strands, and their
+derivatives.
+
+A strand is any part of a rod; a rod may come close to itself. Lengths are in the unit of the positions. Tangents of
+finite elements jump between elements, by which nearest points would alternate; so the curve of an element gets the mean
+tangents at its ends: r + h (H_0 d_0 + H_1 d_1), with Hermite's cubics H of the slopes at the ends and half the jumps d
+there. It is smooth, and linear in the positions of the nodes of three elements.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+#: Sine of the angle of two strands above which they touch in a point; below, along a line.
+CROSSING = 0.2
+# Places of an element where strands are compared first; Newton steps to the nearest points; their largest size, in
+# elements, and the one at which they end; distance from an element's end, in elements, that is at the end.
+_PLACES, _STEPS, _LONGEST, _ENOUGH, _AT_END = 4, 40, 0.7, 1e-14, 1e-9
+# Smallest determinant of the equations of two nearest points, for unit tangents, at which both are varied.
+_PARALLEL = 1e-3
+# The neighbours of a pair of places.
+_BESIDE = [(a, b) for a in (-1, 0, 1) for b in (-1, 0, 1) if a or b]
+
+
+class Apart:
+    """Which points of rods may touch.
+
+    Args:
+        joints: [(rod, arc length, rod, arc length)] of points that are joined; rods by number.
+        exclude: (rods,) length of a rod next to a point, or a joint, where it does not touch itself.
+        pairs: (rods, rods) whether a rod touches another, or itself.
+    """
+
+    def __init__(self, joints, exclude, pairs):
+        self._joints, self._exclude, self._pairs = joints, np.asarray(exclude), pairs
+
+    def scaled(self, length):
+        """The same in another unit of length."""
+        joints = [(a, x / length, b, y / length) for a, x, b, y in self._joints]
+        return Apart(joints, self._exclude / length, self._pairs)
+
+    def may_touch(self, rod, s, other, t):
+        """(n,) whether points at arc lengths s (n,) of rods (n,), and t of others, may touch."""
+        between = np.where(rod == other, np.abs(s - t), np.inf)
+        for a, x, b, y in self._joints:
+            for i, u, j, v in ((a, x, b, y), (b, y, a, x)):
+                here = (rod == i) & (other == j)
+                between = np.where(here, np.minimum(between, np.abs(s - u) + np.abs(t - v)), between)
+        return self._pairs[rod, other] & (between > np.maximum(self._exclude[rod], self._exclude[other]))
+
+
+@dataclass(frozen=True, eq=False)
+class Touches:
+    """Pairs of points of strands, as arrays over them.
+
+    Attributes:
+        element, place: (m, 2) elements of the first and the second point, and the places in them, in [0, 1].
+        slides: (m, 2) whether the point is where the distance is stationary along its strand; it is not at the ends of
+            rods, nor where it is a node of the mesh along a line of contact.
+        gap, distance: between the surfaces, and the centrelines; normal: (m, 3) unit vectors from first to second.
+        node: (m,) the node of the first point along a line of contact, -1 at a point.
+    """
+
+    element: np.ndarray
+    place: np.ndarray
+    slides: np.ndarray
+    gap: np.ndarray
+    distance: np.ndarray
+    normal: np.ndarray
+    node: np.ndarray
+
+    def __len__(self):
+        return len(self.gap)
+
+    def of(self, which):
+        """Some of them."""
+        return Touches(*(getattr(self, name)[which] for name in self.__dataclass_fields__))
+
+
+class Strands:
+    """The centrelines of rods on a mesh.
+
+    Args:
+        cells: (elements, p + 1) nodes of every element; rods: (elements,) the rod of each, in order.
+        sizes, starts: (elements,) its length, and the arc length where it begins.
+        radii: (elements,) of the surface; rule: the `numerics.ElementRule`; apart: an `Apart`.
+    """
+
+    def __init__(self, cells, rods, sizes, starts, radii, rule, apart):
+        self.cells, self.rods, self.sizes, self.starts, self.radii = cells, rods, sizes, starts, radii
+        self._rule, self._nodes, self._apart = rule, rule.nodes, apart
+        same = np.diff(rods) == 0
+        count = np.arange(len(rods))
+        self._next = np.where(np.append(same, False), count + 1, -1)
+        self._before = np.where(np.insert(same, 0, False), count - 1, -1)
+        #: (elements, 3 (p + 1)) the nodes of the elements before, of each, and after it; its own where there is none
+        self.neighbours = np.where(self._before < 0, count, self._before), count, np.where(self._next < 0, count, self._next)
+        self.stencil = np.concatenate([cells[k] for k in self.neighbours], axis=1)
+        cubics = [np.polynomial.Polynomial(c) for c in ((0, 1, -2, 1), (0, 0, -1, 1))]
+        self._hermite = np.zeros((3, 2, 4))
+        for order in range(3):
+            for k, cubic in enumerate(cubics):
+                self._hermite[order, k, : 4 - order] = cubic.deriv(order).coef if order else cubic.coef
+        self._of = np.repeat(count, _PLACES)
+        self._at = np.tile((np.arange(_PLACES) + 0.5) / _PLACES, len(rods))
+        self._spacing = sizes.max() / _PLACES
+        own = np.ones(cells.shape, dtype=bool)  # each node once, in the element before where two share it
+        own[1:, 0] = ~same
+        self._slave, self._slave_node = np.nonzero(own)
+
+    def basis(self, element, place, order=0):
+        """(n, 3 (p + 1)) derivatives of an order of the basis by the place in the element, of `stencil`."""
+        own, slopes = self._rule.derivative(place, order), self._rule.derivative([0.0, 1.0], 1)
+        start, end = (np.polynomial.polynomial.polyval(place, self._hermite[order, k]) / 2 for k in (0, 1))
+        before, after = self._before[element], self._next[element]
+        start, end = np.where(before < 0, 0.0, start)[:, None], np.where(after < 0, 0.0, end)[:, None]
+        ratio = self.sizes[element][:, None] / self.sizes[[before, after]][..., None]
+        parts = start * ratio[0] * slopes[1], own - start * slopes[0] - end * slopes[1], end * ratio[1] * slopes[0]
+        return np.concatenate(parts, axis=1)
+
+    def at(self, x, element, place, order=0):
+        """(n, 3) position, or its derivative by arc length, for positions x (N, 3) of the nodes."""
+        values = np.einsum("nj,nji->ni", self.basis(element, place, order), x[self.stencil[element]])
+        return values / self.sizes[element][:, None] ** order
+
+    def s(self, element, place):
+        """(n,) arc lengths."""
+        return self.starts[element] + self.sizes[element] * place
+
+    def _may_touch(self, first, second):
+        (e, a), (f, b) = first, second
+        return self._apart.may_touch(self.rods[e], self.s(e, a), self.rods[f], self.s(f, b))
+
+    def _moved(self, element, place, change):
+        """Elements and places after a change of the place, in elements, limited; and whether an end of a rod, or of
+        two elements that both lead back to it, stops it."""
+        place = place + np.clip(change, -_LONGEST, _LONGEST)
+        element, stopped = element.copy(), np.zeros(len(element), dtype=bool)
+        for beyond, neighbour, shift, end in ((place > 1, self._next, -1.0, 1.0), (place < 0, self._before, 1.0, 0.0)):
+            ended = beyond & (neighbour[element] < 0)
+            goes = beyond & ~ended
+            place[goes] += shift * 1.0
+            element[goes] = neighbour[element[goes]]
+            place[ended], stopped[ended] = end, True
+        return element, place, stopped
+
+    def _nearest(self, x, element, place, fixed):
+        """The nearest points by Newton's method from (m, 2) elements and places, the first ones `fixed` or not.
+
+        Returns:
+            (elements, places, slides), (m, 2) each.
+        """
+        (e, f), (a, b) = element.T.copy(), place.T.copy()
+        slides = np.ones((len(e), 2), dtype=bool)
+        for step in range(_STEPS):
+            w = self.at(x, f, b) - self.at(x, e, a)
+            t, u = self.at(x, e, a, 1), self.at(x, f, b, 1)
+            tt, uu = self.at(x, e, a, 2), self.at(x, f, b, 2)
+            g, k = -np.sum(w * t, axis=1), np.sum(w * u, axis=1)
+            G, K = np.sum(t * t - w * tt, axis=1), np.sum(u * u + w * uu, axis=1)
+            C = -np.sum(t * u, axis=1)
+            G, K = (np.where(x > 0.2, x, 1.0) for x in (G, K))
+            determinant = G * K - C * C
+            apart = fixed | (determinant < _PARALLEL) | ~slides.all(axis=1)
+            safe = np.where(apart, 1.0, determinant)
+            first = np.where(apart, -g / G, -(K * g - C * k) / safe) * ~fixed
+            second = np.where(apart, -k / K, -(G * k - C * g) / safe)
+            first, second = first / self.sizes[e], second / self.sizes[f]
+            old = e, f, a, b
+            e, a, stop = self._moved(e, a, first)
+            slides[:, 0] = ~(stop | fixed)
+            f, b, stop = self._moved(f, b, second)
+            slides[:, 1] = ~stop
+            if step > 10:  # two elements that lead to each other meet at their common end
+                for now, place_now, was, place_was, column in ((e, a, old[0], old[2], 0), (f, b, old[1], old[3], 1)):
+                    back = (now != was) & ((place_now < 0.1) | (place_now > 0.9)) & (step > 20)
+                    place_now[back] = np.round(place_now[back])
+                    slides[back, column] = False
+            moved = np.abs(np.where(slides, np.c_[first, second], 0.0)).max(initial=0.0)
+            if moved < _ENOUGH:
+                break
+        return np.c_[e, f], np.c_[a, b], slides
+
+    def near(self, x, reach):
+        """All pairs of points of strands that are nearest to each other, with gaps below `reach`: where strands cross,
+        the points of both; along strands side by side, the nodes of one and the nearest points of the other.
+
+        Args:
+            x: (N, 3) positions of the nodes.
+
+        Returns:
+            (`Touches`, the smallest distance of the centrelines over the sum of the radii; infinite without any).
+        """
+        from scipy.spatial import cKDTree  # late: scipy is slow to import
+
+        points = self.at(x, self._of, self._at)
+        cut = 2 * self.radii.max() + reach + self._spacing
+        pairs = cKDTree(points).query_pairs(cut, output_type="ndarray")
+        pairs = pairs[self._may_touch(*((self._of[p], self._at[p]) for p in pairs.T))]
+        if not len(pairs):
+            return self._none(), np.inf
+        i, j = pairs.T
+        size = np.linalg.norm(points[i] - points[j], axis=1)
+        count = len(points)
+        order = np.argsort(i * count + j)
+        i, j, size = i[order], j[order], size[order]
+        keys, lowest = i * count + j, np.ones(len(i), dtype=bool)
+        rod = self.rods[self._of]
+        for a, b in _BESIDE:
+            u, v = i + a, j + b
+            there = (u >= 0) & (v >= 0) & (u < count) & (v < count)
+            u, v = np.clip(u, 0, count - 1), np.clip(v, 0, count - 1)
+            there &= (rod[u] == rod[i]) & (rod[v] == rod[j])
+            place = np.minimum(np.searchsorted(keys, u * count + v), len(keys) - 1)
+            there &= keys[place] == u * count + v
+            lowest &= ~there | (size <= size[place])
+        found = self._made(x, np.c_[self._of[i], self._of[j]][lowest], np.c_[self._at[i], self._at[j]][lowest], None)
+        found = self._once(found)
+        total = self.radii[found.element].sum(axis=1)
+        closest = (found.distance / total).min(initial=np.inf)
+        tangents = [self.at(x, found.element[:, k], found.place[:, k], 1) for k in (0, 1)]
+        sine = np.linalg.norm(np.cross(*(t / np.linalg.norm(t, axis=1)[:, None] for t in tangents)), axis=1)
+        crosses = (sine > CROSSING) | ~found.slides.all(axis=1)
+        parts = [found.of(crosses & (found.gap < reach))]
+        if not crosses.all():
+            parts.append(self._lines(x, points, cut, reach))
+        joined = Touches(*(np.concatenate([getattr(p, n) for p in parts]) for n in Touches.__dataclass_fields__))
+        return joined, closest
+
+    def _none(self):
+        pair, one = np.zeros((0, 2)), np.zeros(0)
+        return Touches(pair.astype(int), pair, pair.astype(bool), one, one, np.zeros((0, 3)), one.astype(int))
+
+    def _made(self, x, element, place, node):
+        """`Touches` next to pairs of places; node: (m,) of first points that are fixed, or None."""
+        fixed = np.full(len(element), node is not None)
+        element, place, slides = self._nearest(x, element, place, fixed)
+        w = self.at(x, element[:, 1], place[:, 1]) - self.at(x, element[:, 0], place[:, 0])
+        distance = np.linalg.norm(w, axis=1)
+        normal = w / np.maximum(distance, np.finfo(float).tiny)[:, None]
+        gap = distance - self.radii[element].sum(axis=1)
+        node = np.full(len(element), -1) if node is None else node
+        found = Touches(element, place, slides, gap, distance, normal, node)
+        return found.of(self._may_touch(*((element[:, k], place[:, k]) for k in (0, 1))))
+
+    def _once(self, found):
+        """Each pair of points once."""
+        s = np.column_stack([self.s(found.element[:, k], found.place[:, k]) for k in (0, 1)])
+        close, kept = 1e-6 * self.radii.min(), []
+        for k in np.argsort(found.distance, kind="stable"):
+            same = [n for n in kept if (self.rods[found.element[n]] == self.rods[found.element[k]]).all()
+                    and np.abs(s[n] - s[k]).max() < close]  # fmt: skip
+            if not same:
+                kept.append(k)
+        return found.of(np.array(sorted(kept), dtype=int))
+
+    def _lines(self, x, points, cut, reach):
+        """Nodes of strands next to others that run along them."""
+        from scipy.spatial import cKDTree
+
+        places = self._nodes[self._slave_node]
+        nodes = x[self.cells[self._slave, self._slave_node]]
+        rod, sizes = self.rods[self._of], self.sizes
+        mean = np.bincount(self.rods, sizes) / np.bincount(self.rods)
+        rows = []
+        for k, near in enumerate(cKDTree(points).query_ball_point(nodes, cut)):
+            near = np.sort(np.array(near, dtype=int))
+            e, own = self._slave[k], self.rods[self._slave[k]]
+            finer = (mean[own] < mean[rod[near]]) | ((mean[own] == mean[rod[near]]) & (own < rod[near]))
+            later = (rod[near] == own) & (self.s(self._of[near], self._at[near]) > self.s(e, places[k]))
+            near = near[np.where(rod[near] == own, later, finer)]
+            many = np.full(len(near), e), np.full(len(near), places[k])
+            near = near[self._may_touch(many, (self._of[near], self._at[near]))] if len(near) else near
+            if not len(near):
+                continue
+            for run in np.split(near, np.flatnonzero((np.diff(near) > 1) | (np.diff(rod[near]) != 0)) + 1):
+                rows.append((k, run[np.argmin(np.linalg.norm(points[run] - nodes[k], axis=1))]))
+        if not rows:
+            return self._none()
+        k, master = np.array(rows).T
+        element = np.c_[self._slave[k], self._of[master]]
+        node = self.cells[self._slave[k], self._slave_node[k]]
+        found = self._made(x, element, np.c_[places[k], self._at[master]], node)
+        tangents = [self.at(x, found.element[:, i], found.place[:, i], 1) for i in (0, 1)]
+        sine = np.linalg.norm(np.cross(*(t / np.linalg.norm(t, axis=1)[:, None] for t in tangents)), axis=1)
+        return found.of((sine <= CROSSING) & found.slides[:, 1] & (found.gap < reach))
+
+    # -- derivatives -------------------------------------------------------------------------------------------------
+
+    def nodes_of(self, touches):
+        """(m, n) the nodes that move the two points of each pair."""
+        return np.concatenate([self.stencil[touches.element[:, k]] for k in (0, 1)], axis=1)
+
+    def gradients(self, touches):
+        """(m, n, 3) derivatives of the gaps by the positions of `nodes_of`."""
+        first, second = (self.basis(touches.element[:, k], touches.place[:, k]) for k in (0, 1))
+        return np.concatenate([-first, second], axis=1)[..., None] * touches.normal[:, None, :]
+
+    def curvatures(self, x, touches):
+        """(m, 3 n, 3 n) second derivatives of the gaps by the positions of `nodes_of`, with the points that slide."""
+        m, p = len(touches), self.stencil.shape[1]
+        values, slopes = ([self.basis(e, place, order) / self.sizes[e][:, None] ** order
+                           for e, place in zip(touches.element.T, touches.place.T, strict=True)] for order in (0, 1))  # fmt: skip
+        W, T = np.zeros((m, 3, 2 * p, 3)), np.zeros((2, m, 3, 2 * p, 3))
+        for i in range(3):
+            W[:, i, :p, i], W[:, i, p:, i] = -values[0], values[1]
+            T[0, :, i, :p, i], T[1, :, i, p:, i] = -slopes[0], slopes[1]
+        W, T = W.reshape(m, 3, 6 * p), T.reshape(2, m, 3, 6 * p)
+        w = touches.normal * touches.distance[:, None]
+        t, tt = ([sign * self.at(x, touches.element[:, k], touches.place[:, k], order)
+                  for k, sign in ((0, -1), (1, 1))] for order in (1, 2))  # fmt: skip
+        A = np.stack([np.einsum("mi,mij->mj", t[k], W) + np.einsum("mi,mij->mj", w, T[k]) for k in (0, 1)], axis=1)
+        F = np.zeros((m, 2, 2))
+        for k in (0, 1):
+            F[:, k, k] = np.sum(t[k] * t[k] + w * tt[k], axis=1)
+        F[:, 0, 1] = F[:, 1, 0] = np.sum(t[0] * t[1], axis=1)
+        free = touches.slides
+        A = A * free[:, :, None]
+        F = np.where(free[:, :, None] & free[:, None, :], F, np.eye(2))
+        g = np.einsum("mi,mij->mj", touches.normal, W)
+        found = np.einsum("mij,mik->mjk", W, W) - np.einsum("mai,mab,mbj->mij", A, np.linalg.inv(F), A)
+        return (found - g[:, :, None] * g[:, None, :]) / touches.distance[:, None, None]
+
+
+def closest_segments(points, rods, s, radii, apart, reach):
+    """Gaps between polygons through points of rods, by the distances of their sides: independent of `Strands`.
+
+    Args:
+        points: (n, 3); rods, s, radii: (n,) of each point; apart: an `Apart`; reach: largest gap of interest.
+
+    Returns:
+        (gap, allowed, first, second), (k,) each: gaps of sides, how far the polygons may lie inside of the curves, and
+        the arc lengths of the nearest points with their rods, (k, 2) each; only gaps below `reach`.
+    """
+    from scipy.spatial import cKDTree
+
+    side = np.flatnonzero(np.diff(rods) == 0)
+    a, b = points[side], points[side + 1]
+    length = np.linalg.norm(b - a, axis=1)
+    cut = 2 * radii.max() + reach + length.max()
+    pairs = cKDTree((a + b) / 2).query_pairs(cut, output_type="ndarray")
+    middle = (s[side] + s[side + 1]) / 2
+    i, j = pairs.T
+    keep = apart.may_touch(rods[side[i]], middle[i], rods[side[j]], middle[j])
+    i, j = i[keep], j[keep]
+    u, v, w = b[i] - a[i], b[j] - a[j], a[i] - a[j]
+    A, B, C, D, E = (np.sum(p * q, axis=1) for p, q in ((u, u), (u, v), (v, v), (u, w), (v, w)))
+    determinant = A * C - B * B
+    x = np.where(determinant > 1e-12 * A * C, (B * E - C * D) / np.where(determinant > 0, determinant, 1.0), 0.5)
+    x = np.clip(x, 0, 1)
+    y = np.clip((B * x + E) / C, 0, 1)
+    x = np.clip((B * y - D) / A, 0, 1)
+    gap = np.linalg.norm(w + x[:, None] * u - y[:, None] * v, axis=1)
+    gap = gap - np.maximum(radii[side[i]], radii[side[i] + 1]) - np.maximum(radii[side[j]], radii[side[j] + 1])
+    bend = np.zeros(len(points))
+    inner = np.flatnonzero((np.diff(rods)[1:] == 0) & (np.diff(rods)[:-1] == 0)) + 1
+    bend[inner] = np.linalg.norm(points[inner - 1] - 2 * points[inner] + points[inner + 1], axis=1) / 4
+    sag = np.maximum(bend[side], bend[side + 1])
+    where = [s[side[k]] + z * (s[side[k] + 1] - s[side[k]]) for k, z in ((i, x), (j, y))]
+    close = gap < reach
+    places = [np.c_[rods[side[k]], at][close] for k, at in zip((i, j), where, strict=True)]
+    return gap[close], (sag[i] + sag[j])[close], *places
