@@ -223,8 +223,9 @@ def _plain(value, writing):
         return value
     if isinstance(value, np.ndarray | np.generic):
         return value.tolist()
-    if isinstance(value, list | tuple):
-        return [_plain(x, writing) for x in value]
+    if isinstance(value, list | tuple | dict):
+        parts = [_plain(x, writing) for x in (value.values() if isinstance(value, dict) else value)]
+        return dict(zip(value, parts, strict=True)) if isinstance(value, dict) else parts
     if hasattr(value, "arguments"):
         return Object((value._family or type(value),)).write(value, writing)
     what = "a function written in Python" if callable(value) else f"a part of the class {type(value).__name__}"

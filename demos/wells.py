@@ -89,6 +89,21 @@ def helix(scene, answers, sweep, folder):
     yield Check("negative modes", solved.negative_modes, 0, 0, "a helix is stable")
 
 
+def strength(scene, answers, sweep, folder):
+    """What premium S-135 pipe bears, by the tables of API; its utilisation at the surface; where a helix begins."""
+    drilling, _ = answers
+    use = scene.strength.of(drilling)["strength"]
+    pipe, api = use.strengths[-1], "API RP 7G, tables of premium drill pipe"
+    yield Check("tension at yield (klbf)", pipe.tension / cf.units.kip, 560.764, 1e-3, api)
+    yield Check("torque at yield (ft-lbf)", pipe.torque / cf.units.ft_lbf, 58113.0, 1.0, api)
+    yield Check("collapse (psi)", float(pipe.collapse()) / cf.units.psi, 10029.0, 1.0, "API Bulletin 5C3")
+    stress = math.hypot(drilling.hook_load / pipe.area, math.sqrt(3) * drilling.surface_torque / pipe.torque * 0.577
+                        * pipe.yield_strength)  # fmt: skip
+    yield Check("utilisation at the surface", use.von_mises[0], stress / pipe.yield_strength, 1e-12, "von Mises")
+    if folder is not None:
+        draw_both(partial(use.plot, units="field"), folder / "strength.png", MPI.COMM_WORLD)
+
+
 def cable_in_conduit(folder):
     """A cable of 12 mm is pulled round a bend of 90 degrees in a conduit of 32 mm: from end to end its tension grows by
     exp(mu times the angle that it turns by); its little bending stiffness changes that by about EI/(T R^2)."""
@@ -102,7 +117,7 @@ def cable_in_conduit(folder):
 
 
 #: The scenes of the folder, and those in other tubes.
-WELLS, TUBES = (well_p, well_p_rod, volve_f12, lock_up, assembly, helix), (cable_in_conduit,)
+WELLS, TUBES = (well_p, well_p_rod, volve_f12, lock_up, assembly, helix, strength), (cable_in_conduit,)
 
 
 def run(demo, out="out/wells"):

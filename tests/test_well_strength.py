@@ -242,3 +242,45 @@ def test_results_of_strength_are_stored_and_shown_in_field_units(well, tmp_path)
     figure = use.plot(units="field")
     labels = " ".join(axes.get_xlabel() + axes.get_ylabel() for axes in figure.axes)
     assert all(x in labels for x in ("(ft)", "(klbf)", "(psi)", "(deg/100ft)", "share of the limit"))
+
+
+def test_casing_sizes_and_pressures_of_flow(well):
+    section = W.HoleSection(2000.0, casing="9 5/8 in 47 lb/ft", friction=0.2)
+    assert section.diameter == pytest.approx(8.681 * u.inch) and section.name == "casing 9 5/8 in 47.00 lb/ft"
+    with pytest.raises(cf.SceneError, match="9 5/8 in 47.00"):
+        W.HoleSection(2000.0, casing="9 5/8 in 48 lb/ft", friction=0.2)
+    with pytest.raises(cf.SceneError, match="either a diameter or a casing"):
+        W.HoleSection(2000.0, 0.2, 0.2, casing="9 5/8 in 47 lb/ft")
+    with pytest.raises(cf.SceneError, match="friction = None"):
+        W.HoleSection(2000.0, 0.2)
+    hole, string = well
+    flow = [(0.0, 25e6), (3700.0, 10e6)]
+    at_rest, pumped = (
+        W.torque_and_drag(hole, string, W.RotateOffBottom(), mud=mud, model="soft")
+        for mud in (W.Mud(1200.0), W.Mud(1200.0, flow_inside=flow))
+    )
+    bore = np.pi / 4 * (4.276 * u.inch) ** 2
+    assert pumped.hook_load == at_rest.hook_load
+    assert pumped.true_tension[0] - at_rest.true_tension[0] == pytest.approx(25e6 * bore)
+    pipe = W.PipeStrength(string.components[-1], "S135")
+    assert pumped.utilisation("S135").burst[0] == pytest.approx(25e6 / pipe.burst)
+    for wrong in ([(10.0, 1e6), (10.0, 2e6)], [1e6, 2e6], "30", [(-1.0, 1e6)]):
+        with pytest.raises(cf.SceneError, match="flow_inside"):
+            W.Mud(1200.0, flow_inside=wrong)
+
+
+def test_strength_in_a_scene_file(tmp_path):
+    file = Path(__file__).parents[1] / "demos" / "wells" / "strength.toml"
+    scene = cf.read(file)
+    found = scene.strength.of(scene.answer(scene.operations[0]))
+    assert list(found) == ["strength", "overpull", "weight_on_bit"] and found["strength"].largest < 1
+    text = file.read_text().replace('grade = "S135"', 'grade = { "drill pipe" = "G105", collar = "100 ksi" }')
+    (tmp_path / "again.toml").write_text(text)
+    again = cf.read(tmp_path / "again.toml")
+    cf.write(again, tmp_path / "written.toml")
+    assert cf.read(tmp_path / "written.toml").strength == again.strength
+    for old, new, words in (('"S135"', '"S153"', "did you mean 'S135'"), ("0.8", "8", "wear"),
+                            ('"S135"', '{ "pipe" = "E75" }', "did you mean 'drill pipe'")):  # fmt: skip
+        (tmp_path / "wrong.toml").write_text(file.read_text().replace(f"= {old}\n", f"= {new}\n"))
+        with pytest.raises(cf.SceneError, match=f"line [0-9]+.*{words}"):
+            cf.read(tmp_path / "wrong.toml")

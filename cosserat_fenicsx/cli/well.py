@@ -14,6 +14,7 @@ from cosserat_fenicsx.well.scenefile import TorqueAndDragSettings
 
 # Ends of the names of files of an operation, and names of those of a sweep.
 _ENDINGS = (".csv", "_contacts.csv", ".png", "_3d.png")
+_OF_STRENGTH = ("_strength.csv", "_strength.png", "_overpull.csv", "_weight_on_bit.csv")
 _OF_SWEEPS = ("depth_sweep.csv", "depth_sweep", "depth_sweep.png")
 
 
@@ -28,7 +29,7 @@ def run(options, scene, tables):
     """`cosserat run` of a `WellScene` and the tables of its file; returns the exit code."""
     scene, stems, picture = _scene(options, scene), _stems(scene.operations), not options.no_picture
     units = units_of(options)
-    names = [f"{stem}{ending}" for stem in stems for ending in _ENDINGS] + list(_OF_SWEEPS)
+    names = [f"{stem}{ending}" for stem in stems for ending in _ENDINGS + _OF_STRENGTH] + list(_OF_SWEEPS)
     out = output_of(options, names, tables)
     if scene.title:
         say(scene.title, file=sys.stdout)
@@ -42,11 +43,25 @@ def run(options, scene, tables):
             in_space: picture and partial(answer.plot_3d, units=units),
         }
 
+    def files_of_strength(stem, found):
+        files = {f"{stem}.csv": partial(found.write, units=units)}
+        return files | ({f"{stem}.png": partial(found.plot, units=units)} if picture and hasattr(found, "plot") else {})
+
     for operation, stem in zip(scene.operations, stems, strict=True):
-        solved = partial(_solved, scene, operation, Units(units))
+        answers = []
+
+        def solved(operation=operation, answers=answers):
+            answers.append(_solved(scene, operation, Units(units)))
+            return answers[0]
+
         code = deliver(solved, options, names, partial(files_of, stem), tables, obeys=False)
         if code != DONE:
             return code
+        for name, found in scene.strength.of(answers[0]).items() if scene.strength else ():
+            files = partial(files_of_strength, f"{stem}_{name}")
+            code = deliver(lambda found=found: found, options, names, files, tables, obeys=False)
+            if code != DONE:
+                return code
     if scene.depth_sweep is None:
         return DONE
     folder = None if out is None else out / "depth_sweep"

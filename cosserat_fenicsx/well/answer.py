@@ -287,13 +287,12 @@ class TorqueAndDrag(Differentiated, Result):
         """Outside and inside at `md`, Pa; NaN where there is no mud."""
         if self.mud is None:
             return np.full((2, len(self.md)), np.nan)
-        head = self.mud.gravity * self.hole.path.position(self.md)[:, 2]
-        return self.mud.density * head, self.mud.inside * head
+        return self.mud.pressures(self.md, self.hole.path.position(self.md)[:, 2])
 
     @cached_property
     def true_tension(self) -> np.ndarray:
-        """Force in the wall of the pipe, N: effective tension + p_i A_i - p_o A_o, with the pressures of the fluids at
-        rest and the areas of the body. NaN without mud, or without diameters."""
+        """Force in the wall of the pipe, N: effective tension + p_i A_i - p_o A_o, with the pressures of the fluids
+        and the areas of the body. NaN without mud, or without diameters."""
         return true_tension(self._sections, self.tension, *self._pressures)
 
     @cached_property

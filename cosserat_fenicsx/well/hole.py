@@ -4,7 +4,8 @@ import math
 from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass, replace
-from typing import Annotated, ClassVar
+from itertools import pairwise
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
@@ -18,6 +19,7 @@ from cosserat_fenicsx.quantities import Units
 from cosserat_fenicsx.results.screen import InWords
 from cosserat_fenicsx.scene.rod import Rod
 from cosserat_fenicsx.scene.sections import Circle, Tube
+from cosserat_fenicsx.well.components import standard_size
 from cosserat_fenicsx.well.path import WellPath
 
 
@@ -27,18 +29,20 @@ class HoleSection(Part):
 
     Args:
         to: measured depth of its lower end, m.
-        diameter: of the hole, or inside the casing, m.
-        friction: coefficient of friction between string and wall (friction factor), 0 to 5.
-        name: in tables and charts, such as "casing".
+        diameter: of the hole, or inside the casing, m; None for that of `casing`.
+        friction: coefficient of friction between string and wall (friction factor), 0 to 5; must be given.
+        name: in tables and charts, such as "casing"; by default the size of the casing.
+        casing: the name of a standard size, such as "9 5/8 in 47 lb/ft", which has its inner diameter.
 
     Raises:
-        SceneError: a number outside its range.
+        SceneError: a number outside its range, neither or both of diameter and casing, an unknown size.
     """
 
     to: Depth
-    diameter: Diameter
-    friction: Friction
+    diameter: Diameter | None = None
+    friction: Friction = None  # type: ignore[assignment]  # refused unless it is given
     name: str = ""
+    casing: str | None = None
 
     def __post_init__(self):
         try:
@@ -48,7 +52,15 @@ class HoleSection(Part):
             raise SceneError(f"{problem}{told}") from None
 
     def validate(self):
-        """Warn of a diameter that is probably in another unit."""
+        """Find the diameter of a casing; warn of one that is probably in another unit."""
+        if self.casing is not None:
+            known = standard_size("Casing", self.casing)
+            inside = known["inner_diameter"]
+            if self.diameter not in (None, inside):
+                refuse(self, "diameter", self.diameter, f"either a diameter or a casing, whose is {inside:.6g} m")
+            store(self, diameter=inside, casing=known["size"], name=self.name or f"casing {known['size']}")
+        if self.diameter is None:
+            refuse(self, "diameter", None, "a diameter (m), or the size of a casing, casing='9 5/8 in 47 lb/ft'")
         doubt_width(self, "diameter")
 
 
@@ -213,15 +225,21 @@ class Mud(InWords, Part):
         added_mass: C_a, for motions: the mass of the fluid around that moves with the string, over the mass that the
             string displaces: 1 far from walls, 1.5 to 3 in a hole. None leaves it and the mud inside out.
         drag: lateral drag on the axis, for motions: force per length and speed, N s/m^2; None for none.
+        flow_inside, flow_outside: pressure in the string and around it above that of the fluids at rest, such as that
+            of a pump: a number, Pa, or rows of measured depth (m) and pressure, linear between and constant beyond
+            them. It is in true tension, stresses, stretch, burst and collapse; not in weight and effective tension,
+            since the fluid hands the loss of pressure to the wall.
 
     Raises:
-        SceneError: a number that is negative or not finite.
+        SceneError: a number that is negative or not finite; depths that do not ascend.
     """
 
     density: Density
     inside: Density | None = None
     added_mass: Annotated[float, at_least(0, "a coefficient")] | None = None
     drag: Annotated[float, Number("damping per length", at_least(0, "a coefficient"))] | None = None
+    flow_inside: Any = 0.0
+    flow_outside: Any = 0.0
 
     #: m/s^2, standard.
     gravity: ClassVar[float] = 9.80665
@@ -230,6 +248,8 @@ class Mud(InWords, Part):
         """Take the same mud inside by default; warn of a density that is probably in another unit."""
         if self.inside is None:
             store(self, inside=self.density)
+        for name in ("flow_inside", "flow_outside"):
+            store(self, **{name: self._pressure(name)})
         # neither a gas nor a liquid; relative densities; heavier than any mud
         if 5 < self.density < 300 or 0.5 < self.density < 3 or self.density > 2700:
             warn(
@@ -237,9 +257,33 @@ class Mud(InWords, Part):
                 "gallon 10 * units.ppg = 1198"
             )
 
+    def _pressure(self, name):
+        """A pressure (Pa), or rows of measured depth and pressure; checked."""
+        given, expected = getattr(self, name), "a pressure (Pa), or rows of measured depth (m), ascending, and pressure"
+        if not isinstance(given, list | tuple | np.ndarray):
+            return number(self, name, given, "a pressure (Pa)", math.isfinite)
+        if not all(isinstance(row, list | tuple | np.ndarray) and len(row) == 2 for row in given):
+            refuse(self, name, given, expected)
+        rows = tuple(
+            (number(self, name, md, "a measured depth (m)", lambda x: x >= 0),
+             number(self, name, pressure, "a pressure (Pa)", math.isfinite))
+            for md, pressure in given
+        )  # fmt: skip
+        if not rows or any(b[0] <= a[0] for a, b in pairwise(rows)):
+            refuse(self, name, given, expected)
+        return rows
+
+    def pressures(self, md, down) -> np.ndarray:
+        """(2, n) Pa, outside and inside the string, at measured depths and depths below the surface (m)."""
+        found = self.gravity * np.multiply.outer([self.density, self.inside], down)
+        for row, flow in zip(found, (self.flow_outside, self.flow_inside), strict=True):
+            row += np.interp(md, *np.transpose(flow)) if isinstance(flow, tuple) else flow
+        return found
+
     def sentences(self, units: Units) -> list[str]:
         """On its density, in SI and in ppg, whatever the units."""
-        return [f"Mud: {self.density:g} kg/m^3, {self.density / constants.ppg:.4g} ppg."]
+        flow = "" if (self.flow_inside, self.flow_outside) == (0.0, 0.0) else "; with pressures of flow"
+        return [f"Mud: {self.density:g} kg/m^3, {self.density / constants.ppg:.4g} ppg{flow}."]
 
     def along(self, rod: Rod, outer: float | None = None, inner: float | None = None) -> tuple:
         """Actions of the mud on a moving rod: an `AddedMass`, across the rod alone, and a `LinearDrag`, if they are not

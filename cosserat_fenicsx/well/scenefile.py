@@ -37,18 +37,23 @@ depth = 3438.0
 depths = { from = "300 m", to = 3438.0, count = 20 }
 friction = [0.1, 0.2, 0.3]
 
+[strength]                       # optional: grade, wear (numbers, or tables by names of components), safety, buckling
+grade = { "drill pipe" = "S135" }
+wear = 0.8
+
 Numbers are in SI, or text with a unit (`dimensions`).
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
 
 from cosserat_fenicsx.checks import File
 from cosserat_fenicsx.parts import Depth, Number, Part, Values, concerning, positive
 from cosserat_fenicsx.quantities import Units
+from cosserat_fenicsx.results.result import Result
 from cosserat_fenicsx.results.screen import InWords
 from cosserat_fenicsx.well.answer import TorqueAndDrag
 from cosserat_fenicsx.well.components import DrillString
@@ -58,6 +63,7 @@ from cosserat_fenicsx.well.pieces import pieces_of
 from cosserat_fenicsx.well.rod.rod_answer import check_rod
 from cosserat_fenicsx.well.solve import CONVENTIONS, ROD, check_settings, torque_and_drag
 from cosserat_fenicsx.well.sweep import DepthSweep, depth_sweep
+from cosserat_fenicsx.well.utilisation import strengths_of
 
 _SOFT = (
     "the soft string by a differential equation along the axis, and what that leaves out is estimated with each answer."
@@ -106,6 +112,34 @@ class DepthSweepSettings(Part):
     called = "depth_sweep"
 
 
+@dataclass(frozen=True)
+class StrengthSettings(Part):
+    """What is asked of the strength of a string in a scene file.
+
+    Args:
+        grade, wear: of the drill pipe, or tables by names of components, see `TorqueAndDrag.utilisation`.
+        safety: factor in the margin of overpull and the most weight on bit.
+        buckling: "helical" or "sinusoidal": which limits the weight on bit.
+    """
+
+    grade: Any = "E75"
+    wear: Any = 1.0
+    safety: float = 1.1
+    buckling: Literal["helical", "sinusoidal"] = "helical"
+
+    called = "strength"
+
+    def of(self, answer: TorqueAndDrag) -> dict[str, Result]:
+        """{name: `Utilisation`, `MarginOfOverpull`, and `MostWeightOnBit` where there is a weight on bit}."""
+        found = {"strength": answer.utilisation(self.grade, self.wear)}
+        found["overpull"] = answer.margin_of_overpull(self.grade, self.wear, safety=self.safety)
+        if answer.operation.weight > 0:
+            found["weight_on_bit"] = answer.most_weight_on_bit(
+                self.grade, self.wear, safety=self.safety, buckling=self.buckling
+            )
+        return found
+
+
 def _given(settings):
     if settings is None:
         return {}
@@ -120,6 +154,7 @@ class WellScene(InWords, Part):
         well: the `Borehole`. string: the `DrillString`. operations: in the order of the file.
         mud: the `Mud`, or None.
         torque_and_drag: arguments of `torque_and_drag`, or None. depth_sweep: arguments of `depth_sweep`, or None.
+        strength: what is asked of the string's strength, or None.
         title: for tables and charts.
 
     Raises:
@@ -132,6 +167,7 @@ class WellScene(InWords, Part):
     mud: Mud | None = None
     torque_and_drag: TorqueAndDragSettings | None = None
     depth_sweep: DepthSweepSettings | None = None
+    strength: StrengthSettings | None = None
     title: str = ""
 
     def validate(self):
@@ -145,6 +181,9 @@ class WellScene(InWords, Part):
         self._check(settings, here)
         with concerning("depth_sweep"):
             self._check({**settings, **of_sweep}, depths)
+        if self.strength is not None:
+            with concerning("strength"):
+                strengths_of("strength", self.string.laid(here[0]), self.strength.grade, self.strength.wear)
 
     def _check(self, asked, depths):
         """Refuse settings of `torque_and_drag`, and what does not fit the hole at some depths."""
