@@ -284,3 +284,21 @@ def test_strength_in_a_scene_file(tmp_path):
         (tmp_path / "wrong.toml").write_text(file.read_text().replace(f"= {old}\n", f"= {new}\n"))
         with pytest.raises(cf.SceneError, match=f"line [0-9]+.*{words}"):
             cf.read(tmp_path / "wrong.toml")
+
+
+def test_tortuosity(well):
+    path, angle = well[0].path, np.radians(0.5)
+    crooked = W.tortuosity(path, 0.5, "100 m")
+    off = np.arccos(np.clip((crooked.tangent(crooked.md) * path.tangent(crooked.md)).sum(axis=1), -1, 1))
+    inside = (crooked.md > 100) & (crooked.md < path.length - 100)
+    assert off[inside] == pytest.approx(angle, rel=1e-3) and off[[0, -1]] == pytest.approx(0, abs=1e-7)
+    # a straight part has the dogleg of a helix
+    straight = (crooked.md[1:] > 120) & (crooked.md[1:] < 480)
+    assert crooked.dogleg_severity[straight] == pytest.approx(2 * np.pi * angle / 100, rel=0.02)
+    assert W.tortuosity(path, 0.0, 100.0).position(path.length) == pytest.approx(path.position(path.length), abs=0.1)
+    one, same, other = (W.tortuosity(path, 0.5, 100.0, seed=seed) for seed in (1, 1, 2))
+    assert (one.inclination == same.inclination).all() and (one.inclination != other.inclination).any()
+    assert np.degrees(np.abs(one.dogleg).max()) < 2
+    for wrong in ((-1.0, 100.0), (0.5, 1e5), (0.5, 100.0, 1.5), (0.5, 1e-3), (20.0, 100.0), ("2 m", 100.0)):
+        with pytest.raises(cf.SceneError, match="tortuosity"):
+            W.tortuosity(path, *wrong)

@@ -36,4 +36,5 @@ from cosserat_fenicsx.well.solve import torque_and_drag as torque_and_drag
 from cosserat_fenicsx.well.strength import PipeStrength as PipeStrength
 from cosserat_fenicsx.well.sweep import DepthSweep as DepthSweep
 from cosserat_fenicsx.well.sweep import depth_sweep as depth_sweep
+from cosserat_fenicsx.well.tortuosity import tortuosity as tortuosity
 from cosserat_fenicsx.well.utilisation import Utilisation as Utilisation
