@@ -73,6 +73,16 @@ def assembly(scene, answers, sweep, folder):
         draw_both(partial(answer.plot_from_side, length=40.0), folder / "assembly.png", MPI.COMM_WORLD)
 
 
+def bent_motor(scene, answers, sweep, folder):
+    """The side force of the bit by the beam of the rates of build, without friction, and by the exact rod."""
+    (answer,), rates = answers, scene.builds(scene.operations[0])
+    found, known = rates.bit_side_force, float(answer.bit_side_force[0])
+    yield Check("side force by the beam (N)", found, known, 100.0, "exact rod, with friction")
+    if folder is not None:
+        draw_both(partial(answer.plot_from_side, length=25.0), folder / "bent_motor.png", MPI.COMM_WORLD)
+        draw_both(rates.plot, folder / "build_rate.png", MPI.COMM_WORLD)
+
+
 def helix(scene, answers, sweep, folder):
     """Turns, wall force and shortening between 200 and 460 m, where the compression is F."""
     (answer,) = answers
@@ -117,7 +127,8 @@ def cable_in_conduit(folder):
 
 
 #: The scenes of the folder, and those in other tubes.
-WELLS, TUBES = (well_p, well_p_rod, volve_f12, lock_up, assembly, helix, strength), (cable_in_conduit,)
+WELLS = well_p, well_p_rod, volve_f12, lock_up, assembly, bent_motor, helix, strength
+TUBES = (cable_in_conduit,)
 
 
 def run(demo, out="out/wells"):

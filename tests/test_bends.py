@@ -107,6 +107,106 @@ def test_a_bend_decides_for_the_rod_and_is_missed_where_there_is_none():
     assert "ONE MOMENT of a turn" in turning.summary()
 
 
+@pytest.mark.parametrize("case", KNOWN, ids=lambda case: case["name"])
+def test_rates_of_build(case):
+    given, truth = case["input"], case["straight hole"]
+    found = well.build_rate(straight(200.0), assembly(given), well.Sliding(given["WOB"]), anisotropy=given["I_b"])
+    assert found.bit_side_force == pytest.approx(truth["side force"], rel=1e-4)
+    assert found.bit_tilt == pytest.approx(truth["tilt"], abs=1e-7)
+    assert found.contacts[-1] == pytest.approx((truth["tangency"], -truth["force at tangency"]), rel=1e-5)
+    assert [-force for _, force in found.contacts[:-1]] == pytest.approx([x for _, x in truth["stabilisers"]], rel=1e-3)
+    for name, rate in case["rates"].items():
+        if rate is not None:
+            assert found.of(name) == pytest.approx(rate, abs=math.radians(0.001) / 30), name
+    # the other program knows no contact of the body below a stabiliser, with which the pendulum's side force vanishes
+    assert np.isnan(found.of("three-point")) == (given["bend"] is None) and np.isfinite(found.rate[:3]).all()
+    assert ("three-point: it is about an assembly with one bend" in found.summary()) == (given["bend"] is None)
+
+
+def in_circle(curvature, length=60.0):
+    md = np.array([0.0, length / 2, length])
+    path = well.WellPath.from_survey(md, 40 - np.degrees(curvature) * (length - md), [0, 0, 0])
+    return well.Borehole(path, well.HoleSection(length, HOLE, 0.0))
+
+
+@pytest.mark.parametrize(("case", "criterion"), [(0, "side force"), (0, "tilt"), (3, "side force")])
+def test_the_rod_in_a_hole_of_that_rate(case, criterion):
+    given = KNOWN[case]["input"]
+    string, operation = assembly(given), well.Sliding(given["WOB"])
+    found = well.build_rate(straight(200.0), string, operation)
+    rod = well.torque_and_drag(in_circle(found.of(criterion)), string, operation, model="rod")
+    if criterion == "tilt":
+        assert rod.bit_tilt[0] == pytest.approx(0.0, abs=3e-6)
+    else:
+        slope = np.abs(np.gradient(found.side_force, found.curvature)).max()
+        assert rod.bit_side_force[0] == pytest.approx(0.0, abs=math.radians(0.02) / 30 * slope)
+
+
+def test_shear_and_a_drop_with_the_bend_turned_over():
+    tube = {"outer_diameter": 0.1714, "inner_diameter": 0.0762}
+    parts = [well.Bit(HOLE), well.Collar(0.8, **tube), well.Stabiliser(0.4, 0.2143, **tube)]
+    parts += [well.Collar(6.0, bend=1.0, bend_at=0.7, **tube), well.Collar(**tube)]
+    string, mud = well.DrillString(parts), well.Mud(1200.0)
+    for face in (0.0, 180.0):
+        given = {"string": turned(string, face), "operation": well.Sliding(80e3), "mud": mud}
+        found = well.build_rate(straight(80.0), **given)
+        rod = well.torque_and_drag(straight(80.0), **given, model="rod")
+        assert found.bit_side_force == pytest.approx(rod.bit_side_force[0], rel=1e-3)
+        assert found.bit_tilt == pytest.approx(rod.bit_tilt[0], abs=2e-6)
+        assert (found.of("three-point") > 0) == (found.of("law") > 0) == (face == 0)
+
+
+def test_rates_of_build_as_files_and_pictures(tmp_path_all):
+    found = well.build_rate(straight(200.0), assembly(KNOWN[0]["input"]), well.Sliding(80e3))
+    found.save(tmp_path_all / "rates.h5")
+    assert cf.read_result(tmp_path_all / "rates.h5").summary() == found.summary()
+    found.write(tmp_path_all / "rates.csv", units="field")
+    assert "rate of build (deg/100ft)" in (tmp_path_all / "rates.csv").read_text(encoding="utf-8")
+    figure = found.plot(units="field")
+    (legend,) = [panel.get_legend() for panel in figure.axes if panel.get_legend()]
+    assert f"side force: {found.of('side force') / cf.units.deg_per_100ft:.2f} deg/100ft" in {
+        text.get_text() for text in legend.get_texts()
+    }
+
+
+def plain(**changed):
+    """Arguments of `build_rate` of a bit and collars."""
+    collar = {"length": 7.5, "size": "NC46-65"}
+    parts = [well.Bit(HOLE), well.Collar(**(collar | changed.pop("motor", {}))), well.Collar(size="NC46-65")]
+    return {"hole": straight(200.0), "string": well.DrillString(parts), "operation": well.Sliding(80e3),
+            "mud": well.Mud(1200.0)} | changed  # fmt: skip
+
+
+@pytest.mark.parametrize(("given", "words"), [
+    (lambda: plain(operation=well.TripOut()), "an operation with weight on bit"),
+    (lambda: plain(anisotropy=-0.1), "a number from 0 to 10"),
+    (lambda: plain(motor={"bend": 1.0, "bend_at": 2.0, "tool_face": 90.0}), "expected 0 or 180 for build_rate"),
+    (lambda: plain(string=well.DrillString([well.Collar(size="NC46-65")])), "the lowest component is collar"),
+    (lambda: plain(hole=straight(9.0)), "does not lie down on the wall within 9 m"),
+    (lambda: plain(hole=straight(200.0, inclination=0.0)), "less weight on bit"),
+    (lambda: plain(string=well.DrillString([well.Bit(HOLE), well.Component(None, None, 900.0, 0.08)])),
+     "expected that of a round section"),
+])  # fmt: skip
+def test_rates_that_are_refused(given, words):
+    with pytest.raises((cf.SceneError, cf.NotConverged)) as refused:
+        well.build_rate(**given())
+    assert words in str(refused.value)
+
+
+SCENE = Path(__file__).parents[1] / "demos" / "wells" / "bent_motor.toml"
+
+
+def test_the_scene_of_a_bent_motor(tmp_path):
+    scene = cf.read(SCENE)
+    found = scene.builds(scene.operations[0])
+    assert np.degrees(found.rate) * 30 == pytest.approx([10.318, -2.0716, 9.813, 7.075], abs=2e-3)
+    assert "Rates of build by several criteria, anisotropy 0.1" in scene.details("field")
+    again = tmp_path / "again.toml"
+    again.write_text(SCENE.read_text(encoding="utf-8").replace("18 klbf", "0 klbf"), encoding="utf-8")
+    with pytest.raises(cf.SceneError, match=r"build_rate.operations = 'none with weight on bit'"):
+        cf.read(again)
+
+
 @pytest.mark.parametrize(("given", "words"), [
     ({"bend": 6.0, "bend_at": 2.0}, "a bend (degrees) from 0 to 5"),
     ({"bend": 1.0}, "Collar.bend_at = None: expected its distance (m) from the lower end, between 0 and the length"),

@@ -16,6 +16,8 @@ from cosserat_fenicsx.well.scenefile import TorqueAndDragSettings
 _ENDINGS = (".csv", "_contacts.csv", ".png", "_3d.png")
 _OF_STRENGTH = ("_strength.csv", "_strength.png", "_overpull.csv", "_weight_on_bit.csv")
 _OF_SWEEPS = ("depth_sweep.csv", "depth_sweep", "depth_sweep.png")
+# Ends of the names of files of rates of build.
+_OF_BUILDS = (".csv", "_holes.csv", ".png")
 
 
 def _scene(options, scene):
@@ -30,6 +32,8 @@ def run(options, scene, tables):
     scene, stems, picture = _scene(options, scene), _stems(scene.operations), not options.no_picture
     units = units_of(options)
     names = [f"{stem}{ending}" for stem in stems for ending in _ENDINGS + _OF_STRENGTH] + list(_OF_SWEEPS)
+    of_builds = ["build_rate"] if len(scene.drilling) == 1 else [f"build_rate_{x}" for x in _stems(scene.drilling)]
+    names += [f"{stem}{ending}" for stem in of_builds for ending in _OF_BUILDS]
     out = output_of(options, names, tables)
     if scene.title:
         say(scene.title, file=sys.stdout)
@@ -62,6 +66,16 @@ def run(options, scene, tables):
             code = deliver(lambda found=found: found, options, names, files, tables, obeys=False)
             if code != DONE:
                 return code
+    for operation, stem in zip(scene.drilling if scene.build_rate else (), of_builds, strict=False):
+
+        def files_of_builds(found, stem=stem):
+            csv, holes, chart = (f"{stem}{ending}" for ending in _OF_BUILDS)
+            drawn = picture and partial(found.plot, units=units)
+            return {csv: partial(found.write, units=units), holes: True, chart: drawn}
+
+        code = deliver(partial(scene.builds, operation), options, names, files_of_builds, tables, obeys=False)
+        if code != DONE:
+            return code
     if scene.depth_sweep is None:
         return DONE
     folder = None if out is None else out / "depth_sweep"

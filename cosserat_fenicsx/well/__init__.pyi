@@ -34,6 +34,8 @@ from cosserat_fenicsx.well.reserves import MostWeightOnBit as MostWeightOnBit
 from cosserat_fenicsx.well.scenefile import WellScene as WellScene
 from cosserat_fenicsx.well.solve import torque_and_drag as torque_and_drag
 from cosserat_fenicsx.well.strength import PipeStrength as PipeStrength
+from cosserat_fenicsx.well.steering import BuildRate as BuildRate
+from cosserat_fenicsx.well.steering import build_rate as build_rate
 from cosserat_fenicsx.well.sweep import DepthSweep as DepthSweep
 from cosserat_fenicsx.well.sweep import depth_sweep as depth_sweep
 from cosserat_fenicsx.well.tortuosity import tortuosity as tortuosity

@@ -418,6 +418,36 @@ def _at_points(panel, answer, *_):
     panel.set_xlabel(f"{heading}{more}")
 
 
+_SIDE_FORCE = Quantity("side force of the bit", unit="N", shown="kN")
+_TILT = Quantity("tilt of the bit", unit="rad", shown="deg", dimension="angle")
+_BUILDS = Quantity("curvature of the hole, > 0 builds", unit="rad/m", shown="deg/30m", dimension="angle per length")
+
+
+def build_figure(found):
+    """Side force and tilt of the bit over the curvature of the hole, and the rates of build; see `BuildRate.plot`."""
+    figure = empty_figure(9, 6.5)
+    panels = figure.subplots(2, sharex=True)
+    (along, curvature), unit = scale(_BUILDS), unit_of(_BUILDS)[0]
+    told = [(name, rate / curvature, colour) for name, rate, colour in
+            zip(found.criterion, found.rate, COLOURS, strict=False) if np.isfinite(rate)]  # fmt: skip
+    for panel, quantity, values in zip(panels, (_SIDE_FORCE, _TILT), (found.side_force, found.tilt), strict=True):
+        label, size = scale(quantity)
+        panel.plot(found.curvature / curvature, values / size, color="black", linewidth=1.5)
+        panel.axhline(0.0, color=GREY, linewidth=0.8)
+        panel.axvline(0.0, color=GREY, linewidth=0.8)
+        panel.set_ylabel(f"{label}\n> 0: to the high side")
+        for name, rate, colour in told:
+            panel.axvline(rate, color=colour, linewidth=1.5, linestyle="--", label=f"{name}: {rate:.2f} {unit}")
+    panels[1].set_xlabel(along)
+    legend(panels[0], title="rate of build by")
+    thrust_unit, thrust = unit_of(_HOOK)
+    figure.suptitle(
+        f"Rates of build: weight on bit {found.assembly.thrust / thrust:.4g} {thrust_unit}, inclination "
+        f"{np.degrees(found.assembly.inclination):.4g} deg, anisotropy {found.anisotropy:g}"
+    )
+    return figure
+
+
 _ROCK, _BODY, _BLADES, _BIT, _FORCE = "#e4d3bd", "#9db4cc", "#5f7f9f", "#4d5b6b", "tab:red"
 # Length of the longest arrow, heights of the names, in turn, and of the picture's edges, over the width of the hole.
 _ARROW, _NAMES, _LOW, _HIGH = 0.35, (1.1, 1.32), 1.1, 1.6
@@ -470,7 +500,8 @@ def _draw_component(axes, place, md, high, name):
         for sign in (1, -1):
             axes.fill_between(at, middle + sign * body, middle + sign * blades, color=colour, linewidth=0)
     axes.plot([at[0], at[0]], [middle[0], name], color="gray", linewidth=0.6)
-    axes.text((at[0] + at[-1]) / 2, name, part.name, ha="center", va="bottom", color="#333333")
+    called = f"{part.name},\nbent {part.bend:g} deg" if part.bend else part.name
+    axes.text((at[0] + at[-1]) / 2, name, called, ha="center", va="bottom", color="#333333")
 
 
 def _draw_forces(axes, answer, top, width):

@@ -41,6 +41,9 @@ friction = [0.1, 0.2, 0.3]
 grade = { "drill pipe" = "S135" }
 wear = 0.8
 
+[build_rate]                     # optional: of each operation with weight on bit
+anisotropy = 0.1                 # optional
+
 Numbers are in SI, or text with a unit (`dimensions`).
 """
 
@@ -50,18 +53,20 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 
-from cosserat_fenicsx.checks import File
-from cosserat_fenicsx.parts import Depth, Number, Part, Values, concerning, positive
+from cosserat_fenicsx.checks import File, refuse
+from cosserat_fenicsx.parts import Depth, Number, Part, Values, between, concerning, positive
 from cosserat_fenicsx.quantities import Units
 from cosserat_fenicsx.results.result import Result
 from cosserat_fenicsx.results.screen import InWords
 from cosserat_fenicsx.well.answer import TorqueAndDrag
+from cosserat_fenicsx.well.assembly import assembly_of
 from cosserat_fenicsx.well.components import DrillString
 from cosserat_fenicsx.well.hole import Borehole, Mud
 from cosserat_fenicsx.well.operations import Operation
 from cosserat_fenicsx.well.pieces import pieces_of
 from cosserat_fenicsx.well.rod.rod_answer import check_rod
 from cosserat_fenicsx.well.solve import CONVENTIONS, ROD, check_settings, torque_and_drag
+from cosserat_fenicsx.well.steering import LENGTH, BuildRate, build_rate
 from cosserat_fenicsx.well.sweep import DepthSweep, depth_sweep
 from cosserat_fenicsx.well.utilisation import strengths_of
 
@@ -140,6 +145,19 @@ class StrengthSettings(Part):
         return found
 
 
+@dataclass(frozen=True)
+class BuildRateSettings(Part):
+    """Arguments of `build_rate` in a scene file.
+
+    Args:
+        anisotropy: as for `build_rate`.
+    """
+
+    anisotropy: Annotated[float, between(0, 10)] = 0.1
+
+    called = "build_rate"
+
+
 def _given(settings):
     if settings is None:
         return {}
@@ -155,6 +173,7 @@ class WellScene(InWords, Part):
         mud: the `Mud`, or None.
         torque_and_drag: arguments of `torque_and_drag`, or None. depth_sweep: arguments of `depth_sweep`, or None.
         strength: what is asked of the string's strength, or None.
+        build_rate: arguments of `build_rate`, or None.
         title: for tables and charts.
 
     Raises:
@@ -168,6 +187,7 @@ class WellScene(InWords, Part):
     torque_and_drag: TorqueAndDragSettings | None = None
     depth_sweep: DepthSweepSettings | None = None
     strength: StrengthSettings | None = None
+    build_rate: BuildRateSettings | None = None
     title: str = ""
 
     def validate(self):
@@ -184,6 +204,21 @@ class WellScene(InWords, Part):
         if self.strength is not None:
             with concerning("strength"):
                 strengths_of("strength", self.string.laid(here[0]), self.strength.grade, self.strength.wear)
+        if self.build_rate is not None:
+            with concerning("build_rate"):
+                self._check_builds(*here)
+
+    def _check_builds(self, depth):
+        """Refuse an assembly that `build_rate` cannot take."""
+        if not self.drilling:
+            refuse("build_rate", "operations", "none with weight on bit", "one that drills, such as Sliding")
+        laid = self.string.laid(depth)
+        assembly_of(self.hole, laid, self.mud, self.drilling[0], depth, min(LENGTH, depth))
+
+    @property
+    def drilling(self) -> list[Operation]:
+        """The operations with weight on bit."""
+        return [operation for operation in self.operations if operation.weight > 0]
 
     def _check(self, asked, depths):
         """Refuse settings of `torque_and_drag`, and what does not fit the hole at some depths."""
@@ -212,6 +247,8 @@ class WellScene(InWords, Part):
         if sweep:
             low, high = (units.told(x, "m") for x in (sweep["depths"].min(), sweep["depths"].max()))
             yield f"Sweep over {len(sweep['depths'])} depths of the bit, {low} to {high}."
+        if self.build_rate is not None:
+            yield f"Rates of build by several criteria, anisotropy {self.build_rate.anisotropy:g}."
         model, tol = settings.get("model", "auto"), settings.get("tol", 1e-4)
         yield f"Model: {model}, tol = {tol:g}: {_MODELS[model]}"
 
@@ -238,6 +275,11 @@ class WellScene(InWords, Part):
     def run(self) -> list[TorqueAndDrag]:
         """The answers of `torque_and_drag`, one an operation; see also `swept`."""
         return [self.answer(operation) for operation in self.operations]
+
+    def builds(self, operation: Operation) -> BuildRate:
+        """The rates of build of an operation with weight on bit."""
+        settings = (self.build_rate or BuildRateSettings()).arguments()
+        return build_rate(self.hole, self.string, operation, mud=self.mud, depth=self.settings.get("depth"), **settings)
 
     def swept(self, folder: File | None = None) -> DepthSweep | None:
         """The sweep over depths that the file asks for, else None; `folder`: see `depth_sweep`."""

@@ -101,6 +101,13 @@ def more_in_words(answer, units):
     """Contacts of the bottom-hole assembly, and sentences: what follows from the loads, contacts, all reasons."""
     yield from _at_the_lower_end(answer, units)
     yield from _on_bit(answer, units)
+    if np.isfinite(answer.bit_side_force).all():
+        build, turn = (answer._told("hook_load", units, float(x), ".5g") for x in answer.bit_side_force)
+        up, right = np.degrees(answer.bit_tilt)
+        yield (
+            f"the bit presses with {build} to the high side and {turn} to the right of it, looking down the hole; its "
+            f"axis is {up:.4g} deg off the hole's to the high side and {right:.4g} deg to the right"
+        )
     more = [f"{name} {told}" for name, value, told in (
         ("stretch", answer.stretch, answer._told("stretch", units)),
         ("twist", answer.twist, f"{(answer.twist if abs(answer.twist) > 1e-8 else 0.0) / (2 * math.pi):.4g} turns"),

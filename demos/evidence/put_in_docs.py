@@ -65,6 +65,8 @@ FOLDERS = {
         "volve_f12_stiff_and_soft.png": "volve_f12/stiff_and_soft.png",
         "well_p_rod.png": "well_p_rod/trip_out_3d.png",
         "assembly.png": "assembly/assembly.png",
+        "bent_motor.png": "bent_motor/bent_motor.png",
+        "build_rate.png": "bent_motor/build_rate.png",
         "helix.png": "helix/static_3d.png",
         "cable_in_conduit.png": "cable_in_conduit/cable.png",
     },

@@ -289,7 +289,8 @@ class InHole:
         tangent = self._near.tangent[-1]
         high = high_side(tangent[None], north=True)[0]
         across = np.array([high, np.cross(tangent, high)])
-        at_end = [i for i, ring in enumerate(self.string.rings) if ring.station.s == self.string.rod.length]
+        end = self.string.rod.length * (1 - 1e-9)
+        at_end = [i for i, ring in enumerate(self.string.rings) if ring.station.s > end]
         force = -across @ self.ring_forces[at_end].sum(axis=0) if at_end else np.full(2, np.nan)
         return force, np.arcsin(across @ self._along[-1])
 

@@ -1,0 +1,301 @@
+"""A bottom-hole assembly as a beam with small offsets in the vertical plane of its hole: contacts, side force, tilt.
+
+The hole near the bit is a circle of curvature k (> 0: it builds). With s from the bit up and u the offset from its axis
+to the high side, the beam has the moment M = EI (k + theta'), which jumps in theta by the angle of a bend, the
+compression F along the hole, and the load -(w sin(inclination) + F k) across it:
+
+    M'' + (F u')' = -(w sin + F k) + forces of the wall,   u' = theta + V/GA.
+
+The bit is on the axis without a moment. A stabiliser touches at a point, the body wherever it meets the wall; the
+sides are found. Where the string lies down on the wall for good, theta' = 0 decides on the place. Elements are cubic
+with shear (J. S. Przemieniecki, Theory of Matrix Structural Analysis, 1968, sec. 5.6), exact at their ends but for F.
+"""
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.linalg import solve_banded
+from scipy.optimize import brentq
+
+from cosserat_fenicsx.errors import NotConverged, SceneError
+from cosserat_fenicsx.well.components import weight_in_mud
+from cosserat_fenicsx.well.pieces import bend_of, is_ring, ring_of
+
+# Length that lies on the wall up to the upper end of what is solved at least, m.
+_LIES = 3.0
+# Largest element, m; changes of the set of touching nodes at most; bracket of the place where the string lies down, in
+# elements; accuracy of that place, m.
+_ELEMENT, _CHANGES, _AROUND, _PLACE = 0.25, 50, 3.0, 1e-7
+# Places closer than this, m, are one.
+_APART = 1e-6
+# Walls that become stiffer, each by a factor; Newton steps in each at most.
+_WALLS, _STIFFER, _STEPS = 5, 10.0, 40
+
+
+@dataclass(frozen=True)
+class Assembly:
+    """The lower end of a string.
+
+    Attributes:
+        ends: (n,) upper ends of its uniform parts, m from the bit up; EI (N m^2), GA (N), weight (N/m in mud),
+            clearance (of the body, m): of each.
+        rings: [(s, clearance)] of stabilisers, m. bends: [(s, angle)], rad, > 0 where it points the bit to the high
+            side. thrust: weight on bit, N. inclination: of the hole at the bit, rad.
+    """
+
+    ends: np.ndarray
+    EI: np.ndarray
+    GA: np.ndarray
+    weight: np.ndarray
+    clearance: np.ndarray
+    rings: tuple
+    bends: tuple
+    thrust: float
+    inclination: float
+
+    @property
+    def length(self):
+        """m."""
+        return float(self.ends[-1])
+
+    def at(self, curvature):
+        """The `Held` in a hole of a curvature, 1/m.
+
+        Raises:
+            NotConverged: no contacts were found that fit, or the string does not lie down on the wall within it.
+        """
+        whole = _solved(self, curvature, self.length, 0)
+        sides, side = whole.sides[:-1], int(whole.sides[-2])
+        lies = whole.s[len(sides) - 1 - np.argmax(sides[::-1] != side)]
+        if side == 0 or self.length - lies < _LIES:
+            raise NotConverged(
+                f"the assembly does not lie down on the wall within {self.length:.4g} m: expected a longer hole, or "
+                "less weight on bit, which may buckle it"
+            )
+        touching = whole.s[:-1][sides == side]
+        gaps = np.flatnonzero(np.diff(touching) > _AROUND * _ELEMENT)
+        first = touching[gaps[-1] + 1] if len(gaps) else touching[0]  # nodes may be free from there to `lies`
+        low, high = max(first - _AROUND * _ELEMENT, _ELEMENT), min(lies + _AROUND * _ELEMENT, self.length)
+        known = [(s, x) for s, x in zip(whole.s, whole.sides, strict=True) if x and s < low]
+
+        def up_to(end):
+            return _solved(self, curvature, end, side, low, known)
+
+        if up_to(low).moment_at_end * up_to(high).moment_at_end > 0:
+            return whole  # it lies down where its width changes
+        return up_to(brentq(lambda end: up_to(end).moment_at_end, low, high, xtol=_PLACE))
+
+    def of_part(self, s):
+        """(n,) indices of the parts at s (n,)."""
+        return np.searchsorted(self.ends[:-1], s)
+
+
+def assembly_of(hole, laid, mud, operation, depth, length):
+    """The `Assembly` of the lowest `length` (m) of a string with its bit at a measured depth (m).
+
+    Raises:
+        SceneError: a component without stiffness, or that bends differently about its two axes; a lower end that is
+            no bit; a bend to another side than the high or the low one.
+    """
+    if not (is_ring(laid[0].component) and laid[0].component.touches == "bottom"):
+        raise SceneError(
+            f"build_rate: the lowest component is {laid[0].component.name}: expected a Bit, at which the hole is made"
+        )
+    rows, rings, bends = [], [], []
+    for place in laid:
+        if depth - place.bottom >= length:
+            break
+        part, S = place.component, place.component.stiffness
+        if S is None or S.matrix is not None or not math.isclose(*S.bending, rel_tol=1e-9):
+            raise SceneError(f"{part.name}: stiffness = {S!r}: expected that of a round section for build_rate")
+        loose = max(0.0, float(hole.at(place.bottom, "diameter")) / 2 - part.body_radius)
+        rows.append((min(depth - place.top, length), S.bending[0], min(S.shear), weight_in_mud(part, mud), loose))
+        if part.touches == "middle" and depth - ring_of(place, hole).s < length:
+            rings.append((depth - ring_of(place, hole).s, ring_of(place, hole).clearance))
+        if part.bend:
+            md, angle, side = bend_of(place)
+            if abs(math.sin(side)) > 1e-6:
+                raise SceneError(
+                    f"{part.name}: tool_face = {part.tool_face:g}: expected 0 or 180 for build_rate, whose beam lies "
+                    "in the vertical plane; torque_and_drag with model='rod' takes any"
+                )
+            bends.append((depth - md, angle * math.cos(side)))
+    inclination = float(hole.path.inclination_at(np.array([depth]))[0])
+    ends, *numbers = np.array(rows).T
+    return Assembly(ends, *numbers, tuple(rings), tuple(bends), operation.weight, inclination)
+
+
+@dataclass(frozen=True, eq=False)
+class Held:
+    """An `Assembly` in its hole; arrays are over the nodes from the bit up.
+
+    Attributes:
+        s: from the bit up, m. offset: to the high side, m; angle: rad. sides: where it touches, 1 the high side, -1
+            the low one, 0 not. force: of the wall, N, to the high side. moment_at_end: N m, of the support of the upper
+            end, beyond that of the hole's curvature.
+    """
+
+    s: np.ndarray
+    offset: np.ndarray
+    angle: np.ndarray
+    sides: np.ndarray
+    force: np.ndarray
+    moment_at_end: float
+
+    @property
+    def side_force(self):
+        """Of the bit on the wall, N, > 0 to the high side."""
+        return -float(self.force[0])
+
+    @property
+    def tilt(self):
+        """Of the bit, rad, > 0 to the high side."""
+        return -float(self.angle[0])
+
+    @cached_property
+    def contacts(self):
+        """[(s, force on the wall (N), > 0 on the high side)] below where it lies down, and there."""
+        up_to = len(self.s) - int(np.argmin(self.sides[::-1] != 0)) + 1
+        return [(float(s), -float(x)) for s, x in zip(self.s[1:up_to], self.force[1:up_to], strict=True) if x]
+
+
+def _solved(beam, curvature, end, lies, free_from=math.inf, known=None):
+    """The `Held` of the lowest `end` metres, whose upper end has an angle of 0. Where `lies` is not 0, it lies there on
+    the wall of that side (1 high, -1 low), and does not touch elsewhere from `free_from` (m) on. known: [(s, side)] of
+    an equilibrium close by."""
+    fixed = np.array([0.0, *beam.ends, *(s for s, _ in (*beam.rings, *beam.bends))])
+    fixed = np.append(np.unique(np.round(fixed[fixed < end - _APART], 9)), end)
+    fixed = fixed[np.diff(fixed, prepend=-1.0) > _APART]
+    counts = np.ceil(np.diff(fixed) / _ELEMENT).astype(int)
+    s = np.append(np.concatenate([np.linspace(a, b, n, endpoint=False)
+                                  for a, b, n in zip(fixed, fixed[1:], counts, strict=False)]), fixed[-1])  # fmt: skip
+    bands, load = _equations(beam, curvature, s)
+    clearance = beam.clearance[beam.of_part(s)]
+    np.minimum(clearance[:-1], beam.clearance[beam.of_part((s[1:] + s[:-1]) / 2)], out=clearance[:-1])
+    for at, loose in beam.rings:
+        if at < end:
+            clearance[np.argmin(np.abs(s - at))] = loose
+    clearance[0] = 0.0
+    reached = np.where((s < free_from) | (s == end), clearance, np.inf)
+    ends = np.array([-1, lies or (1 if load[-2] > 0 else -1)])
+    for sides in _begun(bands, load, s, ends, reached, known, beam.weight.max() * _ELEMENT):
+        for _ in range(_CHANGES):
+            x, force = _with_contacts(bands, load, sides, clearance)
+            offset, across = x[::2], force[::2]
+            pulled = sides * across > 0  # a wall does not pull
+            beyond = np.where(sides == 0, np.sign(offset) * (np.abs(offset) > reached * (1 + 1e-9) + 1e-12), 0.0)
+            pulled[[0, -1]] = beyond[[0, -1]] = False
+            if not pulled.any() and not beyond.any():
+                moment = float(force[-1] - beam.EI[beam.of_part(s[-1:])[0]] * curvature)
+                return Held(s, offset, x[1::2], sides, np.where(sides, across, 0.0), moment)
+            sides = np.where(pulled, 0, np.where(sides, sides, beyond)).astype(int)
+    raise NotConverged(
+        f"no contacts of the assembly were found that fit in a hole of curvature {curvature:.3g} rad/m: expected less "
+        "weight on bit, or less of a bend"
+    )
+
+
+def _begun(bands, load, s, ends, clearance, known, typical):
+    """(n,) sides on which nodes may touch: those that are known, then those in soft walls."""
+    if known is not None:
+        sides = np.zeros(len(s), dtype=int)
+        for at, side in known:
+            sides[np.argmin(np.abs(s - at))] = side
+        sides[[0, -1]] = ends
+        yield sides
+    yield _sides_in_soft_walls(bands, load, ends, clearance, typical)
+
+
+def _sides_in_soft_walls(bands, load, ends, clearance, typical):
+    """(n,) sides on which nodes touch, in walls that become stiffer: Newton's method with a line search, which lowers
+    the energy until it ends. ends: sides of the two ends, which are held there; clearance: (n,) m, infinite where
+    nothing is touched; typical: size of the force of a node, N."""
+    inner, x, c = slice(2, -2, 2), np.zeros(len(load)), clearance[1:-1]
+    held = np.array([0, len(load) - 2, len(load) - 1])
+    finite = np.where(np.isfinite(clearance), clearance, clearance[-1])
+    x[::2] = -finite
+    x[0], x[-2] = 0.0, ends[1] * finite[-1]
+
+    def energy(x, stiffness):
+        depth = np.maximum(np.abs(x[inner]) - c, 0.0)
+        return x @ (_product(bands, x) / 2 - load) + stiffness * (depth @ depth) / 2
+
+    for stiffness in typical / finite.max() * _STIFFER ** np.arange(_WALLS):
+        for _ in range(_STEPS):
+            depth = np.abs(x[inner]) - c
+            touches = depth >= 0
+            residual, matrix = _product(bands, x) - load, bands.copy()
+            residual[inner] += stiffness * np.where(touches, depth, 0.0) * np.sign(x[inner])
+            matrix[3, inner] += stiffness * touches
+            dx = _with_held(matrix, -residual, held, np.zeros(3))
+            before, falls, step = energy(x, stiffness), residual @ dx, 1.0
+            while step > 1e-3 and energy(x + step * dx, stiffness) > before + 1e-4 * step * min(falls, 0.0):
+                step /= 2
+            x = x + step * dx
+            if np.abs(dx[::2]).max() < 1e-7 * finite.max():
+                break
+    sides = np.zeros(len(clearance), dtype=int)
+    sides[1:-1] = np.where(np.abs(x[inner]) >= c, np.sign(x[inner]), 0)
+    sides[[0, -1]] = ends
+    return sides
+
+
+def _equations(beam, curvature, s):
+    """The banded matrix (7, 2 n) and the load (2 n,) for offsets and angles of nodes at s (n,)."""
+    h, middle = np.diff(s), (s[1:] + s[:-1]) / 2
+    part = beam.of_part(middle)
+    EI, weight, lean = beam.EI[part], beam.weight[part], beam.inclination - curvature * middle
+    below = np.append(0.0, np.cumsum(weight * np.cos(lean) * h))
+    F = beam.thrust - (below[1:] + below[:-1]) / 2
+    shear = 12 * EI / (beam.GA[part] * h**2)
+    one, zero = np.ones_like(h), np.zeros_like(h)
+    bending = np.array([[12 * one, 6 * h, -12 * one, 6 * h], [6 * h, (4 + shear) * h**2, -6 * h, (2 - shear) * h**2],
+                        [-12 * one, -6 * h, 12 * one, -6 * h], [6 * h, (2 - shear) * h**2, -6 * h, (4 + shear) * h**2]])  # fmt: skip
+    pressing = np.array([[36 * one, 3 * h, -36 * one, 3 * h], [3 * h, 4 * h**2, -3 * h, -(h**2)],
+                         [-36 * one, -3 * h, 36 * one, -3 * h], [3 * h, -(h**2), -3 * h, 4 * h**2]])  # fmt: skip
+    K = bending * (EI / (h**3 * (1 + shear))) - pressing * (F / (30 * h))
+    across = -(weight * np.sin(lean) + F * curvature)
+    loads = across * np.array([h / 2, h**2 / 12, h / 2, -(h**2) / 12]) + EI * curvature * np.array(
+        [zero, one, zero, -one]
+    )
+    for at, angle in beam.bends:
+        if at < s[-1]:  # the element above begins with a greater angle
+            e = int(np.argmin(np.abs(s - at)))
+            loads[:, e] -= K[:, 1, e] * angle
+    bands, load, first = np.zeros((7, 2 * len(s))), np.zeros(2 * len(s)), 2 * np.arange(len(h))
+    for i in range(4):
+        load[first + i] += loads[i]
+        for j in range(4):
+            bands[3 + i - j, first + j] += K[i, j]
+    return bands, load
+
+
+def _with_contacts(bands, load, sides, clearance):
+    """Offsets and angles (2 n,), and the forces and moments that hold them, with nodes on their sides of the wall and
+    an angle of 0 at the upper end."""
+    at = np.flatnonzero(sides)
+    x = _with_held(bands, load, np.append(2 * at, len(load) - 1), np.append(sides[at] * clearance[at], 0.0))
+    return x, _product(bands, x) - load
+
+
+def _with_held(bands, load, held, values):
+    """The solution with some unknowns given."""
+    n, matrix, right = len(load), bands.copy(), load.copy()
+    for off in range(-3, 4):
+        column = held + off
+        inside = (column >= 0) & (column < n)
+        matrix[3 - off, column[inside]] = 0.0
+    matrix[3, held] = 1.0
+    right[held] = values
+    return solve_banded((3, 3), matrix, right, overwrite_ab=True, overwrite_b=True, check_finite=False)
+
+
+def _product(bands, x):
+    """The banded matrix times x."""
+    n, found = len(x), np.zeros(len(x))
+    for off in range(-3, 4):
+        first, last = max(0, off), min(n, n + off)
+        found[first - off : last - off] += bands[3 - off, first:last] * x[first:last]
+    return found
