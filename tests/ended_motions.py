@@ -26,18 +26,18 @@ class Stopped(Exception):
     """Raised to end a run."""
 
 
-def stop_at(monkeypatch, step, apart):
-    """Make the next run raise `Stopped` in the middle of a step; `apart`: seconds between checkpoints."""
-    accept, taken = Moving.accept, []
+def stop_at(monkeypatch, step, apart, model=Moving):
+    """Make the next run of a model raise `Stopped` in the middle of a step; `apart`: seconds between checkpoints."""
+    accept, taken = model.accept, []
 
     def accept_or_stop(self, h):
         accept(self, h)
         taken.append(h)
         if len(taken) == step:
-            monkeypatch.setattr(Moving, "accept", accept)
+            monkeypatch.setattr(model, "accept", accept)
             raise Stopped
 
-    monkeypatch.setattr(Moving, "accept", accept_or_stop)
+    monkeypatch.setattr(model, "accept", accept_or_stop)
     monkeypatch.setattr(Store, "APART", apart)
     monkeypatch.setattr(Store, "SELDOM", 0)
 

@@ -106,20 +106,6 @@ def test_the_law_read_backwards(seed):
     np.testing.assert_allclose(value(equilibrium.compatibility(n, p.motion(), p.section)), 0, atol=1e-13)
 
 
-def test_second_variation_is_the_change_of_the_balance():
-    """Where n agrees with the motion; with n known, that of the moments."""
-    p = Point(1)
-    expected = central(lambda h: value(equilibrium.displacement(p.motion(h), p.section, p.test, lambda a: a)))
-    n, _ = equilibrium.contact(p.motion(), p.section)
-    found = value(equilibrium.second_variation(n, p.motion(), p.section, p.test, p.direction))
-    np.testing.assert_allclose(found, expected, rtol=1e-8)
-    known = VECTOR([0.3, -0.7, 0.5])
-    test = determinate.tests_of(p.test.phi, p.test.phi_s)
-    expected = central(lambda h: value(determinate.moments(known, p.motion(h), p.section, test, lambda a: a)))
-    found = value(determinate.second_variation(known, p.motion(), p.section, test, p.direction))
-    np.testing.assert_allclose(found, expected, rtol=1e-8)
-
-
 def test_loads_that_turn():
     p = Point(4)
     F, arm = VECTOR([0.3, -0.2, 0.9]), VECTOR([0.4, 0.1, -0.6])
@@ -151,10 +137,10 @@ def test_what_sees_position_and_rotation_changes_with_both():
 
     expected = central(lambda h: value(work(p.point(h), p.test)))
     np.testing.assert_allclose(value(variation(work, p.point(), p.test, p.direction)), expected, rtol=1e-7)
-    for angle in (0.0, 1e-9, 0.05, 3.0, 4.5, 6.2):
+    for angle in (0.0, 1e-9, 0.0199, 0.05, 3.0, 4.5, 6.2):
         axis = np.array([0.6, 0.0, 0.8])
         q = VECTOR([np.cos(angle / 2), *(np.sin(angle / 2) * axis)])
-        np.testing.assert_allclose(value(rotation_vector(q)), angle * axis, rtol=1e-9, atol=1e-15)
+        np.testing.assert_allclose(value(rotation_vector(q)), angle * axis, rtol=1e-11, atol=1e-15)
 
 
 class PlanePoint:
@@ -317,10 +303,9 @@ def test_coupled_law_read_backwards(seed):
     assert value(mixed) == pytest.approx(value(plain), rel=1e-12)
 
 
-@pytest.mark.parametrize("seed", range(3))
-def test_coupled_second_variation_is_the_change_of_the_balance(seed):
+@pytest.mark.parametrize("p", [Point(1), *map(CoupledPoint, range(3))], ids=["diagonal", *"012"])
+def test_second_variation_is_the_change_of_the_balance(p):
     """Where n agrees with the motion; with n known, that of the moments."""
-    p = CoupledPoint(seed)
     expected = central(lambda h: value(equilibrium.displacement(p.motion(h), p.section, p.test, as_it_is)))
     n = VECTOR(value(equilibrium.contact(p.motion(), p.section)[0]))
     found = value(equilibrium.second_variation(n, p.motion(), p.section, p.test, p.direction))

@@ -483,23 +483,6 @@ def test_a_torque_by_the_weight_leaves_out_what_belongs_to_an_impulse():
     np.testing.assert_array_equal(model.advance(200), again.advance(200))
 
 
-@pytest.mark.parametrize(("rpm", "stiffness"), [(60, 2.5e7), (100, 1e8)])
-def test_lobes_shake_the_weight_less_where_the_rock_gives_way(rpm, stiffness):
-    """`bit_bounce` and the motion agree: D k/(D + k) of the dynamic stiffness D of the string."""
-    turns = rpm * cf.units.rpm
-    bit = cf.drilling.BitOnRock(cf.drilling.Lobes(LOBES, 0.001), weight=80e3, mass=500.0, rock_stiffness=stiffness)
-    scene = hanging(
-        cf.drilling.Hook(5e6), cf.drilling.TopDrive(turns), bit, drag=cf.drilling.ViscousDrag(0.2, 0.2), start="steady"
-    )
-    model = AxialTorsional(scene, 0.002, 300)
-    rows = model.advance(30000)[20000:]
-    phase = LOBES * turns * (rows[:, 0] - model.dt / 2)
-    parts = np.column_stack([np.sin(phase), np.cos(phase), np.ones(len(phase))])
-    sine, cosine, mean = np.linalg.lstsq(parts, column(rows, "weight_on_bit"), rcond=None)[0]
-    expected = cf.drilling.bit_bounce(scene, [turns]).amplitude[0]
-    assert math.hypot(sine, cosine) == pytest.approx(expected, rel=4e-3) and mean == pytest.approx(80e3, rel=1e-3)
-
-
 def test_a_rock_in_other_units_is_doubted():
     """1000 kN/mm, say, as a number of 1e3 N/m."""
     with pytest.warns(cf.SceneWarning, match="BitOnRock.rock_stiffness = 1000 N/m: 60000 N press the bit by 60 m into"):

@@ -6,35 +6,21 @@ import os
 import numpy as np
 import pytest
 from conftest import COMM
+from ended_motions import Stopped, stop_at
 from fake_string import scene
 from moving_scenes import right_angle
 
 import cosserat_fenicsx as cf
-from cosserat_fenicsx.models.moving import Moving
 from cosserat_fenicsx.storage.store import Store
 
 pytestmark = pytest.mark.ranks
 ASKED = {"duration": 2, "dt": 0.05, "elements": 4, "degree": 2}
 
 
-class Stopped(Exception):
-    """Raised to end a run."""
-
-
 def test_it_goes_on(tmp_path_all, monkeypatch):
     arm, scene = right_angle()
     whole = cf.simulate(scene, **ASKED)
-    accept, taken = Moving.accept, []
-
-    def accept_or_stop(self, h):
-        accept(self, h)
-        taken.append(h)
-        if len(taken) == 25:
-            raise Stopped
-
-    monkeypatch.setattr(Moving, "accept", accept_or_stop)
-    monkeypatch.setattr(Store, "APART", 0.02)
-    monkeypatch.setattr(Store, "SELDOM", 0)
+    stop_at(monkeypatch, 25, 0.02)
     with pytest.raises(Stopped):
         cf.simulate(scene, **ASKED, folder=tmp_path_all / "motion")
     history = cf.resume(tmp_path_all / "motion")

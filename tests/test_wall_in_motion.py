@@ -5,14 +5,15 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from conftest import COMM
+from ended_motions import Stopped, stop_at
 from moving_scenes import drift
 from mpi4py import MPI
 from scipy.integrate import simpson
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.actions.walls import HoleRing, HoleWall
+from cosserat_fenicsx.models.collocated import Collocated
 from cosserat_fenicsx.models.moving import Moving
-from cosserat_fenicsx.storage.store import Store
 
 SCHEMES = ("momentum", "energy", "generalised-alpha")
 STEEL = cf.Material(E=206e9, nu=0.3, density=7850.0)
@@ -166,39 +167,13 @@ def test_it_is_continued_to_the_same_digits(scheme, tmp_path, monkeypatch):
     _, scene = in_hole(VERTICAL, (0.9, 0.3, 0), (0, 0, 3.0), stiffness=1e9, friction=0.3, damping=0.1)
     asked = {"duration": 0.08, "dt": 1e-3, "scheme": scheme, **SMALL}
     whole = cf.simulate(scene, **asked)
-    accept, taken = Moving.accept, []
-
-    def accept_or_stop(self, h):
-        accept(self, h)
-        taken.append(h)
-        if len(taken) == 50:
-            raise KeyboardInterrupt
-
-    monkeypatch.setattr(Moving, "accept", accept_or_stop)
-    monkeypatch.setattr(Store, "APART", 0.0)
-    monkeypatch.setattr(Store, "SELDOM", 0)
-    if scheme == "generalised-alpha":
-        monkeypatch.setattr("cosserat_fenicsx.models.collocated.Collocated.accept", stopping(taken))
-    with pytest.raises(cf.Interrupted):
+    stop_at(monkeypatch, 50, 0.0, Collocated if scheme == "generalised-alpha" else Moving)
+    with pytest.raises(Stopped):
         cf.simulate(scene, **asked, folder=tmp_path / "motion")
     monkeypatch.undo()
     history = cf.resume(tmp_path / "motion", scene)
     for name in ("kinetic", "strain", "work", "dissipated"):
         assert getattr(history, name).tobytes() == getattr(whole, name).tobytes(), name
-
-
-def stopping(taken):
-    from cosserat_fenicsx.models.collocated import Collocated
-
-    accept = Collocated.accept
-
-    def accept_or_stop(self, h):
-        accept(self, h)
-        taken.append(h)
-        if len(taken) == 50:
-            raise KeyboardInterrupt
-
-    return accept_or_stop
 
 
 @pytest.mark.parametrize(("wrong", "word"), [

@@ -414,5 +414,5 @@ def test_the_view_from_the_side(out, tmp_path_all):
     assert lying and any(f"{lying[-1] / 1e3:.3g} kN from" in text.get_text() for text in axes.texts)
     out.plot_from_side(tmp_path_all / "side.png")
     assert (tmp_path_all / "side.png").stat().st_size > 10_000
-    with pytest.raises(cf.SceneError, match="length"):
+    with pytest.raises(cf.SceneError, match="plot_from_side.length = -1.0"):
         out.plot_from_side(length=-1.0)
