@@ -14,8 +14,8 @@ import numpy as np
 #: Sine of the angle of two strands above which they touch in a point; below, along a line.
 CROSSING = 0.2
 # Places of an element where strands are compared first; Newton steps to the nearest points; their largest size, in
-# elements, and the one at which they end; distance from an element's end, in elements, that is at the end.
-_PLACES, _STEPS, _LONGEST, _ENOUGH, _AT_END = 4, 40, 0.7, 1e-14, 1e-9
+# elements, and the one at which they end.
+_PLACES, _STEPS, _LONGEST, _ENOUGH = 4, 40, 0.7, 1e-12
 # Smallest determinant of the equations of two nearest points, for unit tangents, at which both are varied.
 _PARALLEL = 1e-3
 # The neighbours of a pair of places.
@@ -96,6 +96,8 @@ class Strands:
         #: (elements, 3 (p + 1)) the nodes of the elements before, of each, and after it; its own where there is none
         self.neighbours = np.where(self._before < 0, count, self._before), count, np.where(self._next < 0, count, self._next)
         self.stencil = np.concatenate([cells[k] for k in self.neighbours], axis=1)
+        #: the elements that another one of their rod follows, and those that follow
+        self.joined = np.flatnonzero(self._next >= 0), self._next[self._next >= 0]
         cubics = [np.polynomial.Polynomial(c) for c in ((0, 1, -2, 1), (0, 0, -1, 1))]
         self._hermite = np.zeros((3, 2, 4))
         for order in range(3):

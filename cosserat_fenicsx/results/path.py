@@ -17,6 +17,7 @@ from cosserat_fenicsx.results.modes import ModesAlong
 from cosserat_fenicsx.results.records import Event, Records
 from cosserat_fenicsx.results.recovery import element_contact
 from cosserat_fenicsx.results.result import by_name
+from cosserat_fenicsx.results.rod_contacts import RodContacts, nodal_forces, rod_contacts_of
 from cosserat_fenicsx.results.rods import RodResult
 from cosserat_fenicsx.results.sensitivity import Sensitivity, Uncertainty
 from cosserat_fenicsx.results.threads import Threads
@@ -61,6 +62,9 @@ _QUANTITIES = by_name(
 )  # fmt: skip
 
 
+_ROD_FORCE = Quantity("rod_force", "force of other rods at a node", "N", "xyz", "inertial", ("point", "s"), nodal_forces)
+
+
 class Path(RodResult):
     """An equilibrium path: a sequence of converged points.
 
@@ -103,10 +107,11 @@ class Path(RodResult):
 
     @property
     def quantities(self) -> dict[str, Quantity]:
-        """{name: `Quantity`}, with the errors of further criteria that `tol` bounds."""
+        """{name: `Quantity`}, with the errors of further criteria that `tol` bounds, and forces of rods that touch."""
         further = ((x.name, f"estimated error of {words_of(x.name)}", f"errors.{x.name}") for x in self.criteria)
+        touches = [_ROD_FORCE] if self.scene.rod_contact else []
         return super().quantities | by_name(
-            *(Quantity(f"error_{name}", label, getter=getter, digits=2) for name, label, getter in further)
+            *(Quantity(f"error_{name}", label, getter=getter, digits=2) for name, label, getter in further), *touches
         )
 
     @classmethod
@@ -331,15 +336,18 @@ class Path(RodResult):
         check_once(self.scene, standard_deviations)
         return self.sensitivity(query, standard_deviations).uncertainty(standard_deviations, correlation)
 
-    def contacts(self, obstacle: Action) -> Contacts:
-        """Where rods touch an obstacle, and the forces there; `print` shows a table of the last state.
+    def contacts(self, obstacle: Action) -> Contacts | RodContacts:
+        """Where rods touch an obstacle or each other, and the forces there; `print` shows a table of the last state.
 
         Args:
-            obstacle: of the scene, such as a `Plane`.
+            obstacle: of the scene, such as a `Plane`; or its `RodContact`, which gives the `RodContacts` of the last
+                state (`path[k].contacts` those of state k).
 
         Raises:
             SceneError: something else.
         """
+        if obstacle is self.scene.rod_contact is not None:
+            return rod_contacts_of(self, len(self) - 1)
         return contacts_of(self, obstacle)
 
     @property

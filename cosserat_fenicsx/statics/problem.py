@@ -338,7 +338,10 @@ def solvers_of(scene, layout, *, formulation="mixed", degree=4, points=None, com
 
 def record_of(problem, load_factor, negative_modes, iterations, steps, neutral=False):
     """The `Record` of a problem's state, an equilibrium."""
-    model = problem.model
+    model, touching = problem.model, problem.touching
+    at_gauss, at_nodes = model.densities.here()
+    if touching:
+        at_nodes = touching.densities() + (0.0 if at_nodes is None else at_nodes)
     return Record(load_factor, *model.snapshot(), negative_modes, iterations, problem.multipliers(), neutral,
-                  model.densities.here(), problem.tie_forces(), model.clamps.loads(load_factor), steps,
-                  problem.touching and problem.touching.nodal_forces())  # fmt: skip
+                  (at_gauss, at_nodes), problem.tie_forces(), model.clamps.loads(load_factor), steps,
+                  touching and touching.nodal_forces())  # fmt: skip

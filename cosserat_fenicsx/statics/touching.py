@@ -29,6 +29,8 @@ _CLOSEST = 0.5
 _SETTLED, _SMALL = 1e-12, 1e-9
 # Iterations allowed, and those after which shares of steps are taken in turn.
 _MOST, _PATIENCE, _SHARES = 200, 25, (1.0, 0.5, 0.7)
+# Distance from an element's end, in elements, that is at it.
+_AT_END = 1e-6
 # Eigenvalues of d2g over the largest that are zero; a contact of the iteration before is the same up to this sliding,
 # over the radius; added to the diagonal of the compliance, over its mean.
 _ZERO, _SAME, _REGULAR = 1e-10, 4.0, 1e-12
@@ -282,12 +284,31 @@ class RodContacts:
 
     def nodal_forces(self):
         """(elements, p + 1, 3) forces of the contacts at the nodes of the elements that touch, inertial."""
+        return self._nodal_forces(np.ones((len(self._touches), 2), dtype=bool))
+
+    def densities(self):
+        """(elements, p + 1, 6) the same per length, for the contact forces of elements: without forces at points where
+        elements end, which act between them; those of nodes along a line there are shared by both."""
+        strands, touches = self.strands, self._touches
+        end = (np.abs(touches.place - 0.5) > 0.5 - _AT_END) & (touches.node < 0)[:, None]
+        found = self._nodal_forces(~end)
+        h, weights = strands.sizes, self._model.rule.lobatto
+        before, after = strands.joined
+        both = h[before] + h[after]
+        total = found[before, -1] + found[after, 0]
+        for element, node in ((before, -1), (after, 0)):
+            found[element, node] = total * (h[element] / both)[:, None]
+        found /= (h[:, None] * weights)[..., None]
+        return np.concatenate([found, np.zeros_like(found)], axis=2)
+
+    def _nodal_forces(self, which):
+        """The forces of those points of contacts (m, 2) alone."""
         strands, touches = self.strands, self._touches
         found = np.zeros((*strands.cells.shape, 3))
         for k, sign in ((0, -1.0), (1, 1.0)):
             element = touches.element[:, k]
             basis = strands.basis(element, touches.place[:, k])
-            push = (sign * self._forces)[:, None] * touches.normal
+            push = (sign * self._forces * which[:, k])[:, None] * touches.normal
             for neighbour, part in zip(strands.neighbours, np.split(basis, 3, axis=1), strict=True):
                 np.add.at(found, neighbour[element], part[..., None] * push[:, None, :])
         return found

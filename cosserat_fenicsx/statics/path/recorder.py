@@ -20,6 +20,7 @@ from cosserat_fenicsx.results.contacts import check_passes
 from cosserat_fenicsx.results.export import saved
 from cosserat_fenicsx.results.path import Path
 from cosserat_fenicsx.results.records import Event, Record, Records
+from cosserat_fenicsx.results.rod_contacts import check_apart
 from cosserat_fenicsx.results.staged import StagedPath
 from cosserat_fenicsx.scene.action import rubs
 from cosserat_fenicsx.statics.critical import derivatives_of
@@ -89,10 +90,13 @@ class Tracing:
 
     def _watch(self, point):
         self._bar.at(point)
-        if self.track.watches_steps:  # a rod that is beyond an obstacle in a later state has passed through it in one
+        if self.track.watches_steps or self.track.touching:
             here = Path.of(self.model, ())
             here.append(record_of(self.problem, point.load_factor, 0, 0, 0))
+        if self.track.watches_steps:  # a rod that is beyond an obstacle in a later state has passed through it in one
             check_passes(here, whole=self.path)
+        if self.track.touching:
+            check_apart(here, whole=self.path)
         if self._choice.promoted and point.negative_modes:
             where = f"before the load factor {point.load_factor:.4g}"
             if self.problem.model.scene.follows:

@@ -1,0 +1,140 @@
+"""Where rods touch each other and the forces there; and that none has passed through another."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from cosserat_fenicsx.errors import NotConverged
+from cosserat_fenicsx.quantities import Quantity, Units
+from cosserat_fenicsx.results import screen
+from cosserat_fenicsx.results.compared import all_cell_nodes
+from cosserat_fenicsx.strands import CROSSING, Strands, closest_segments
+
+# Gaps over the radius up to which rods may touch; forces over the largest that are rounding.
+_TOUCHES, _NOTHING = 1e-5, 1e-9
+# Depth over the radius that is allowed between the places where rods touch.
+_DEEP = 0.02
+
+
+@dataclass(frozen=True, eq=False)
+class RodContacts:
+    """Contacts of rods with each other in one state, m of them. `print` shows them.
+
+    Attributes:
+        rod, other: (m,) names of the rods; s, other_s: (m,) arc lengths of the points that touch, m.
+        point: (m, 3) where their surfaces touch, inertial, m.
+        gap: (m,) between the surfaces, m.
+        force: (m,) along the normal, N; line: (m,) whether it is one of a line of contact, at a node of the mesh.
+        pressure: (m,) force per length along a line of contact, N/m; NaN at a point.
+        normal: (m, 3) unit vectors from the rod to the other one, inertial.
+    """
+
+    rod: np.ndarray
+    s: np.ndarray
+    other: np.ndarray
+    other_s: np.ndarray
+    point: np.ndarray
+    gap: np.ndarray
+    force: np.ndarray
+    line: np.ndarray
+    pressure: np.ndarray
+    normal: np.ndarray
+    _title: str = field(default="", repr=False)
+
+    def __len__(self):
+        return len(self.s)
+
+    def __str__(self):
+        if not len(self):
+            return f"{self._title}: no contact"
+        columns = [getattr(self, x.name) for x in _COLUMNS]
+        return screen.as_text(screen.table(list(zip(_COLUMNS, columns, strict=True)), Units(), screen.ROWS, self._title))
+
+
+_COLUMNS = (
+    Quantity("rod"),
+    Quantity("s", "s", "m"),
+    Quantity("other", "touches"),
+    Quantity("other_s", "at s", "m"),
+    Quantity("gap", "gap", "m"),
+    Quantity("force", "force", "N"),
+    Quantity("pressure", "force per length", "N/m"),
+)
+
+
+def strands_of(path):
+    """The `Strands` of a path's rods, in the unit of length of the path."""
+    scene, layout, length = path.scene, path.layout, path.scales.length
+    action, rods = scene.rod_contact, np.repeat(np.arange(len(layout.counts)), layout.counts)
+    radii = np.array([action.radius_of(rod) if action.acts_on(rod) else 0.0 for rod in scene.rods]) / length
+    starts = [b[:-1] * rod.length / length for b, rod in zip(layout.breaks, scene.rods, strict=True)]
+    sizes, cells = layout.sizes(scene) / length, all_cell_nodes(layout, path.degree)
+    return Strands(cells, rods, sizes, np.concatenate(starts), radii[rods], path.rule, action.apart(scene).scaled(length))
+
+
+def rod_contacts_of(path, k):
+    """See `Path.rod_contacts`."""
+    strands, length, record = strands_of(path), path.scales.length, path._records[k]
+    counts = [n * path.degree + 1 for n in path.layout.counts]
+    x = record.rq[:, :3] + np.repeat(path.scene.origins / length, counts, axis=0)
+    found, _ = strands.near(x, _TOUCHES * strands.radii.max())
+    nodes = strands.nodes_of(found)
+    matrix, total = np.zeros((len(x), 3, len(found))), np.zeros(x.shape)
+    gradients = strands.gradients(found)
+    for i in range(len(found)):
+        np.add.at(matrix[..., i], nodes[i], gradients[i])
+    np.add.at(total, strands.cells, record.rod_forces)
+    forces = np.linalg.lstsq(matrix.reshape(-1, len(found)), total.ravel(), rcond=None)[0] if len(found) else np.zeros(0)
+    held = forces > _NOTHING * np.abs(forces).max(initial=0.0)
+    found, forces = found.of(held), forces[held] * path.scales.force
+    names = np.array([rod.name for rod in path.scene.rods])
+    (rod, s, place), (other, other_s, _) = (
+        (names[strands.rods[e]], strands.s(e, a) * length, strands.at(x, e, a) * length)
+        for e, a in zip(found.element.T, found.place.T, strict=True)
+    )
+    radius = strands.radii[found.element[:, 0]] * length
+    share = np.zeros(len(x))
+    np.add.at(share, strands.cells, strands.sizes[:, None] * path.rule.lobatto * length)
+    line = found.node >= 0
+    pressure = np.where(line, forces / share[np.maximum(found.node, 0)], np.nan)
+    title = f"Contacts of rods at the {path.axis} {path.along_axis[k]:.6g}"
+    return RodContacts(rod, s, other, other_s, place + radius[:, None] * found.normal, found.gap * length, forces, line,
+                       pressure, found.normal, title)  # fmt: skip
+
+
+def nodal_forces(path, rod):
+    """(points, nodes, 3) forces of other rods at the nodes of a rod, N, inertial."""
+    nodes, cells = path._rows(rod)[1], path._cells(path.scene.number(rod))
+    forces = path._stacked("rod_forces")[:, cells] * path.scales.force
+    found = np.zeros((len(path), nodes.stop - nodes.start, 3))
+    for j in range(path.degree + 1):
+        found[:, j : j + path.degree * (forces.shape[1] - 1) + 1 : path.degree] += forces[:, :, j]
+    return found
+
+
+def check_apart(path, whole=None):
+    """Refuse a path in which rods overlap, by the distances of the sides of fine polygons along them.
+
+    Raises:
+        NotConverged: naming rods, places and depth; with the path `whole`, or with this one.
+    """
+    scene, action = path.scene, path.scene.rod_contact
+    apart = action.apart(scene)
+    for k in range(len(path)):
+        points = action.polygons(scene.rods, lambda rod, s, k=k: path.sample(k, rod, s / rod.length)[0])
+        gap, sag, *places = closest_segments(*points, apart, 0.0)
+        deep = gap + sag + _DEEP * points[3].min()
+        if len(gap) and deep.min() < 0:
+            i = int(np.argmin(deep))
+            (a, s), (b, t) = (place[i] for place in places)
+            raise NotConverged(
+                f"rod '{scene.rods[int(a)].name}' at s = {s:.6g} m overlaps rod '{scene.rods[int(b)].name}' at s = "
+                f"{t:.6g} m by {-gap[i]:.3g} m, at the {path.axis} {path.along_axis[k]:.6g}: expected more elements "
+                f"there{_ANGLE}",
+                path if whole is None else whole,
+            )
+
+
+_ANGLE = (
+    f"; strands that touch along a line, at an angle whose sine is below {CROSSING:g}, touch at the nodes of the mesh alone"
+)

@@ -1,0 +1,139 @@
+"""Rods that touch each other: solutions of boundary value problems by another program, refusals, and that none passes
+through another."""
+
+import json
+import math
+import tomllib
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import cosserat_fenicsx as cf
+
+pytestmark = pytest.mark.serial
+RIGID = (math.inf, math.inf)
+
+
+def crossing(lowered=0.15, **contact):
+    """Two rods at right angles that touch in their middles; the ends of the upper one are lowered."""
+    radius, E, nu = 0.01, 1e7, 0.3
+    area, inertia = math.pi * radius**2, math.pi * radius**4 / 4
+    G, factor = E / (2 * (1 + nu)), 0.8863636363636364
+    section = cf.Stiffness((factor * G * area,) * 2, E * area, (E * inertia,) * 2, 2 * G * inertia)
+    lower = cf.Rod(cf.Line((-0.5, 0, 0), (0.5, 0, 0)), section, name="lower")
+    upper = cf.Rod(cf.Line((0, -0.5, 2 * radius), (0, 0.5, 2 * radius)), section, name="upper")
+    moved = {"displacement": (0, 0, -lowered), "rotation": (0, 0, 0)}
+    ends = [cf.Prescribed(upper.start, **moved), cf.Prescribed(upper.end, **moved)]
+    touch = cf.RodContact(**{"radius": radius, **contact})
+    return cf.Scene([lower, upper], [cf.Clamp(lower.start), cf.Clamp(lower.end), *ends], [touch])
+
+
+def test_crossing_rods(tmp_path):
+    """13.689149090107861 N of solve_bvp; they hold each other by the same force in tables, files and fields."""
+    scene, force = crossing(), 13.689149090107861
+    path = cf.solve(scene, [1.0], elements=20)
+    found = path.contacts(scene.loads[0])
+    assert found.force == pytest.approx([force], rel=2e-7) and not found.line.any()
+    np.testing.assert_allclose([found.s[0], found.other_s[0]], 0.5, atol=1e-9)
+    np.testing.assert_allclose(found.point[0], (0, 0, -0.065), atol=1e-7)
+    assert abs(found.gap[0]) < 1e-12 and "lower" in str(found) and path.stable[-1]
+    lower, upper = path.scene.rods
+    assert path.force(lower.at(0.25))[-1, 2] == pytest.approx(-force / 2, rel=2e-6)
+    np.testing.assert_allclose(path.position(lower.at(0.25))[-1, [0, 2]], (-0.25, -0.0375), atol=1e-7)
+    field = path.quantities["rod_force"].of(path, upper)
+    np.testing.assert_allclose(field[-1].sum(axis=0), (0, 0, force), atol=1e-6 * force)
+    path.save(tmp_path / "crossing.h5")
+    again = cf.read_path(tmp_path / "crossing.h5")
+    assert again.contacts(again.scene.loads[0]).force == pytest.approx(found.force, rel=1e-12)
+
+
+def test_a_ring_is_pulled_until_it_touches_itself():
+    """By shooting: F = 6 N presses it onto itself by 0.12063607907258804 N, in one point."""
+    R, EI, radius, n = 1 / (2 * math.pi), 1e-3, 0.03, 16
+    section = cf.Stiffness(RIGID, math.inf, (EI, EI), EI)
+    a, b = (cf.Rod(cf.Arc((0, 0, 0), (-R, 0, 0), turn), section, name=name) for name, turn in
+            (("a", -math.pi), ("b", math.pi)))  # fmt: skip
+    touch = cf.RodContact(radius=radius)
+    joints = [cf.Joint(a.start, b.start), cf.Joint(a.end, b.end)]
+    scene = cf.Scene([a, b], [cf.Clamp(a.start)], [touch, cf.Force(a.end, (1.0, 0, 0))], joints=joints)
+    path = cf.solve(scene, [2.0, 6.0], elements=n)
+    apart = np.linalg.norm(path.position(a.end) - path.position(a.start), axis=1)
+    np.testing.assert_allclose(apart, (0.46295178732099795, 0.47801546152226415), rtol=1e-6)
+    assert not len(path[0].contacts(touch))
+    assert path.contacts(touch).force.sum() == pytest.approx(0.12063607907258804, rel=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"radius": 0.011}, "rod 'lower' at s = .* overlaps rod 'upper' at s = .* by 0.002 m at rest: .*`exclude`"),
+        ({"radius": None}, "RodContact.radius is missing: the section of rod 'lower' is not round"),
+        ({"pairs": [("lower", "upr")]}, "RodContact.pairs: no rod is named 'upr'.*'upper'"),
+        ({"pairs": [("lower",)]}, "expected two names of rods each"),
+    ],
+)
+def test_bad_input_is_refused(change, words):
+    with pytest.raises(cf.SceneError, match=words):
+        crossing(**change)
+
+
+def test_a_rod_that_folds_its_own_surface():
+    rod = cf.Rod(cf.Arc((0, 0, 0), (0.01, 0, 0), 1.0), cf.Stiffness(RIGID, math.inf, (1.0, 1.0), 1.0), name="bend")
+    with pytest.raises(cf.SceneError, match="is larger than its radius of curvature at rest, 0.01 m"):
+        cf.Scene([rod], [cf.Clamp(rod.start)], [cf.RodContact(radius=0.02), cf.Force(rod.end, (0, 0, 1))])
+
+
+def test_what_rods_that_touch_have_not():
+    scene = crossing()
+    with pytest.raises(cf.SceneError, match="simulate: RodContact acts in `solve` alone"):
+        cf.simulate(scene, 1.0)
+    with pytest.raises(cf.SceneError, match="buckling: RodContact acts in `solve` alone"):
+        cf.buckling(scene)
+    with pytest.raises(cf.SceneError, match="modes: RodContact acts in `solve` alone"):
+        cf.modes(scene)
+    with pytest.raises(cf.SceneError, match="expected load control and no branch, since rods touch each other"):
+        cf.solve(scene, control="arc")
+
+
+def test_it_is_a_table_of_scene_files(tmp_path):
+    scene = crossing(pairs=[("lower", "upper")], exclude=0.05)
+    cf.write(scene, tmp_path / "crossing.toml")
+    assert "RodContact" in tomllib.loads((tmp_path / "crossing.toml").read_text())["loads"][0]["type"]
+    assert cf.read(tmp_path / "crossing.toml").scene.loads[0] == replace(scene.loads[0])
+    assert "RodContact" in json.dumps(cf.schema())
+
+
+def closest(path, radius):
+    """The smallest distance of two rods' centrelines over 2 radius in all states, by samples alone."""
+    smallest = math.inf
+    for k in range(len(path)):
+        points = [path.sample(k, rod, np.linspace(0, 1, 400))[0] for rod in path.scene.rods]
+        for i, p in enumerate(points):
+            for q in points[:i]:
+                smallest = min(smallest, np.linalg.norm(p[:, None] - q, axis=2).min())
+    return smallest / (2 * radius)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_no_rod_passes_through_another(seed):
+    """Rods at random angles, whose ends are moved through each other by many diameters: each path ends with rods that
+    hold each other, or with the contact by name; none is crossed."""
+    random, radius, count = np.random.default_rng(seed), 0.02, 3
+    section = cf.Stiffness((1e4, 1e4), 1e4, (1.0, 1.0), 0.8)
+    rods, supports = [], []
+    for k in range(count):
+        angle = random.uniform(0.3, 1.2) + k * math.pi / count
+        half = 0.5 * np.array([math.cos(angle), math.sin(angle), 0])
+        middle = np.array([*random.uniform(-0.1, 0.1, 2), 2.2 * radius * k])
+        rod = cf.Rod(cf.Line(tuple(middle - half), tuple(middle + half)), section, name=f"rod {k}")
+        rods.append(rod)
+        moved = {"displacement": (0, 0, -0.12 * k), "rotation": (0, 0, 0)}
+        supports += [cf.Prescribed(end, **moved) if k else cf.Clamp(end) for end in (rod.start, rod.end)]
+    try:
+        path = cf.solve(cf.Scene(rods, supports, [cf.RodContact(radius=radius)]), np.linspace(0.25, 1, 4), elements=12)
+    except cf.NotConverged as failure:
+        path = failure.path
+        assert "next to rod" in str(failure)
+    order = [path.sample(-1, rod, np.array([0.5]))[0][0, 2] for rod in path.scene.rods]
+    assert len(path) and closest(path, radius) > 1 - 1e-2 and order == sorted(order)
