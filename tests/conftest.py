@@ -1,5 +1,6 @@
 """Fixtures, and support of mpirun: only one rank reports, and no rank waits for one that has failed."""
 
+import gc
 import json
 import os
 import re
@@ -54,6 +55,13 @@ def pytest_collection_modifyitems(config, items):
                 item.add_marker(pytest.mark.skip(reason="needs one process"))
             elif COMM.size > 2 and "ranks" not in item.keywords:
                 item.add_marker(pytest.mark.skip(reason="does not depend on the number of ranks"))
+
+
+def pytest_collection_finish():
+    """What is imported stays: Python need not look through it again and again for what could be freed."""
+    gc.collect()
+    gc.freeze()
+    gc.set_threshold(20_000, 20, 20)
 
 
 @pytest.hookimpl(hookwrapper=True)

@@ -59,7 +59,7 @@ def check_all(*plots, units=True):
     for width in (1280, 400):
         for plot in plots:
             check(plot(width=width), width)
-            if units:
+            if units and width == 400:  # the texts are longer in these
                 check(plot(width=width, units="field"), width)
 
 
