@@ -26,15 +26,21 @@ class Progress:
         self._terminal = sys.stderr.isatty()
         way = [0.0, *targets]
         self._way = sum(abs(b - a) for a, b in zip(way[:-1], way[1:], strict=True)) or 1.0
-        self._bar = None
+        self._bar, self._meshes = None, 0
 
     def __enter__(self):
         self._began = self._last = time.monotonic()
         return self
 
+    def on_mesh(self):
+        """The runs that follow are on another mesh, of which at least two are needed."""
+        self._meshes += 1
+
     def start(self, what):
         """Start a run over all targets; `what` describes it."""
-        self._what, self._done, self._eta = what, 0.0, 0.0
+        mesh = f"mesh {self._meshes}, " if self._meshes else ""
+        again = "compared with the one before, " if self._meshes > 1 else ""
+        self._what, self._done, self._eta = f"{mesh}{again}{what}", 0.0, 0.0
         if self._bar is not None:
             self._bar.reset(self._task)
 

@@ -120,6 +120,16 @@ def test_a_stiff_rope_on_a_bollard(a, ratio):
         cf.solve(scene, [ratio * (1 + 1e-3) - 1], elements=20, model="planar")
 
 
+@pytest.mark.parametrize("friction, way", [(0.0, "move it upwards in one Stage"), (0.4, "sags: pull by a Force")])
+def test_a_slack_cable_that_is_pressed_is_told_another_way(friction, way):
+    rod = cf.Rod(cf.Line((0, 0, 0), (100, 0, 0)), cf.Circle(0.05), cf.Material(E=1e9, nu=0.3, density=2000.0))
+    floor = cf.Plane((0, 0, 0), normal=(0, 0, 1), contact_radius=0.0, friction=friction)
+    hold = [cf.Clamp(rod.start), cf.Prescribed(rod.end, displacement=(-4.0, 0, 8.0))]
+    scene = cf.Scene([rod], hold, [floor, cf.Weight(permanent=True)])
+    with pytest.raises(cf.NotConverged, match=way):
+        cf.solve(scene, [1.0], elements=20, control="load", steps=cf.StepControl(smallest=0.2))
+
+
 def test_a_rod_slides_to_rest():
     """With the speed v on a rough plane: it stops after v/(mu g) on the way v^2/(2 mu g)."""
     mu, g, v = 0.3, 9.81, 2.0

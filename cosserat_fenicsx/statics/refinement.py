@@ -53,6 +53,7 @@ class Refinement:
     located: float = 1e-6  # smallest tolerance of the load factors of events on two meshes
     for_events: int = 2  # most finer meshes that are solved for events alone
     few_new: int = 4  # events that a mesh may have in addition to those of the one before, which a finer one may clear
+    most_lost: int = 2  # finer meshes on which a path with events is not found again, before it is given up
     most_balancings: int = 4  # times that the error is equidistributed over the elements
     most_moves: int = 3  # times that element ends are moved to the edges of contact, before elements are halved
     cheap: int = 800  # unknowns, of all points together, that are cheaper to solve than another mesh is to make
@@ -68,22 +69,22 @@ class _TooCoarse(Exception):
     """The path on a coarse first mesh is not plain, see `_plain`."""
 
 
-def refine(trace, correct, scene, layout, tol, bound, degree, usual=None):
+def refine(trace, correct, bar, scene, layout, tol, bound, degree, usual=None):
     """A path whose estimated errors are at most `tol`, relative, from the first mesh on; bound: the user's criteria
-    among those that it bounds.
+    among those that it bounds; bar: the `Progress`.
 
     trace: (layout, path or None) -> path followed from the unloaded state, through the points of the given path;
     correct: (layout, path) -> its points corrected on this mesh, None where that fails; usual: for a first mesh coarser
     than usual, the mesh to start again with unless the path is plain, see `_plain`. Raises NotConverged where two
     meshes in a row cannot be solved or the accuracy is not reached, Promoted where the path leaves the plane.
     """
-    search = _Search(trace, correct, scene, tol, bound, degree, usual)
+    search = _Search(trace, correct, bar, scene, tol, bound, degree, usual)
     try:
         while True:
             try:
                 found = search.on(layout)
             except _TooCoarse:
-                layout, search = usual, _Search(trace, correct, scene, tol, bound, degree, None)
+                layout, search = usual, _Search(trace, correct, bar, scene, tol, bound, degree, None)
                 continue
             except NotConverged:
                 if search.accurate is None:
@@ -100,8 +101,9 @@ class _Search:
     """State of the search for a mesh; whole: the complete path on the last mesh on which all points were computed, or
     None; accurate: the last path with accurate positions whose events differ from those of the mesh before, or None."""
 
-    def __init__(self, trace, correct, scene, tol, bound, degree, usual):
-        self._trace, self._correct, self._scene, self._tol, self._degree = trace, correct, scene, tol, degree
+    def __init__(self, trace, correct, bar, scene, tol, bound, degree, usual):
+        self._trace, self._correct, self._bar = trace, correct, bar
+        self._scene, self._tol, self._degree = scene, tol, degree
         self._presses = any(action.presses for action in scene.actions)
         self._usual, self._next = usual, None  # `_next`: the next mesh and its refinement factor, where it is known
         self.whole = self._few = self._which = None  # `_few`: sample points on the last mesh; `_which`: their indices
@@ -117,11 +119,12 @@ class _Search:
         self._halved = None  # sample points on this mesh and on the one before, if this one halves its elements
         self._error_before = None  # errors of the latter
         self._layered = None  # the next mesh where the last one does not resolve the boundary layers
-        self._balancings = self._moved = 0
+        self._balancings = self._moved = self._lost = 0
 
     def on(self, layout):
         """Solve on the next mesh; the path where it is accurate, else None."""
         self._level += 1
+        self._bar.on_mesh()
         elements = max(layout.counts)
         try:
             found = self._found_on(layout)
@@ -135,6 +138,9 @@ class _Search:
             # a mesh for events alone need not be solved: those that two meshes agree on are known
             if again or self.accurate is not None or elements >= _REFINEMENT.most_elements:
                 raise
+            self._lost += self.whole is not None and bool(self.whole.events) and not promoted
+            if self._lost >= _REFINEMENT.most_lost:
+                raise NotConverged(_lost(self._tol, self.whole, problem), self.whole) from None
             self._promoted, self._failed = (problem, self._failed) if promoted else (self._promoted, True)
             self._few = self._apart = self._halved = None
             return None
@@ -324,6 +330,16 @@ def _rounding_hides(tol, rounding, elements, formulation):
         f"the accuracy tol = {tol:g} is out of reach of the formulation {formulation!r} on rods as slender as these: "
         f"rounding errors alone may amount to {rounding:.2g} with {elements} elements per rod. Ask for the formulation "
         "'mixed', or a larger tol."
+    )
+
+
+def _lost(tol, path, problem):
+    first = path.events[0]
+    ahead = "" if path.left else ", or branch=1 or -1 for what a structure does that buckles there"
+    return (
+        f"the accuracy tol = {tol:g} was not reached: finer meshes do not follow the path that coarser ones follow "
+        f"({problem}). It loses its stability at the load factor {first.load_factor:.7g} ({first.kind}): ask for "
+        f"load factors up to there{ahead}. The exception's `path` holds the path of a coarser mesh."
     )
 
 

@@ -185,7 +185,7 @@ def solve(
             turning = resolving_turns(leg.scene, layout, max(map(abs, leg.load_factors)))
             layout, usual = (layout, usual) if turning is None else (turning, None)
             layout, usual = (x and turning_in_law(leg.scene, x, leg.load_factors) for x in (layout, usual))
-        return refine(along.trace, along.correct, scene, layout, tol, bounded[1], degree, usual)
+        return refine(along.trace, along.correct, bar, scene, layout, tol, bounded[1], degree, usual)
 
     with Progress(load_factors, progress, comm) as bar:
         while True:

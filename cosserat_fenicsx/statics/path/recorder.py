@@ -63,6 +63,22 @@ class _Enough(Exception):
     """Raised where the user's `until` returns True."""
 
 
+def _slackens(scene):
+    """Whether the end of a rod beside an obstacle is prescribed to move towards the rod's other end."""
+    if not any(action.presses for action in scene.actions):
+        return False
+    for x in scene.supports:
+        moved, station = getattr(x, "displacement", None), x.station
+        if moved is not None and not callable(moved) and station.s in (0.0, station.rod.length):
+            here, other = (
+                station.rod.curve.position(station.s),
+                station.rod.curve.position(station.rod.length - station.s),
+            )
+            if np.dot(moved, other - here) > 0:
+                return True
+    return False
+
+
 class Tracing:
     """Computes and records a `Path`; follow: arguments of `Follower`; start: a path whose last point is the state at
     the load factor 0, on any mesh; None for the reference."""
@@ -225,7 +241,7 @@ class Tracing:
             return (
                 f"The loads are {strain:.1e} times EA there, which no rod bears: are the units those of SI (N, m, Pa)?"
             )
-        where = "Try"
+        scene, where = self.model.scene, "Try"
         if len(self.track.history) == 1 and self._options["control"] == "arc":
             where = "Try control='auto',"
         elif len(self.track.history) == 1:
@@ -233,11 +249,17 @@ class Tracing:
             where = (
                 f"Try a first step below {self._follower.smallest:.1g}, by steps=StepControl(smallest={shorter:.1g}),"
             )
-        if here and rubs(self.model.scene):
+        if _slackens(scene):
+            way = "" if rubs(scene) else " move it upwards in one Stage and inwards in the next, or"
+            where = (
+                f"A cable whose end is prescribed inwards is pressed before it sags:{way} pull by a Force in place of "
+                "the Prescribed displacement; otherwise try"
+            )
+        elif here and rubs(scene):
             where = "Friction may not hold more; otherwise try"
         elif here and self._options["control"] == "load":
             where = "There may be a limit point, which load control cannot pass (control='auto' can); otherwise try"
-        softer = ", a softer wall" if any(action.at_nodes for action in self.model.scene.actions) else ""
+        softer = ", a softer wall" if any(action.at_nodes for action in scene.actions) else ""
         return f"{where} load factors in between, more elements{softer}, or {self.model.signature.formulation.advice}."
 
     def corrected(self, coarse):
