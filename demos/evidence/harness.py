@@ -51,6 +51,16 @@ def whole_process(words, told="", limit=None, **settings):
     return said, process.returncode, used.ru_utime + used.ru_stime, time.perf_counter() - began
 
 
+def apart(file, number, before=()):
+    """What the function `one` of a `command` in a file finds for a number, in its own process, started by `before`."""
+    # a copy of the environment, without what MPI has put into this process's since it was started
+    words = [*before, sys.executable, file, "--one", str(number)]
+    done = subprocess.run(words, env=dict(os.environ), capture_output=True, text=True, timeout=600)
+    if done.returncode:
+        raise SystemExit(done.stderr)
+    return json.loads(done.stdout.splitlines()[-1])
+
+
 def orders(errors, counts):
     """Observed orders of errors between successive numbers of steps or elements."""
     with np.errstate(divide="ignore", invalid="ignore"):  # errors may be zero

@@ -8,15 +8,13 @@ size runs in a process of its own. The time of the equations of the points, whic
 BLAS that PETSc finds: the table names it.
 """
 
-import json
 import re
 import resource
-import subprocess
 import sys
 from pathlib import Path
 
 import numpy as np
-from harness import HEADS, command, in_words, judged, table, timed, write
+from harness import HEADS, apart, command, in_words, judged, table, timed, write
 
 import cosserat_fenicsx as cf
 
@@ -57,9 +55,7 @@ def main(sizes=range(len(SIZES)), out="out"):
     """Print the table, write it to out/many_rods.md; returns its rows as an array."""
     rows = []
     for size in sizes:
-        words = [sys.executable, __file__, "--one", str(size)]
-        done = subprocess.run(words, capture_output=True, text=True, check=True)
-        rows.append(json.loads(done.stdout.splitlines()[-1]))
+        rows.append(apart(__file__, size))
         print(f"{rows[-1][0]:6.0f} rods: {rows[-1][2]:.2f} s", file=sys.stderr, flush=True)
     rows = np.array(rows)
     each = 1e3 * rows[:, 1:3].sum(axis=1) / rows[:, 0]

@@ -8,7 +8,6 @@ parent of a study over an executor: processor time, memory, and bytes in its fol
 that return what those of the map do, and compute nothing.
 """
 
-import json
 import resource
 import sys
 import tempfile
@@ -17,7 +16,7 @@ from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
-from harness import command, in_words, table, timed, whole_process, write
+from harness import apart, command, in_words, table, timed, whole_process, write
 
 import cosserat_fenicsx as cf
 
@@ -76,7 +75,7 @@ def _memory():
 def main(count=100_000, samples=10, out="out"):
     """Print the table, write it to out/million_cases.md; returns what was measured."""
     each, (busy, wall) = float(np.median(case(samples))), start()
-    found = {"case": each, "start": busy, "wall": wall, **json.loads(_apart(count))}
+    found = {"case": each, "start": busy, "wall": wall, **apart(__file__, count)}
     hours, ideal = CASES * each / 3600, CASES * each / CORES
     rate, part = 1 / found["seconds"], CASES // JOBS
     measured = [
@@ -105,14 +104,6 @@ def main(count=100_000, samples=10, out="out"):
     heads = f"{CASES} cases on {CORES} cores, on paper | one study over an executor | an array of {JOBS} jobs"
     print(write("million_cases", [*lines, *table(heads, paper)], out))
     return found
-
-
-def _apart(count):
-    """`parent`, by a process that has computed nothing else, as JSON."""
-    said, code, *_ = whole_process([sys.executable, __file__, "--one", str(count)])
-    if code:
-        raise RuntimeError(f"the study of {count} cases ended with code {code}")
-    return said.splitlines()[-1]
 
 
 if __name__ == "__main__":

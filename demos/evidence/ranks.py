@@ -7,16 +7,13 @@ The cantilever and the step of scaling.py. Numbers of ranks take turns; results 
 than the machine has cores show only whether the digits are the same.
 """
 
-import json
 import os
 import shutil
-import subprocess
-import sys
 import time
 from pathlib import Path
 
 import numpy as np
-from harness import HEADS, command, in_words, judged, table, write
+from harness import HEADS, apart, command, in_words, judged, table, write
 from mpi4py import MPI
 from scaling import from_rest, loaded
 
@@ -41,12 +38,7 @@ def under_mpirun(ranks, elements):
     program = "/usr/bin/mpirun" if Path("/usr/bin/mpirun").exists() else shutil.which("mpirun")
     # not bound to cores: one of them may be busy with something else, and the other ranks would wait
     words = [program, "--oversubscribe", "--bind-to", "none", "-n", str(ranks)]
-    words += [sys.executable, __file__, "--one", str(elements)]
-    # a copy, without what MPI has put into this process's environment since it was started
-    done = subprocess.run(words, env=dict(os.environ), capture_output=True, text=True, timeout=600)
-    if done.returncode:
-        raise SystemExit(done.stderr)
-    return json.loads(done.stdout.splitlines()[-1])
+    return apart(__file__, elements, words)
 
 
 def main(sizes=SIZES, rounds=ROUNDS, out="out", ranks=RANKS):

@@ -9,18 +9,16 @@ Each size runs in a separate process: a thick cantilever under a small transvers
 A second table has a step at 8 elements beside that of the cheapest rod there is, in plain C (floor.c), and its parts.
 """
 
-import json
 import os
 import resource
 import subprocess
-import sys
 import tempfile
 import time
 from pathlib import Path
 
 import numpy as np
 from cantilever import column
-from harness import HEADS, command, judged, table, timed, write
+from harness import HEADS, apart, command, judged, table, timed, write
 
 from cosserat_fenicsx import compat
 from cosserat_fenicsx.models.rodmesh import Layout
@@ -156,10 +154,7 @@ def main(sizes=SIZES, out="out", runs=300):
     """
     rows = []
     for elements in sizes:
-        done = subprocess.run(
-            [sys.executable, __file__, "--one", str(elements)], capture_output=True, text=True, check=True
-        )
-        rows.append(json.loads(done.stdout.splitlines()[-1]))
+        rows.append(apart(__file__, elements))
         print(f"{rows[-1][0]:8d} unknowns: step {1e3 * rows[-1][1]:9.3f} ms", flush=True)
     rows = np.array(rows)
     about = f"{compat.version()}; medians, processor time, one process. Memory is the process's largest, all loaded."

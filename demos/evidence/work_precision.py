@@ -219,6 +219,14 @@ def run(found, peers, budgets, *, quick, wanted, limits, after=None):
     return rows
 
 
+def concluded(found, rows, text):
+    """Write the table beside the samples, and print it; returns the stem of the files."""
+    stem, told = found.file.stem, text(found, rows)
+    found.file.with_suffix(".md").write_text(told + "\n", encoding="utf-8")
+    print(told)
+    return stem
+
+
 def main(out="out", quick=False, fresh=False, peers=PEERS, names=None, wanted=None):
     """Measure, write the JSON, the table and the charts.
 
@@ -243,11 +251,8 @@ def main(out="out", quick=False, fresh=False, peers=PEERS, names=None, wanted=No
         found.waits = waits(started, rows)
 
     rows = run(found, peers, dict.fromkeys(names, BUDGET), quick=quick, wanted=wanted, limits=limits, after=after)
-    text = table.text(found, rows)
-    stem = found.file.stem
-    (out / f"{stem}.md").write_text(text + "\n", encoding="utf-8")
+    stem = concluded(found, rows, table.text)
     pictures = chart.draw(found, rows, out, stem)
-    print(text)
     told = Counter(row["failed"] is not None for row in rows)
     print(
         f"\n{told[False]} configurations answered, {told[True]} did not; written: {found.file}, {stem}.md,"

@@ -16,7 +16,7 @@ from harness import HEADS, command, in_words, judged, table
 from matplotlib.ticker import LogLocator
 from peers import motions
 from peers.environments import OWN
-from work_precision import SAMPLES, Panel, Record, run
+from work_precision import SAMPLES, Panel, Record, concluded, run
 from work_precision_chart import in_time, plot
 from work_precision_table import answered, at_accuracies, cheapest, median, milliseconds
 
@@ -147,10 +147,9 @@ def main(out="out", quick=False, fresh=False, peers=motions.PEERS, wanted=None):
     wanted = wanted or (1 if quick else SAMPLES)
     budgets = {name: BUDGET * k / len(motions.TITLES) for k, name in enumerate(motions.TITLES, 1)}  # a share for each
     rows = run(found, peers, budgets, quick=quick, wanted=wanted, limits=limits)
-    told = text(found, rows)
-    (out / f"{stem}.md").write_text(told + "\n", encoding="utf-8")
+    concluded(found, rows, text)
     draw_both(partial(draw_chart, lambda: draw(rows)), out / f"{stem}.png")
-    print(f"{told}\n\nwritten: {found.file}, {stem}.md, {stem}.png")
+    print(f"\nwritten: {found.file}, {stem}.md, {stem}.png")
     return found
 
 

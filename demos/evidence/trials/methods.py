@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from trials.bare import Bare
+from trials.catalogue import TRIALS
 from trials.cells import MISSING, NOT, STOPPED, Cell, NotForIt, NotInstalled, Stopped
 from trials.chains import CHAINS
 from trials.own import OWN
@@ -15,6 +16,12 @@ from trials.secant import Secant
 
 METHODS = (*OWN, Bare(), RotationVector(), *CHAINS, Secant(), *PROGRAMS)
 BY_KEY = {method.key: method for method in METHODS}
+
+
+def shown(data):
+    """The methods and the trials of failures.json."""
+    columns = [method for method in METHODS if method.key in data["methods"]]
+    return columns, [trial for trial in TRIALS if trial.key in data["trials"]]
 
 
 def cell(trial, method):

@@ -3,7 +3,7 @@
 from harness import in_words
 
 from cosserat_fenicsx.pictures.charts import draw_chart, empty_figure
-from trials import catalogue, methods
+from trials import methods
 from trials.cells import MISSING, NOT, RIGHT, SAID, SILENT, STOPPED, Cell
 from trials.table import MARKS
 
@@ -33,8 +33,7 @@ def draw(data, file):
 
 
 def _figure(data):
-    columns = [method for method in methods.METHODS if method.key in data["methods"]]
-    rows = [trial for trial in catalogue.TRIALS if trial.key in data["trials"]]
+    columns, rows = methods.shown(data)
     figure = empty_figure(2.9 + 0.84 * len(columns), 2.6 + 0.42 * len(rows))
     axes = figure.subplots()
     axes.set(xlim=(-0.5, len(columns) - 0.5), ylim=(len(rows) - 0.5, -0.5))

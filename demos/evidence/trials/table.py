@@ -2,7 +2,7 @@
 
 from harness import in_words
 
-from trials import catalogue, methods
+from trials import methods
 from trials.cells import MISSING, NOT, RIGHT, SAID, SILENT, STOPPED
 
 #: Marks in front of a cell's number, also used in the picture.
@@ -24,8 +24,7 @@ MEANINGS = {
 
 def text(data):
     """Markdown of failures.json."""
-    columns = [method for method in methods.METHODS if method.key in data["methods"]]
-    rows = [trial for trial in catalogue.TRIALS if trial.key in data["trials"]]
+    columns, rows = methods.shown(data)
     lines = [
         f"| trial | {' | '.join(method.title.replace(chr(10), ' ').replace('- ', '-') for method in columns)} |",
         "|---" * (len(columns) + 1) + "|",
