@@ -92,7 +92,7 @@ from cosserat_fenicsx.statics.natural_modes import modes as modes
 from cosserat_fenicsx.statics.path.load_control import StepControl as StepControl
 from cosserat_fenicsx.statics.path.recorder import read_path as read_path
 from cosserat_fenicsx.statics.solve import solve as solve
-from cosserat_fenicsx.statics.vibrating import campbell as campbell
+from cosserat_fenicsx.statics.natural_modes import campbell as campbell
 from cosserat_fenicsx.storage.store import resume as resume
 from cosserat_fenicsx.studies.outcome import Study as Study
 from cosserat_fenicsx.studies.study import study as study

@@ -85,7 +85,6 @@ FITTERS = {
         "linear_buckling",
         "natural_modes",
         "small_motions",
-        "vibrating",
         "refinement",
         "sensitivity",
         "solve",

@@ -54,7 +54,7 @@ def _conservative_along(path):
 
 
 def _modes_along(path, count, damped):
-    from cosserat_fenicsx.statics.vibrating import modes_along  # late: it imports `solve`
+    from cosserat_fenicsx.statics.natural_modes import modes_along  # late: scipy is slow to import
 
     return modes_along(path, count, damped)
 
