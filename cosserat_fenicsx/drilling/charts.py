@@ -495,16 +495,16 @@ def draw_hfto(answer):
     if not len(answer):
         raise SceneError("plot: expected at least one oscillation, this state keeps up none")
     figure, panels = stacked(8, [2.4, 2.4])
-    shown = (SPEED, answer.amplitude, "bit speed +-", BIT), (TORQUE, answer.torque, "largest torque +-", DRIVE)
+    growth = Quantity("growth", unit="1/s")
+    shown = (growth, answer.growth, "growth while small", BIT), (TORQUE, answer.torque, "largest torque +-", DRIVE)
     for panel, (quantity, values, label, colour) in zip(panels, shown, strict=True):
         unit, size = unit_of(quantity, values)
         panel.vlines(answer.frequency, 0, values / size, color=colour, linewidth=0.9)
         panel.plot(answer.frequency, values / size, "o", color=colour, markersize=4)
         panel.set_ylabel(f"{label} ({unit})")
         panel.set_ylim(bottom=0)
-    rpm, size = unit_of(SPEED)
-    panels[0].axhline(answer.speed / size, color="black", linestyle="--", label="mean speed of the bit")
-    legend(panels[0])
     panels[-1].set_xlabel("frequency (Hz)")
-    figure.suptitle(f"Torsional oscillations that the bit keeps up, {answer.speed / size:.4g} {rpm}")
+    (rpm, size), largest = unit_of(SPEED), float(np.nan_to_num(answer.amplitude).max())
+    figure.suptitle(f"Torsional oscillations that the bit keeps up, {answer.speed / size:.4g} {rpm}, "
+                    f"its speed +- {largest / size:.4g} {rpm} at most")  # fmt: skip
     return figure

@@ -9,7 +9,7 @@ and the motion goes on where string and drive take the power that the bit gives:
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from scipy.optimize import brentq
@@ -24,10 +24,11 @@ from cosserat_fenicsx.numerics import gauss
 from cosserat_fenicsx.quantities import Quantity
 from cosserat_fenicsx.results.result import by_name
 
-# Gauss points in each half cycle without a jump; amplitudes tried, over the mean speed; places in a wave.
+# Gauss points in each half cycle without a jump; amplitudes tried, over the mean speed; places in a wave; oscillations in a
+# table.
 _RULE = gauss(64)
 _TRIED = np.concatenate([np.linspace(0.02, 1.0, 50), 1 + np.geomspace(1e-7, 30.0, 150)])
-_PLACES = 16
+_PLACES, _LISTED = 16, 12
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -89,6 +90,13 @@ class Hfto(Drawn):
         )
         if stuck := int((self.torque < still).sum()):
             yield f"In {stuck} of them the torque stays below that which holds the bit at rest: it sticks, see simulate."
+        if len(self) > _LISTED:
+            yield f"Below: the {_LISTED} that grow fastest; to_dataframe() has all."
+
+    def _table(self, units, rows):
+        kept = np.sort(np.argsort(-self.growth)[: min(rows, _LISTED)])
+        arrays = {x.name: getattr(self, x.name)[kept] for x in fields(self)[2:]}
+        return super(Hfto, replace(self, **arrays))._table(units, rows)
 
     def __repr__(self):
         return f"<Hfto: {len(self)} oscillations at {self.speed:.4g} rad/s>"
@@ -107,7 +115,9 @@ def oscillations(scene, up_to, frequencies, growth):
     speed = scene.drive.signal()(0.0)
     guide = Steady(scene).guides(speed, scene.bit.weight)[0]
     w, slopes = critical_slopes(scene, up_to, speed)
-    kept = (w > 0) & (slopes > law.slope(speed))
+    om, B, dom, dB = guide.bit(1j * w)
+    # where a mode begins to grow as the slope falls; where friction at the wall feeds the string there are others
+    kept = (w > 0) & (slopes > law.slope(speed)) & (((dB * om - B * dom) / om**2).real > 0)
     frequency, slopes = w[kept] / (2 * math.pi), slopes[kept]
     amplitude = np.array([_amplitude(law, speed, slope) for slope in slopes])
     nearest = np.abs(frequency[:, None] - np.asarray(frequencies)[None, :])

@@ -141,7 +141,7 @@ def limit_weight(scene: Drilling, speed: float, *, up_to: float = 10.0) -> float
         low, high = high, 2 * high
         if high > _HEAVIEST:
             return math.inf
-    return brentq(excess, low, high, rtol=1e-12)
+    return brentq(excess, low, high, rtol=1e-10)
 
 
 def _falls_at_wall(scene):
