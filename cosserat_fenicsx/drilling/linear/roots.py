@@ -9,6 +9,7 @@ take s (n,) and return (f, f') scaled by any positive factors (n,): only phases 
 
 import math
 from dataclasses import dataclass, replace
+from itertools import takewhile
 
 import numpy as np
 
@@ -180,7 +181,8 @@ def distinct(roots):
     """The roots without repetition, by frequency and then by growth."""
     kept = []
     for s in roots[np.lexsort((-roots.real, roots.imag))]:
-        if all(abs(s - other) > 1e-8 * max(abs(s), 1e-6) for other in kept):
+        same = 1e-8 * max(abs(s), 1e-6)
+        if all(abs(s - other) > same for other in takewhile(lambda x: s.imag - x.imag <= same, reversed(kept))):
             kept.append(s)
     return np.array(kept, dtype=complex)
 
