@@ -197,20 +197,16 @@ def _told(curvature):
 
 def _three_points(beam, laid, depth):
     """The curvature of the circle through the bit and two contacts on the side that the bend leans on, of a rigid
-    string with a kink b at s: with y = a s + b <s - sb> - k s^2/2 its offset from the axis is the clearance there; and
-    why there is none. The contacts are the lowest two stabilisers, or the only one and the upper end of the component
-    with the bend."""
+    string with a kink b at sb: with y = a s + b <s - sb> - k s^2/2 its offset from the axis is the clearance there; and
+    why there is none. The contacts are the next stabiliser below the bend, or else the bend itself, and the next one
+    above it, or else the upper end of the component with the bend."""
     if len(beam.bends) != 1:
         return math.nan, "it is about an assembly with one bend"
     (bend, angle), side = beam.bends[0], -math.copysign(1.0, beam.bends[0][1])
-    points = list(beam.rings[:2])
-    if len(points) == 1:
-        (top,) = (depth - place.top for place in laid if place.component.bend and depth - place.bottom < bend)
-        points.append((top, float(beam.clearance[beam.of_part(np.array([top]))[0]])))
-    if len(points) < 2 or points[0][0] == points[1][0]:
-        return math.nan, "it takes a stabiliser"
-    s, clearance = np.array(sorted(points)).T
-    if s[1] <= bend:
-        return math.nan, "both contacts are below the bend"
+    (top,) = (depth - place.top for place in laid if place.component.bend and depth - place.bottom < bend)
+    of_body = [(s, float(beam.clearance[beam.of_part(np.array([s]))[0]])) for s in (bend, top)]
+    below = max((ring for ring in beam.rings if ring[0] < bend), default=of_body[0])
+    above = min((ring for ring in beam.rings if ring[0] > bend), default=of_body[1])
+    s, clearance = np.array([below, above]).T
     right = side * clearance - angle * np.maximum(s - bend, 0.0)
     return float(np.linalg.solve(np.column_stack([s, -(s**2) / 2]), right)[1]), ""
