@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import cosserat_fenicsx as cf
+from cosserat_fenicsx.drilling.choose import chosen
 from cosserat_fenicsx.well.components import StringPart
 
 well = cf.well
@@ -103,6 +104,9 @@ def test_a_bend_decides_for_the_rod_and_is_missed_where_there_is_none():
     assert sliding.model == "rod" and sliding.enough
     soft = well.torque_and_drag(hole, string, well.Sliding(given["WOB"]), model="soft")
     assert not soft.enough and np.isnan(soft.bit_tilt).all() and "THE BEND of motor IS NOT IN IT" in soft.details()
+    readings = [well.RigMeasurement(x, well.TripOut(), 1e3 * x) for x in (40.0, 50.0, 60.0)]
+    with pytest.warns(cf.SceneWarning, match="the bend of motor is not in the soft string"):
+        well.calibrate_friction(hole, string, readings)
     turning = well.torque_and_drag(hole, string, well.RotaryDrilling(given["WOB"], 2e3), model="rod")
     assert "ONE MOMENT of a turn" in turning.summary()
 
@@ -205,6 +209,15 @@ def test_the_scene_of_a_bent_motor(tmp_path):
     again.write_text(SCENE.read_text(encoding="utf-8").replace("18 klbf", "0 klbf"), encoding="utf-8")
     with pytest.raises(cf.SceneError, match=r"build_rate.operations = 'none with weight on bit'"):
         cf.read(again)
+
+
+def test_motions_leave_a_bend_out_or_refuse_it():
+    motor = well.Collar(7.5, "NC46-65", name="motor", bend=1.0, bend_at=2.0)
+    string, drive = well.DrillString([motor, well.DrillPipe(size="5 in 19.50 lb/ft")]), cf.drilling.TopDrive(6.0)
+    motion = cf.drilling.Drilling(string, drive, depth=300.0)
+    assert any("the bend of motor is left out" in line for line in chosen(motion)[1])
+    with pytest.raises(cf.SceneError, match="None in mixed_scene, whose rod is straight"):
+        cf.drilling.mixed_scene(motion)
 
 
 @pytest.mark.parametrize(("given", "words"), [

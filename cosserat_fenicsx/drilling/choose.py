@@ -58,8 +58,8 @@ def _asks_for_axial(scene):
 
 def _left_out(scene, name):
     """Sentences on the approximations of a string on the axis of the hole."""
-    bent = [part.name for part in scene.string.components if part.bend]
-    found = [f"APPROXIMATE: the bend of {' and '.join(bent)} is left out: the string lies on the axis"] if bent else []
+    bent = scene.string.bent
+    found = [f"APPROXIMATE: the bend of {bent} is left out: the string lies on the axis"] if bent else []
     return found + _pushed(scene) + (_buckled(scene, name) if scene.hole is not None else [])
 
 

@@ -96,8 +96,8 @@ class FrictionFit(Result):
             were left out.
         misfit: root of the sum of squares of the residuals that are kept, over the readings in excess: 1 where the
             standard deviations are right.
-        doubts: sentences on readings that were left out, and on possible mistakes where the misfit is far above 1;
-            also given as warnings.
+        doubts: sentences on readings that were left out, on possible mistakes where the misfit is far above 1, and on a
+            bend, which the models of the fit have not; also given as warnings.
         measurements: as given.
     """
 
@@ -257,6 +257,8 @@ def calibrate_friction(
     friction = values[:sections]
     block = float(values[-1]) if unknown_block else float(block_weight)
     doubts = tuple(_left_out(readings, found))
+    if string.bent:
+        doubts += (f"the bend of {string.bent} is not in the {model} string: its friction counts as the hole's",)
     if misfit > _SET.bad:
         with_block = partial(calibrate_friction, hole, string, measurements, mud=mud, block_weight=None, model=model,
                              torque_convention=torque_convention)  # fmt: skip

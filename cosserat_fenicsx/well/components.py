@@ -504,6 +504,11 @@ class DrillString(InWords, Part):
                     expected += f"; where the list runs the other way, say order='{other}'"
                 refuse(part, "length", None, expected)
 
+    @property
+    def bent(self) -> str:
+        """Names of the components with a bend, from the bit up; "" where there are none."""
+        return " and ".join(part.name for part in self.components if part.bend)
+
     def sentences(self, units: Units):
         """On its components from the bit up, in some units."""
         for part in self.components:

@@ -141,14 +141,13 @@ def _flexible(given, model, tol, torque_convention, pieces, laid):
     differences = {SOFT: tuple(float(a - b) for a, b in zip(*ends, strict=True))} if buckled else {}
     answer = TorqueAndDrag(*given, used, tol, torque_convention, tuple(whole), error, max(shares.values()),
                            tuple(parts.total for parts in left_out), differences, laid, pieces, solved)  # fmt: skip
-    bent = [place.component.name for place in laid if place.component.bend]
-    if bent:
+    if bent := given[1].bent:
         unknown = (
-            f"THE BEND of {' and '.join(bent)} IS NOT IN IT: a string on the axis of the hole has none, and what it "
+            f"THE BEND of {bent} IS NOT IN IT: a string on the axis of the hole has none, and what it "
             "adds to the wall's forces is not estimated; model='rod' has it"
         )
         answer = replace(answer, why=(*answer.why, unknown), model_error=np.inf, left_out=(np.inf, np.inf))
-        why.append(f"{' and '.join(bent)} is bent: solving the rod in contact, which has the bend")
+        why.append(f"{bent} is bent: solving the rod in contact, which has the bend")
     return answer, why
 
 

@@ -188,7 +188,7 @@ def sweep_in_words(sweep, units):
         i, j, k = np.unravel_index(np.nanargmax(told), told.shape)
         worst, most = told[i, j, k], np.nanmax(np.abs(loads), initial=1e-300)
         size = f"at most {sweep._told(name, units, worst, '.3g')}, {100 * worst / most:.1g} % of the largest one"
-        size = "without a bound, since it may lock up" if np.isinf(worst) else size
+        size = "without a bound, since it may lock up or is bent" if np.isinf(worst) else size
         yield (
             f"{sweep.quantities[name].label}: what the model leaves out is {size} "
             f"({sweep.label(i, j)}, bit at {sweep._told('depth', units, sweep.depths[k])}), estimated"
