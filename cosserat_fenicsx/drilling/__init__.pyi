@@ -1,5 +1,8 @@
 """The public names of this package and their modules, see the stub of `cosserat_fenicsx`."""
 
+from cosserat_fenicsx.drilling.bit_curves import RateLaw as RateLaw
+from cosserat_fenicsx.drilling.bit_curves import Rational as Rational
+from cosserat_fenicsx.drilling.bit_curves import TableLaw as TableLaw
 from cosserat_fenicsx.drilling.bit_laws import BitLaw as BitLaw
 from cosserat_fenicsx.drilling.bit_laws import BitOnRock as BitOnRock
 from cosserat_fenicsx.drilling.bit_laws import Cutting as Cutting
@@ -35,16 +38,18 @@ from cosserat_fenicsx.drilling.scene import Drilling as Drilling
 from cosserat_fenicsx.drilling.scenefile import DrillingScene as DrillingScene
 from cosserat_fenicsx.drilling.segments import Discs as Discs
 from cosserat_fenicsx.drilling.stick_slip import StickSlip as StickSlip
+from cosserat_fenicsx.drilling.top_drive import PI as PI
+from cosserat_fenicsx.drilling.top_drive import Autodriller as Autodriller
 from cosserat_fenicsx.drilling.top_drive import DriveControl as DriveControl
 from cosserat_fenicsx.drilling.top_drive import Gains as Gains
 from cosserat_fenicsx.drilling.top_drive import Hook as Hook
 from cosserat_fenicsx.drilling.top_drive import Matched as Matched
 from cosserat_fenicsx.drilling.top_drive import Motor as Motor
-from cosserat_fenicsx.drilling.top_drive import PI as PI
 from cosserat_fenicsx.drilling.top_drive import Sample as Sample
 from cosserat_fenicsx.drilling.top_drive import SampledControl as SampledControl
 from cosserat_fenicsx.drilling.top_drive import Stiff as Stiff
 from cosserat_fenicsx.drilling.top_drive import TopDrive as TopDrive
+from cosserat_fenicsx.drilling.top_drive import TorqueOverTime as TorqueOverTime
 from cosserat_fenicsx.drilling.wall_friction import FrictionLaw as FrictionLaw
 from cosserat_fenicsx.drilling.wall_friction import ViscousDrag as ViscousDrag
 from cosserat_fenicsx.drilling.wall_friction import WallFriction as WallFriction

@@ -32,7 +32,7 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 
 from cosserat_fenicsx.checks import refuse, warn
-from cosserat_fenicsx.drilling.laws import Resistance, by_method, checked
+from cosserat_fenicsx.drilling.laws import Resistance, by_method, checked, tabulated
 from cosserat_fenicsx.drilling.signals import doubt_decay
 from cosserat_fenicsx.parts import (
     AngularVelocity,
@@ -88,7 +88,10 @@ class BitLaw(Part, family="bit law"):
         return by_method(self, "torque", weight if self.needs_weight else math.nan)
 
     def in_c(self):
-        """The torque as a function of speed and weight on bit, which C calls where `resistance` has a function."""
+        """The torque as a function of speed and weight on bit, which C calls where `resistance` has a function; None
+        for a smooth one of the speed alone, which is tabulated."""
+        if not self.needs_weight and tabulated(self.resistance(None)) is not None:
+            return None
         return lambda speed, weight: checked(self, "torque", weight if self.needs_weight else math.nan)(speed)
 
     def end(self, weight: float, place: np.ndarray, motion: np.ndarray) -> "EndCondition | None":
@@ -204,6 +207,16 @@ class Cutting(BitLaw):
 
     def steady_forces(self, weight, motion):
         return np.array(CuttingEnd(self, 0.0, np.zeros(2), motion).steady_forces(*motion))
+
+    def rate(self, weight: float, turning: float) -> float:
+        """Rate of penetration (m/s) under a weight on bit (N), at a speed of rotation (rad/s).
+
+        Raises:
+            SceneError: a weight that the wear flats bear.
+        """
+        if weight <= self.idle:
+            refuse("BitOnRock", "weight", weight, f"more than the wear flats carry, {self.idle:.6g} N")
+        return (weight - self.idle) / self.axial_stiffness * self.blades * turning / (2 * math.pi)
 
     @property
     def idle(self) -> float:

@@ -53,6 +53,8 @@ def _asks_for_axial(scene):
     hook, found = scene.hook, []
     if hook is not None and not (hook.signal().constant and hook.signal()(0.0) == 0.0):
         found.append("the hook moves")
+    if hook is not None and hook.autodriller is not None:
+        found.append("an autodriller moves the block")
     return found + ([scene.bit.law.lifts] if scene.bit is not None and scene.bit.law.lifts else [])
 
 

@@ -17,7 +17,7 @@ from cosserat_fenicsx.checks import number, positive, refuse
 from cosserat_fenicsx.drilling.chain import chain_of, unresolved, usual_step
 from cosserat_fenicsx.drilling.laws import InC, check_bit
 from cosserat_fenicsx.drilling.protocol import StringModel
-from cosserat_fenicsx.drilling.signals import intervals
+from cosserat_fenicsx.drilling.signals import ScalarSignal, intervals
 from cosserat_fenicsx.drilling.steady_start import (
     check_rock,
     check_steady,
@@ -25,7 +25,7 @@ from cosserat_fenicsx.drilling.steady_start import (
     steady_state,
     steady_velocities,
 )
-from cosserat_fenicsx.drilling.top_drive import Hook
+from cosserat_fenicsx.drilling.top_drive import Hook, Sample, Sampler, divided
 from cosserat_fenicsx.drilling.wall_friction import law_of, static_weight
 from cosserat_fenicsx.errors import SceneError
 
@@ -77,6 +77,12 @@ class AxialTorsional(StringModel):
             expected = f"a number of elements from 2 to {_ELEMENTS}"
             number("AxialTorsional", "elements", elements, expected, lambda x: 2 <= x <= _ELEMENTS and x == int(x))
         self.dt = dt or usual_step(scene, elements, self._axial)
+        controls = [scene.drive.control, scene.hook and self._axial and scene.hook.autodriller]
+        periods = [divided(x, self.dt, dt is not None) for x in controls if x]
+        period = min((x for x in periods if x), default=None)
+        if period:
+            self.dt = period / max(2, math.ceil(period / self.dt * (1 - 1e-9)))
+            dt = dt and self.dt
         for _ in range(_TRIALS):
             self._set(elements)  # masses of elements depend on the step
             if self._lib.steepest(self._m, self.dt) > 0:
@@ -88,8 +94,8 @@ class AxialTorsional(StringModel):
                 "friction or of the bit falls more steeply than inertia and string allow, and the speed at the end of "
                 "a step is not determined"
             )
-        self._set_sampler(scene.drive, self._m.top[self._dofs - 1])
         self._start()
+        self._sample()
         self.why = tuple(self._reasons())
 
     def _set(self, elements):
@@ -163,7 +169,9 @@ class AxialTorsional(StringModel):
         top, segments = self._m.top[self._dofs - 1], None if self.scene.discs else self.scene.segments
         top.inertia = drive.inertia
         self._kept["mass"][0, -1] += drive.inertia
-        if not drive.control.sampled:
+        if drive.control.sampled:
+            top.rigid = drive.control.of_speed
+        else:
             gains = drive.control.gains(segments and segments[0].torsional_impedance)
             top.rigid, top.given, top.proportional, top.integral = gains
         return drive.signal()
@@ -181,6 +189,21 @@ class AxialTorsional(StringModel):
             motion[1 - axial :] = steady_velocities(scene)[1 - axial :]
             self._set_steady(motion)
             self._set_end(motion)
+
+    def _sample(self):
+        """Take samples for the controls of the drive and the hook."""
+        turning, drive = self._dofs - 1, self.scene.drive
+        top = self._m.top[turning]
+        self._sample_torque(drive, top, float(self._kept["v"][0, -1]) if top.rigid else top.force)
+        if top.rigid and drive.control.sampled:
+            self._signals[turning] = self._samplers["drive"]
+        hook = self.scene.hook
+        if self._axial and hook is not None and hook.autodriller is not None:
+            down = float(self._kept["v"][0, 0])
+            self._samplers["hook"] = Sampler(
+                hook.autodriller, "speed", self.dt, ScalarSignal(hook, "speed", 0.0, "m/s"), down
+            )
+            self._signals[0] = self._samplers["hook"]
 
     def _set_end(self, motion):
         """The memory of the bit's law, from the state now."""
@@ -230,12 +253,16 @@ class AxialTorsional(StringModel):
         """Steps that were halved, iterations of Newton's method, and most of them in a step."""
         return {"halved": self._m.halved, "iterations": self._m.iterations, "most_iterations": self._m.most}
 
-    def _at_drive(self):
-        return self._kept["v"][0, -1], self._kept["x"][0, -1], self._top.force
+    def _seen(self):
+        v, x, top = self._kept["v"][0], self._kept["x"][0], self._m.top
+        axial = ()
+        if self._axial:
+            axial = self._m.hanging_top - top[0].force, static_weight(self.scene) + top[0].force, float(v[0])
+        return Sample(self.time, 0.0, float(v[-1]), float(x[-1]), self._top.force, *axial)
 
     def _record(self, steps, rows):
         parts, start = intervals(self._signals, (self.steps, self.steps + steps), self.dt), self.steps
-        if self._axial:
+        if self._axial and "hook" not in self._samplers:
             parts[:, [1, 3]] *= -1  # the hook's speed is positive upwards
         for part in [parts] if self.end is None else parts[:, None]:
             if self.end is not None:
@@ -294,8 +321,8 @@ class AxialTorsional(StringModel):
         found["ends"] = np.array([*((m.top[i].error, m.top[i].force) for i in (0, 1))]).ravel()
         found["bit"] = np.array([*(getattr(m.bit, name) for name in _BIT), *m.bit.recorded])
         found["counts"] = np.array([self.steps, m.halved, m.iterations, m.most])
-        if self.end is not None:
-            found["end"] = self.end.memory()
+        if self.end is not None and (memory := self.end.memory()):
+            found["end"] = memory
         return found
 
     def recall(self, memory: dict) -> None:
@@ -309,7 +336,7 @@ class AxialTorsional(StringModel):
             setattr(m.bit, name, value)
         m.bit.recorded = memory["bit"][len(_BIT) :].tolist()
         self.steps, m.halved, m.iterations, m.most = (int(x) for x in memory["counts"])
-        if self.end is not None:
+        if "end" in memory:
             self.end.recall(memory["end"])
 
     def _reasons(self):

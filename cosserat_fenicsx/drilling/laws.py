@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from scipy.interpolate import PchipInterpolator
+from scipy.interpolate import CubicHermiteSpline
 from scipy.optimize import brentq
 
 from cosserat_fenicsx.checks import call, number
@@ -26,6 +26,8 @@ SOURCES = tuple(Path(__file__).with_name(f"{name}.c") for name in ("strings", "w
 SLIPS = np.geomspace(1e-6, 1e3, 9 * 128 + 1)
 # Relative step of slopes by differences; share of the change between neighbours that is left of a drop; bisections.
 _STEP, _STAYS, _HALVINGS = 1e-5, 0.5, 45
+# Value at the least slip, over the largest one, of a law that is smooth through zero; error of a table, likewise.
+_SMOOTH, _CLOSE = 1e-3, 1e-8
 
 
 @dataclass(frozen=True)
@@ -108,7 +110,7 @@ def by_method(owner, name, *more) -> Resistance:
 def _sampled(owner, name, *more):
     function = checked(owner, name, *more)
     still, values = function(0.0), np.array([function(s) for s in SLIPS])
-    if still == 0 and values.any():
+    if still == 0 and values[0] > _SMOOTH * values.max():
         raise SceneError(
             f"{type(owner).__name__}.{name} = 0 at the speed 0: expected the largest value at rest, above 0 where "
             "there is one in motion"
@@ -152,6 +154,29 @@ def _steepest_fall(function, values):
     return 0.0, drops
 
 
+def _cubics(values):
+    """Cubics over ln s through values at `SLIPS`, of the fourth order where these are smooth, and monotone where these
+    are."""
+    x, secants = np.log(SLIPS), np.diff(values) / np.diff(np.log(SLIPS))
+    slopes = np.gradient(values, x, edge_order=2)
+    h = x[1] - x[0]
+    slopes[2:-2] = (8 * (values[3:-1] - values[1:-3]) - (values[4:] - values[:-4])) / (12 * h)
+    before, after = secants[:-1], secants[1:]
+    most = np.where(before * after > 0, 3 * np.minimum(abs(before), abs(after)), np.maximum(abs(before), abs(after)))
+    slopes[1:-1] = np.clip(slopes[1:-1], -most, most)
+    return CubicHermiteSpline(x, values, slopes)
+
+
+def tabulated(resistance: Resistance) -> CubicHermiteSpline | None:
+    """The table of a function over ln s which differs from it by at most 1e-8 of its range, None where it has none."""
+    if resistance.function is None or resistance.drops:
+        return None
+    values, middles = resistance(SLIPS), np.sqrt(SLIPS[:-1] * SLIPS[1:])
+    table = _cubics(values)
+    close = np.abs(table(np.log(middles)) - resistance(middles)).max() <= _CLOSE * values.max()
+    return table if close else None
+
+
 class InC:
     """A `Resistance` for C, with the memory that C refers to.
 
@@ -169,7 +194,7 @@ class InC:
             _answers(ffi)
             self._handle = ffi.new_handle(weakref.ref(self))
         elif resistance.function is not None:
-            self._cubics = np.ascontiguousarray(PchipInterpolator(np.log(SLIPS), resistance(SLIPS)).c.T)
+            self._cubics = np.ascontiguousarray(_cubics(resistance(SLIPS)).c.T)
 
     def fill(self, curve):
         """Fill C's record of a `curve`; a law in closed form needs none, and leaves it empty."""

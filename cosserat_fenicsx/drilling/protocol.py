@@ -11,7 +11,7 @@ import numpy as np
 
 from cosserat_fenicsx.algebra.building import Pointers
 from cosserat_fenicsx.drilling.laws import SOURCES
-from cosserat_fenicsx.drilling.top_drive import Sampler
+from cosserat_fenicsx.drilling.top_drive import Sample, Sampler
 from cosserat_fenicsx.errors import NotConverged
 
 #: Recorded at the end of every step. drive_speed, bit_speed: rad/s; drive_angle, bit_angle: rad; surface_torque: M at
@@ -54,7 +54,7 @@ class StringModel(Pointers):
 
     def __init__(self):
         super().__init__(*SOURCES)
-        self.steps, self._laws, self._sampler, self._top, self._kept = 0, [], None, None, {}
+        self.steps, self._laws, self._samplers, self._kept = 0, [], {}, {}
 
     def _array(self, record, name, values):
         """Give C's record a copy of an array, which is kept by its name."""
@@ -62,11 +62,20 @@ class StringModel(Pointers):
         array = self._kept[name] = np.array(values, dtype=np.int32 if whole else float, order="C")
         setattr(record, name, (self.integers if whole else self.doubles)(array))
 
-    def _set_sampler(self, drive, top):
-        """Take the samples of a `SampledControl`; `top`: C's record that holds the torque `given` by the drive."""
-        self._top = top
-        if drive.control.sampled:
-            self._sampler = Sampler(drive, self.dt)
+    def _sample_torque(self, drive, top, first=0.0):
+        """Take the samples of a drive's control; `top`: C's record that holds the torque `given` by the drive; `first`:
+        torque (N m) or speed (rad/s) before its first command acts."""
+        control, self._top = drive.control, top
+        if control.sampled:
+            name = "speed" if control.of_speed else "torque"
+            self._samplers["drive"] = Sampler(control, name, self.dt, drive.signal(), first)
+            self._given()
+
+    def _given(self):
+        """Give C the torque that a sampled control of the drive commands."""
+        sampler = self._samplers.get("drive")
+        if sampler and not self.scene.drive.control.of_speed:
+            self._top.given = sampler.command
 
     @property
     def time(self) -> float:
@@ -82,14 +91,13 @@ class StringModel(Pointers):
         Raises:
             NotConverged: a step fails however short it is; `rows` of the exception holds the steps before.
         """
-        start, last, sampler = self.steps, self.steps + steps, self._sampler
+        start, last, samplers = self.steps, self.steps + steps, self._samplers.values()
         rows, failed = np.empty((steps, 1 + len(SERIES) + len(LEDGER))), False
         while self.steps < last and not failed:
-            end = last
-            if sampler:
-                if self.steps % sampler.every == 0:
-                    self._top.given = sampler.torque(self.time, *map(float, self._at_drive()))
-                end = min(last, self.steps + sampler.left(self.steps))
+            for sampler in samplers:
+                sampler.at(self.steps, self._seen)
+            self._given()
+            end = min(last, *(self.steps + sampler.left(self.steps) for sampler in samplers), last)
             self._record(end - self.steps, rows[self.steps - start :])
             failed = self.steps < end
         rows = rows[: self.steps - start]
@@ -102,8 +110,8 @@ class StringModel(Pointers):
             raise problem
         return rows
 
-    def _at_drive(self):
-        """Speed (rad/s) and angle (rad) of the drive, and the torque (N m) that it hands down."""
+    def _seen(self) -> Sample:
+        """What sampled controls see, but for the speed asked for."""
         raise NotImplementedError
 
     def _record(self, steps, rows):
@@ -117,11 +125,13 @@ class StringModel(Pointers):
     def memory(self) -> dict[str, Any]:
         """All that later steps depend on, arrays and numbers, such that `recall` leads to the same digits."""
         found = {name: self._kept[name].copy() for name in self._changing}
-        return found | ({"control": self._sampler.state.copy(), "given": self._top.given} if self._sampler else {})
+        found |= {f"sampled_{name}": sampler.memory() for name, sampler in self._samplers.items()}
+        return found
 
     def recall(self, memory: dict[str, Any]) -> None:
         """Restore the result of `memory`."""
         for name in self._changing:
             self._kept[name][:] = memory[name]
-        if self._sampler:
-            self._sampler.state, self._top.given = memory["control"].copy(), float(memory["given"])
+        for name, sampler in self._samplers.items():
+            sampler.recall(memory[f"sampled_{name}"])
+        self._given()

@@ -4,8 +4,6 @@ All of the string turns at the drive's speed and moves at the hook's. The forces
 velocities twist and compress the string. The normal force at the wall depends on the tension, so it is iterated.
 """
 
-import math
-
 import numpy as np
 
 from cosserat_fenicsx.checks import refuse
@@ -20,7 +18,8 @@ def check_steady(scene) -> None:
     """
     drive = scene.drive
     gains = None if drive.speed is None or drive.control.sampled else drive.control.gains(1.0)
-    if gains is None or not (gains.rigid or gains.Ki > 0):
+    sampled = drive.speed is not None and drive.control.sampled
+    if not sampled and (gains is None or not (gains.rigid or gains.Ki > 0)):
         refuse("Drilling", "start", "steady", "'rest' with this drive: only Stiff(), and PI(Kp, Ki) with Ki above 0, "
                "have the speed asked for in steady rotation")  # fmt: skip
     speed = drive.signal()(0.0)
@@ -54,20 +53,8 @@ def steady_velocities(scene) -> np.ndarray:
     """
     turning = scene.drive.signal()(0.0)
     if follows_the_bit(scene):
-        return np.array([penetration(scene.bit, turning), turning])
+        return np.array([scene.bit.law.rate(scene.bit.weight, turning), turning])
     return np.array([0.0 if scene.hook is None else -scene.hook.signal()(0.0), turning])
-
-
-def penetration(bit, turning) -> float:
-    """Rate (m/s) at which a bit with a `Cutting` law drills by its weight at a speed of rotation (rad/s).
-
-    Raises:
-        SceneError: a weight that its wear flats bear.
-    """
-    law, idle = bit.law, bit.law.idle
-    if bit.weight <= idle:
-        refuse(bit, "weight", bit.weight, f"more than the wear flats carry, {idle:.6g} N")
-    return (bit.weight - idle) / law.axial_stiffness * law.blades * turning / (2 * math.pi)
 
 
 # Most iterations; relative change at which they end.

@@ -238,7 +238,8 @@ static void rub_by_weight(lower *bit)
         double slope;
         f.load = bit->weighs ? load : bit->hanging;
         f.scale = bit->weighs ? load > 0 : stands;
-        f.still = f.scale > 0 ? resistance_of_other(&f, 0, &slope) : 0;
+        if (f.other->self) f.still = f.scale > 0 ? resistance_of_other(&f, 0, &slope) : 0;
+        else f.still *= f.scale;
         f.slipping = f.scale > 0 ? resistance_of_other(&f, 1e-6, &slope) : 0;
     } else {
         const double factor = bit->weighs ? load : stands;

@@ -17,15 +17,18 @@ from typing import Annotated, Literal, NamedTuple
 import numpy as np
 
 from cosserat_fenicsx.checks import call, finite_array, number, refuse
+from cosserat_fenicsx.checks import positive as positive_number
 from cosserat_fenicsx.drilling.signals import ScalarSignal, doubt_speed
 from cosserat_fenicsx.parts import (
     AngularVelocity,
+    ForceSize,
     Inertia,
     InTime,
     Number,
     Part,
     Speed,
     Stiffness,
+    Time,
     Torque,
     TorsionalDamping,
     at_least,
@@ -54,6 +57,8 @@ class DriveControl(Part, family="control of a drive"):
         sampled: whether it is a `SampledControl`, called once a sample; the gains of others say all.
     """
 
+    # s by which it acts late in the linear theory.
+    late = 0.0
     sampled = False
     # In words, a control that needs a drive with an inertia.
     _needs_inertia = ""
@@ -79,17 +84,20 @@ class DriveControl(Part, family="control of a drive"):
 
 
 class SampledControl(DriveControl):
-    """Base of controls of your own that are called once a sample: I om' = T - M, with a constant torque T in between.
+    """Base of controls of your own that are called once a sample, for a torque T held constant in between, as in
+    I om' = T - M, or for a speed, which the drive reaches linearly until the next sample.
 
-    Derive a frozen dataclass from it, and write `torque`. Samples take whole steps. Such controls act in
-    `simulate`; where a scene has other uses for the drive, such as `stability`, they are refused, unless the
-    class has a method `gains` with the control of continuous time which it stands for.
+    Derive a frozen dataclass from it, and write `torque` or `speed`. The steps of a motion divide `sample`. Such
+    controls act in `simulate`; where a scene has other uses for the drive, such as `stability`, they are refused,
+    unless the class has a method `gains` with the control of continuous time which it stands for: there it is late by
+    half a sample and by the delay.
 
     Attributes:
-        sample: s from sample to sample; also as a field of the dataclass.
+        sample: s from sample to sample. delay: s from a sample to the moment when its command acts, rounded to whole
+            steps. Both also as fields of the dataclass.
     """
 
-    sample, sampled, _needs_inertia = 0.01, True, "a sampled control"
+    sample, delay, sampled = 0.01, 0.0, True
 
     def begin(self) -> tuple[float, ...]:
         """The state of the control at the start, numbers; checkpoints hold it. Nothing unless you write another."""
@@ -97,59 +105,161 @@ class SampledControl(DriveControl):
 
     def torque(self, state: np.ndarray, now: "Sample") -> tuple[float, np.ndarray]:
         """The torque of the drive until the next sample, N m, and the new state."""
-        raise NotImplementedError(f"{type(self).__name__}.torque(state, now) is missing")
+        raise NotImplementedError(f"{type(self).__name__}.torque(state, now) or .speed(state, now) is missing")
+
+    def speed(self, state: np.ndarray, now: "Sample") -> tuple[float, np.ndarray]:
+        """In place of `torque`: the speed of the drive at the next sample, rad/s, and the new state."""
+        raise NotImplementedError
+
+    @property
+    def of_speed(self) -> bool:
+        """Whether the class commands the speed."""
+        return type(self).speed is not SampledControl.speed
+
+    @property
+    def late(self) -> float:
+        return self.sample / 2 + self.delay
+
+    @property
+    def _needs_inertia(self):
+        return "" if self.of_speed else "a sampled control"
 
     def gains(self, impedance):
         refuse("TopDrive", "control", self, "Stiff(), PI(Kp, Ki), Matched() or Motor(torque) here: a control that is "
                f"called once a sample acts in drilling.simulate, unless {type(self).__name__} has gains")  # fmt: skip
 
 
+@dataclass(frozen=True)
+class TorqueOverTime(SampledControl):
+    """A motor whose torque is a function of time, held over every sample at its value in the middle.
+
+    Args:
+        values: N m, such as a `Ramp` or a `Table`. sample: s.
+
+    Raises:
+        SceneError: a torque that is not finite; a speed asked for beside it.
+    """
+
+    values: InTime[Torque]
+    sample: Annotated[Time, positive()] = 0.01
+
+    def torque(self, state, now):
+        return ScalarSignal(self, "values", self.values, "N m")(now.time + self.sample / 2), state
+
+    def check(self, drive):
+        super().check(drive)
+        if drive.speed is not None:
+            refuse(drive, "speed", drive.speed, "None: a motor of given torque has no speed asked for")
+
+
 class Sample(NamedTuple):
-    """The input of a `SampledControl`: time (s), speed asked for and speed of the drive (rad/s), angle of the drive
-    (rad), torque handed down to the string (N m)."""
+    """What a control that is called once a sample sees.
+
+    Attributes:
+        time: s. asked, speed: speed asked for and speed of the drive, rad/s. angle: of the drive, rad.
+        torque: handed down to the string, N m. hook_load: N. weight: by the hook, the hanging weight of the string at
+            rest less the hook load, N. block_speed: m/s, downwards. NaN along the axis for torsion alone.
+    """
 
     time: float
     asked: float
     speed: float
     angle: float
     torque: float
+    hook_load: float = math.nan
+    weight: float = math.nan
+    block_speed: float = math.nan
 
 
 class Sampler:
-    """The `SampledControl` of a drive in a motion in steps of dt (s).
+    """A control that is called once a sample, in a motion in steps of dt (s); the speed that it commands over time.
+
+    Args:
+        control: a `SampledControl`, or another object with sample, delay, begin, and torque or speed.
+        name: of its method, "torque" or "speed". first: the command before the first one acts, N m, rad/s or m/s.
+        asked: the `ScalarSignal` of the speed asked for.
 
     Attributes:
-        every: steps between samples. state: (n,).
+        every: steps between samples. command: the one that acts.
     """
 
-    def __init__(self, drive, dt):
-        self._control, self._signal = control, _ = drive.control, drive.signal()
-        self.every = max(1, round(control.sample / dt))
-        self.state = self._numbers("begin", control.begin())
+    constant, jumps = False, ()
+
+    def __init__(self, control, name, dt, asked, first=0.0):
+        self._control, self._name, self._signal = control, name, asked
+        self._dt, self.command = dt, first
+        self.every = round(control.sample / dt)
+        self._whole, self._after = divmod(round(control.delay / dt), self.every)
+        self._waiting, self._line = [], (0.0, first, 1.0, first)
+        self._state = self._numbers("begin", control.begin())
 
     def left(self, step: int) -> int:
-        """Steps from a step on to the next sample after it."""
-        return self.every - step % self.every
+        """Steps from a step on to the next one at which a sample is taken or a command begins to act."""
+        return min(self.every - step % self.every, self.every - (step - self._after) % self.every)
 
-    def torque(self, time: float, speed: float, angle: float, torque: float) -> float:
-        """Take a sample: the torque of the drive from now on, N m, see `Sample`.
+    def at(self, step: int, now) -> None:
+        """Take a sample, and let a command act, as far as it is time; `now`: function that gives the `Sample` but for
+        the speed asked for.
 
         Raises:
             SceneError: the control fails, or returns no numbers.
         """
-        now, where = Sample(time, self._signal(time), speed, angle, torque), f" at t = {time:g} s"
-        name = f"{type(self._control).__name__}.torque"
-        found = call(lambda state: self._control.torque(state, now), self.state.copy(), name, where)
+        if step % self.every == 0:
+            self._waiting.append(self._take(now()._replace(asked=self._signal(step * self._dt))))
+        if step % self.every == self._after and len(self._waiting) > self._whole:
+            start = step * self._dt
+            self._line = start, self(start), start + self.every * self._dt, self._waiting[0]
+            self.command = self._waiting.pop(0)
+
+    def __call__(self, t: float) -> float:
+        """The speed at a time (s), linear from one command to the next."""
+        start, old, end, new = self._line
+        return old + (new - old) * min(max((t - start) / (end - start), 0.0), 1.0)
+
+    def mean(self, start: float, end: float) -> float:
+        """Over a step."""
+        return (self(start) + self(end)) / 2
+
+    def _take(self, now):
+        where = f" at t = {now.time:g} s"
+        name = f"{type(self._control).__name__}.{self._name}"
+        found = call(lambda state: getattr(self._control, self._name)(state, now), self._state.copy(), name, where)
         if not isinstance(found, tuple) or len(found) != 2:
-            refuse(self._control, "torque", found, f"the torque (N m) and the new state{where}")
-        state = self._numbers("torque", found[1])
-        if state.shape != self.state.shape:
-            refuse(self._control, "torque", found[1], f"a state of {self.state.size} numbers{where}, as begin returned")
-        self.state = state
-        return number(self._control, "torque", found[0], f"a finite number (N m){where}", math.isfinite)
+            refuse(self._control, self._name, found, f"the {self._name} and the new state{where}")
+        state = self._numbers(self._name, found[1])
+        if state.shape != self._state.shape:
+            refuse(self._control, self._name, found[1],
+                   f"a state of {self._state.size} numbers{where}, as begin returned")  # fmt: skip
+        self._state = state
+        return number(self._control, self._name, found[0], f"a finite number{where}", math.isfinite)
 
     def _numbers(self, name, state):
         return finite_array(self._control, name, state, "a state of finite numbers").ravel().copy()
+
+    def memory(self) -> dict:
+        """All that later samples depend on."""
+        now = {"state": self._state.copy(), "waiting": np.array(self._waiting), "line": np.array(self._line)}
+        return now | {"command": self.command}
+
+    def recall(self, memory: dict) -> None:
+        """Restore the result of `memory`."""
+        self._state, self.command = memory["state"].copy(), float(memory["command"])
+        self._waiting, self._line = memory["waiting"].tolist(), tuple(memory["line"].tolist())
+
+
+def divided(control, dt: float, given: bool) -> float | None:
+    """The sample (s) that steps of a motion divide, None for controls of continuous time.
+
+    Raises:
+        SceneError: a step dt (s) that is `given` is longer than half of it, or the control has no such sample.
+    """
+    if not control.sampled:
+        return None
+    period = positive_number(control, "sample", control.sample, "s")
+    number(control, "delay", control.delay, "a delay from 0 on (s)", lambda x: 0 <= x < math.inf)
+    if given and period < 2 * dt * (1 - 1e-9):
+        refuse(control, "sample", period, f"at least two steps: {2 * dt:g} s for dt = {dt:g} s, or a shorter dt")
+    return period
 
 
 @dataclass(frozen=True)
@@ -281,22 +391,75 @@ class TopDrive(Part):
 
 
 @dataclass(frozen=True)
+class Autodriller(Part):
+    """A control of the block that holds the weight on bit: it goes down at Kp (W - w) + Ki int (W - w) dt, w the
+    hanging weight of the string less the hook load, within limits, at which the integral stops.
+
+    It is called once a sample, and the block reaches the speed linearly until the next one.
+
+    Args:
+        weight: W, N; None for a block that goes down at the `rate` alone. It may be a function of time.
+        Kp, Ki: m/(s N) and m/(s^2 N).
+        limits: of the speed of the block downwards, m/s. rate: a lower upper limit, of the rate of penetration, m/s.
+        sample: s.
+
+    Raises:
+        SceneError: neither weight nor rate, a weight without gains, or limits that do not ascend.
+    """
+
+    weight: InTime[Annotated[ForceSize, positive()]] | None = None
+    Kp: Annotated[float, Number(limits=at_least(0))] = 0.0
+    Ki: Annotated[float, Number(limits=at_least(0))] = 0.0
+    limits: tuple[Speed, Speed] = (0.0, 0.02)
+    rate: Annotated[Speed, positive()] | None = None
+    sample: Annotated[Time, positive()] = 0.02
+
+    delay, sampled = 0.0, True
+
+    def validate(self):
+        if self.weight is None and self.rate is None:
+            refuse(self, "weight", None, "the weight on bit to hold (N), or a rate (m/s)")
+        if self.weight is not None and not self.Kp + self.Ki > 0:
+            refuse(self, "Kp", self.Kp, "Kp (m/(s N)), Ki (m/(s^2 N)) or both above 0, about 1e-8 and 1e-9")
+        if not self.limits[0] < self.limits[1]:
+            refuse(self, "limits", self.limits, "the least and the largest speed of the block downwards (m/s)")
+
+    def begin(self):
+        """The integral, m/s."""
+        return (0.0,)
+
+    def speed(self, state, now):
+        """The speed of the block downwards at the next sample, m/s, and the new integral."""
+        low, high = self.limits[0], min(self.limits[1], self.rate or math.inf)
+        if self.weight is None:
+            return high, state
+        error = ScalarSignal(self, "weight", self.weight, "N")(now.time) - now.weight
+        more = self.Ki * self.sample * error
+        asked = self.Kp * error + float(state[0]) + more
+        stops = (asked > high and more > 0) or (asked < low and more < 0)
+        return min(max(asked, low), high), state + (0.0 if stops else more)
+
+
+@dataclass(frozen=True)
 class Hook(Part):
     """The travelling block with its lines.
 
     Args:
         stiffness: of lines and derrick, N/m; infinity for a rigid one.
         speed: of the block, m/s, upwards positive: a number, from the start on, or a function of time.
+        autodriller: an `Autodriller`, which moves the block in place of a speed.
 
     Raises:
-        SceneError: a stiffness that is not positive, or a speed that is no number.
+        SceneError: a stiffness that is not positive, a speed that is no number, or a speed beside an autodriller.
     """
 
     stiffness: Stiffness = math.inf
     speed: InTime[Speed] = 0.0
+    autodriller: Autodriller | None = None
 
     def validate(self):
-        self.signal()
+        if not (self.signal().constant and self.signal()(0.0) == 0) and self.autodriller is not None:
+            refuse(self, "speed", self.speed, "0 beside an autodriller, which moves the block")
 
     def signal(self) -> ScalarSignal:
         """The speed of the block at every time, m/s."""

@@ -31,7 +31,7 @@ from cosserat_fenicsx.drilling.laws import InC, check_bit
 from cosserat_fenicsx.drilling.protocol import PROFILE, StringModel
 from cosserat_fenicsx.drilling.scene import Drilling
 from cosserat_fenicsx.drilling.steady_start import check_steady, steady_velocities
-from cosserat_fenicsx.drilling.top_drive import Gains
+from cosserat_fenicsx.drilling.top_drive import Sample, divided
 from cosserat_fenicsx.drilling.wall_friction import law_of, wall_of
 from cosserat_fenicsx.well.components import DrillString
 
@@ -59,8 +59,9 @@ Part = namedtuple("Part", "time impedance top bottom")
 Cells = namedtuple("Cells", "dt depths impedance time turn joined unfit")
 
 
-def cells_of(segments, dt):
-    """The `Cells` of `Segment`s from the top down, for a step of dt (s) or the next shorter one that fits better."""
+def cells_of(segments, dt, period=None):
+    """The `Cells` of `Segment`s from the top down, for a step of dt (s) or the next shorter one that fits better, a
+    whole part of a period (s) if there is one."""
     parts, top = [], 0.0
     for segment in segments:
         bottom = top + segment.length
@@ -72,7 +73,7 @@ def cells_of(segments, dt):
         parts.append(part)
         top = bottom
     dt = min(dt, math.fsum(part.time for part in parts) / 4)
-    dt = _step([part.time for part in parts], dt)
+    dt = _step([part.time for part in parts], dt, period)
     parts, joined = _long_enough(parts, dt)
     depths, impedance, time, turn = [0.0], [], [], []
     unfit = 0.0
@@ -98,11 +99,12 @@ def _delays(steps):
     return delays, (1 - extra) / (1 + extra)
 
 
-def _step(times, dt):
-    """The step from 0.75 dt to dt for which travel times of so many seconds are nearest to whole numbers of steps."""
+def _step(times, dt, period=None):
+    """The step from 0.75 dt to dt for which travel times of so many seconds are nearest to whole numbers of steps; a
+    whole part of a period (s) if there is one."""
     times = np.array([time for time in times if time >= _SET.shortest * dt])
-    tried = [dt]
-    for time in times:
+    tried = [dt] if period is None else [period / math.ceil(period / dt * (1 - 1e-12))]
+    for time in times if period is None else [period]:
         tried.append(
             time / np.arange(math.ceil(time / dt * (1 - 1e-12)), math.floor(time / (_SET.least_step * dt)) + 1)
         )
@@ -190,7 +192,10 @@ class TorsionWaves(StringModel):
             dt = positive("TorsionWaves", "dt", dt, "s")
         if elements is not None:
             dt = min(time / positive("TorsionWaves", "elements", elements, "cells"), dt or math.inf)
+        given = dt is not None
         asked = dt = dt or time / min(max(scene.bit_depth / _SET.length, _SET.fewest), _SET.cells)
+        period = divided(scene.drive.control, dt, given)
+        dt = min(dt, period / 2) if period else dt
         if time / dt > _SET.most:
             refuse(
                 "TorsionWaves", "dt", dt, f"at least {1 / _SET.most:g} of the travel time of the string, {time:.4g} s"
@@ -204,7 +209,7 @@ class TorsionWaves(StringModel):
                            "speed of the bit is not determined")  # fmt: skip
                 refuse("Drilling", "friction", scene.friction, "a friction that decays more slowly with the "
                        f"speed: with {_SET.most:g} cells the speed at every place is not determined")  # fmt: skip
-            self.cells = cells = cells_of(scene.segments, dt)
+            self.cells = cells = cells_of(scene.segments, dt, period)
             self._set_nodes(drag)
             factor, at_bit = self._steepness()
             dt = cells.dt * min(_SET.narrower / factor if factor else 1.0, _SET.narrower)
@@ -215,6 +220,8 @@ class TorsionWaves(StringModel):
         if scene.start == "steady":
             check_steady(scene)
             self._set_steady(float(steady_velocities(scene)[1]))
+        else:
+            self._sample_torque(scene.drive, self.c)
 
     def _set_nodes(self, drag):
         """Impedances beside nodes, drag and friction at nodes."""
@@ -281,9 +288,10 @@ class TorsionWaves(StringModel):
             self._array(c, name, np.zeros(sizes.get(name, n + 1)))
         drive, bit = scene.drive, scene.bit
         c.bit, c.drive_inertia = bit is not None, drive.inertia
-        self._set_sampler(drive, c)
-        gains = Gains() if self._sampler else drive.control.gains(scene.segments[0].torsional_impedance)
-        c.stiff, c.given, c.Kp, c.Ki = gains
+        if drive.control.sampled:
+            c.stiff = drive.control.of_speed
+        else:
+            c.stiff, c.given, c.Kp, c.Ki = drive.control.gains(scene.segments[0].torsional_impedance)
         c.bit_inertia = 0.0 if bit is None else bit.inertia
         self._laws = [InC(self._ffi, self._wall)]
         self._laws[0].fill(c.wall)
@@ -310,17 +318,20 @@ class TorsionWaves(StringModel):
         c.drive_speed = c.bit_speed = speed
         c.last_on_bit = law[-1]
         c.integral = above[0] / c.Ki if c.Ki else 0.0
+        self._sample_torque(self.scene.drive, c, speed if c.stiff else above[0])
 
     @property
     def counts(self):
         """Iterations of Newton's method, of all nodes together; no step is ever halved."""
         return {"halved": 0, "iterations": int(self.c.iterations)}
 
-    def _at_drive(self):
-        return self.c.drive_speed, self._kept["angle"][0], self._kept["moment"][0]
+    def _seen(self):
+        now = self._kept
+        return Sample(self.time, 0.0, self.c.drive_speed, float(now["angle"][0]), float(now["moment"][0]))
 
     def _record(self, steps, rows):
-        signal, dt, buffer = self._signal, self.dt, self._ffi.from_buffer
+        dt, buffer = self.dt, self._ffi.from_buffer
+        signal = self._samplers["drive"] if self.scene.drive.control.sampled and self.c.stiff else self._signal
         if signal.constant:
             speeds = np.full(steps, signal(0.0))
         else:

@@ -4,7 +4,7 @@
 static inline friction law_at(const waves *w, int node)
 {
     friction f = {w->hold[node], w->slide[node], w->decay[node], NULL, 1, 1, 0};
-    if (w->wall.self || w->wall.count || w->rock.self) {
+    if (w->wall.self || w->wall.count || w->rock.self || w->rock.count) {
         const int bit = w->bit && node == w->cells;
         const curve *other = bit ? &w->rock : &w->wall;
         if (other->self || other->count) {

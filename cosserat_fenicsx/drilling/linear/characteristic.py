@@ -16,12 +16,13 @@ rigid rock stands. All are written without denominators.
 """
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import brentq
 
 from cosserat_fenicsx.checks import number, refuse
+from cosserat_fenicsx.drilling.bit_laws import Cutting
 from cosserat_fenicsx.drilling.laws import refuse_several_speeds
 from cosserat_fenicsx.drilling.linear.friction import WallDashpots
 from cosserat_fenicsx.drilling.linear.impedances import Guide, axial, torsional
@@ -214,6 +215,9 @@ class Steady:
         self.scene, self.kind = scene, kind
         self.law = scene.bit.law if scene.bit else None
         self.cuts = self.law is not None and self.law.drills
+        if self.cuts and not isinstance(self.law, Cutting):
+            refuse("BitOnRock", "law", self.law, "Cutting(...), or a law of the torque over the speed, in the linear "
+                   "theory")  # fmt: skip
         self.guide = torsional(scene) if kind == "torsion" else axial(scene)
         if self.cuts:
             axial(scene)  # refuses discs
@@ -286,7 +290,7 @@ class Steady:
                 refuse(self.scene.bit, "weight", None, "the weight on bit (N), or a Hook whose speed (m/s) is a "
                        "negative number: that of the block downwards")  # fmt: skip
             return rate
-        return penetration(replace(self.scene.bit, weight=weight), speed)
+        return self.law.rate(weight, speed)
 
     def equation(self, parameters):
         """The characteristic function of `parameters`."""

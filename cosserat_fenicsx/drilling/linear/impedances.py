@@ -258,13 +258,21 @@ def _free(s):
 
 
 def _drive_top(drive, impedance):
-    """The condition of the drive: (om, M) at the top and their derivatives, free of poles."""
-    (rigid, _, Kp, Ki), inertia = drive.control.gains(impedance), drive.inertia
+    """The condition of the drive: (om, M) at the top and their derivatives, free of poles; a control that is called
+    once a sample acts late by half a sample and its delay, exp(-s late)."""
+    control, inertia = drive.control, drive.inertia
+    (rigid, _, Kp, Ki), late = control.gains(impedance), control.late
     if rigid:
         return _held
-    if Ki:
-        return lambda s: (s, -(inertia * s**2 + Kp * s + Ki), 1.0, -(2 * inertia * s + Kp))
-    return lambda s: (1.0, -(inertia * s + Kp), 0.0, -inertia)
+
+    def top(s):
+        hold = np.exp(-late * s)
+        gain, slope = (Kp * s + Ki) * hold, (Kp - late * (Kp * s + Ki)) * hold
+        if Ki:
+            return s, -(inertia * s**2 + gain), 1.0, -(2 * inertia * s + slope)
+        return 1.0, -(inertia * s + Kp * hold), 0.0, -(inertia - late * Kp * hold)
+
+    return top
 
 
 def torsional(scene, walls=None) -> Guide:

@@ -1,0 +1,187 @@
+"""Controls that are called once a sample, linear ones, laws of the bit and autodrillers against independent truths."""
+
+import json
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import cosserat_fenicsx as cf
+from cosserat_fenicsx.drilling import (
+    Autodriller,
+    BitOnRock,
+    Discs,
+    Drilling,
+    Hook,
+    Matched,
+    RateLaw,
+    Rational,
+    SampledControl,
+    Stribeck,
+    TableLaw,
+    TopDrive,
+    TorqueOverTime,
+)
+from cosserat_fenicsx.parts import Time, Torque, TorsionalDamping, TorsionalStiffness
+
+STEEL = cf.Material(E=206e9, nu=0.3, density=7850.0)
+TRUTHS = json.loads((Path(__file__).parent / "reference" / "controls.json").read_text())
+
+
+def pipe(length):
+    """5 in pipe of the impedance 296.25 N m s/rad."""
+    return cf.well.DrillString([cf.well.Collar(length, None, 0.127, 0.10861, material=STEEL)])
+
+
+@dataclass(frozen=True)
+class Held(SampledControl):
+    """A PI control whose integral is summed at samples, with the torque that it begins with."""
+
+    Kp: TorsionalDamping
+    Ki: TorsionalStiffness
+    faster: float = 0.0
+    first: Torque = 0.0
+    sample: Time = 0.05
+    delay: Time = 0.0
+
+    def begin(self):
+        return (0.0,)
+
+    def torque(self, state, now):
+        error = now.asked + self.faster - now.speed
+        state = state + error * self.sample
+        return self.first + self.Kp * error + self.Ki * state[0], state
+
+    def gains(self, impedance):
+        return cf.drilling.Gains(Kp=self.Kp, Ki=self.Ki)
+
+
+def steady(string, drive, torque, inertia=0.0):
+    bit = BitOnRock(Stribeck(torque, torque), inertia=inertia)
+    return Drilling(string, drive, bit, start="steady")
+
+
+def at(history, times, *series):
+    """Rows over the times (s) of series at the ends of steps, or means of their own times."""
+    return np.column_stack([np.interp(times, when, values) for when, values in series])
+
+
+@pytest.mark.parametrize("name", [name for name in TRUTHS if "two inertias" in name])
+def test_sampled_on_two_inertias(name):
+    given, truth = TRUTHS[name]["input"], TRUTHS[name]["truth"]
+    begin = given["T0"] + given["c2"] * given["Om"]
+    control = Held(given["Kp"], given["Ki"], given["dOm"], begin, given["Ts"], given["late"] * given["Ts"])
+    discs = Discs((900.0, given["I2"]), (given["k"],), drags=(0.0, given["c2"]))
+    scene = steady(discs, TopDrive(given["Om"], given["I1"] - 900.0, control), given["T0"])
+    found = cf.drilling.simulate(scene, given["duration"], dt=given["Ts"] / 20, progress=False)
+    twist = found.drive_angle - found.bit_angle
+    rows = np.array(truth["rows: t, drive speed, disc speed, spring torque"])
+    expected = rows[:, 1:]
+    found = at(found, rows[:, 0], *((found.times, x) for x in (found.drive_speed, found.bit_speed, given["k"] * twist)))
+    np.testing.assert_allclose(found, expected, rtol=1e-4)
+
+
+def test_sampled_on_waves():
+    truth = TRUTHS["sampled PI, uniform string of waves, 2T = m Ts"]
+    given, truth = truth["input"], truth["truth"]
+    control = Held(given["Kp"], given["Ki"], given["dOm"], given["T0"], given["Ts"])
+    scene = steady(pipe(given["L"]), TopDrive(given["Om"], given["I"], control), given["T0"])
+    found = cf.drilling.simulate(scene, given["duration"] + 0.1, dt=given["Ts"] / 160, progress=False)
+    rows = np.array(truth["rows: t, drive speed, surface torque"])
+    got = at(found, rows[:, 0], (found.times, found.drive_speed), (found.mean_times, found.surface_torque))
+    np.testing.assert_allclose(got, rows[:, 1:], rtol=1e-4)
+
+
+def found_by(name):
+    """The motion of a stick-slip truth, above a matched impedance, from rest or steady as its code has it."""
+    given = TRUTHS[name]["input"]
+    law = {
+        "Coulomb": lambda: Stribeck(given["a"], given["b"]),
+        "Stribeck": lambda: Stribeck(given["a"], given["b"], given["c_law"]),
+        "rational": lambda: Rational(given["a"], given["b"]),
+    }[given["law"]]()
+    control = Matched(given["drive impedance over Z"] * given["Z"])
+    bit = BitOnRock(law, inertia=given["I"])
+    scene = Drilling(pipe(given["L"]), TopDrive(given["Om"], control=control), bit)
+    return cf.drilling.simulate(scene, given["duration"], elements=2000, save_every=1e-9 + 0.005, progress=False)
+
+
+@pytest.mark.parametrize("name", [name for name in TRUTHS if name.startswith("stick-slip, ")])
+def test_stick_slip_of_waves(name):
+    truth, found = TRUTHS[name]["truth"], found_by(name).stick_slip()
+    assert found.period == pytest.approx(truth["period"], rel=1e-4)
+    assert found.peak == pytest.approx(truth["peak"], rel=1e-4)
+
+
+def test_stick_slip_of_one_disc():
+    truth = TRUTHS["stick-slip of one disc, drop at once, exact cycle"]
+    given, truth = truth["input"], truth["truth"]
+    discs = Discs((1.0, given["J"]), (given["k"],), drags=(0.0, given["c"]))
+    scene = Drilling(discs, TopDrive(given["Om"]), BitOnRock(Stribeck(given["Ts"], given["Td"])))
+    found = cf.drilling.simulate(scene, 60.0, dt=1e-3, progress=False).stick_slip()
+    assert found.period == pytest.approx(truth["period"], rel=1e-4)
+    assert found.peak == pytest.approx(truth["largest speed of the disc"], rel=1e-4)
+
+
+def test_autodriller():
+    """Weight by the hook, to a thousandth of the weight asked for."""
+    given, truth = TRUTHS["autodriller"]["input"], TRUTHS["autodriller"]["truth"]
+    rows = np.array(truth["waves: t, weight at the hook, hook speed"])
+    control = Autodriller(given["Ws"], given["Kp"], given["Ki"])
+    bit = BitOnRock(RateLaw(given["c"]))
+    scene = Drilling(pipe(given["L"]), TopDrive(0.0), bit, hook=Hook(autodriller=control))
+    found = cf.drilling.simulate(scene, 200.1, elements=100, save_every=0.05, progress=False)
+    weight = scene.segments[0].weight * given["L"] - found.hook_load
+    np.testing.assert_allclose(np.interp(rows[:, 0], found.mean_times, weight), rows[:, 1], atol=1e-3 * given["Ws"])
+
+
+def test_torque_over_time():
+    """On an inertia alone the speed is the integral of the torque."""
+    control = TorqueOverTime(cf.signals.Ramp((2e3,), end=2.0))
+    scene = Drilling(Discs((100.0, 100.0), (1e5,)), TopDrive(None, 800.0, control))
+    found = cf.drilling.simulate(scene, 4.0, progress=False)
+    assert (found.drive_speed[-1] * 900 + found.bit_speed[-1] * 100) == pytest.approx(6e3, rel=1e-6)
+
+
+@pytest.mark.parametrize(("make", "words"), [
+    (lambda: TableLaw((0.0, 2.0, 1.0), (3e3, 2e3, 1e3)), "TableLaw.speeds = .*begin at 0 and ascend"),
+    (lambda: TableLaw((0.0, 2.0), (3e3, -2e3)), "TableLaw.torques"),
+    (lambda: Rational(0.0, 2.0), "Rational.peak = 0"),
+    (lambda: Autodriller(1e5), "Autodriller.Kp = 0.0"),
+    (lambda: Autodriller(), "Autodriller.weight = None"),
+    (lambda: Autodriller(1e5, 1e-8, limits=(0.1, 0.0)), "Autodriller.limits"),
+    (lambda: Hook(speed=0.1, autodriller=Autodriller(rate=0.01)), "Hook.speed = 0.1: expected 0 beside"),
+])  # fmt: skip
+def test_refused_by_name(make, words):
+    with pytest.raises(cf.SceneError, match=words):
+        make()
+
+
+def test_samples_shorter_than_two_steps_are_refused():
+    scene = Drilling(pipe(1000.0), TopDrive(6.0, 2900.0, Held(1e3, 1e3, sample=0.01)))
+    with pytest.raises(cf.SceneError, match="Held.sample = 0.01: expected at least two steps"):
+        cf.drilling.simulate(scene, 1.0, dt=0.008)
+
+
+def test_a_table_is_met_by_its_curve(tmp_path):
+    """Close to the law that it samples; stored and resumed with an autodriller and a delayed control."""
+    speeds = np.linspace(0.0, 40.0, 400) ** 1.5 / 40**0.5
+    law = Stribeck(6e3, 4e3, 3.0)
+    table = TableLaw(tuple(speeds), tuple(law.torque(x, 0.0) for x in speeds))
+    scene = Drilling(pipe(1000.0), TopDrive(6.0, 2900.0, Held(1e3, 1e3, delay=0.07)), BitOnRock(table, inertia=350.0))
+    whole = cf.drilling.simulate(scene, 6.0, progress=False)
+    smooth = replace(scene, bit=replace(scene.bit, law=law))
+    expected = cf.drilling.simulate(smooth, 6.0, progress=False)
+    assert np.abs(whole.bit_speed - expected.bit_speed).max() < 0.02
+    cf.drilling.simulate(scene, 3.333, folder=tmp_path / "run", progress=False)
+    np.testing.assert_array_equal(cf.resume(tmp_path / "run", scene, duration=6.0).rows, whole.rows)
+    drilled = Drilling(
+        pipe(500.0),
+        TopDrive(6.0),
+        BitOnRock(RateLaw(18e6, "2 kN m")),
+        hook=Hook(autodriller=Autodriller("10 kN", 2e-7)),
+    )
+    whole = cf.drilling.simulate(drilled, 2.0, progress=False)
+    cf.drilling.simulate(drilled, 1.01, folder=tmp_path / "down", progress=False)
+    np.testing.assert_array_equal(cf.resume(tmp_path / "down", duration=2.0).rows, whole.rows)
