@@ -18,7 +18,7 @@ export VTK_DEFAULT_OPENGL_WINDOW = vtkEGLRenderWindow
 # A numpy in the user's own site directory would hide the distribution's.
 export PYTHONNOUSERSITE = 1
 
-.PHONY: help setup packages demo animation motion gallery well string whirl recipes test docs tutorials tables figure3 work-precision benchmarks cosseratbench failures rods-in-wells folders truths random random-wells imperfect mutants release clean
+.PHONY: help setup packages demo animation motion gallery well string whirl recipes test docs tutorials tables figure3 work-precision benchmarks cosseratbench failures rods-in-wells folders tangles truths random random-wells imperfect mutants release clean
 
 help:
 	@echo "Times are those of two cores and an empty cache of compiled forms, after \`make setup\`."
@@ -128,6 +128,9 @@ rods-in-wells: setup
 truths: setup
 	$(PYTHON) demos/evidence/truths.py
 	$(PYTHON) demos/evidence/put_in_docs.py truths
+
+tangles: setup
+	$(PYTHON) -m pytest tests/test_rod_contact.py -k passes_through --tangles 300
 
 folders: setup
 	$(PYTHON) -m pytest tests/test_store.py -k damaged_folders --mutations 200

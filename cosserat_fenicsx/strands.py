@@ -15,7 +15,7 @@ import numpy as np
 CROSSING = 0.2
 # Places of an element where strands are compared first; Newton steps to the nearest points; their largest size, in
 # elements, and the one at which they end.
-_PLACES, _STEPS, _LONGEST, _ENOUGH = 4, 40, 0.7, 1e-12
+_PLACES, _STEPS, _LONGEST, _ENOUGH = 4, 40, 0.7, 1e-10
 # Smallest determinant of the equations of two nearest points, for unit tangents, at which both are varied.
 _PARALLEL = 1e-3
 # The neighbours of a pair of places.
@@ -94,10 +94,15 @@ class Strands:
         self._next = np.where(np.append(same, False), count + 1, -1)
         self._before = np.where(np.insert(same, 0, False), count - 1, -1)
         #: (elements, 3 (p + 1)) the nodes of the elements before, of each, and after it; its own where there is none
-        self.neighbours = np.where(self._before < 0, count, self._before), count, np.where(self._next < 0, count, self._next)
+        self.neighbours = (
+            np.where(self._before < 0, count, self._before),
+            count,
+            np.where(self._next < 0, count, self._next),
+        )
         self.stencil = np.concatenate([cells[k] for k in self.neighbours], axis=1)
         #: the elements that another one of their rod follows, and those that follow
         self.joined = np.flatnonzero(self._next >= 0), self._next[self._next >= 0]
+        self._slopes = rule.derivative([0.0, 1.0], 1)
         cubics = [np.polynomial.Polynomial(c) for c in ((0, 1, -2, 1), (0, 0, -1, 1))]
         self._hermite = np.zeros((3, 2, 4))
         for order in range(3):
@@ -110,9 +115,20 @@ class Strands:
         own[1:, 0] = ~same
         self._slave, self._slave_node = np.nonzero(own)
 
+    @classmethod
+    def of(cls, scene, layout, rule, length):
+        """Those of a scene with a `RodContact` on a mesh, in a unit of length (m)."""
+        action, counts, p = scene.rod_contact, layout.counts, len(rule.nodes) - 1
+        rods = np.repeat(np.arange(len(counts)), counts)
+        cells = (p * np.arange(len(rods)) + rods)[:, None] + np.arange(p + 1)
+        radii = np.array([action.radius_of(rod) if action.acts_on(rod) else 0.0 for rod in scene.rods]) / length
+        starts = [b[:-1] * rod.length / length for b, rod in zip(layout.breaks, scene.rods, strict=True)]
+        sizes, apart = layout.sizes(scene) / length, action.apart(scene).scaled(length)
+        return cls(cells, rods, sizes, np.concatenate(starts), radii[rods], rule, apart)
+
     def basis(self, element, place, order=0):
         """(n, 3 (p + 1)) derivatives of an order of the basis by the place in the element, of `stencil`."""
-        own, slopes = self._rule.derivative(place, order), self._rule.derivative([0.0, 1.0], 1)
+        own, slopes = self._rule.derivative(place, order), self._slopes
         start, end = (np.polynomial.polynomial.polyval(place, self._hermite[order, k]) / 2 for k in (0, 1))
         before, after = self._before[element], self._next[element]
         start, end = np.where(before < 0, 0.0, start)[:, None], np.where(after < 0, 0.0, end)[:, None]
@@ -122,8 +138,10 @@ class Strands:
 
     def at(self, x, element, place, order=0):
         """(n, 3) position, or its derivative by arc length, for positions x (N, 3) of the nodes."""
-        values = np.einsum("nj,nji->ni", self.basis(element, place, order), x[self.stencil[element]])
-        return values / self.sizes[element][:, None] ** order
+        nodes = x[self.stencil[element]]
+        first = nodes[:, :1]  # subtracted for the sake of rounding
+        values = np.einsum("nj,nji->ni", self.basis(element, place, order), nodes - first)
+        return values / self.sizes[element][:, None] ** order if order else values + first[:, 0]
 
     def s(self, element, place):
         """(n,) arc lengths."""
@@ -248,7 +266,7 @@ class Strands:
     def _once(self, found):
         """Each pair of points once."""
         s = np.column_stack([self.s(found.element[:, k], found.place[:, k]) for k in (0, 1)])
-        close, kept = 1e-6 * self.radii.min(), []
+        close, kept = 1e-6 * self.radii.max(), []
         for k in np.argsort(found.distance, kind="stable"):
             same = [n for n in kept if (self.rods[found.element[n]] == self.rods[found.element[k]]).all()
                     and np.abs(s[n] - s[k]).max() < close]  # fmt: skip

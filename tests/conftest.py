@@ -25,8 +25,14 @@ sys.path += [str(DEMOS), str(DEMOS / "evidence")]
 
 
 def pytest_addoption(parser):
+    parser.addoption("--tangles", type=int, default=3, help="random tangles of rods that touch")
     parser.addoption("--mutations", type=int, default=12, help="damaged folders of each kind of computation")
     parser.addoption("--truths", action="store_true", help="only what is compared with independent truths by `truth`")
+
+
+def pytest_generate_tests(metafunc):
+    if "tangle" in metafunc.fixturenames:
+        metafunc.parametrize("tangle", range(metafunc.config.getoption("--tangles")))
 
 
 @pytest.hookimpl(trylast=True)

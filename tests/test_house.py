@@ -56,6 +56,7 @@ SHARED = {
     "quantities",
     "ranks",
     "remember",
+    "strands",
     "units",
 }
 ROOMS = {

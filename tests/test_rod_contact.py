@@ -54,7 +54,7 @@ def test_a_ring_is_pulled_until_it_touches_itself():
     section = cf.Stiffness(RIGID, math.inf, (EI, EI), EI)
     a, b = (cf.Rod(cf.Arc((0, 0, 0), (-R, 0, 0), turn), section, name=name) for name, turn in
             (("a", -math.pi), ("b", math.pi)))  # fmt: skip
-    touch = cf.RodContact(radius=radius)
+    touch = cf.RodContact(radius=radius, exclude=0.4)  # the ends that are pulled are thinner bends than rods
     joints = [cf.Joint(a.start, b.start), cf.Joint(a.end, b.end)]
     scene = cf.Scene([a, b], [cf.Clamp(a.start)], [touch, cf.Force(a.end, (1.0, 0, 0))], joints=joints)
     path = cf.solve(scene, [2.0, 6.0], elements=n)
@@ -115,11 +115,10 @@ def closest(path, radius):
     return smallest / (2 * radius)
 
 
-@pytest.mark.parametrize("seed", range(4))
-def test_no_rod_passes_through_another(seed):
-    """Rods at random angles, whose ends are moved through each other by many diameters: each path ends with rods that
+def test_no_rod_passes_through_another(tangle):
+    """Two to five rods at random angles, whose ends are moved through each other by many diameters: each path ends with rods that
     hold each other, or with the contact by name; none is crossed."""
-    random, radius, count = np.random.default_rng(seed), 0.02, 3
+    random, radius, count = np.random.default_rng(tangle), 0.02, 2 + tangle % 4
     section = cf.Stiffness((1e4, 1e4), 1e4, (1.0, 1.0), 0.8)
     rods, supports = [], []
     for k in range(count):
@@ -131,7 +130,7 @@ def test_no_rod_passes_through_another(seed):
         moved = {"displacement": (0, 0, -0.12 * k), "rotation": (0, 0, 0)}
         supports += [cf.Prescribed(end, **moved) if k else cf.Clamp(end) for end in (rod.start, rod.end)]
     try:
-        path = cf.solve(cf.Scene(rods, supports, [cf.RodContact(radius=radius)]), np.linspace(0.25, 1, 4), elements=12)
+        path = cf.solve(cf.Scene(rods, supports, [cf.RodContact(radius=radius)]), np.linspace(0.25, 1, 4), elements=10)
     except cf.NotConverged as failure:
         path = failure.path
         assert "next to rod" in str(failure)

@@ -79,7 +79,10 @@ class RodContact(LineAction):
         for pair in self.pairs or ():
             a, b = (scene.number(scene.rod(name)) for name in pair)
             allowed[a, b] = allowed[b, a] = True
-        exclude = [math.pi * self.radius_of(rod) if self.exclude is None else self.exclude for rod in rods]
+        exclude = [
+            math.pi * self.radius_of(rod) if self.exclude is None and self.acts_on(rod) else self.exclude or 0.0
+            for rod in rods
+        ]
         joints = [(scene.number(x.first.rod), x.first.s, scene.number(x.second.rod), x.second.s) for x in scene.joints]
         return Apart(joints, exclude, allowed)
 
@@ -88,6 +91,8 @@ class RodContact(LineAction):
         function (rod, arc lengths (k,)) -> (k, 3) points."""
         found = []
         for i, rod in enumerate(rods):
+            if not self.acts_on(rod):
+                continue
             radius = self.radius_of(rod)
             s = np.linspace(0, rod.length, 2 + min(_MOST, math.ceil(rod.length / (_SIDE * radius))))
             found.append((at(rod, s), np.full(len(s), i), s, np.full(len(s), radius)))
@@ -121,6 +126,3 @@ class RodContact(LineAction):
                 f"{-gap[k]:.3g} m at rest: expected rods that touch at most; `exclude` is the arc length next to a "
                 "point, or to a joint, within which rods do not touch"
             )
-
-    def breaks(self, rod):
-        return ()

@@ -147,12 +147,11 @@ def contacts_in_words(path):
     for obstacle in path.scene.actions:
         if obstacle.gaps is None or not len(path):
             continue
-        told, grazing, depth = [], "", 0.0
+        told, depth = [], 0.0
         for rod, x in zip(path.scene.rods, path.layout.node_s(path.rule.nodes), strict=True):
             if obstacle.acts_on(rod):
                 gap, _ = _gaps(path, obstacle, rod, x)
                 depth = max(depth, -gap.min())
-                grazing = grazing or _grazing(path.scene, rod, x * rod.length, gap[-1])
         if obstacle.law is None and depth > 0:
             told.append(f"lets rods in by up to {depth:.2g} m")
         if obstacle.friction and path.counts_modes and obstacle.law is None:
@@ -167,8 +166,7 @@ def contacts_in_words(path):
                 "stiffness makes that, and estimated errors do not contain it."
             )
         yield from slanted(path, obstacle)
-        if grazing and path.counts_modes:
-            yield f"{grazing} {describe(obstacle)} {_LIFTS}."
+    yield from lifting(path)
 
 
 def slanted(path, obstacle):
@@ -188,6 +186,19 @@ def slanted(path, obstacle):
             f"{describe(obstacle)} pushes along rods by up to {share:.2g} of its pressure, which no surface does: rods "
             "touch it beside their nodes. Expected more elements there, or a tol, which puts a node there."
         )
+
+
+def lifting(path):
+    """Sentences on rods that touch an obstacle in the last state without pressing on it: stability does not see that
+    they may lift off."""
+    obstacles = [action for action in path.scene.actions if action.gaps is not None]
+    for obstacle in obstacles if len(path) and path.counts_modes else ():
+        last = path[len(path) - 1]
+        for rod, x in zip(path.scene.rods, path.layout.node_s(path.rule.nodes), strict=True):
+            if obstacle.acts_on(rod):
+                if where := _grazing(path.scene, rod, x * rod.length, _gaps(last, obstacle, rod, x)[0][-1]):
+                    yield f"{where} {describe(obstacle)} {_LIFTS}."
+                    break
 
 
 _LIFTS = "without pressing on it: stability counts it as held there both ways, and does not see that it may lift off"

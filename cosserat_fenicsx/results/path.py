@@ -62,7 +62,9 @@ _QUANTITIES = by_name(
 )  # fmt: skip
 
 
-_ROD_FORCE = Quantity("rod_force", "force of other rods at a node", "N", "xyz", "inertial", ("point", "s"), nodal_forces)
+_ROD_FORCE = Quantity(
+    "rod_force", "force of other rods at a node", "N", "xyz", "inertial", ("point", "s"), nodal_forces
+)
 
 
 class Path(RodResult):

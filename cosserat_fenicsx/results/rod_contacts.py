@@ -7,7 +7,6 @@ import numpy as np
 from cosserat_fenicsx.errors import NotConverged
 from cosserat_fenicsx.quantities import Quantity, Units
 from cosserat_fenicsx.results import screen
-from cosserat_fenicsx.results.compared import all_cell_nodes
 from cosserat_fenicsx.strands import CROSSING, Strands, closest_segments
 
 # Gaps over the radius up to which rods may touch; forces over the largest that are rounding.
@@ -48,7 +47,9 @@ class RodContacts:
         if not len(self):
             return f"{self._title}: no contact"
         columns = [getattr(self, x.name) for x in _COLUMNS]
-        return screen.as_text(screen.table(list(zip(_COLUMNS, columns, strict=True)), Units(), screen.ROWS, self._title))
+        return screen.as_text(
+            screen.table(list(zip(_COLUMNS, columns, strict=True)), Units(), screen.ROWS, self._title)
+        )
 
 
 _COLUMNS = (
@@ -62,19 +63,10 @@ _COLUMNS = (
 )
 
 
-def strands_of(path):
-    """The `Strands` of a path's rods, in the unit of length of the path."""
-    scene, layout, length = path.scene, path.layout, path.scales.length
-    action, rods = scene.rod_contact, np.repeat(np.arange(len(layout.counts)), layout.counts)
-    radii = np.array([action.radius_of(rod) if action.acts_on(rod) else 0.0 for rod in scene.rods]) / length
-    starts = [b[:-1] * rod.length / length for b, rod in zip(layout.breaks, scene.rods, strict=True)]
-    sizes, cells = layout.sizes(scene) / length, all_cell_nodes(layout, path.degree)
-    return Strands(cells, rods, sizes, np.concatenate(starts), radii[rods], path.rule, action.apart(scene).scaled(length))
-
-
 def rod_contacts_of(path, k):
     """See `Path.rod_contacts`."""
-    strands, length, record = strands_of(path), path.scales.length, path._records[k]
+    length, record = path.scales.length, path._records[k]
+    strands = Strands.of(path.scene, path.layout, path.rule, length)
     counts = [n * path.degree + 1 for n in path.layout.counts]
     x = record.rq[:, :3] + np.repeat(path.scene.origins / length, counts, axis=0)
     found, _ = strands.near(x, _TOUCHES * strands.radii.max())
@@ -84,7 +76,9 @@ def rod_contacts_of(path, k):
     for i in range(len(found)):
         np.add.at(matrix[..., i], nodes[i], gradients[i])
     np.add.at(total, strands.cells, record.rod_forces)
-    forces = np.linalg.lstsq(matrix.reshape(-1, len(found)), total.ravel(), rcond=None)[0] if len(found) else np.zeros(0)
+    forces = (
+        np.linalg.lstsq(matrix.reshape(-1, len(found)), total.ravel(), rcond=None)[0] if len(found) else np.zeros(0)
+    )
     held = forces > _NOTHING * np.abs(forces).max(initial=0.0)
     found, forces = found.of(held), forces[held] * path.scales.force
     names = np.array([rod.name for rod in path.scene.rods])
@@ -135,6 +129,4 @@ def check_apart(path, whole=None):
             )
 
 
-_ANGLE = (
-    f"; strands that touch along a line, at an angle whose sine is below {CROSSING:g}, touch at the nodes of the mesh alone"
-)
+_ANGLE = f"; strands that touch along a line, at an angle whose sine is below {CROSSING:g}, touch at the nodes of the mesh alone"

@@ -22,7 +22,7 @@ from cosserat_fenicsx.ranks import communicator
 from cosserat_fenicsx.remember import per_scene
 from cosserat_fenicsx.results.accuracy import FEW
 from cosserat_fenicsx.results.compared import NAMES, Criterion, criteria_of
-from cosserat_fenicsx.results.contacts import check_passes, slanted
+from cosserat_fenicsx.results.contacts import check_passes, lifting, slanted
 from cosserat_fenicsx.results.path import Path
 from cosserat_fenicsx.scene.action import path_dependent, rubs
 from cosserat_fenicsx.scene.describe import describe
@@ -203,12 +203,13 @@ def solve(
             "netlib's reference BLAS solves the equations where rods meet: OpenBLAS takes about a third of the time "
             "for them (on Debian: apt install libopenblas0-serial)"
         )
-    if elements is not None:
-        for part in path.parts.values() if scene.stages else [path]:
-            told = [words for x in part.scene.actions if x.gaps is not None for words in slanted(part, x)]
-            path.why.extend(told)
-            for words in told if comm.rank == 0 else ():
-                warn(words)
+    for part in path.parts.values() if scene.stages else [path]:
+        told = list(lifting(part))
+        if elements is not None:
+            told += [words for x in part.scene.actions if x.gaps is not None for words in slanted(part, x)]
+        path.why.extend(told)
+        for words in told if comm.rank == 0 else ():
+            warn(words)
     if oscillates:
         path.why.append(
             "with more Gauss points than the degree, contact forces and moments oscillate inside elements: tol bounds "

@@ -25,8 +25,9 @@ _SHARE, _WIDEST = 0.35, 0.5
 _REACH = 8.0
 # Least distance of two centrelines, over the sum of the radii.
 _CLOSEST = 0.5
-# Size of a full step (rod lengths, rad) at which it ends, and below which it may end where steps shrink tenfold.
-_SETTLED, _SMALL = 1e-12, 1e-9
+# Size of a full step (rod lengths, rad) at which it ends, this one or, by the contraction, the next; and of two in turn
+# that rounding leaves.
+_SETTLED, _ROUNDING = 1e-11, 1e-8
 # Iterations allowed, and those after which shares of steps are taken in turn.
 _MOST, _PATIENCE, _SHARES = 200, 25, (1.0, 0.5, 0.7)
 # Distance from an element's end, in elements, that is at it.
@@ -75,19 +76,14 @@ class RodContacts:
 
     def __init__(self, problem):
         model = problem.model
-        action, scene, layout, length = model.scene.rod_contact, model.scene, model.layout, model.scales.length
+        scene, layout, length = model.scene, model.layout, model.scales.length
         self._problem, self._model, self._length = problem, model, length
-        order = np.argsort(model.slots)
-        self._nodal = model.nodal[order][:, :3]
+        self._nodal = model.nodal[np.argsort(model.slots)][:, :3]
         self._rows = model.numbering.rows[self._nodal]
-        rods = np.repeat(np.arange(len(layout.counts)), layout.counts)
-        p = model.signature.degree
-        cells = (p * np.arange(len(rods)) + rods)[:, None] + np.arange(p + 1)
-        radii = np.array([action.radius_of(rod) if action.acts_on(rod) else 0.0 for rod in scene.rods]) / length
-        starts = np.concatenate([b[:-1] * rod.length for b, rod in zip(layout.breaks, scene.rods, strict=True)])
-        apart = action.apart(scene).scaled(length)
-        self.strands = Strands(cells, rods, layout.sizes(scene) / length, starts / length, radii[rods], model.rule, apart)
-        self._origins = np.repeat(scene.origins / length, np.bincount(rods) * p + 1, axis=0)
+        self.strands = Strands.of(scene, layout, model.rule, length)
+        counts = np.multiply(layout.counts, model.signature.degree) + 1
+        self._origins = np.repeat(scene.origins / length, counts, axis=0)
+        radii = self.strands.radii
         self._radius, self._largest = radii[radii > 0].min(), radii.max()
         self._newton = _Steps(problem, self)
         self._negative = problem.numbering.vector(), problem.numbering.vector()
@@ -167,7 +163,9 @@ class RodContacts:
             self._touches, self._forces = touches, forces
             size = max(step.moved, step.turned)
             whole = step.share == 1.0
-            if whole and (size < _SETTLED or (sizes and size < _SMALL and size < 0.1 * sizes[-1])):
+            last = sizes[-1] if sizes else 0.0  # of a full step before
+            shrinks = size < 0.1 * last and size * size < _SETTLED * last
+            if whole and (size < _SETTLED or shrinks or size < last < _ROUNDING):
                 self._take(touches, forces, 0)
                 return self._confirmed(newton.iterations)
             sizes = [*sizes, size] if whole else []
@@ -275,7 +273,11 @@ class RodContacts:
             inner = np.diag(1 / np.array(factors)) - S[:q, :q]
             removed = np.count_nonzero(np.linalg.eigvalsh(inner) < 0) - np.count_nonzero(np.array(factors) < 0)
         whole = np.zeros((len(near),) * 2)
-        M = np.linalg.solve(np.eye(q) - np.array(factors)[:, None] * S[:q, :q], np.diag(factors)) if q else np.zeros((0, 0))
+        M = (
+            np.linalg.solve(np.eye(q) - np.array(factors)[:, None] * S[:q, :q], np.diag(factors))
+            if q
+            else np.zeros((0, 0))
+        )
         whole[np.ix_(near, near)] = S[q:, q:] + S[q:, :q] @ M @ S[:q, q:]
         self._last = whole, removed
         return True

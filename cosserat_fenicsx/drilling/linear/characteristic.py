@@ -28,7 +28,6 @@ from cosserat_fenicsx.drilling.linear.friction import WallDashpots
 from cosserat_fenicsx.drilling.linear.impedances import Guide, axial, torsional
 from cosserat_fenicsx.drilling.linear.roots import Box
 from cosserat_fenicsx.drilling.signals import doubt_speed
-from cosserat_fenicsx.drilling.steady_start import penetration
 from cosserat_fenicsx.parts import Number, Values, at_least, positive
 
 
