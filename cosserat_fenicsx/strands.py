@@ -238,11 +238,10 @@ class Strands:
         found = self._once(found)
         total = self.radii[found.element].sum(axis=1)
         closest = (found.distance / total).min(initial=np.inf)
-        tangents = [self.at(x, found.element[:, k], found.place[:, k], 1) for k in (0, 1)]
-        sine = np.linalg.norm(np.cross(*(t / np.linalg.norm(t, axis=1)[:, None] for t in tangents)), axis=1)
-        crosses = (sine > CROSSING) | ~found.slides.all(axis=1)
+        crosses = (self._sines(x, found) > CROSSING) | ~found.slides.all(axis=1)
         parts = [found.of(crosses & (found.gap < reach))]
-        if not crosses.all():
+        along = self.at(x, self._of, self._at, 1)
+        if (_sine(along[i], along[j]) <= CROSSING).any():
             parts.append(self._lines(x, points, cut, reach))
         joined = Touches(*(np.concatenate([getattr(p, n) for p in parts]) for n in Touches.__dataclass_fields__))
         return joined, closest
@@ -301,9 +300,11 @@ class Strands:
         element = np.c_[self._slave[k], self._of[master]]
         node = self.cells[self._slave[k], self._slave_node[k]]
         found = self._made(x, element, np.c_[places[k], self._at[master]], node)
-        tangents = [self.at(x, found.element[:, i], found.place[:, i], 1) for i in (0, 1)]
-        sine = np.linalg.norm(np.cross(*(t / np.linalg.norm(t, axis=1)[:, None] for t in tangents)), axis=1)
-        return found.of((sine <= CROSSING) & found.slides[:, 1] & (found.gap < reach))
+        return found.of((self._sines(x, found) <= CROSSING) & found.slides[:, 1] & (found.gap < reach))
+
+    def _sines(self, x, found):
+        """(m,) sines of the angles of the strands."""
+        return _sine(*(self.at(x, e, place, 1) for e, place in zip(found.element.T, found.place.T, strict=True)))
 
     # -- derivatives -------------------------------------------------------------------------------------------------
 
@@ -317,29 +318,48 @@ class Strands:
         return np.concatenate([-first, second], axis=1)[..., None] * touches.normal[:, None, :]
 
     def curvatures(self, x, touches):
-        """(m, 3 n, 3 n) second derivatives of the gaps by the positions of `nodes_of`, with the points that slide."""
+        """The second derivatives of the gaps by the positions of `nodes_of`, with the points that slide, as sums of
+        products of columns: sum_k factor_k c_k c_k^T.
+
+        Returns:
+            columns (m, 4, 3 n), factors (m, 4).
+        """
         m, p = len(touches), self.stencil.shape[1]
-        values, slopes = ([self.basis(e, place, order) / self.sizes[e][:, None] ** order
-                           for e, place in zip(touches.element.T, touches.place.T, strict=True)] for order in (0, 1))  # fmt: skip
-        W, T = np.zeros((m, 3, 2 * p, 3)), np.zeros((2, m, 3, 2 * p, 3))
-        for i in range(3):
-            W[:, i, :p, i], W[:, i, p:, i] = -values[0], values[1]
-            T[0, :, i, :p, i], T[1, :, i, p:, i] = -slopes[0], slopes[1]
-        W, T = W.reshape(m, 3, 6 * p), T.reshape(2, m, 3, 6 * p)
-        w = touches.normal * touches.distance[:, None]
-        t, tt = ([sign * self.at(x, touches.element[:, k], touches.place[:, k], order)
-                  for k, sign in ((0, -1), (1, 1))] for order in (1, 2))  # fmt: skip
-        A = np.stack([np.einsum("mi,mij->mj", t[k], W) + np.einsum("mi,mij->mj", w, T[k]) for k in (0, 1)], axis=1)
-        F = np.zeros((m, 2, 2))
+        values, slopes = (
+            [
+                self.basis(e, place, order) / self.sizes[e][:, None] ** order
+                for e, place in zip(touches.element.T, touches.place.T, strict=True)
+            ]
+            for order in (0, 1)
+        )
+        moves = np.concatenate([-values[0], values[1]], axis=1)
+        turns = np.zeros((2, m, 2 * p))
+        turns[0, :, :p], turns[1, :, p:] = -slopes[0], slopes[1]
+        n, w = touches.normal, touches.normal * touches.distance[:, None]
+        t, tt = (
+            [sign * self.at(x, touches.element[:, k], touches.place[:, k], order) for k, sign in ((0, -1), (1, 1))]
+            for order in (1, 2)
+        )
+        across = np.cross(n, np.eye(3)[np.abs(n).argmin(axis=1)])
+        across /= np.linalg.norm(across, axis=1)[:, None]
+        columns = np.zeros((m, 4, 2 * p, 3))
+        for k, direction in enumerate((across, np.cross(n, across))):
+            columns[:, k] = moves[..., None] * direction[:, None]
+        F, free = np.zeros((m, 2, 2)), touches.slides
         for k in (0, 1):
             F[:, k, k] = np.sum(t[k] * t[k] + w * tt[k], axis=1)
         F[:, 0, 1] = F[:, 1, 0] = np.sum(t[0] * t[1], axis=1)
-        free = touches.slides
-        A = A * free[:, :, None]
         F = np.where(free[:, :, None] & free[:, None, :], F, np.eye(2))
-        g = np.einsum("mi,mij->mj", touches.normal, W)
-        found = np.einsum("mij,mik->mjk", W, W) - np.einsum("mai,mab,mbj->mij", A, np.linalg.inv(F), A)
-        return (found - g[:, :, None] * g[:, None, :]) / touches.distance[:, None, None]
+        sizes, turned = np.linalg.eigh(F)
+        A = np.stack([moves[..., None] * t[k][:, None] + turns[k][..., None] * w[:, None] for k in (0, 1)], axis=1)
+        columns[:, 2:] = np.einsum("mka,mknx->manx", turned, A * free[:, :, None, None])
+        factors = np.concatenate([np.ones((m, 2)), -1 / sizes], axis=1) / touches.distance[:, None]
+        return columns.reshape(m, 4, 6 * p), factors
+
+
+def _sine(t, u):
+    """(n,) sines of the angles of vectors (n, 3)."""
+    return np.linalg.norm(np.cross(t, u), axis=1) / np.linalg.norm(t, axis=1) / np.linalg.norm(u, axis=1)
 
 
 def closest_segments(points, rods, s, radii, apart, reach):

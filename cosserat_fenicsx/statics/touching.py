@@ -28,15 +28,18 @@ _CLOSEST = 0.5
 # Size of a full step (rod lengths, rad) at which it ends, this one or, by the contraction, the next; and of two in turn
 # that rounding leaves.
 _SETTLED, _ROUNDING = 1e-11, 1e-8
-# Iterations allowed, and those after which shares of steps are taken in turn.
-_MOST, _PATIENCE, _SHARES = 200, 25, (1.0, 0.5, 0.7)
+# Iterations allowed, and full steps; full steps after which shares of steps are taken in turn.
+_MOST, _MOST_FULL, _PATIENCE, _SHARES = 300, 40, 20, (1.0, 0.5, 0.7)
+# Residual force of a node at equilibrium, over the largest force.
+_BALANCED = 1e-7
 # Distance from an element's end, in elements, that is at it.
 _AT_END = 1e-6
-# Eigenvalues of d2g over the largest that are zero; a contact of the iteration before is the same up to this sliding,
-# over the radius; added to the diagonal of the compliance, over its mean.
-_ZERO, _SAME, _REGULAR = 1e-10, 4.0, 1e-12
-# First stiffness of springs that keep the tangent stable, over that of the rods at a contact; factor of the next one.
-_SPRING, _STIFFER = 1e-3, 10.0
+# A contact of the iteration before is the same up to this sliding, over the radius; added to the diagonal of the
+# compliance, over its mean.
+_SAME, _REGULAR = 4.0, 1e-12
+# First stiffness of springs that keep the tangent stable, over that of the rods at a contact; factor of the next one;
+# the largest; eigenvalues of the compliance that need none, over its mean: out of equilibrium it is not symmetric.
+_SPRING, _STIFFER, _STIFFEST, _NOTHING = 1e-3, 10.0, 1e6, 1e-6
 
 
 def complementary(A, b):
@@ -86,7 +89,7 @@ class RodContacts:
         radii = self.strands.radii
         self._radius, self._largest = radii[radii > 0].min(), radii.max()
         self._newton = _Steps(problem, self)
-        self._negative = problem.numbering.vector(), problem.numbering.vector()
+        self._vectors = problem.numbering.vector(), problem.numbering.vector()
         self.force = np.zeros(problem.numbering.size)
         self._take(self.strands.near(self._x, 0.0)[0], None, 0)
 
@@ -141,7 +144,7 @@ class RodContacts:
                 problem.put(accepted)
                 found, closest = self._look()
         self._spring = spring
-        while newton.iterations < _MOST:
+        while newton.iterations < _MOST and len(sizes) < _MOST_FULL:
             obey()
             self.force[:] = 0.0
             self._touches_now = found
@@ -168,15 +171,17 @@ class RodContacts:
             if whole and (size < _SETTLED or shrinks or size < last < _ROUNDING):
                 self._take(touches, forces, 0)
                 return self._confirmed(newton.iterations)
-            sizes = [*sizes, size] if whole else []
+            sizes = [*sizes, size] if whole or len(sizes) > _PATIENCE else []
             self._spring = self._spring / _STIFFER if self._spring > 1e-14 else 0.0
         why = why or f"Newton's iterations ran out, {self._in_words(found)}"
         return Solved(False, newton.iterations, why)
 
     def _confirmed(self, iterations):
         """`Solved`, where the contacts of the last step are those of the state, with its negative modes."""
-        A, removed = self._last
-        active = self._forces > 0
+        problem, (A, removed), active = self._problem, self._last, self._forces > 0
+        allowed = _BALANCED * (problem.load_norm + self._forces.max(initial=0.0)) + self._model.round_off
+        if not self._newton.imbalance() <= allowed:
+            return Solved(False, iterations, f"forces are left over at a node, {self._in_words(self._touches)}")
         self.removed = removed - np.count_nonzero(np.linalg.eigvalsh(A[np.ix_(active, active)]) < 0)
         return Solved(True, iterations, "converged")
 
@@ -228,21 +233,18 @@ class RodContacts:
         touches = touches.of(near)
         known = self._known_forces(touches)
         rows, gradients = self._gradients(touches)
-        columns, factors = [], []  # of the second derivatives
-        pressed = known > 0
-        for k, H in zip(np.flatnonzero(pressed), self.strands.curvatures(self._x, touches.of(pressed)), strict=True):
-            values, vectors = np.linalg.eigh(H)
-            kept = np.abs(values) > _ZERO * np.abs(values).max()
-            columns += [(rows[k], v) for v in vectors[:, kept].T]
-            factors += (known[k] * values[kept]).tolist()
-        m, q = len(touches), len(columns)
-        columns = [*columns, *zip(rows, gradients, strict=True)]
-        solved = np.empty((len(change.array_r), len(columns)))
-        at, values = np.array([c[0] for c in columns]), np.array([c[1] for c in columns])
-        values = np.where(at < 0, 0.0, values)
-        at = np.maximum(at, 0)
-        load, answer = self._negative
-        for k in range(len(columns)):
+        pressed = np.flatnonzero(known > 0)
+        columns, factors = self.strands.curvatures(self._x, touches.of(pressed))
+        factors = (known[pressed][:, None] * factors).ravel()
+        kept = columns.reshape(len(factors), -1).any(axis=1) if len(factors) else np.zeros(0, dtype=bool)
+        factors, m = factors[kept], len(touches)
+        q = len(factors)
+        values = np.concatenate([columns.reshape(-1, gradients.shape[1])[kept], gradients])
+        at = np.concatenate([np.repeat(rows[pressed], 4, axis=0)[kept], rows])
+        values, at = np.where(at < 0, 0.0, values), np.maximum(at, 0)
+        solved = np.empty((len(change.array_r), len(values)))
+        load, answer = self._vectors
+        for k in range(len(values)):
             load.array_w[:] = 0.0
             np.add.at(load.array_w, at[k], values[k])
             if not self._problem.solve(load, answer):
@@ -257,12 +259,14 @@ class RodContacts:
             E = D - self._spring / typical
             M = np.linalg.solve(np.eye(q + m) - E[:, None] * S, np.diag(E)) if self._spring or q else np.zeros_like(S)
             A = S[q:, q:] + S[q:] @ M @ S[:, q:]
-            A = (A + A.T) / 2 + _REGULAR * typical * np.eye(m)
-            if np.linalg.eigvalsh(A)[0] > 0 or self._spring > 1e6:
+            A = (A + A.T) / 2
+            lowest = np.linalg.eigvalsh(A)[0]
+            if lowest > -_NOTHING * typical:
                 break
+            if self._spring > _STIFFEST:
+                return False
             self._spring = max(self._spring * _STIFFER, _SPRING)
-        if np.linalg.eigvalsh(A)[0] <= 0:
-            return False
+        A += (_REGULAR * typical + 2 * max(-lowest, 0.0)) * np.eye(m)
         forces = complementary(A, touches.gap + d[q:] + S[q:] @ M @ d)
         spread = M @ (d + S[:, q:] @ forces)
         spread[q:] += forces
@@ -270,14 +274,10 @@ class RodContacts:
         self._found[near] = forces
         removed = 0
         if q:
-            inner = np.diag(1 / np.array(factors)) - S[:q, :q]
-            removed = np.count_nonzero(np.linalg.eigvalsh(inner) < 0) - np.count_nonzero(np.array(factors) < 0)
+            inner = np.diag(1 / factors) - S[:q, :q]
+            removed = np.count_nonzero(np.linalg.eigvalsh(inner) < 0) - np.count_nonzero(factors < 0)
         whole = np.zeros((len(near),) * 2)
-        M = (
-            np.linalg.solve(np.eye(q) - np.array(factors)[:, None] * S[:q, :q], np.diag(factors))
-            if q
-            else np.zeros((0, 0))
-        )
+        M = np.linalg.solve(np.eye(q) - factors[:, None] * S[:q, :q], np.diag(factors)) if q else np.zeros((0, 0))
         whole[np.ix_(near, near)] = S[q:, q:] + S[q:, :q] @ M @ S[:q, q:]
         self._last = whole, removed
         return True
