@@ -204,6 +204,8 @@ def test_the_scene_of_a_bent_motor(tmp_path):
     scene = cf.read(SCENE)
     found = scene.builds(scene.operations[0])
     assert np.degrees(found.rate) * 30 == pytest.approx([10.318, -2.0716, 9.813, 7.075], abs=2e-3)
+    # of the heavy-weight pipe above, which then hardly lies on its wall
+    assert "no equilibrium was found in 7 of 25 holes that were tried" in found.summary()
     assert "Rates of build by several criteria, anisotropy 0.1" in scene.details("field")
     again = tmp_path / "again.toml"
     again.write_text(SCENE.read_text(encoding="utf-8").replace("18 klbf", "0 klbf"), encoding="utf-8")

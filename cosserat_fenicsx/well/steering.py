@@ -185,6 +185,10 @@ def build_rate(
                        f"{_told(_LOOKED_FOR[-1])}")  # fmt: skip
         elif len(found) > 1:
             why.append(f"{name}: it vanishes in several holes: {', '.join(map(_told, found))}")
+    unknown = _LOOKED_FOR[np.isnan(side_force)]
+    if len(unknown):
+        why.append(f"no equilibrium was found in {len(unknown)} of {len(_LOOKED_FOR)} holes that were tried, between "
+                   f"{_told(unknown[0])} and {_told(unknown[-1])}")  # fmt: skip
     three, reason = _three_points(beam, laid, depth)
     why += [f"three-point: {reason}"] if reason else []
     return BuildRate(np.array([*rates, three]), tuple(why), anisotropy, straight.side_force, straight.tilt,
