@@ -195,3 +195,14 @@ def test_modes_are_followed_from_free_ones():
     found = cf.campbell(cf.Scene([rod], held, [cf.Centrifugal((0, 0, 1.0))]), [0.0, 1.0, 2.0], 2, elements=2)
     assert [x.kind[0] for x in found.modes] == ["free", "oscillates", "oscillates"]
     np.testing.assert_allclose([x.eigenvalues.imag[0] for x in found.modes], found.rates, atol=1e-4)
+
+
+@pytest.mark.parametrize("damped", [False, True])
+def test_the_error_covers_the_bounds_in_place_of_infinite_stiffnesses(damped):
+    """A cantilever without shear: cos x cosh x = -1."""
+    stiff = cf.Stiffness((np.inf,) * 2, np.inf, (1.0, 1.0), 1.0, mass=1.0, inertia=(1e-12,) * 3)
+    rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, 1)), stiff)
+    found = cf.modes(cf.Scene([rod], [cf.Clamp(rod.start)]), 6, tol=1e-5, damped=damped)
+    exact = np.repeat([1.875104068711961, 4.694091132974175, 7.854757438237613], 2) ** 2
+    off = np.abs(np.abs(found.eigenvalues) / exact - 1) * (1 if damped else 2)
+    assert (off <= found.error).all() and off.max() < 5e-7

@@ -91,8 +91,8 @@ class Symbols:
     # -- supports and joints -----------------------------------------------------------------------------------------
 
     def support(self, mark, pose, text=""):
-        """A plate for a clamp, a cone for a pin, a cone with the axis for a hinge, a cone on balls for a roller; with an
-        arrow for a prescribed displacement.
+        """A plate for a clamp, a cone for a pin, a cone with the axis for a hinge, a cone on balls for a roller; with
+        an arrow for a prescribed displacement.
 
         Args:
             text: the label of that arrow; without one it is not drawn.

@@ -173,7 +173,8 @@ class Modes(Shapes):
             the real parts of omega^2, but the vibrations differ, and flutter is not detected.
         left_out: what resists or follows velocities and is not in the modes, in words; () where nothing is left out.
         rate: (3,) the steady rotation, rad/s, inertial, or None.
-        rounding: (n,) estimated relative errors by rounding alone, as of `error`.
+        rounding: (n,) estimated relative errors by rounding, and by bounds in place of infinite stiffnesses, alone, as
+            of `error`.
     """
 
     eigenvalues: np.ndarray

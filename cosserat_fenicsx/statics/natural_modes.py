@@ -34,7 +34,7 @@ from cosserat_fenicsx.scene.statical import without_mechanism
 from cosserat_fenicsx.statics.meshes import layers_of, until_two_meshes_agree
 from cosserat_fenicsx.statics.path.follower import standing
 from cosserat_fenicsx.statics.problem import check_arguments, solvers_of
-from cosserat_fenicsx.statics.small_motions import Bodies, circulatory_part, resisting, stiffness
+from cosserat_fenicsx.statics.small_motions import Bodies, circulatory_part, corrected, resisting, softness, stiffness
 from cosserat_fenicsx.statics.stability import shapes_of
 
 _MOST_ELEMENTS = 128
@@ -131,8 +131,8 @@ def modes(
     error = np.maximum(error, found.rounding)  # NaN stays
     if (error > tol).any():
         raise NotConverged(
-            f"the accuracy tol = {tol:g} is out of reach: rounding alone may change the squares by {error.max():.2g} "
-            "of themselves, since the rods are so slender. Ask for a larger tol."
+            f"the accuracy tol = {tol:g} is out of reach: rounding of rods as slender as these, and bounds in place of "
+            f"infinite stiffnesses, may change the squares by {error.max():.2g} of themselves. Ask for a larger tol."
         )
     return _result(scene, found, error, comm, near or 0.0)
 
@@ -216,8 +216,9 @@ def _rotation(scene):
 
 
 #: What is computed on one mesh: squares, or complex eigenvalues (1/s), (n,); the lengths of boundary layers or None;
-#: their relative rounding errors (n,); shapes (n, N, 6); the number of negative modes; the `Equilibrium`; whether the
-#: loads have a potential; whether the numbers are complex eigenvalues; and (r, q) and the contact force there.
+#: their relative errors (n,) by rounding and by bounds in place of infinite stiffnesses; shapes (n, N, 6); the number
+#: of negative modes; the `Equilibrium`; whether the loads have a potential; whether the numbers are complex
+#: eigenvalues; and (r, q) and the contact force there.
 _OnMesh = namedtuple("_OnMesh", "numbers layers rounding shapes negative state conservative complex start")
 
 
@@ -251,6 +252,7 @@ def _on_mesh(scene, layout, count, load_factor, degree, comm, damped, near, rota
         model, scales = problem.model, problem.model.scales
         negative = stability.count() if loaded else 0
         K, rows, held = stiffness(problem)
+        soft = softness(problem, K)
         unit = max(float(rod.profile.range[1].mass) for rod in scene.rods)
         bodies, time = Bodies(model, unit), math.sqrt(unit * scales.length**2 / scales.force)
         layers = layers_of(model) if loaded else None
@@ -263,10 +265,12 @@ def _on_mesh(scene, layout, count, load_factor, degree, comm, damped, near, rota
         if damped and not conservative:
             K = K + on_every_rank(circulatory.skew(rq, load_factor))
     if not damped:
-        squares, vectors, rounding = Pencil(K, bodies.mass(), held).lowest(count)
+        mass = bodies.mass()
+        squares, vectors, rounding = Pencil(K, mass, held).lowest(count)
         negative = _below_free(squares, negative)
         shapes = shapes_of(vectors.T, squares, rows, scales.length)
         rounding = np.where(squares == 0, 0.0, rounding / np.abs(np.where(squares == 0, 1.0, squares)))
+        squares, rounding = corrected(soft, mass, None, squares, vectors, rounding, True)
         return _OnMesh(squares / time**2, layers, rounding, shapes, negative, state, conservative, False, (rq, n))
     turning = None
     if rotation is not None:
@@ -276,13 +280,15 @@ def _on_mesh(scene, layout, count, load_factor, degree, comm, damped, near, rota
     C, more = resisting(scene, layout, degree, comm, rq, load_factor, time, bodies, turning)
     if rotation is not None:
         C = C + bodies.gyroscopic(w)
-    pencil = QuadraticPencil(K + more, C, bodies.mass(), held)
+    mass = bodies.mass()
+    pencil = QuadraticPencil(K + more, C, mass, held)
     found = pencil.nearest(near * time, count) if near else pencil.lowest(count)
     values = found.values
     if (values == 0).any():
-        negative = _below_free(Pencil((K + K.T) / 2, bodies.mass(), held).lowest(count)[0], negative)
+        negative = _below_free(Pencil((K + K.T) / 2, mass, held).lowest(count)[0], negative)
     shapes = shapes_of(found.vectors.T, values, rows, scales.length)
     rounding = np.where(values == 0, 0.0, found.rounding / np.abs(np.where(values == 0, 1.0, values)))
+    values, rounding = corrected(soft, mass, C, values, found.vectors, rounding, conservative)
     return _OnMesh(values / time, layers, rounding, shapes, negative, state, conservative, True, (rq, n))
 
 

@@ -24,19 +24,24 @@ from cosserat_fenicsx.models.signature import Signature
 from cosserat_fenicsx.models.spatial import CirculatoryModel
 from cosserat_fenicsx.numerics import directors, lobatto_weights
 
+# Share of a first-order change of an eigenvalue that is assumed to remain as error: at most this, or this times the
+# relative change.
+_REMAINING, _SQUARED = 0.1, 100.0
+# Rounding errors of an eigenvalue with such a change, a difference of large entries, over those without.
+_OF_CHANGE = 8.0
 # Largest force, over EI/L^2, with which what resists velocities may act on the rods in a steady rotation.
 _DRIVEN = 1e-6
 
 
-def stiffness(problem):
+def stiffness(problem, bounds=1.0):
     """K (sparse), the row numbers of all nodes (N, 6), -1 where clamped, and the gradients (equations, size) of the
-    constraints of supports and joints."""
+    constraints of supports and joints; bounds: factor of those in place of infinite stiffnesses."""
     model = problem.model
     (variation,) = model.second_variations
     tied = variation.tied
     K = variation.numbering.matrix(variation.cell_dofs, tied, model.signature.connections.pattern)
-    true = model.section.K
-    model.stiffen(np.where(np.isfinite(true), true, model.bounded_K))  # stability counts bound finite ones as well
+    true = model.section.K  # stability counts bound finite ones as well
+    model.stiffen(np.where(np.isfinite(true), true, bounds * model.bounded_stiffness()))
     Packed(variation.form, (), ()).add_to_matrix(K)
     model.stiffen(model.bounded_K)
     if problem.ties:
@@ -47,6 +52,35 @@ def stiffness(problem):
     K = on_every_rank(K)
     gradients = problem.ties.gradients() if problem.ties else np.empty((0, *tied.shape))
     return (K + K.T) / 2, model.rows_of_nodes, constraint_rows(gradients, tied, K.shape[0])
+
+
+def softness(problem, K):
+    """What bounds in place of infinite stiffnesses take from K (sparse), to first order in their inverse: they are in
+    series with the others, so that twice the bound takes half of it. None where all stiffnesses are finite."""
+    if np.isfinite(problem.model.section.K).all():
+        return None
+    return stiffness(problem, 2.0)[0] - K
+
+
+def corrected(softness, M, C, values, vectors, rounding, trusted):
+    """Eigenvalues without `softness`, to first order with left eigenvectors taken for right ones, unless that is within
+    their relative rounding errors (n,); and these with what is left.
+
+    Args:
+        M, C: see the head of this file; C is None where `values` are squares of frequencies.
+        values: (n,) dimensionless; vectors: (size, n). trusted: whether the stiffness is symmetric, so that the left
+            eigenvectors are known.
+    """
+    if softness is None:
+        return values, rounding
+    left = vectors.conj()
+    change, inertia = (np.einsum("in,in->n", left, A @ vectors) for A in (softness, M))
+    if C is not None:
+        change, inertia = -change, 2 * values * inertia + np.einsum("in,in->n", left, C @ vectors)
+    change = np.where((values == 0) | (inertia == 0), 0.0, change / np.where(inertia == 0, 1.0, inertia))
+    share = np.abs(change) / np.where(values == 0, 1.0, np.abs(values))
+    known, left = share > rounding, share * (np.minimum(_REMAINING, _SQUARED * share) if trusted else 1.0)
+    return np.where(known, values + change, values), np.where(known, _OF_CHANGE * rounding + left, rounding)
 
 
 class Bodies:

@@ -198,8 +198,8 @@ class Part:
         return float(self._nearest(1)[0][0])  # zero to rounding: factorisation and eigensolver differ in its sign
 
     def negative_space(self, count):
-        """Orthonormal eigenvectors y of the `count` negative eigenvalues at the problem's state, (owned entries, count);
-        None where the eigensolver finds another number."""
+        """Orthonormal eigenvectors y of the `count` negative eigenvalues at the problem's state, (owned entries,
+        count); None where the eigensolver finds another number."""
         if self.factor() != count:
             return None
         values, vectors = self._nearest(count, -1)
