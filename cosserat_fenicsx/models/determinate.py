@@ -191,11 +191,11 @@ class DeterminateInPlane(_KnownForce, PlaneModel):
             n = load_factors[:, None, None, None] * known + lasting
             material[..., 0], material[..., 2] = (np.einsum("...i,...i", direction, n) for direction in (a, t))
             bent[..., 1] = curvature
-            e = _strain(section, material, bent)
+            e = strain(section, material, bent)
             sheared, stretched = section.v_R[..., 0] + e[..., 0], section.v_R[..., 1] + e[..., 2]
             r_s = sheared[..., None] * a + stretched[..., None] * t
             r = tree.positions(r_s * sizes[:, None, None], rest, rule)
-            return in_space(axes, offset, r, theta, n, _moment(section, material, bent)[..., 1], r_s)
+            return in_space(axes, offset, r, theta, n, moment(section, material, bent)[..., 1], r_s)
 
         return expand
 
@@ -243,22 +243,22 @@ class DeterminateInSpace(_KnownForce):
             n = load_factors[:, None, None, None] * known + lasting
             curvature = np.einsum("...ij,...i", R_R, 2 * conjugate_product(q, q_s) / squared)
             material = np.einsum("...ij,...i", T, n)
-            r_s = np.einsum("...ij,...j", T, section.v_R + _strain(section, material, curvature))
-            m = np.einsum("...ij,...j", T, _moment(section, material, curvature))
+            r_s = np.einsum("...ij,...j", T, section.v_R + strain(section, material, curvature))
+            m = np.einsum("...ij,...j", T, moment(section, material, curvature))
             r = tree.positions(r_s * sizes[:, None, None], rest, rule)
             return np.concatenate([r, nodal], axis=-1), np.concatenate([n, m, r_s], axis=-1)
 
         return expand
 
 
-def _strain(data, n, k):
+def strain(data, n, k):
     """v - v_R (.., 3) where the contact force n is known, material."""
     if data.G is None:
         return n / data.K
     return _times(spread(1 / data.K, data.A_axes), n) - _times(data.G, k)
 
 
-def _moment(data, n, k):
+def moment(data, n, k):
     """m (.., 3) where the contact force n is known, material."""
     if data.G is None:
         return data.J * k

@@ -3,7 +3,7 @@ in its hole from the side, where depth runs to the right and the high side of th
 
 import numpy as np
 
-from cosserat_fenicsx.checks import finite_array, positive, refuse
+from cosserat_fenicsx.checks import finite_array, refuse
 from cosserat_fenicsx.pictures.charts import (
     COLOURS,
     GREY,
@@ -456,8 +456,6 @@ _TOWARDS_HIGH_SIDE = Quantity("from the hole's axis towards its high side", unit
 
 def side_figure(answer, length=None):
     """The lower end from the side, see `TorqueAndDrag.plot_from_side`."""
-    if length is not None:
-        positive("plot_from_side", "length", length, "m")
     top = max(0.0, answer.depth - (length or answer.depth))
     figure = empty_figure(11, 5.5)
     axes = figure.subplots()
