@@ -19,7 +19,7 @@ import nbformat
 
 ROOT = Path(__file__).resolve().parents[1]
 FOLDER = ROOT / "docs" / "tutorials"
-NAMES = ("column", "frame", "soft_arm", "well", "stick_slip")  # in the order in which they are read
+NAMES = ("column", "frame", "soft_arm", "well", "strength", "stick_slip")  # in the order in which they are read
 
 
 def ran(name):

@@ -302,3 +302,19 @@ def test_tortuosity(well):
     for wrong in ((-1.0, 100.0), (0.5, 1e5), (0.5, 100.0, 1.5), (0.5, 1e-3), (20.0, 100.0), ("2 m", 100.0)):
         with pytest.raises(cf.SceneError, match="tortuosity"):
             W.tortuosity(path, *wrong)
+
+
+def test_centralisers_carry_a_pipe_as_a_beam_on_supports():
+    """An inclined pipe whose rings alone touch: inner rings carry q L, and clamp it with q L^2/12."""
+    hole = W.Borehole(W.WellPath.from_survey([0, 84], [60, 60], [0, 0], True), [W.HoleSection(84.0, 0.25, 0.0)])
+    rings = W.Centraliser(12.0, 0.23)
+    pipe = W.DrillPipe(outer_diameter=0.1778, inner_diameter=0.157, centralisers=rings)
+    answer = W.torque_and_drag(hole, W.DrillString([pipe]), W.Static(), mud=W.Mud(1200.0), model="rod", tol=1e-3)
+    load = answer.pieces.weight[0] * np.sin(np.radians(60))
+    points = [x for x in answer.contacts if x.at_point]
+    assert [x.top for x in points] == pytest.approx(6.0 + 12.0 * np.arange(7), abs=1e-3)
+    assert sum(x.force for x in points) == pytest.approx(84 * load, rel=2e-3)
+    assert points[3].force == pytest.approx(12 * load, rel=0.02)
+    assert np.interp(42.0, answer.md, answer.bending_moment) == pytest.approx(load * 12**2 / 12, rel=0.05)
+    with pytest.raises(cf.SceneError, match="rings wider than the body"):
+        W.DrillPipe(size="5 in 19.50 lb/ft", centralisers=W.Centraliser(12.0, 0.13))

@@ -11,6 +11,7 @@ from cosserat_fenicsx.well.calibrate import FrictionFit as FrictionFit
 from cosserat_fenicsx.well.calibrate import RigMeasurement as RigMeasurement
 from cosserat_fenicsx.well.calibrate import calibrate_friction as calibrate_friction
 from cosserat_fenicsx.well.components import Bit as Bit
+from cosserat_fenicsx.well.components import Centraliser as Centraliser
 from cosserat_fenicsx.well.components import Collar as Collar
 from cosserat_fenicsx.well.components import Component as Component
 from cosserat_fenicsx.well.components import DrillPipe as DrillPipe

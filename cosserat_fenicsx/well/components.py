@@ -20,6 +20,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import Annotated, ClassVar, Literal
 
+import numpy as np
+
 from cosserat_fenicsx import units
 from cosserat_fenicsx.checks import doubt_width, positive, refuse, store
 from cosserat_fenicsx.errors import SceneError, nearest
@@ -134,6 +136,10 @@ class StringPart(Part, family="component of a string"):
         """Contact radius along its whole length, m; of the body, where the `diameter` stands out from it."""
         return self.contact_radius if self.touches is None else self.outer_diameter / 2
 
+    def rings(self, length):
+        """Distances (m) from the lower end of the places at which it touches alone, where there are any."""
+        return {None: (), "bottom": (0.0,), "middle": (length / 2,)}[self.touches]
+
     @property
     def torsion(self):
         """Torsional stiffness (N m^2) and polar inertia per length (kg m) for waves of torsion along the string."""
@@ -215,6 +221,23 @@ class Component(_Bendable):
 
 
 @dataclass(frozen=True)
+class Centraliser(Part):
+    """Rings on a component, which alone touch the wall where they hold its body off: centralisers, or tool joints that
+    the exact rod in contact shall see one by one.
+
+    Args:
+        spacing: of the rings, m; the lowest one is half of it above the component's lower end.
+        diameter: of the rings, m; at most the hole's.
+
+    Raises:
+        SceneError: a number that is not positive.
+    """
+
+    spacing: Length
+    diameter: Diameter
+
+
+@dataclass(frozen=True)
 class _Tubular(_Bendable):
     """Base of the components of steel, by their dimensions or by the name of a standard size.
 
@@ -230,6 +253,7 @@ class _Tubular(_Bendable):
         bend: of its housing, degrees, up to 5: two straight pieces at an angle, free of stress. bend_at: its distance
             from the component's lower end, m. tool_face: the side of the hole that the bend points its lower end to,
             degrees clockwise from the high side looking down the hole (from north where it is vertical), by default 0.
+        centralisers: a `Centraliser`: its rings touch; the soft string touches with their diameter everywhere.
         joint_spacing: of the tool joints, m, such as 9.45 of range 2: the pipe between them bends more than the hole,
             see `bending_between_joints`. It counts in `TorqueAndDrag.utilisation` alone.
 
@@ -248,6 +272,7 @@ class _Tubular(_Bendable):
     name: str = ""
     damping_time: DampingTime = 0.0
     joint_spacing: Length | None = None
+    centralisers: Centraliser | None = None
 
     weight = None
 
@@ -293,11 +318,26 @@ class _Tubular(_Bendable):
             refuse(self, "tool_joint", self.tool_joint, f"at least the body's diameter, {self.outer_diameter:g} m")
         if self.joint_spacing is not None and not (self.tool_joint or 0) > self.outer_diameter:
             refuse(self, "joint_spacing", self.joint_spacing, "tool_joint as well, wider than the body")
+        if self.centralisers is not None and not self.centralisers.diameter > 2 * self.body_radius:
+            expected = f"rings wider than the body, {2 * self.body_radius:g} m"
+            refuse(self, "centralisers", self.centralisers, expected)
+
+    @property
+    def body_radius(self):
+        """Contact radius between centralisers, m."""
+        return (self.tool_joint or self.outer_diameter) / 2
 
     @property
     def contact_radius(self):
         """m."""
-        return (self.tool_joint or self.outer_diameter) / 2
+        return self.body_radius if self.centralisers is None else self.centralisers.diameter / 2
+
+    def rings(self, length):
+        return (
+            ()
+            if self.centralisers is None
+            else np.arange(self.centralisers.spacing / 2, length, self.centralisers.spacing)
+        )
 
     @cached_property
     def stiffness(self):

@@ -88,17 +88,18 @@ _SPAN, _MOMENT, _CARRIED, _TURN = 72.0, 1 / 6, 2 / 3, 1 / 24
 _CAUTION, _ENLARGED, _REACH, _NONE = 1.5, 5.0, 60.0, 1e-9
 
 
-def is_ring(component):
-    """Whether a component touches at a place."""
-    return component.touches is not None
+def rings_of(laid, hole):
+    """[`Ring`] of components in their places, from the bit up: bits, stabilisers and centralisers."""
+    return [
+        _ring(place, place.bottom - x, hole) for place in laid for x in place.component.rings(place.bottom - place.top)
+    ]
 
 
-def ring_of(place, hole):
-    """The `Ring` of a component in its place: a stabiliser touches in the middle of its length, a bit at its end."""
-    s = place.bottom if place.component.touches == "bottom" else (place.top + place.bottom) / 2
+def _ring(place, s, hole):
     radius = place.component.contact_radius
     clearance = max(0.0, float(hole.at(s, "diameter")) / 2 - radius)
-    return Ring(s, clearance, radius, place.component.outer_diameter / 2)
+    body = place.component.body_radius if place.component.touches is None else place.component.outer_diameter / 2
+    return Ring(s, clearance, radius, body)
 
 
 def bend_of(place):

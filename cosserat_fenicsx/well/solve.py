@@ -12,7 +12,7 @@ from cosserat_fenicsx.well.components import DrillString
 from cosserat_fenicsx.well.hole import Borehole, Mud
 from cosserat_fenicsx.well.model_error import model_errors
 from cosserat_fenicsx.well.operations import Operation
-from cosserat_fenicsx.well.pieces import is_ring, pieces_of, ring_of, sections_of
+from cosserat_fenicsx.well.pieces import pieces_of, rings_of, sections_of
 from cosserat_fenicsx.well.rod.rod_answer import rod_in_contact
 from cosserat_fenicsx.well.softstring import chain_of, soft_string
 
@@ -112,7 +112,7 @@ def _flexible(given, model, tol, torque_convention, pieces, laid):
     why it is not the answer where it is not."""
     path, operation = given[0].path, given[2]
     sections = sections_of([place.component for place in laid])
-    rings = [ring_of(place, given[0]) for place in laid if is_ring(place.component)]
+    rings = rings_of(laid, given[0])
     soft = soft_string(chain_of(pieces, torque_convention == "coulomb"), -operation.weight, operation.torque, tol)
     buckled, locked = None, []
     if model != SOFT:

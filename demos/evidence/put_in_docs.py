@@ -68,6 +68,7 @@ FOLDERS = {
         "bent_motor.png": "bent_motor/bent_motor.png",
         "build_rate.png": "bent_motor/build_rate.png",
         "helix.png": "helix/static_3d.png",
+        "strength.png": "strength/strength.png",
         "cable_in_conduit.png": "cable_in_conduit/cable.png",
     },
     "strings": {

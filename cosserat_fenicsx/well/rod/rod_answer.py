@@ -20,7 +20,7 @@ from cosserat_fenicsx.well import criteria
 from cosserat_fenicsx.well.answer import TorqueAndDrag, scales_of, share
 from cosserat_fenicsx.well.components import weight_in_mud
 from cosserat_fenicsx.well.contacts import VERTICAL, WallContact, name_of_side
-from cosserat_fenicsx.well.pieces import bend_of, is_ring, ring_of
+from cosserat_fenicsx.well.pieces import bend_of, rings_of
 from cosserat_fenicsx.well.rod.resultants import MOSTLY
 from cosserat_fenicsx.well.rod.string_scene import energy_of_helix, turns_of_helix
 
@@ -224,7 +224,7 @@ def rod_in_contact(flexible, decided, progress=None, exact=True):
                 slip=[operation.direction(place.component.contact_radius) for place in laid],
                 bottom_tension=-operation.weight,
                 bottom_torque=operation.torque,
-                rings=[ring_of(place, hole)[:3] for place in laid if is_ring(place.component)],
+                rings=[ring[:3] for ring in rings_of(flexible.laid, hole)[::-1]],
                 bends=[bend_of(place) for place in laid if place.component.bend],
                 wall_stiffness=hole.wall_stiffness,
                 helix=helix,
