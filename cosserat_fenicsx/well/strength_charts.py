@@ -23,7 +23,7 @@ def utilisation_figure(use, between=None):
     top, bottom = depths_between("plot", between, answer.depth)
     rotating = np.isfinite(use.allowed_dogleg).any()
     draws = [_shares, _tension, _bending, *([_doglegs] if rotating else [])]
-    figure, panels, _, length = over_depth([2.2, 3.2, 2.9, 2.7, 2.7][: 1 + len(draws)], DEPTH)
+    figure, panels, _, length = over_depth([2.0, 2.9, 2.4, 2.4, 2.4][: 1 + len(draws)], DEPTH)
     rows, room = rows_between(use.md, top, bottom), 0.01 * (bottom - top)
     depth = use.md[rows] / length
     panels[0].set_ylim((bottom + room) / length, (top - room) / length)
@@ -56,7 +56,7 @@ def _tension(panel, use, rows, depth):
     panel.plot(tension / size, depth, color="black", label="effective tension")
     panel.plot(limit / size, depth, color="tab:red", label="at yield, with the torque")
     panel.axvline(0.0, color="black", linewidth=0.6)
-    panel.set_xlim(right=1.1 * min(np.nanmax(limit), 4 * max(tension.max(), 1.0)) / size)
+    panel.set_xlim(right=1.15 * max(np.nanmin(limit), tension.max()) / size)
     panel.set_xlabel(heading)
 
 
