@@ -212,6 +212,12 @@ def test_friction_of_a_string_that_slides():
     axial, torsion = (drilling.stability(sliding, [0.0], modes=2, kind=kind) for kind in ("axial", "torsion"))
     slope = friction.resistance.slope(V)
     assert axial.growth[0, 0] == pytest.approx([-slope * N / 26.71375795359451 / 2] * 2, rel=1e-12)
+    fed = drilling.stability(lying(bit=drilling.BitOnRock(drilling.Stribeck(0.0, 0.0))), [6.0], modes=2).hfto()
+    assert (
+        np.isnan(fed.amplitude).tolist() == [True] * 2
+        and fed.unbounded == 0
+        and "2 modes grow that friction at the wall feeds" in str(fed)
+    )
     rate = friction.coefficient(V) * N * r**2 / V / 0.09324815246769404
     assert torsion.growth[0, 0, -1] == pytest.approx(-rate / 2, rel=1e-12)
     for scene, told in (

@@ -36,7 +36,8 @@ class Hfto(Drawn):
     """Result of `Stability.hfto`: oscillations of one frequency each, by frequency.
 
     Attributes:
-        scene: the `Drilling` at the speed and weight. speed: rad/s.
+        scene: the `Drilling` at the speed and weight. speed: rad/s. unbounded: how many more modes grow, which friction
+            at the wall feeds whatever the bit takes.
         frequency: (n,) Hz. slope: (n,) N m s/rad, kappa_c, which the string's damping takes at the bit. growth: (n,)
             1/s, of the nearest mode while it is small. amplitude: (n,) of the bit's speed, rad/s; NaN where the law of
             the bit bounds none. torque, torque_depth: (n,) largest amplitude of the torque in the string, N m, and its
@@ -45,6 +46,7 @@ class Hfto(Drawn):
 
     scene: Drilling
     speed: float
+    unbounded: int
     frequency: np.ndarray
     slope: np.ndarray
     growth: np.ndarray
@@ -74,14 +76,22 @@ class Hfto(Drawn):
         return len(self.frequency)
 
     def _about(self):
-        return {"kind": "Hfto", "speed": self.speed}
+        return {"kind": "Hfto", "speed": self.speed, "unbounded": self.unbounded}
 
     def _answer(self, units):
         rpm, size = units.on_screen(SPEED)
+        bounded = np.isfinite(self.amplitude)
+        if fed := self.unbounded + int((~bounded).sum()):
+            yield f"{fed} modes grow that friction at the wall feeds and the bit does not bound: see simulate."
         if not len(self):
             yield f"No oscillation is kept up at {self.speed / size:.4g} {rpm}."
             return
-        k, still = int(np.argmax(self.growth)), self.scene.bit.law.resistance(self.scene.bit.weight).still
+        if not bounded.any():
+            return
+        k, still = (
+            int(np.argmax(np.where(bounded, self.growth, -np.inf))),
+            self.scene.bit.law.resistance(self.scene.bit.weight).still,
+        )
         torque, scale = units.on_screen(TORQUE)
         yield (
             f"{len(self)} possible {'oscillation' if len(self) == 1 else 'oscillations'} at {self.speed / size:.4g} {rpm}, each alone. Fastest to grow: "
@@ -95,7 +105,7 @@ class Hfto(Drawn):
 
     def _table(self, units, rows):
         kept = np.sort(np.argsort(-self.growth)[: min(rows, _LISTED)])
-        arrays = {x.name: getattr(self, x.name)[kept] for x in fields(self)[2:]}
+        arrays = {x.name: getattr(self, x.name)[kept] for x in fields(self)[3:]}
         return super(Hfto, replace(self, **arrays))._table(units, rows)
 
     def __repr__(self):
@@ -121,9 +131,10 @@ def oscillations(scene, up_to, frequencies, growth):
     frequency, slopes = w[kept] / (2 * math.pi), slopes[kept]
     amplitude = np.array([_amplitude(law, speed, slope) for slope in slopes])
     nearest = np.abs(frequency[:, None] - np.asarray(frequencies)[None, :])
+    unbounded = max(int((np.asarray(growth) > 0).sum()) - len(frequency), 0)
     growth = np.asarray(growth)[nearest.argmin(axis=1)] if len(frequency) else np.zeros(0)
     largest = np.array([_largest_torque(guide, x) for x in w[kept]]).reshape(-1, 2)
-    return Hfto(scene, speed, frequency, slopes, growth, amplitude, largest[:, 0] * amplitude, largest[:, 1])
+    return Hfto(scene, speed, unbounded, frequency, slopes, growth, amplitude, largest[:, 0] * amplitude, largest[:, 1])
 
 
 def equivalent_slope(law, speed, amplitude):
