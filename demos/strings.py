@@ -102,7 +102,15 @@ def four_discs(found, history, folder):
     yield Check("peak bit speed (rad/s)", history.stick_slip(since=120.0).peak, 6.694377, 2e-3, source)
 
 
-STRINGS = (stick_slip, tuned_drive, off_bottom, stopped_block, four_discs)
+def autodriller(found, history, folder):
+    """The weight by the hook on its way to the one that is asked for, and there."""
+    weight = sum(part.weight * part.length for part in found.scene.segments) - history.hook_load
+    at = np.interp([20.0, 100.0, 200.0], history.mean_times, weight) / 1e3
+    yield Check("weight by the hook (kN)", at, [16.008978, 108.202469, 114.449216], 0.1, "delayed equations")
+    yield Check("in the end (kN)", weight[-1] / 1e3, 100.0, 0.6, "the weight asked for")
+
+
+STRINGS = (stick_slip, tuned_drive, off_bottom, stopped_block, four_discs, autodriller)
 
 
 def run(demo, out="out/strings"):

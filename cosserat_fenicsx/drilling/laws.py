@@ -26,6 +26,8 @@ SOURCES = tuple(Path(__file__).with_name(f"{name}.c") for name in ("strings", "w
 SLIPS = np.geomspace(1e-6, 1e3, 9 * 128 + 1)
 # Relative step of slopes by differences; share of the change between neighbours that is left of a drop; bisections.
 _STEP, _STAYS, _HALVINGS = 1e-5, 0.5, 45
+# Difference of slopes of the second and the fourth order at a jump, over that of secants, is 1/12.
+_ROUGH = 0.02
 # Value at the least slip, over the largest one, of a law that is smooth through zero; error of a table, likewise.
 _SMOOTH, _CLOSE = 1e-3, 1e-8
 
@@ -158,12 +160,15 @@ def _cubics(values):
     """Cubics over ln s through values at `SLIPS`, of the fourth order where these are smooth, and monotone where these
     are."""
     x, secants = np.log(SLIPS), np.diff(values) / np.diff(np.log(SLIPS))
-    slopes = np.gradient(values, x, edge_order=2)
-    h = x[1] - x[0]
+    slopes, h = np.empty_like(values), x[1] - x[0]
     slopes[2:-2] = (8 * (values[3:-1] - values[1:-3]) - (values[4:] - values[:-4])) / (12 * h)
+    ends = np.array([[-25, 48, -36, 16, -3], [-3, -10, 18, -6, 1]]) / (12 * h)
+    slopes[:2], slopes[-1:-3:-1] = ends @ values[:5], -ends @ values[-1:-6:-1]
     before, after = secants[:-1], secants[1:]
     most = np.where(before * after > 0, 3 * np.minimum(abs(before), abs(after)), np.maximum(abs(before), abs(after)))
-    slopes[1:-1] = np.clip(slopes[1:-1], -most, most)
+    # beside a smooth maximum a secant may vanish, but slopes of second and fourth order agree
+    rough = np.abs(slopes[1:-1] - (before + after) / 2) > _ROUGH * np.abs(after - before)
+    slopes[1:-1] = np.where(rough, np.clip(slopes[1:-1], -most, most), slopes[1:-1])
     return CubicHermiteSpline(x, values, slopes)
 
 

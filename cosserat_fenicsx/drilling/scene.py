@@ -6,6 +6,7 @@ from functools import cached_property
 from typing import Literal
 
 from cosserat_fenicsx.checks import refuse
+from cosserat_fenicsx.drilling import bit_curves  # noqa: F401 its laws join their family
 from cosserat_fenicsx.drilling.bit_laws import BitOnRock, Stribeck
 from cosserat_fenicsx.drilling.segments import Discs, Segment, segment_of
 from cosserat_fenicsx.drilling.top_drive import Hook, TopDrive

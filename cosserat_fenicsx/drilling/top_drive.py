@@ -410,7 +410,7 @@ class Autodriller(Part):
     weight: InTime[Annotated[ForceSize, positive()]] | None = None
     Kp: Annotated[float, Number(limits=at_least(0))] = 0.0
     Ki: Annotated[float, Number(limits=at_least(0))] = 0.0
-    limits: tuple[Speed, Speed] = (0.0, 0.02)
+    limits: tuple[Speed, ...] = (0.0, 0.02)
     rate: Annotated[Speed, positive()] | None = None
     sample: Annotated[Time, positive()] = 0.02
 
@@ -421,7 +421,7 @@ class Autodriller(Part):
             refuse(self, "weight", None, "the weight on bit to hold (N), or a rate (m/s)")
         if self.weight is not None and not self.Kp + self.Ki > 0:
             refuse(self, "Kp", self.Kp, "Kp (m/(s N)), Ki (m/(s^2 N)) or both above 0, about 1e-8 and 1e-9")
-        if not self.limits[0] < self.limits[1]:
+        if len(self.limits) != 2 or not self.limits[0] < self.limits[1]:
             refuse(self, "limits", self.limits, "the least and the largest speed of the block downwards (m/s)")
 
     def begin(self):
