@@ -73,6 +73,7 @@ FOLDERS = {
     },
     "strings": {
         "stick_slip.png": "stick_slip/drilling.png",
+        "autodriller.png": "autodriller/drilling.png",
         "off_bottom_map.png": "off_bottom/map.png",
         "stopped_block_map.png": "stopped_block/map.png",
         "stability_map.png": "stability_map.png",
