@@ -21,7 +21,7 @@ from scipy.optimize import brentq
 
 from cosserat_fenicsx.errors import NotConverged, SceneError
 from cosserat_fenicsx.well.components import weight_in_mud
-from cosserat_fenicsx.well.pieces import bend_of, is_ring, ring_of
+from cosserat_fenicsx.well.pieces import bend_of, rings_of
 
 # Length that lies on the wall up to the upper end of what is solved at least, m.
 _LIES = 3.0
@@ -99,11 +99,11 @@ def assembly_of(hole, laid, mud, operation, depth, length):
         SceneError: a component without stiffness, or that bends differently about its two axes; a lower end that is
             no bit; a bend to another side than the high or the low one.
     """
-    if not (is_ring(laid[0].component) and laid[0].component.touches == "bottom"):
+    if laid[0].component.touches != "bottom":
         raise SceneError(
             f"build_rate: the lowest component is {laid[0].component.name}: expected a Bit, at which the hole is made"
         )
-    rows, rings, bends = [], [], []
+    rows, bends = [], []
     for place in laid:
         if depth - place.bottom >= length:
             break
@@ -112,8 +112,6 @@ def assembly_of(hole, laid, mud, operation, depth, length):
             raise SceneError(f"{part.name}: stiffness = {S!r}: expected that of a round section for build_rate")
         loose = max(0.0, float(hole.at(place.bottom, "diameter")) / 2 - part.body_radius)
         rows.append((min(depth - place.top, length), S.bending[0], min(S.shear), weight_in_mud(part, mud), loose))
-        if part.touches == "middle" and depth - ring_of(place, hole).s < length:
-            rings.append((depth - ring_of(place, hole).s, ring_of(place, hole).clearance))
         if part.bend:
             md, angle, side = bend_of(place)
             if abs(math.sin(side)) > 1e-6:
@@ -122,6 +120,8 @@ def assembly_of(hole, laid, mud, operation, depth, length):
                     "in the vertical plane; torque_and_drag with model='rod' takes any"
                 )
             bends.append((depth - md, angle * math.cos(side)))
+    _, *above = rings_of(laid, hole)  # the first one is the bit
+    rings = [(depth - ring.s, ring.clearance) for ring in above if depth - ring.s < length]
     inclination = float(hole.path.inclination_at(np.array([depth]))[0])
     ends, *numbers = np.array(rows).T
     return Assembly(ends, *numbers, tuple(rings), tuple(bends), operation.weight, inclination)
