@@ -206,7 +206,7 @@ def test_strings_damped_by_kelvin_and_voigt(kind):
 
 
 def test_friction_of_a_string_that_slides():
-    """mu N r^2/V around, and mu' along, of a string that does not rotate; it is refused at rest, and beside rotation."""
+    """mu N r^2/V around, and mu' along, of a string that does not rotate; refused at rest, and beside rotation."""
     r, N, V, friction = 0.08, 150.0, 0.4, drilling.WallFriction(0.3, 0.2, 0.3)
     sliding = lying(hook=drilling.Hook(speed=-V), turns=0.0)
     axial, torsion = (drilling.stability(sliding, [0.0], modes=2, kind=kind) for kind in ("axial", "torsion"))
@@ -233,7 +233,7 @@ def test_friction_of_a_string_that_slides():
 
 
 def test_the_wall_force_is_that_of_the_well():
-    """In a curved well with some weight on bit: pieces are fine enough, and the string grows where its friction falls."""
+    """In a curved well with some weight on bit: pieces are fine enough, and friction that falls feeds it."""
     path = well.WellPath.from_survey([0, 800, 1400, 3000], [0, 0, 60, 60], [0, 0, 20, 20], degrees=True)
     hole = well.Borehole(path, well.HoleSection(3000, 0.2159, 0.25))
     string = well.DrillString([well.Collar(200.0, "NC46-65"), well.DrillPipe(size="5 in 19.50 lb/ft")])

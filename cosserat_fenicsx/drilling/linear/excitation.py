@@ -24,7 +24,7 @@ class Drawn(Result):
 
     def plot(self, file: File | None = None, *, units: Any = "SI", width: int | None = None):
         """Draw the chart: of `Campbell` natural frequencies as lines and excitations as rays, of `BitBounce` the
-        amplitude over speed beside the static weight, of `FrequencyResponse` a Bode chart of what the surface and the bit
+        amplitude over speed beside the static weight, of `FrequencyResponse` a Bode chart of what surface and bit
         feel of a load on bit, with the impedances of string and drive, which absorb each other's waves where both are
         equal; of `Hfto` amplitudes over the frequency. With a file it is written, otherwise the Figure is returned.
 

@@ -79,7 +79,8 @@ class WallDashpots:
             return radius**2 * float(law(sliding)) / sliding, law.slope(sliding)
         if sliding > _APART * slip:
             refuse(self.scene, "hook.speed", sliding, f"at most {_APART:g} of the speed of the surface around, "
-                   f"{slip:.4g} m/s, or a string that does not rotate: else friction couples torsion and axial motion")  # fmt: skip
+                   f"{slip:.4g} m/s, or a string that does not rotate: else friction "
+                   "couples torsion and axial motion")  # fmt: skip
         if self._of_rotation:
             return radius * law.slope(speed), float(law(speed)) / slip
         return radius**2 * law.slope(slip), float(law(slip)) / slip

@@ -24,8 +24,8 @@ from cosserat_fenicsx.numerics import gauss
 from cosserat_fenicsx.quantities import Quantity
 from cosserat_fenicsx.results.result import by_name
 
-# Gauss points in each half cycle without a jump; amplitudes tried, over the mean speed; places in a wave; oscillations in a
-# table.
+# Gauss points in each half cycle without a jump; amplitudes tried, over the mean speed; places in a wave;
+# oscillations in a table.
 _RULE = gauss(64)
 _TRIED = np.concatenate([np.linspace(0.02, 1.0, 50), 1 + np.geomspace(1e-7, 30.0, 150)])
 _PLACES, _LISTED = 16, 12
@@ -94,7 +94,8 @@ class Hfto(Drawn):
         )
         torque, scale = units.on_screen(TORQUE)
         yield (
-            f"{len(self)} possible {'oscillation' if len(self) == 1 else 'oscillations'} at {self.speed / size:.4g} {rpm}, each alone. Fastest to grow: "
+            f"{len(self)} possible {'oscillation' if len(self) == 1 else 'oscillations'} at "
+            f"{self.speed / size:.4g} {rpm}, each alone. Fastest to grow: "
             f"{self.frequency[k]:.4g} Hz, bit speed +- {self.amplitude[k] / size:.4g} {rpm}, "
             f"{self.amplitude[k] / self.speed:.4g} times the mean; torque +- {self.torque[k] / scale:.4g} {torque}."
         )
