@@ -100,7 +100,7 @@ class Hfto(Drawn):
             f"{self.amplitude[k] / self.speed:.4g} times the mean; torque +- {self.torque[k] / scale:.4g} {torque}."
         )
         if stuck := int((self.torque < still).sum()):
-            yield f"In {stuck} of them the torque stays below that which holds the bit at rest: it sticks, see simulate."
+            yield f"In {stuck} of them the torque stays below that which holds the bit: it sticks, see simulate."
         if len(self) > _LISTED:
             yield f"Below: the {_LISTED} that grow fastest; to_dataframe() has all."
 

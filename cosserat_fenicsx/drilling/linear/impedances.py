@@ -59,7 +59,7 @@ class _Section:
 
 @dataclass(frozen=True)
 class Uniform(_Section):
-    """A uniform part: length (m), stiffness (N m^2 or N), inertia (kg m or kg/m), drag (1/s), name, damping time (s)."""
+    """A uniform part: length (m), stiffness (N m^2 or N), inertia (kg m or kg/m), drag (1/s), name, damping (s)."""
 
     length: float
     stiffness: float

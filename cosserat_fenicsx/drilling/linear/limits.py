@@ -166,8 +166,8 @@ def limit_speed(
             wall falls with the slip; a range of growth between two of them is missed.
 
     Returns:
-        rad/s; 0 where all modes decay at every speed, infinite where the string has no losses. Where speeds are searched:
-        infinite where some mode grows at the highest of the speeds, 0 where none does at any.
+        rad/s; 0 where all modes decay at every speed, infinite where the string has no losses. Where speeds are
+        searched: infinite where some mode grows at the highest of the speeds, 0 where none does at any.
 
     Raises:
         SceneError: numbers that are not positive, or a bit without a law.

@@ -46,7 +46,8 @@ class ModeShape:
     Attributes:
         root: s, 1/s. depth: (m,) below the top drive, m; the number of the disc for discs. rotation: (m,) complex, the
             amplitude of the rotation om, 1 at the bit; None where nothing turns. velocity: (m,) complex, the axial one
-            in m/s per rad/s of the bit, without rotation 1 at a bit that moves; None where nothing moves axially. shares: {what: share} of the kinetic energy over a period, of the
+            in m/s per rad/s of the bit, without rotation 1 at a bit that moves; None where nothing moves axially.
+        shares: {what: share} of the kinetic energy over a period, of the
             components by name, of the top drive and the bit; "axial motion of ..." for the axial part. lengths: {name:
             m} of the components; empty for discs.
     """
@@ -96,7 +97,7 @@ def shape_of(equation, s, points=200):
 
 
 def _along(guide, s, points):
-    """(depth, w, {name: twice the kinetic energy}) of one guide, w = 1 at the bit, or 1 at most where the bit stands."""
+    """(depth, w, {name: twice the kinetic energy}) of one guide, w = 1 at the bit, or at most where it stands."""
     at = np.array([s], dtype=complex)
     state, found, depth, energies, top = guide.start(at), [], [], [], 0.0
     if guide.top_inertia:
