@@ -26,8 +26,8 @@ _REACH = 8.0
 # Least distance of two centrelines, over the sum of the radii.
 _CLOSEST = 0.5
 # Size of a full step (rod lengths, rad) at which it ends, this one or, by the contraction, the next; and of two in turn
-# that rounding leaves.
-_SETTLED, _ROUNDING = 1e-11, 1e-8
+# that do not shrink, which rounding leaves.
+_SETTLED, _ROUNDING = 1e-11, 2e-7
 # Iterations allowed, and full steps; full steps after which shares of steps are taken in turn.
 _MOST, _MOST_FULL, _PATIENCE, _SHARES = 300, 40, 20, (1.0, 0.5, 0.7)
 # Residual force of a node at equilibrium, over the largest force.
@@ -168,7 +168,7 @@ class RodContacts:
             whole = step.share == 1.0
             last = sizes[-1] if sizes else 0.0  # of a full step before
             shrinks = size < 0.1 * last and size * size < _SETTLED * last
-            if whole and (size < _SETTLED or shrinks or size < last < _ROUNDING):
+            if whole and (size < _SETTLED or shrinks or 0.3 * last < size < _ROUNDING > last > 0):
                 self._take(touches, forces, 0)
                 return self._confirmed(newton.iterations)
             sizes = [*sizes, size] if whole or len(sizes) > _PATIENCE else []
