@@ -14,8 +14,9 @@ import numpy as np
 #: Sine of the angle of two strands above which they touch in a point; below, along a line.
 CROSSING = 0.2
 # Places of an element where strands are compared first; Newton steps to the nearest points; their largest size, in
-# elements, and the one at which they end.
-_PLACES, _STEPS, _LONGEST, _ENOUGH = 4, 40, 0.7, 1e-10
+# elements, and the one at which they end, first, and from a step on after which rounding may not leave less: gaps have
+# its square.
+_PLACES, _STEPS, _LONGEST, _ENOUGH, _ROUNDED, _ROUGH = 4, 40, 0.7, 1e-10, 8, 1e-7
 # Smallest determinant of the equations of two nearest points, for unit tangents, at which both are varied.
 _PARALLEL = 1e-3
 # The neighbours of a pair of places.
@@ -197,7 +198,7 @@ class Strands:
                     place_now[back] = np.round(place_now[back])
                     slides[back, column] = False
             moved = np.abs(np.where(slides, np.c_[first, second], 0.0)).max(initial=0.0)
-            if moved < _ENOUGH:
+            if moved < (_ENOUGH if step < _ROUNDED else _ROUGH):
                 break
         return np.c_[e, f], np.c_[a, b], slides
 
