@@ -74,16 +74,17 @@ def turned(string, face):
 
 
 @pytest.mark.parametrize("case", KNOWN, ids=lambda case: case["name"])
-def test_the_rod_of_an_assembly(case):
-    given, truth = case["input"], case["straight hole"]
+def test_the_rod_of_an_assembly(case, truth):
+    given, known, name = case["input"], case["straight hole"], case["name"]
     answer = well.torque_and_drag(straight(60.0), assembly(given), well.Sliding(given["WOB"]), model="rod")
-    assert answer.bit_side_force == pytest.approx([truth["side force"], 0.0], rel=1e-3, abs=1e-3)
-    assert answer.bit_tilt == pytest.approx([truth["tilt"], 0.0], abs=1e-6)
+    size = abs(known["side force"])
+    truth(f"{name}, rod: side force of the bit", answer.bit_side_force, [known["side force"], 0.0], 1e-3, of=size)
+    assert answer.bit_tilt == pytest.approx([known["tilt"], 0.0], abs=1e-6)
     *_, tangency = [x for x in answer.contacts if x.at_point and x.top < 60.0 - given["stabilisers"][-1][0] - 1.0]
-    assert tangency.top == pytest.approx(60.0 - truth["tangency"], abs=1e-2)
-    assert tangency.force == pytest.approx(truth["force at tangency"], rel=1e-3)
+    truth(f"{name}, rod: place of tangency (m)", tangency.top, 60.0 - known["tangency"], 1e-2, of=1.0)
+    truth(f"{name}, rod: force at tangency", tangency.force, known["force at tangency"], 1e-3)
     on_blades = [x.force for x in answer.contacts if x.at_point and tangency.top < x.top < 59.9]
-    assert on_blades[::-1] == pytest.approx([force for _, force in truth["stabilisers"]], rel=1e-3)
+    truth(f"{name}, rod: forces on stabilisers", on_blades[::-1], [force for _, force in known["stabilisers"]], 1e-3)
 
 
 def test_a_bend_to_any_side():

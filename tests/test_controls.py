@@ -68,29 +68,29 @@ def at(history, times, *series):
 
 
 @pytest.mark.parametrize("name", [name for name in TRUTHS if "two inertias" in name])
-def test_sampled_on_two_inertias(name):
-    given, truth = TRUTHS[name]["input"], TRUTHS[name]["truth"]
+def test_sampled_on_two_inertias(name, truth):
+    given, known = TRUTHS[name]["input"], TRUTHS[name]["truth"]
     begin = given["T0"] + given["c2"] * given["Om"]
     control = Held(given["Kp"], given["Ki"], given["dOm"], begin, given["Ts"], given["late"] * given["Ts"])
     discs = Discs((900.0, given["I2"]), (given["k"],), drags=(0.0, given["c2"]))
     scene = steady(discs, TopDrive(given["Om"], given["I1"] - 900.0, control), given["T0"])
     found = cf.drilling.simulate(scene, given["duration"], dt=given["Ts"] / 20, progress=False)
     twist = found.drive_angle - found.bit_angle
-    rows = np.array(truth["rows: t, drive speed, disc speed, spring torque"])
+    rows = np.array(known["rows: t, drive speed, disc speed, spring torque"])
     expected = rows[:, 1:]
     found = at(found, rows[:, 0], *((found.times, x) for x in (found.drive_speed, found.bit_speed, given["k"] * twist)))
-    np.testing.assert_allclose(found, expected, rtol=1e-4)
+    truth(f"{name}, speeds and torque", found, expected, 1e-4)
 
 
-def test_sampled_on_waves():
-    truth = TRUTHS["sampled PI, uniform string of waves, 2T = m Ts"]
-    given, truth = truth["input"], truth["truth"]
+def test_sampled_on_waves(truth):
+    known = TRUTHS["sampled PI, uniform string of waves, 2T = m Ts"]
+    given, known = known["input"], known["truth"]
     control = Held(given["Kp"], given["Ki"], given["dOm"], given["T0"], given["Ts"])
     scene = steady(pipe(given["L"]), TopDrive(given["Om"], given["I"], control), given["T0"])
     found = cf.drilling.simulate(scene, given["duration"] + 0.1, dt=given["Ts"] / 160, progress=False)
-    rows = np.array(truth["rows: t, drive speed, surface torque"])
+    rows = np.array(known["rows: t, drive speed, surface torque"])
     got = at(found, rows[:, 0], (found.times, found.drive_speed), (found.mean_times, found.surface_torque))
-    np.testing.assert_allclose(got, rows[:, 1:], rtol=1e-4)
+    truth("sampled PI, waves, speed and torque", got, rows[:, 1:], 1e-4)
 
 
 def found_by(name):
@@ -110,32 +110,41 @@ def found_by(name):
 
 
 @pytest.mark.parametrize("name", [name for name in TRUTHS if name.startswith("stick-slip, ")])
-def test_stick_slip_of_waves(name):
-    truth, found = TRUTHS[name]["truth"], found_by(name).stick_slip()
-    assert found.period == pytest.approx(truth["period"], rel=1e-4)
-    assert found.peak == pytest.approx(truth["peak"], rel=1e-4)
+def test_stick_slip_of_waves(name, truth):
+    known, found = TRUTHS[name]["truth"], found_by(name).stick_slip()
+    truth(f"{name}, period and peak", [found.period, found.peak], [known["period"], known["peak"]], 1e-4)
 
 
-def test_stick_slip_of_one_disc():
-    truth = TRUTHS["stick-slip of one disc, drop at once, exact cycle"]
-    given, truth = truth["input"], truth["truth"]
+def test_stick_slip_of_one_disc(truth):
+    known = TRUTHS["stick-slip of one disc, drop at once, exact cycle"]
+    given, known = known["input"], known["truth"]
     discs = Discs((1.0, given["J"]), (given["k"],), drags=(0.0, given["c"]))
     scene = Drilling(discs, TopDrive(given["Om"]), BitOnRock(Stribeck(given["Ts"], given["Td"])))
     found = cf.drilling.simulate(scene, 60.0, dt=1e-3, progress=False).stick_slip()
-    assert found.period == pytest.approx(truth["period"], rel=1e-4)
-    assert found.peak == pytest.approx(truth["largest speed of the disc"], rel=1e-4)
+    cycle = [known["period"], known["largest speed of the disc"]]
+    truth("stick-slip of one disc, period and peak", [found.period, found.peak], cycle, 1e-4)
 
 
-def test_autodriller():
+def test_autodriller(truth):
     """Weight by the hook, to a thousandth of the weight asked for."""
-    given, truth = TRUTHS["autodriller"]["input"], TRUTHS["autodriller"]["truth"]
-    rows = np.array(truth["waves: t, weight at the hook, hook speed"])
+    given, known = TRUTHS["autodriller"]["input"], TRUTHS["autodriller"]["truth"]
+    rows = np.array(known["waves: t, weight at the hook, hook speed"])
     control = Autodriller(given["Ws"], given["Kp"], given["Ki"])
     bit = BitOnRock(RateLaw(given["c"]))
     scene = Drilling(pipe(given["L"]), TopDrive(0.0), bit, hook=Hook(autodriller=control))
     found = cf.drilling.simulate(scene, 200.1, elements=100, save_every=0.05, progress=False)
     weight = scene.segments[0].weight * given["L"] - found.hook_load
-    np.testing.assert_allclose(np.interp(rows[:, 0], found.mean_times, weight), rows[:, 1], atol=1e-3 * given["Ws"])
+    told = np.interp(rows[:, 0], found.mean_times, weight)
+    truth("autodriller on waves, weight over that asked for", told, rows[:, 1], 1e-3, of=given["Ws"])
+
+
+def test_small_motions_leave_an_autodriller_out():
+    hook = Hook(autodriller=Autodriller(100e3, 2e-8))
+    scene = Drilling(pipe(1000.0), TopDrive(12.0), BitOnRock(Stribeck(5e3, 3e3, 3.0), 100e3), hook=hook)
+    (caution,) = cf.drilling.stability(scene, [12.0], modes=1).cautions
+    assert "the autodriller is left out" in caution
+    (caution,) = cf.drilling.frequency_response(scene, [0.1, 0.2]).cautions
+    assert "the autodriller is left out" in caution
 
 
 def test_torque_over_time():

@@ -31,12 +31,13 @@ def crossing(lowered=0.15, **contact):
     return cf.Scene([lower, upper], [cf.Clamp(lower.start), cf.Clamp(lower.end), *ends], [touch])
 
 
-def test_crossing_rods(tmp_path):
+def test_crossing_rods(tmp_path, truth):
     """13.689149090107861 N of solve_bvp; they hold each other by the same force in tables, files and fields."""
     scene, force = crossing(), 13.689149090107861
     path = cf.solve(scene, [1.0], elements=20)
     found = path.contacts(scene.loads[0])
-    assert found.force == pytest.approx([force], rel=2e-7) and not found.line.any()
+    truth("crossing rods, force", found.force, [force], 1e-6, most=2e-7)
+    assert not found.line.any()
     np.testing.assert_allclose([found.s[0], found.other_s[0]], 0.5, atol=1e-9)
     np.testing.assert_allclose(found.point[0], (0, 0, -0.065), atol=1e-7)
     assert abs(found.gap[0]) < 1e-12 and "lower" in str(found) and path.stable[-1]
@@ -50,7 +51,7 @@ def test_crossing_rods(tmp_path):
     assert again.contacts(again.scene.loads[0]).force == pytest.approx(found.force, rel=1e-12)
 
 
-def test_a_ring_is_pulled_until_it_touches_itself():
+def test_a_ring_is_pulled_until_it_touches_itself(truth):
     """By shooting: F = 6 N presses it onto itself by 0.12063607907258804 N, in one point."""
     R, EI, radius, n = 1 / (2 * math.pi), 1e-3, 0.03, 32
     section = cf.Stiffness(RIGID, math.inf, (EI, EI), EI)
@@ -63,7 +64,7 @@ def test_a_ring_is_pulled_until_it_touches_itself():
     apart = np.linalg.norm(path.position(a.end) - path.position(a.start), axis=1)
     np.testing.assert_allclose(apart, (0.46295178732099795, 0.47801546152226415), rtol=1e-6)
     assert not len(path[0].contacts(touch))
-    assert path.contacts(touch).force.sum() == pytest.approx(0.12063607907258804, rel=1e-5)
+    truth("pulled ring that touches itself, force", path.contacts(touch).force.sum(), 0.12063607907258804, 1e-5)
 
 
 @pytest.mark.parametrize(
@@ -118,8 +119,8 @@ def closest(path, radius):
 
 
 def test_no_rod_passes_through_another(tangle):
-    """Two to five rods at random angles, whose ends are moved through each other by many diameters: each path ends with rods that
-    hold each other, or with the contact by name; none is crossed."""
+    """Two to five rods at random angles, whose ends are moved through each other by many diameters: each path ends with
+    rods that hold each other, or with the contact by name; none is crossed."""
     random, radius, count = np.random.default_rng(tangle), 0.02, 2 + tangle % 4
     section = cf.Stiffness((1e4, 1e4), 1e4, (1.0, 1.0), 0.8)
     rods, supports = [], []

@@ -122,9 +122,8 @@ def of_reflection():
     (of_hfto, 1e-9),
     (of_reflection, 1e-12),
 ], ids=["impedance", "drive", "bit", "torque", "wall torsion", "wall axial", "wall limit", "hfto", "reflection"])  # fmt: skip
-def test_truths(row, tolerance):
-    found, truth = map(np.atleast_1d, row())
-    assert (np.abs(found - truth) <= tolerance * np.abs(truth)).all()
+def test_truths(row, tolerance, truth, request):
+    truth(f"small motions of a string: {request.node.callspec.id}", *map(np.atleast_1d, row()), tolerance)
 
 
 def test_discs_answer_as_their_matrices_do():

@@ -196,6 +196,12 @@ class Regenerative(Characteristic):
         return self.torsion.inertia * s - turned, self.axial.inertia * s + moved
 
 
+def without_autodriller(scene):
+    """[A caution] where an autodriller moves the block, which the linear theory leaves out."""
+    moved = scene.hook is not None and scene.hook.autodriller is not None
+    return ["the autodriller is left out: the block is taken to keep its speed"] if moved else []
+
+
 class Steady:
     """Steady rotations of a scene at any speed and weight.
 

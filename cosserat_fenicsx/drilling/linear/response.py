@@ -11,7 +11,7 @@ import numpy as np
 from rich.table import Table
 
 from cosserat_fenicsx.checks import Numbers, instance, refuse
-from cosserat_fenicsx.drilling.linear.characteristic import Characteristic, box_up_to, numbers, speed_of
+from cosserat_fenicsx.drilling.linear.characteristic import Characteristic, box_up_to, numbers, speed_of, without_autodriller
 from cosserat_fenicsx.drilling.linear.excitation import Drawn
 from cosserat_fenicsx.drilling.linear.roots import all_roots
 from cosserat_fenicsx.drilling.linear.stability import ModeShape, shape_of, steady_of
@@ -141,9 +141,10 @@ class FrequencyResponse(Drawn):
 
     @property
     def cautions(self) -> list[str]:
-        """Sentences: modes that grow."""
+        """Sentences: modes that grow, and what is left out."""
         growing = _growing(self.roots, self.equation)
-        return [f"The steady state is unstable: {growing}; the motion leaves it"] if growing else []
+        told = [f"The steady state is unstable: {growing}; the motion leaves it"] if growing else []
+        return told + without_autodriller(self.scene)
 
     def _answer(self, units):
         rpm, size = units.on_screen(SPEED)

@@ -9,7 +9,13 @@ import numpy as np
 from rich.table import Table
 
 from cosserat_fenicsx.checks import File, Numbers, instance, number, positive, refuse
-from cosserat_fenicsx.drilling.linear.characteristic import Steady, box_up_to, or_none, speeds_and_weights
+from cosserat_fenicsx.drilling.linear.characteristic import (
+    Steady,
+    box_up_to,
+    or_none,
+    speeds_and_weights,
+    without_autodriller,
+)
 from cosserat_fenicsx.drilling.linear.frequencies import SoftSpeed, SoftTorque, natural_frequencies, own_rule, with_rule
 from cosserat_fenicsx.drilling.linear.hfto import Hfto, oscillations
 from cosserat_fenicsx.drilling.linear.roots import all_roots, follow
@@ -256,7 +262,7 @@ class Stability(Result):
     @property
     def cautions(self) -> list[str]:
         """Sentences on approximations."""
-        steady, left_out = Steady(self.scene, self.kind), []
+        steady, left_out = Steady(self.scene, self.kind), without_autodriller(self.scene)
         walls = steady.walls(or_none(self.weights[0]))
         if walls is not None and (sliding := walls.caution(float(self.speeds.min()), steady.sliding)):
             left_out.append(sliding)
