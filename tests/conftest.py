@@ -25,7 +25,7 @@ sys.path += [str(DEMOS), str(DEMOS / "evidence")]
 
 
 def pytest_addoption(parser):
-    parser.addoption("--tangles", type=int, default=3, help="random tangles of rods that touch")
+    parser.addoption("--tangles", type=int, default=2, help="random tangles of rods that touch")
     parser.addoption("--mutations", type=int, default=12, help="damaged folders of each kind of computation")
     parser.addoption("--truths", action="store_true", help="only what is compared with independent truths by `truth`")
 
