@@ -27,8 +27,6 @@ class Search:
     # Largest imaginary part of the roots of a determinant that almost vanishes, and largest distance from the step,
     # over its length.
     nearly: float = 0.35
-    # Distances from where a root is expected at which it is looked for, where the sign does not change next to it.
-    around: tuple[float, ...] = (1e-4, 3e-4, 1e-3, 3e-3, 1e-2)
     # Distances on both sides of a critical point at which the path is solved for.
     beside: tuple[float, ...] = (1e-3, 1e-4)
     steep: float = 2.0  # largest length between these two points, over their distance along the chord
@@ -151,8 +149,7 @@ class Chord:
 
     def root(self, value, near=None):
         """The coordinate where a function of the path's `PathPoint`s changes its sign; None where it does not. near:
-        its expected coordinate; then only the nearest known points and the ends are used, and points around it
-        where the sign changes between none of these.
+        its expected coordinate; then only the nearest known points and the ends are used.
 
         The root of the polynomial through the nearest values, among them those of the bracket, is iterated until two
         successive load factors agree. The equilibrium at the last root is not solved for, since its tangent would be
@@ -162,13 +159,9 @@ class Chord:
         known = dict(self.known)
         places = known if near is None else {0.0, 1.0, *_nearest(known, near)}
         values = {at: value(known[at]) for at in sorted(places)}
-        around = (near + side * far for far in _SEARCH.around for side in (1, -1)) if near is not None else ()
-        while not (changes := [(a, b) for a, b in itertools.pairwise(sorted(values)) if values[a] * values[b] <= 0]):
-            look = next((place for place in around if 0 < place < 1), None)
-            if look is None:
-                return None
-            if (found := self.at(look)) is not None:
-                values[found[0]] = value(found[1])
+        changes = [(a, b) for a, b in itertools.pairwise(values) if values[a] * values[b] <= 0]
+        if not changes:
+            return None
         middle = 0.5 if near is None else near
         low, high = min(changes, key=lambda ends: abs(ends[0] + ends[1] - 2 * middle))
         place, estimate, halve = middle, None, False
