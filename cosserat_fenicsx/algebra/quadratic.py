@@ -228,7 +228,11 @@ class QuadraticPencil:
 
     def _left(self, value, X):
         """Left eigenvectors, by inverse iteration with the transposed matrix next to the eigenvalue."""
-        factors, Y = self._factors(value * (1 + 1e-9)), X.conj()
+        try:
+            factors = self._factors(value * (1 + 1e-9))
+        except RuntimeError:  # singular to rounding there
+            factors = self._factors(value * (1 + 1e-6) + 1e-6 * _LOW)
+        Y = X.conj()
         for _ in range(2):
             Y, _ = np.linalg.qr(self._solved(factors, Y.astype(complex), "H"))
         return Y
