@@ -125,6 +125,18 @@ def solved(well, operation=W.RotaryDrilling(60e3, 5e3), **more):
     return W.torque_and_drag(*well, operation, mud=W.Mud(1200.0), model="soft", **more)
 
 
+def test_a_worn_pipe_fatigues_sooner_and_what_is_not_known_is_not_zero(well):
+    answer = solved(well)
+    new, worn = (answer.utilisation("S135", wear) for wear in (1.0, 0.8))
+    at = np.nanargmax(new.fatigue)
+    assert worn.fatigue[at] > 1.1 * new.fatigue[at] > 0 and worn.allowed_dogleg[at] < new.allowed_dogleg[at]
+    pressed = solved(well, W.RotaryDrilling(200e3, 5e3)).utilisation("S135", 0.8)
+    assert np.isnan(pressed.bending_stress).any()
+    assert (np.isnan(pressed.fatigue) >= np.isnan(pressed.bending_stress)).all() and "where it is known" in str(pressed)
+    with pytest.raises(cf.SceneError, match="one that goes down or rotates"):
+        solved(well, W.TripOut()).most_weight_on_bit("S135")
+
+
 def test_the_utilisation_of_a_string(well):
     answer = solved(well)
     use = answer.utilisation("S135")

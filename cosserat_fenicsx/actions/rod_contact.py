@@ -123,6 +123,6 @@ class RodContact(LineAction):
             first, second = (scene.rods[int(i)] for i in (a, b))
             raise SceneError(
                 f"RodContact: rod '{first.name}' at s = {s:.6g} m overlaps rod '{second.name}' at s = {t:.6g} m by "
-                f"{-gap[k]:.3g} m at rest: expected rods that touch at most; `exclude` is the arc length next to a "
+                f"{-gap[k]:.3g} m at rest: expected rods that touch at most, which are farther apart by that; `exclude` is the arc length next to a "
                 "point, or to a joint, within which rods do not touch"
             )

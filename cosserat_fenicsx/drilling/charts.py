@@ -231,7 +231,7 @@ def draw_fit(fit):
     axes[-1].set_xlabel("time (s)")
     told = (f"{name.split('.', 1)[-1]} {x:.5g} ± {e:.2g} {unit}"
             for name, x, e, unit in zip(fit.names, fit.values, fit.standard_error, fit.units, strict=True))  # fmt: skip
-    figure.suptitle(f"Fit: {', '.join(told)}; misfit {fit.misfit:.3g}")
+    figure.suptitle(f"Fit: {', '.join(told)} (standard errors); misfit {fit.misfit:.3g}")
     return figure
 
 

@@ -16,6 +16,7 @@ import numpy as np
 from scipy.stats import qmc
 
 from cosserat_fenicsx.checks import File, instance, number, refuse, warn
+from cosserat_fenicsx.dimensions import BY_UNIT, in_si
 from cosserat_fenicsx.drilling.choose import chosen, model_of
 from cosserat_fenicsx.drilling.history import DrillingHistory
 from cosserat_fenicsx.drilling.motion import simulate
@@ -182,8 +183,14 @@ def _ranges(scene, unknowns):
         refuse("fit", "unknowns", unknowns, "{'bit.law.static': (least, largest)}")
     found = {}
     for name, ends in unknowns.items():
-        parameter_of(scene, name)
-        if np.shape(ends) != (2,) or not -math.inf < ends[0] < ends[1] < math.inf:
+        unit = parameter_of(scene, name).unit
+        if np.shape(ends) == (2,) and unit in BY_UNIT:
+            ends = [in_si(f"fit.unknowns['{name}']", x, BY_UNIT[unit]) for x in ends]
+        if (
+            np.shape(ends) != (2,)
+            or any(isinstance(x, str) for x in ends)
+            or not -math.inf < ends[0] < ends[1] < math.inf
+        ):
             refuse("fit", f"unknowns['{name}']", ends, "two numbers, (least, largest), ascending")
         found[name] = tuple(map(float, ends))
     return found

@@ -200,7 +200,7 @@ class DrillingHistory(Result):
         caution = alias(self)
         if caution:
             yield f"{caution[0].upper()}{caution[1:]}."
-        yield from map(units.sentence, self.why[:1])
+        yield from map(units.sentence, (*self.why[:1], *(x for x in self.why[1:] if x.startswith("APPROXIMATE"))))
 
     def _more(self, units):
         if len(self) > 5:
@@ -217,7 +217,7 @@ class DrillingHistory(Result):
                 f"Impacts of the bit on rigid rock: the largest impulse {each.max():.4g} N s, at t = "
                 f"{self.times[each.argmax()]:.5g} s, together {impulse[-1]:.4g} N s; the weight on bit is without them."
             )
-        yield from map(units.sentence, self.why[1:])
+        yield from (units.sentence(x) for x in self.why[1:] if not x.startswith("APPROXIMATE"))
 
     def _table(self, units, rows):
         if not len(self):

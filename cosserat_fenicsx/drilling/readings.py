@@ -159,7 +159,9 @@ def _column(file, names, quantity, wanted, usual, needed=None):
 def _size(file, name, unit, si):
     """The size in SI of the unit of a column."""
     if not unit:
-        raise SceneError(f"{file}: column '{name}' has no unit: expected one behind the name, such as '{name} ({si})'")
+        known = list(DIMENSIONS[BY_UNIT[si]].units) if si in BY_UNIT else [si]
+        raise SceneError(f"{file}: column '{name}' has no unit: expected one behind the name, as in '{name} "
+                         f"({known[-1]})', of {', '.join(known)}")  # fmt: skip
     known = DIMENSIONS[BY_UNIT[si]].units if si in BY_UNIT else {si: 1.0}
     plain = {name.lower().replace(" ", ""): size for name, size in known.items()}
     size = known.get(unit, plain.get(unit.lower().replace(" ", "")))

@@ -19,6 +19,8 @@ _PARTS, _LIMITS = ("component",), ("limit",)
 # Relative accuracy of weights on bit; a string that locks up under this much more weight than uses up its hook load is
 # said to lock up.
 _ACCURATE, _BEYOND = 3e-4, 1.05
+# Relative difference of two weights on bit below which the limits are reached together.
+_TOGETHER = 2 * _ACCURATE
 
 
 def _safety(owner, safety):
@@ -127,7 +129,9 @@ class MostWeightOnBit(Result):
 
     @property
     def _first(self):
-        return int(np.argmin(np.where(self.counts & np.isfinite(self.weights), self.weights, np.inf)))
+        counted = np.where(self.counts & np.isfinite(self.weights), self.weights, np.inf)
+        # a helix takes the hook load at once: then it is the limit, and not the weight, which is first in the list
+        return int(np.flatnonzero(counted <= counted.min() * (1 + _TOGETHER))[-1])
 
     weight = property(lambda self: float(self.weights[self._first]), doc="N.")
     limit = property(lambda self: str(self.limits[self._first]), doc="What limits it.")
@@ -166,6 +170,8 @@ def most_weight_of(answer, grade, wear, safety, buckling, model):
         refuse(who, "model", model, "'soft' or 'buckled'")
     if "weight" not in {field.name for field in fields(answer.operation)}:
         refuse(who, "operation", answer.operation.name, "one with a weight on bit, such as Sliding(weight)")
+    if answer.operation.direction(1.0)[0] > 0:
+        refuse(who, "operation", answer.operation.name, "one that goes down or rotates, such as Sliding(weight)")
     strengths = strengths_of(who, answer.laid, grade, wear)
     soft, solved = (cache(partial(_solved, answer, x)) for x in ("soft", model))
     high, least = float(answer.pieces.weight @ (answer.pieces.bottom - answer.pieces.top)), soft(0.0)

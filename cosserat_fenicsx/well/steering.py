@@ -191,6 +191,10 @@ def build_rate(
                    f"{_told(unknown[0])} and {_told(unknown[-1])}")  # fmt: skip
     three, reason = _three_points(beam, laid, depth)
     why += [f"three-point: {reason}"] if reason else []
+    turning = [place.component.name for place in laid if place.component.bend] if operation.direction(1.0)[1] else []
+    if turning:
+        why.append(f"ONE MOMENT of a turn: {' and '.join(turning)} rotates, and its bend with it: the rates are those of a "
+                   "string that slides")  # fmt: skip
     return BuildRate(np.array([*rates, three]), tuple(why), anisotropy, straight.side_force, straight.tilt,
                      tuple(straight.contacts), _LOOKED_FOR, side_force, tilt, beam)  # fmt: skip
 

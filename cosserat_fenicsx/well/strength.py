@@ -103,6 +103,11 @@ class PipeStrength(InWords, Part):
         return found._replace(outer=self.outer_diameter / 2)
 
     @property
+    def bending(self) -> float:
+        """Bending stiffness of the worn body, N m^2."""
+        return float(self.pipe.material.E * np.pi / 4 * (self.section.outer**4 - self.section.inner**4))
+
+    @property
     def area(self) -> float:
         """m^2."""
         bore, whole = areas(self.section)
@@ -189,7 +194,7 @@ class PipeStrength(InWords, Part):
         factor = np.ones(tension.shape)
         if half is not None:
             # as Lubinski has it, without touching the wall
-            one = bent(min(self.pipe.stiffness.bending), half, np.inf, tension, 1.0)
+            one = bent(self.bending, half, np.inf, tension, 1.0)
             factor = np.maximum(one.joint, one.middle)
         return self.fatigue_stress(tension) / (self.pipe.material.E * self.outer_diameter / 2 * factor)
 

@@ -119,8 +119,8 @@ class Utilisation(Result):
             half, gap = span_of(strength.pipe)
             if half is None:
                 return 1.0
-            EI, curvature = min(strength.pipe.stiffness.bending), answer.dogleg_severity[here]
-            found = bent(EI, half, gap, answer.tension[here], curvature)
+            curvature, worn = answer.dogleg_severity[here], (strength.pipe.outer_diameter - strength.outer_diameter) / 2
+            found = bent(strength.bending, half, gap + worn, answer.tension[here], curvature)
             mode[here] = found.mode
             largest = np.maximum(found.joint, found.middle)
             straight = np.where(found.mode == UNKNOWN, np.nan, 1.0)
@@ -164,8 +164,7 @@ class Utilisation(Result):
             here = answer.component == i
             if strength is not None and here.any():
                 section = strength.section
-                I = np.pi / 4 * (section.outer**4 - section.inner**4)
-                moment = strength.pipe.material.E * I * self.curvature[here]
+                moment = strength.bending * self.curvature[here]
                 pressures = outside[here], inside[here]
                 true = strength.true_tension(answer.tension[here], *pressures)
                 found[here] = (von_mises(section, true, answer.torque[here], moment, *pressures)
@@ -280,7 +279,8 @@ class Utilisation(Result):
         yield (
             f"{self.answer.operation.name}, bit at {self._told('md', units, self.answer.depth)}: largest utilisation "
             f"{self.largest:.3g} of the yield strength (von Mises), at md = {self._told('md', units, self.worst_at)}, "
-            f"{self.component_name[i]}, {self.worst_surface[i]} of bending."
+            f"{self.component_name[i]}, {self.worst_surface[i]} of bending{self._known_part()}. Strength: "
+            f"{', '.join(self._grades(units))}."
         )
         others = [(name, kind, self._worst(name)) for name, kind in list(_KINDS.items())[1:]]
         told = [f"{kind} {getattr(self, name)[j]:.3g} at {self._told('md', units, self.md[j])}"
@@ -288,6 +288,15 @@ class Utilisation(Result):
         if told:
             yield f"The largest shares of each limit alone: {', '.join(told)}."
         yield from self._notes(units)
+
+    def _known_part(self):
+        return ", where it is known" if (self._bent[1] == UNKNOWN).any() else ""
+
+    def _grades(self, units):
+        """Yield strength and wear of each component."""
+        for x in {x.pipe.name: x for x in self.strengths if x is not None}.values():
+            wear = f" with {100 * x.wear:g} % of the wall left" if x.wear < 1 else ""
+            yield f"{x.pipe.name} {units.told(x.yield_strength, 'Pa', form='.4g')}{wear}"
 
     def _more(self, units):
         for strength in {x.pipe.name: x for x in self.strengths if x is not None}.values():
@@ -325,4 +334,4 @@ class Utilisation(Result):
 def _over(load, limit):
     """Their ratio; infinite where a load has no limit left."""
     with np.errstate(divide="ignore", invalid="ignore"):
-        return np.where(load > 0, load / limit, 0.0 * limit)
+        return np.where(load > 0, load / limit, 0.0 * load * limit)  # NaN where one of them is not known

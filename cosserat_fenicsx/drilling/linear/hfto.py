@@ -105,6 +105,8 @@ class Hfto(Drawn):
             yield f"Below: the {_LISTED} that grow fastest; to_dataframe() has all."
 
     def _table(self, units, rows):
+        if not len(self):
+            return None
         kept = np.sort(np.argsort(-self.growth)[: min(rows, _LISTED)])
         arrays = {x.name: getattr(self, x.name)[kept] for x in fields(self)[3:]}
         return super(Hfto, replace(self, **arrays))._table(units, rows)
