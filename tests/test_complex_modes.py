@@ -205,4 +205,4 @@ def test_the_error_covers_the_bounds_in_place_of_infinite_stiffnesses(damped):
     found = cf.modes(cf.Scene([rod], [cf.Clamp(rod.start)]), 6, tol=1e-5, damped=damped)
     exact = np.repeat([1.875104068711961, 4.694091132974175, 7.854757438237613], 2) ** 2
     off = np.abs(np.abs(found.eigenvalues) / exact - 1) * (1 if damped else 2)
-    assert (off <= found.error).all() and off.max() < 5e-7
+    assert (off <= found.error).all() and off.max() < 2e-6  # without the correction 7.7e-6

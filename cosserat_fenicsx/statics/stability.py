@@ -65,6 +65,10 @@ class NegativeModes(Called):
         return found
 
 
+# Ratio of the bending stiffnesses of the thickest and the thinnest rod from which on the second variation is scaled.
+_ALIKE = 1e3
+
+
 class Part:
     """A diagonal block of the second variation, decoupled from the others: one of its model's `second_variations`.
 
@@ -73,9 +77,10 @@ class Part:
         elimination, interface: for counts; the latter None where nothing is to be added.
         resistance: (tied unknowns,) the last scales of the springs in place of supports and joints.
 
-    Eigenvalues and eigenvectors y are those of D K D, with the D of `eigen.balance` at the first state of a scene: as
-    many of them are negative, and D y is the null vector where one vanishes. Those of K would be far apart where rods
-    of very different sections meet, and the small negative ones beside them would not be found.
+    Eigenvalues and eigenvectors y are those of D K D, with the D of `eigen.balance` at the first state of a scene whose
+    sections differ much, else of K: as many of them are negative, and D y is the null vector where one vanishes. Those
+    of K would be far apart where rods of very different sections meet, and the small negative ones beside them would
+    not be found.
     """
 
     resistance = _scale = None
@@ -153,13 +158,22 @@ class Part:
         """Assemble D K D at the problem's state and factorise it; its number of negative eigenvalues, by the factors
         that give eigenvalues and modes."""
         self.assemble()
-        self._scale = self._scale or eigen.balance(self.K)
+        self._scale = self._scale or self._balance()
         self.K.diagonalScale(self._scale, self._scale)
         self.pc.setOperators(self.K)
         self.pc.setUp()
         negative, self._zero, _ = self.pc.getFactorMatrix().getInertia()
         self._shift = 0.0
         return negative
+
+    def _balance(self):
+        """D: ones where the sections bend about alike."""
+        sizes = self.model.section.J.max(axis=-1)
+        sizes = sizes[np.isfinite(sizes) & (sizes > 0)]
+        scale = eigen.balance(self.K)
+        if not len(sizes) or sizes.max() < _ALIKE * sizes.min():
+            scale.set(1.0)
+        return scale
 
     def _nearest(self, count, side=0):
         """(eigenvalues nearest zero, their eigenvectors) of D K D as last factorised; side: 1, -1 or 0 for both."""
