@@ -13,6 +13,7 @@ import cosserat_fenicsx as cf
 from cosserat_fenicsx.drilling.choose import chosen
 from cosserat_fenicsx.well.components import StringPart
 
+pytestmark = pytest.mark.serial
 well = cf.well
 KNOWN = json.loads((Path(__file__).parent / "reference" / "bent_assemblies.json").read_text(encoding="utf-8"))
 HOLE, BLADE = 0.2159, 0.2  # diameter, and length of a stabiliser, m

@@ -25,6 +25,7 @@ from cosserat_fenicsx.drilling import (
 )
 from cosserat_fenicsx.parts import Time, Torque, TorsionalDamping, TorsionalStiffness
 
+pytestmark = [pytest.mark.serial, pytest.mark.once]
 STEEL = cf.Material(E=206e9, nu=0.3, density=7850.0)
 TRUTHS = json.loads((Path(__file__).parent / "reference" / "controls.json").read_text())
 
