@@ -1,5 +1,5 @@
-"""Rods that touch each other and themselves. Nearest points and their derivatives are in strands.py, the laws are solved
-in statics/touching.py."""
+"""Rods that touch each other and themselves. Nearest points and their derivatives are in strands.py; the laws are
+solved in statics/touching.py."""
 
 import math
 from dataclasses import dataclass
@@ -123,6 +123,6 @@ class RodContact(LineAction):
             first, second = (scene.rods[int(i)] for i in (a, b))
             raise SceneError(
                 f"RodContact: rod '{first.name}' at s = {s:.6g} m overlaps rod '{second.name}' at s = {t:.6g} m by "
-                f"{-gap[k]:.3g} m at rest: expected rods that touch at most, which are farther apart by that; `exclude` is the arc length next to a "
-                "point, or to a joint, within which rods do not touch"
+                f"{-gap[k]:.3g} m at rest: expected rods that touch at most, which are farther apart by that; "
+                "`exclude` is the arc length next to a point, or to a joint, within which rods do not touch"
             )

@@ -145,7 +145,7 @@ def fit(
         scene: a `Drilling`, whose motion begins at time 0.
         readings: `Readings`, with standard deviations.
         unknowns: {name: (least, largest)} of numbers of the scene, in SI, such as "bit.law.static",
-            "hole.sections[0].friction" or "drag.torsional".
+            "hole.sections[0].friction" or "drag.torsion".
         clock: s that the readings' time 0 is after the start of the motion; None where it is one more unknown, within
             5 s of it.
         model, dt: see `simulate`.
@@ -167,14 +167,14 @@ def fit(
     confidence = number("fit", "confidence", confidence, "a number between 0 and 1", lambda x: 0 < x < 1)
     problem = _Problem(scene, readings, _ranges(scene, unknowns), clock, model, dt)
     with StageProgress("fit", progress, world()) as at:
-        best = None
+        found = []
         for k, start in enumerate(problem.starts(at)):
-            found, kept_clear = problem.fitted(start, leave_out, at, k)
-            if best is None or kept_clear > best[1]:
-                best = found, kept_clear
-            if found.misfit < _GOOD:
+            found.append(problem.fitted(start, leave_out, at, k))
+            if found[-1].misfit < _GOOD:
                 break
-    return problem.answer(best[0], confidence)
+    # by medians, which outliers do not change
+    best = min(found, key=lambda estimate: np.median(np.abs(estimate.residuals)))
+    return problem.answer(best, confidence)
 
 
 def _ranges(scene, unknowns):
@@ -296,7 +296,7 @@ class _Problem:
         return total
 
     def fitted(self, start, leave_out, at, k):
-        """(`Estimate` from a start, minus its robust misfit)."""
+        """The `Estimate` from a start."""
         bounds, shares = (np.zeros(len(start)), np.ones(len(start))), np.clip(start, 1e-3, 1 - 1e-3)
         for share in _SHARES:
             if sum((x & (self._readings.times <= self._readings.times[0] + share * np.ptp(self._readings.times))).sum()
@@ -304,8 +304,7 @@ class _Problem:
                 at.at(f"start {k + 1}, the first {100 * share:g} % of the readings")
                 shares = self._estimate(shares, share, bounds, False, _ROUGH).values
         at.at(f"start {k + 1}, all readings")
-        found = self._estimate(shares, 1.0, bounds, leave_out, _FINE)
-        return found, -float(np.median(np.abs(found.residuals)))
+        return self._estimate(shares, 1.0, bounds, leave_out, _FINE)
 
     def _estimate(self, start, share, bounds, leave_out, settings):
         last = {}
@@ -315,15 +314,13 @@ class _Problem:
             if key not in last:
                 found = self.residuals(x, share)
                 last.clear()
-                last[key] = np.full(last_size[0], _NONE) if found is None else found
-                last_size[0] = len(last[key])
+                last[key] = np.full(len(first), _NONE) if found is None else found
             return last[key]
 
         def jacobian(x):
             base, columns = residuals(x), []
             for i in range(len(x)):
                 step = _STEP if x[i] + _STEP <= 1 else -_STEP
-                moved = None
                 for sign in (1, -1):
                     moved = self.residuals(x + sign * step * np.eye(len(x))[i], share)
                     if moved is not None:
@@ -336,7 +333,6 @@ class _Problem:
         first = self.residuals(start, share)
         if first is None:
             raise NotConverged(f"fit: no motion with {self._told(start)}: expected narrower bounds of unknowns")
-        last_size = [len(first)]
         return estimated(residuals, jacobian, start, bounds, leave_out, settings)
 
     def _told(self, shares):

@@ -181,7 +181,8 @@ class Path(RodResult):
         station = self._most_displaced()
         turned = np.where((angle := self.rotation_angle(station)) > 1e-12, angle, 0.0)[-1]
         yield (
-            f"{title} the load factor {self.load_factors[-1]:.6g}{self._of_stage(self.stage[-1])}, {_STATES[np.sign(self.negative_modes[-1])]}, "
+            f"{title} the load factor {self.load_factors[-1]:.6g}{self._of_stage(self.stage[-1])}, "
+            f"{_STATES[np.sign(self.negative_modes[-1])]}, "
             f"{station} is displaced by {self._moved_in_words(station, units)} and turned by {turned:.6g} rad."
         )
         for doubt in self.scene.doubts:

@@ -89,8 +89,9 @@ class Problem(Equations):
     """Residual and tangent of a model in statics; see `Equations`.
 
     load_factor: of loads and prescribed motions; while `begins`, that of permanent loads, from 0 to 1, before all
-    others. touching: the `RodContacts` of the scene, or None. fields: the `PackedExpression` of `CompiledForms.fields`, or None; load_norm: Euclidean norm of the dead
-    loads at load factor 1, dimensionless; sweep: the `Sweep` that finds points in C, once it was asked for.
+    others. touching: the `RodContacts` of the scene, or None. fields: the `PackedExpression` of `CompiledForms.fields`,
+    or None; load_norm: Euclidean norm of the dead loads at load factor 1, dimensionless; sweep: the `Sweep` that finds
+    points in C, once it was asked for.
     """
 
     ties_class, sweep, touching = TieRows, None, None

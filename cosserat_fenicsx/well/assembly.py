@@ -251,8 +251,9 @@ def _equations(beam, curvature, s):
     F = beam.thrust - (below[1:] + below[:-1]) / 2
     shear = 12 * EI / (beam.GA[part] * h**2)
     one, zero = np.ones_like(h), np.zeros_like(h)
-    bending = np.array([[12 * one, 6 * h, -12 * one, 6 * h], [6 * h, (4 + shear) * h**2, -6 * h, (2 - shear) * h**2],
-                        [-12 * one, -6 * h, 12 * one, -6 * h], [6 * h, (2 - shear) * h**2, -6 * h, (4 + shear) * h**2]])  # fmt: skip
+    near, far = (4 + shear) * h**2, (2 - shear) * h**2
+    bending = np.array([[12 * one, 6 * h, -12 * one, 6 * h], [6 * h, near, -6 * h, far],
+                        [-12 * one, -6 * h, 12 * one, -6 * h], [6 * h, far, -6 * h, near]])  # fmt: skip
     pressing = np.array([[36 * one, 3 * h, -36 * one, 3 * h], [3 * h, 4 * h**2, -3 * h, -(h**2)],
                          [-36 * one, -3 * h, 36 * one, -3 * h], [3 * h, -(h**2), -3 * h, 4 * h**2]])  # fmt: skip
     K = bending * (EI / (h**3 * (1 + shear))) - pressing * (F / (30 * h))

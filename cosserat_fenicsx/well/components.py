@@ -6,8 +6,8 @@ mud follows from it (`Mud`), or is given (`Component`).
 Standard sizes are in standard_sizes.csv. Drill pipe: bodies of API Spec 5DP (ISO 11961); tool joints and weights with
 them of API RP 7G, for new grade E75 pipe with the connection named, which other grades and connections exceed by up to
 a tenth. Casing: API Spec 5CT (ISO 11960), nominal weights with threads and couplings; its inner diameter is that of the
-body, which the drift diameter is less than. Drill collars: number, outer diameter and bore of API Spec 7-1 (ISO 10424-1); of those with two bores the
-larger one. Heavy-weight pipe: Drilco's Hevi-Wate; other makes differ by about 1 %. Sizes without a weight have
+body, which the drift diameter is less than. Drill collars: number, outer diameter and bore of API Spec 7-1 (ISO
+10424-1); of those with two bores the larger one. Heavy-weight pipe: Drilco's Hevi-Wate; other makes differ by about 1 %. Sizes without a weight have
 the weight of the plain section.
 """
 
@@ -68,7 +68,8 @@ def standard_size(kind, name):
     """Its full name as `size`, outer_diameter, inner_diameter, tool_joint (m, or None), mass (kg/m in air, or None).
 
     Args:
-        kind: "DrillPipe", "HeavyWeight", "Collar" or "Casing"; name: such as "5 in 19.50 lb/ft"; the units may be left out.
+        kind: "DrillPipe", "HeavyWeight", "Collar" or "Casing"; name: such as "5 in 19.50 lb/ft"; the units may be left
+            out.
 
     Raises:
         SceneError: an unknown name, with the nearest known one.

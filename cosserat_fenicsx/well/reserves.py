@@ -76,7 +76,8 @@ class MarginOfOverpull(Result):
         i = int(np.argmin(self.margins))
         yield (
             f"{self.operation}: margin of overpull {self._told('margin', units, form='.5g')}, by the "
-            f"{self.component[i]} at md = {self._told('md', units, self.md[i])}, with a safety factor of {self.safety:g}."
+            f"{self.component[i]} at md = {self._told('md', units, self.md[i])}, with a safety factor of "
+            f"{self.safety:g}."
         )
 
     def __repr__(self):
@@ -151,8 +152,8 @@ class MostWeightOnBit(Result):
             f" at md = {self._told('md', units, self.md[i])}, {self.component[i]}" if self.md[i] == self.md[i] else ""
         )
         yield (
-            f"{self.operation}: at most {self._told('weight', units, form='.4g')} on bit, limited by {self.limit}{where}; "
-            f"strength with a safety factor of {self.safety:g}."
+            f"{self.operation}: at most {self._told('weight', units, form='.4g')} on bit, limited by "
+            f"{self.limit}{where}; strength with a safety factor of {self.safety:g}."
         )
         yield "'-': the hook load is 0 before this limit is reached."
 
@@ -217,8 +218,8 @@ def most_weight_of(answer, grade, wear, safety, buckling, model):
 
 
 def _solved(answer, model, weight):
-    """The `TorqueAndDrag` of the flexible string with another weight on bit (N), without estimates of errors of its own;
-    or the `LockUp`."""
+    """The `TorqueAndDrag` of the flexible string with another weight on bit (N), without estimates of errors of its
+    own; or the `LockUp`."""
     operation = replace(answer.operation, weight=weight)
     chain = chain_of(answer.pieces, answer.torque_convention == "coulomb")
     solved = soft_string(chain, -weight, operation.torque, _ACCURATE)

@@ -193,8 +193,10 @@ def build_rate(
     why += [f"three-point: {reason}"] if reason else []
     turning = [place.component.name for place in laid if place.component.bend] if operation.direction(1.0)[1] else []
     if turning:
-        why.append(f"ONE MOMENT of a turn: {' and '.join(turning)} rotates, and its bend with it: the rates are those of a "
-                   "string that slides")  # fmt: skip
+        why.append(
+            f"ONE MOMENT of a turn: {' and '.join(turning)} rotates, and its bend with it: the rates are those of a string "
+            "that slides"
+        )
     return BuildRate(np.array([*rates, three]), tuple(why), anisotropy, straight.side_force, straight.tilt,
                      tuple(straight.contacts), _LOOKED_FOR, side_force, tilt, beam)  # fmt: skip
 

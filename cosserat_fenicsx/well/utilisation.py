@@ -270,9 +270,14 @@ class Utilisation(Result):
             found = [f"{self.md[where][0] / size:.5g}"]
         return f"{', '.join(found[:3])}{more} {unit}" if found else ""
 
+    @property
+    def _by_name(self):
+        """{name: `PipeStrength`} of the components that have one."""
+        return {x.pipe.name: x for x in self.strengths if x is not None}
+
     def _about(self):
         return {"kind": "Utilisation", "operation": self.answer.operation.name, "depth": self.answer.depth,
-                "yield_strength": {x.pipe.name: x.yield_strength for x in self.strengths if x is not None}}  # fmt: skip
+                "yield_strength": {name: x.yield_strength for name, x in self._by_name.items()}}  # fmt: skip
 
     def _answer(self, units):
         i = self._worst()
@@ -294,12 +299,12 @@ class Utilisation(Result):
 
     def _grades(self, units):
         """Yield strength and wear of each component."""
-        for x in {x.pipe.name: x for x in self.strengths if x is not None}.values():
+        for x in self._by_name.values():
             wear = f" with {100 * x.wear:g} % of the wall left" if x.wear < 1 else ""
             yield f"{x.pipe.name} {units.told(x.yield_strength, 'Pa', form='.4g')}{wear}"
 
     def _more(self, units):
-        for strength in {x.pipe.name: x for x in self.strengths if x is not None}.values():
+        for strength in self._by_name.values():
             yield from strength.sentences(units)
 
     def _table(self, units, rows):

@@ -11,7 +11,13 @@ import numpy as np
 from rich.table import Table
 
 from cosserat_fenicsx.checks import Numbers, instance, refuse
-from cosserat_fenicsx.drilling.linear.characteristic import Characteristic, box_up_to, numbers, speed_of, without_autodriller
+from cosserat_fenicsx.drilling.linear.characteristic import (
+    Characteristic,
+    box_up_to,
+    numbers,
+    speed_of,
+    without_autodriller,
+)
 from cosserat_fenicsx.drilling.linear.excitation import Drawn
 from cosserat_fenicsx.drilling.linear.roots import all_roots
 from cosserat_fenicsx.drilling.linear.stability import ModeShape, shape_of, steady_of

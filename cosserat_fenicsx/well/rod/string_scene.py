@@ -296,7 +296,8 @@ def in_helix(string, s):
 
 
 def _untwisted(rod, s, position, tangent):
-    """Along a line (n, 3), m, with unit tangents (n, 3), without twist; at arc lengths s (n,), its bends straightened."""
+    """Along a line (n, 3), m, with unit tangents (n, 3), without twist; at arc lengths s (n,), its bends
+    straightened."""
     q = _carried(rod.curve, tangent)
     if rod.curve.breaks:
         q = product_conjugate(q, rod.curve.turned(s))
