@@ -24,6 +24,7 @@ from scipy.optimize import brentq
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.algebra.pool import PROBLEMS, ProblemPool
+from cosserat_fenicsx.results import compared
 from cosserat_fenicsx.results.records import find_again, keep_confirmed
 from cosserat_fenicsx.statics import refinement
 from cosserat_fenicsx.statics.path.recorder import Tracing
@@ -314,6 +315,18 @@ def test_soft_members_hide_no_bifurcation(soft):
     )
     assert path.negative_modes.tolist() == [0, 1] and len(path.events) == 1
     assert [e.load_factor for e in path.events] == pytest.approx([4.493409457909064**2], rel=1e-6)
+
+
+@pytest.mark.parametrize(("apart", "counts"), [(9e-12, False), (2e-11, True)])
+def test_rounding_of_a_column_that_keeps_its_line_is_no_error(apart, counts):
+    """Positions of two meshes differ by rounding times a load near that of buckling."""
+    column = cf.Rod(cf.Line((0, 0, 0), (0, 0, 1)), cf.Stiffness((np.inf,) * 2, np.inf, (1.0, 1.0), 1.0))
+    scene = cf.Scene([column], [cf.Clamp(column.start)], [cf.Force(column.end, (0, 0, -1.0))])
+    fine, coarse = (cf.solve(scene, 2.0, elements=n, model="spatial") for n in (4, 2))
+    moved = coarse._in_elements.copy()
+    moved[..., 0] += apart
+    coarse._in_elements = moved
+    assert (compared.differences(fine, coarse)[0][0] > 0).all() == counts
 
 
 def test_thin_guys_hold_a_mast_in_the_count_of_its_modes():

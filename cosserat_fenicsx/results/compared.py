@@ -214,6 +214,9 @@ def _norms(values):
 ROUNDING = 1e-14
 # Sizes, in the scales' units, below which a quantity is taken to vanish; and the least moment over n times the length.
 NOTHING, LEAST_MOMENT = 1e-9, 1e-9
+# Differences of positions up to this are rounding alone where the displacement vanishes: a straight column holds its
+# line to the rounding of many elements, which a load near that of buckling amplifies.
+STILL = 1e-2 * NOTHING
 # Least size of positions and of rotations over the largest of the path: unloaded states differ by rounding.
 _AT_REST = 1e-6
 # Moments up to this multiple of their rounding at all points of a path count as zero, as in straight bars.
@@ -341,6 +344,7 @@ def differences(fine, coarse):
             apart[:, part, 0] = np.maximum(apart[:, part, 0], turned)
     everywhere, at_ends = apart.max(axis=1).T, apart[:, places.ends].max(axis=1).T
     everywhere[everywhere <= np.maximum(ROUNDING, NOISE * sizes.rounding[: len(NAMES)])] = 0.0
+    everywhere[0, (sizes.sizes[0] <= NOTHING) & (everywhere[0] <= STILL)] = 0.0
     shared, ratios = everywhere, np.divide(fine.layout.counts, coarse.layout.counts)
     if ratios.max() > 2:
         shares = np.minimum((2 / ratios) ** fine.degree, 1.0)

@@ -44,7 +44,7 @@ class Pair(Pointers):
         p.coarse, p.fine, p.tol, p.resolved, p.in_layer = coarse.c, fine.c, tol, RESOLVED, LONGEST_IN_LAYER
         for name in ("ahead", "of_ends", "safety", "safety_below", "asymptotic"):
             setattr(p, name, getattr(accuracy, name.upper()))
-        for name in ("nothing", "least_moment", "vanishing", "rounding", "noise"):
+        for name in ("nothing", "still", "least_moment", "vanishing", "rounding", "noise"):
             setattr(p, name, getattr(compared, name.upper()))
         p.far, p.equal, p.single = accuracy.FAR_AHEAD, equal_elements(fine.layout), min(coarse.layout.counts) == 1
         rule = fine.model.rule
