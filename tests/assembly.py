@@ -20,7 +20,7 @@ def assembly(scene):
     inc, hole = scene.hole.path.inclination[0], scene.hole.sections[0].diameter / 2
     thrust, pieces, held = scene.operations[0].weight, [], {}
     for part in scene.string.components:
-        stiffness, weight = part.stiffness, weight_in_mud(part, scene.mud)
+        stiffness, weight = part.stiffness, weight_in_mud(part, scene.mud, 0.0)
         halves = 2 if isinstance(part, cf.well.Stabiliser) else 1
         for k in range(halves):
             if k or isinstance(part, cf.well.Bit):

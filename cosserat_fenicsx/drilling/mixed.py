@@ -70,7 +70,7 @@ def mixed_scene(drilling: Drilling, depth: float | None = None) -> MixedScene:
     if not hasattr(drilling.string, "components"):
         refuse("mixed_scene", "drilling.string", drilling.string, "a DrillString; discs are no rod")
     top = _depth(drilling, depth)
-    parts = list(zip(reversed(drilling.laid), drilling.segments, strict=True))  # from the top down
+    parts = list(zip(drilling.places, drilling.segments, strict=True))  # from the top down
     below = [
         (max(place.top, top), place.bottom, place.component, x) for place, x in parts if place.bottom > top + _NOTHING
     ]

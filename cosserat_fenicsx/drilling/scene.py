@@ -15,7 +15,7 @@ from cosserat_fenicsx.parts import Depth, Part
 from cosserat_fenicsx.quantities import Units
 from cosserat_fenicsx.results.screen import InWords
 from cosserat_fenicsx.units import rpm
-from cosserat_fenicsx.well.components import DrillString, weight_in_mud
+from cosserat_fenicsx.well.components import DrillString, in_columns
 from cosserat_fenicsx.well.hole import Borehole, Mud
 
 
@@ -84,10 +84,19 @@ class Drilling(InWords, Part):
         return self.string.laid(self.bit_depth)
 
     @cached_property
+    def fluids(self) -> Mud | None:
+        """The mud: without a hole air where none is given."""
+        return self.mud if self.mud is not None or self.hole is not None else Mud(0.0)
+
+    @cached_property
+    def places(self) -> list:
+        """The uniform parts of the string in their places, from the top down: components, cut between fluids."""
+        return in_columns(self.laid, self.fluids)[::-1]
+
+    @cached_property
     def segments(self) -> tuple[Segment, ...]:
         """The uniform parts of the string, from the top down."""
-        mud = self.mud if self.mud is not None or self.hole is not None else Mud(0.0)
-        return tuple(segment_of(place, weight_in_mud(place.component, mud)) for place in reversed(self.laid))
+        return tuple(segment_of(place, place.weight_in(self.fluids)) for place in self.places)
 
     @property
     def damped(self) -> bool:
@@ -135,7 +144,7 @@ class Drilling(InWords, Part):
     def _string_in_words(self, units):
         mud, told = self.mud, units.told
         fluid = " in air" if mud is not None or self.hole is None else ""
-        fluid = " in mud" if mud is not None and mud.density > 0 else fluid
+        fluid = " in mud" if mud is not None and mud.densities([0.0, self.bit_depth]).any() else fluid
         for part in self.segments:
             weight = told(part.weight, "N/m", "force per length", ".5g", "N/m")
             torsion = told(part.torsional_impedance, "N m s/rad", form=".5g")

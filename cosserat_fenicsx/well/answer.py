@@ -61,6 +61,8 @@ _QUANTITIES = by_name(
     Quantity("azimuth", unit="deg", axes=_ALONG, getter=_degrees("azimuth")),
     Quantity("tension", "effective tension", "N", axes=_ALONG, noise=1e-2, digits=5, short="tension"),
     Quantity("true_tension", unit="N", axes=_ALONG),
+    Quantity("pressure_outside", unit="Pa", axes=_ALONG),
+    Quantity("pressure_inside", unit="Pa", axes=_ALONG),
     Quantity("torque", unit="N m", axes=_ALONG, noise=1e-2, digits=5),
     Quantity("side_force", unit="N/m", axes=_ALONG, dimension="force per length"),
     Quantity("distributed_force", "distributed side force", "N/m", axes=_ALONG, dimension="force per length",
@@ -287,7 +289,10 @@ class TorqueAndDrag(Differentiated, Result):
         """Outside and inside at `md`, Pa; NaN where there is no mud."""
         if self.mud is None:
             return np.full((2, len(self.md)), np.nan)
-        return self.mud.pressures(self.md, self.hole.path.position(self.md)[:, 2])
+        return self.mud.pressures(self.md, self.hole.path)
+
+    pressure_outside = property(lambda self: self._pressures[0], doc="Of the fluid around it, with flow, Pa.")
+    pressure_inside = property(lambda self: self._pressures[1], doc="Of the fluid in it, with flow, Pa.")
 
     @cached_property
     def true_tension(self) -> np.ndarray:
@@ -473,6 +478,28 @@ class TorqueAndDrag(Differentiated, Result):
         from cosserat_fenicsx.well import charts
 
         return charts.drawn(self, charts.answer_figure, file, between, units=units, width=width)
+
+    def plot_pressures(
+        self,
+        file: File | None = None,
+        between: tuple[float, float] | None = None,
+        *,
+        units: Any = "SI",
+        width: int | None = None,
+    ):
+        """Draw the fluids around the string and in it, their pressures, effective and true tension, depth downwards.
+
+        Args:
+            file, between, units, width: see `plot`.
+
+        Raises:
+            SceneError: see `plot`; no mud.
+        """
+        from cosserat_fenicsx.well import charts, strength_charts
+
+        if self.mud is None:
+            raise SceneError("plot_pressures: mud = None: expected the answer of a string in Mud(density)")
+        return charts.drawn(self, strength_charts.pressures_figure, file, between, units=units, width=width)
 
     def plot_from_side(
         self,

@@ -20,7 +20,7 @@ from scipy.linalg import solve_banded
 from scipy.optimize import brentq
 
 from cosserat_fenicsx.errors import NotConverged, SceneError
-from cosserat_fenicsx.well.components import weight_in_mud
+from cosserat_fenicsx.well.components import in_columns
 from cosserat_fenicsx.well.pieces import bend_of, rings_of
 
 # Length that lies on the wall up to the upper end of what is solved at least, m.
@@ -111,7 +111,8 @@ def assembly_of(hole, laid, mud, operation, depth, length):
         if S is None or S.matrix is not None or not math.isclose(*S.bending, rel_tol=1e-9):
             raise SceneError(f"{part.name}: stiffness = {S!r}: expected that of a round section for build_rate")
         loose = max(0.0, float(hole.at(place.bottom, "diameter")) / 2 - part.body_radius)
-        rows.append((min(depth - place.top, length), S.bending[0], min(S.shear), weight_in_mud(part, mud), loose))
+        for x in in_columns([place], mud):
+            rows.append((min(depth - x.top, length), S.bending[0], min(S.shear), x.weight_in(mud), loose))
         if part.bend:
             md, angle, side = bend_of(place)
             if abs(math.sin(side)) > 1e-6:

@@ -17,6 +17,7 @@ import math
 import re
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, ClassVar, Literal
 
@@ -463,26 +464,28 @@ class Bit(StringPart):
         return Circle(self.body_diameter).stiffness(self.material)
 
 
-def weight_in_mud(component, mud):
-    """N/m: as given, or from the mass in air and the fluids outside and inside, whose pressures carry a part of it.
+def weight_in_mud(component, mud, md):
+    """N/m at measured depths (m): as given, or from the mass in air and the fluids outside and inside, whose pressures
+    carry a part of it.
 
     w = m g - rho_o g A_o + rho_i g A_i, the weight that goes with the effective tension: A. Sparks, J. Energy Resour.
     Technol. 106 (1984) 46, doi:10.1115/1.3231023. The outer area A_o is the area of the steel, mass
-    over density, and of the bore A_i, so that tool joints count.
+    over density, and of the bore A_i, so that tool joints count. Where the fluids change w jumps and the effective
+    tension does not.
 
     Raises:
         SceneError: no mud, and no weight in it.
     """
     if component.weight is not None:
-        return component.weight
+        return np.full(np.shape(md), component.weight)[()]
     if mud is None:
         raise SceneError(
             f"torque_and_drag: mud = None: expected Mud(density), since {component.name} is given by its weight in air "
             "(Mud(0) for air, or Component(weight=...) by the weight in mud)"
         )
     steel, bore = component.mass / component.material.density, math.pi / 4 * component.inner_diameter**2
-    lifted = mud.density * (steel + bore) - mud.inside * bore
-    return (component.mass - lifted) * mud.gravity
+    outside, inside = mud.densities(md)
+    return (component.mass - (outside * (steel + bore) - inside * bore)) * mud.gravity
 
 
 def in_words(part, where, weight, units):
@@ -505,6 +508,20 @@ class Laid:
     top: float
     bottom: float
     component: StringPart
+
+    def weight_in(self, mud):
+        """N/m in a mud, of a place with one fluid outside and one inside, see `in_columns`."""
+        return float(weight_in_mud(self.component, mud, (self.top + self.bottom) / 2))
+
+
+def in_columns(laid, mud):
+    """Components in their places, from the bit up, cut where a fluid gives way to another one."""
+    cuts = [] if mud is None else mud.interfaces[::-1].tolist()
+    found = []
+    for place in laid:
+        inside = [x for x in cuts if place.top < x < place.bottom and place.component.weight is None]
+        found += [Laid(top, bottom, place.component) for bottom, top in pairwise([place.bottom, *inside, place.top])]
+    return found
 
 
 @dataclass(frozen=True)
@@ -562,9 +579,9 @@ class DrillString(InWords, Part):
 
     def sentences_at(self, depth, mud, units):
         """Sentences on the components in their places, with the bit at a measured depth (m) in a mud, in some units."""
-        for place in self.laid(depth):
+        for place in in_columns(self.laid(depth), mud):
             where = f"md {units.told(place.top, 'm').split()[0]} to {units.told(place.bottom, 'm')}"
-            weight = units.told(weight_in_mud(place.component, mud), "N/m", "force per length", ".2f", "N/m")
+            weight = units.told(place.weight_in(mud), "N/m", "force per length", ".2f", "N/m")
             yield in_words(place.component, where, f"{weight} in mud", units)
 
     def laid(self, depth):

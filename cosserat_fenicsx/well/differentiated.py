@@ -90,7 +90,7 @@ class Differentiated:
             "operation.weight": (Change(none, none, -1.0, 0.0), operation.weight, "N"),
             "operation.torque": (Change(none, none, 0.0, 1.0), operation.torque, "N m"),
         }
-        if mud is not None:
+        if mud is not None and not isinstance(mud.density, tuple):
             weights = np.array([_by_density(place.component, mud) for place in self.laid])[pieces.component]
             found["mud.density"] = Change(weights, none, 0.0, 0.0), mud.density, "kg/m^3"
         section = np.searchsorted([x.to for x in self.hole.sections[:-1]], (pieces.top + pieces.bottom) / 2)
@@ -99,7 +99,8 @@ class Differentiated:
             found[f"hole.sections[{i}].friction"] = change, one.friction, "1"
         for i in range(len(self.laid)):
             here = pieces.component == i
-            weight = float(pieces.weight[here][0]) if here.any() else math.nan
+            weights = set(pieces.weight[here])
+            weight = float(weights.pop()) if len(weights) == 1 else math.nan  # of several, or of none
             found[f"string.components[{i}].weight"] = Change(here.astype(float), none, 0.0, 0.0), weight, "N/m"
         return found
 

@@ -5,16 +5,17 @@ from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 
 from cosserat_fenicsx import units as constants
 from cosserat_fenicsx.actions.fluids import AddedMass, LinearDrag
+from cosserat_fenicsx.actions.walls import value_at
 from cosserat_fenicsx.checks import File, Numbers, doubt_width, number, positive, refuse, store, warn
 from cosserat_fenicsx.dimensions import in_si, size_of
 from cosserat_fenicsx.errors import SceneError
-from cosserat_fenicsx.parts import Density, Depth, Diameter, FileName, Friction, Number, Part, WallStiffness, at_least
+from cosserat_fenicsx.parts import Depth, Diameter, FileName, Friction, Number, Part, WallStiffness, at_least
 from cosserat_fenicsx.quantities import Units
 from cosserat_fenicsx.results.screen import InWords
 from cosserat_fenicsx.scene.rod import Rod
@@ -216,12 +217,55 @@ class Borehole(InWords, Part):
 
 
 @dataclass(frozen=True)
+class _Rows(Number):
+    """A number, or ascending rows of measured depth (m) and such a number; `ends`: of the lower ends of columns, which
+    are one number where all are equal."""
+
+    ends: bool = False
+
+    @property
+    def words(self):
+        depth = "of the lower end of each column" if self.ends else "ascending"
+        return f"{super().words}, or rows of measured depth (m), {depth}, and such a value"
+
+    def check(self, owner, field, value):
+        if not isinstance(value, list | tuple | np.ndarray):
+            return super().check(owner, field, value)
+        if not len(value) or not all(isinstance(row, list | tuple | np.ndarray) and len(row) == 2 for row in value):
+            refuse(owner, field, value, self.words)
+        rows, last = [], 0.0 if self.ends else -math.ulp(0.0)
+        more = ", of the lower ends of columns, from above 0" if self.ends else ""
+        for md, x in value:
+            last = number(
+                owner, field, md, f"measured depths (m) that ascend{more}", lambda x, last=last: last < x < math.inf
+            )
+            rows.append((last, super().check(owner, field, x)))
+        if not self.ends:
+            return tuple(rows)
+        kept = [a for a, b in pairwise(rows) if a[1] != b[1]] + rows[-1:]
+        return tuple(kept) if len(kept) > 1 else kept[0][1]
+
+    def schema(self, definitions):
+        plain, depth = super().schema(definitions), Number("length", at_least(0)).schema(definitions)
+        row = {"type": "array", "prefixItems": [depth, plain], "minItems": 2, "maxItems": 2}
+        return {"anyOf": [plain, {"type": "array", "items": row, "minItems": 1}]}
+
+
+_Columns = Annotated[float | Numbers, _Rows("density", at_least(0, "a density"), ends=True)]
+_Flow = Annotated[float | Numbers, _Rows("pressure")]
+
+
+@dataclass(frozen=True)
 class Mud(InWords, Part):
-    """The fluid in the hole and in the string, at rest.
+    """The fluids in the hole and in the string, at rest.
 
     Args:
-        density: kg/m^3; 0 for air.
-        inside: that in the string, kg/m^3; None for the same.
+        density: kg/m^3; 0 for air. Of columns of fluid on top of each other, such as of a spacer and a slurry: rows of
+            the measured depth of a column's lower end (m) and its density, from the surface down; the last one reaches
+            to the bottom.
+        inside: that in the string, kg/m^3, or rows as of `density`; None for the same. Where the pressures inside and
+            outside differ at the lower end, something there holds the difference: a float valve, the nozzles of a bit,
+            a plug.
         added_mass: C_a, for motions: the mass of the fluid around that moves with the string, over the mass that the
             string displaces: 1 far from walls, 1.5 to 3 in a hole. None leaves it and the mud inside out.
         drag: lateral drag on the axis, for motions: force per length and speed, N s/m^2; None for none.
@@ -234,12 +278,12 @@ class Mud(InWords, Part):
         SceneError: a number that is negative or not finite; depths that do not ascend.
     """
 
-    density: Density
-    inside: Density | None = None
+    density: _Columns
+    inside: _Columns | None = None
     added_mass: Annotated[float, at_least(0, "a coefficient")] | None = None
     drag: Annotated[float, Number("damping per length", at_least(0, "a coefficient"))] | None = None
-    flow_inside: Any = 0.0
-    flow_outside: Any = 0.0
+    flow_inside: _Flow = 0.0
+    flow_outside: _Flow = 0.0
 
     #: m/s^2, standard.
     gravity: ClassVar[float] = 9.80665
@@ -248,42 +292,40 @@ class Mud(InWords, Part):
         """Take the same mud inside by default; warn of a density that is probably in another unit."""
         if self.inside is None:
             store(self, inside=self.density)
-        for name in ("flow_inside", "flow_outside"):
-            store(self, **{name: self._pressure(name)})
-        # neither a gas nor a liquid; relative densities; heavier than any mud
-        if 5 < self.density < 300 or 0.5 < self.density < 3 or self.density > 2700:
-            warn(
-                f"Mud.density = {self.density:g} kg/m^3 is hardly that of a mud: 1.2 g/cm^3 are 1200, 10 pounds per US "
-                "gallon 10 * units.ppg = 1198"
-            )
+        for density in {x for rows in (self.density, self.inside) for _, x in _columns(rows)}:
+            # neither a gas nor a liquid; relative densities; heavier than any mud
+            if 5 < density < 300 or 0.5 < density < 3 or density > 2700:
+                warn(
+                    f"Mud.density = {density:g} kg/m^3 is hardly that of a mud: 1.2 g/cm^3 are 1200, 10 pounds per US "
+                    "gallon 10 * units.ppg = 1198"
+                )
 
-    def _pressure(self, name):
-        """A pressure (Pa), or rows of measured depth and pressure; checked."""
-        given, expected = getattr(self, name), "a pressure (Pa), or rows of measured depth (m), ascending, and pressure"
-        if not isinstance(given, list | tuple | np.ndarray):
-            return number(self, name, given, "a pressure (Pa)", math.isfinite)
-        if not all(isinstance(row, list | tuple | np.ndarray) and len(row) == 2 for row in given):
-            refuse(self, name, given, expected)
-        rows = tuple(
-            (number(self, name, md, "a measured depth (m)", lambda x: x >= 0),
-             number(self, name, pressure, "a pressure (Pa)", math.isfinite))
-            for md, pressure in given
-        )  # fmt: skip
-        if not rows or any(b[0] <= a[0] for a, b in pairwise(rows)):
-            refuse(self, name, given, expected)
-        return rows
+    @property
+    def interfaces(self) -> np.ndarray:
+        """Measured depths at which a fluid gives way to another one, outside or inside, m."""
+        return np.unique([end for rows in (self.density, self.inside) for end, _ in _columns(rows)[:-1]])
 
-    def pressures(self, md, down) -> np.ndarray:
-        """(2, n) Pa, outside and inside the string, at measured depths and depths below the surface (m)."""
-        found = self.gravity * np.multiply.outer([self.density, self.inside], down)
-        for row, flow in zip(found, (self.flow_outside, self.flow_inside), strict=True):
-            row += np.interp(md, *np.transpose(flow)) if isinstance(flow, tuple) else flow
-        return found
+    def densities(self, md) -> np.ndarray:
+        """(2, ...) kg/m^3, outside and inside the string, at measured depths (m); at an interface, above it."""
+        return np.array([value_at(_columns(rows), md) for rows in (self.density, self.inside)])
+
+    def pressures(self, md, path: WellPath) -> np.ndarray:
+        """(2, n) Pa, outside and inside the string, at measured depths (m) along a path."""
+        down, found = path.position(md)[:, 2], []
+        for rows, flow in ((self.density, self.flow_outside), (self.inside, self.flow_inside)):
+            ends, densities = np.transpose(_columns(rows))
+            tops = path.position(np.append(0.0, np.minimum(ends[:-1], path.length)))[:, 2]
+            below = np.append(0.0, np.cumsum(densities[:-1] * np.diff(tops)))
+            i = np.searchsorted(ends, md)
+            added = np.interp(md, *np.transpose(flow)) if isinstance(flow, tuple) else flow
+            found.append(self.gravity * (below[i] + densities[i] * (down - tops[i])) + added)
+        return np.array(found)
 
     def sentences(self, units: Units) -> list[str]:
-        """On its density, in SI and in ppg, whatever the units."""
+        """On its densities, in SI and in ppg, whatever the units."""
         flow = "" if (self.flow_inside, self.flow_outside) == (0.0, 0.0) else "; with pressures of flow"
-        return [f"Mud: {self.density:g} kg/m^3, {self.density / constants.ppg:.4g} ppg{flow}."]
+        outside, inside = (_fluid_in_words(rows, units) for rows in (self.density, self.inside))
+        return [f"Mud: {outside}{'' if inside == outside else f'; inside the string {inside}'}{flow}."]
 
     def along(self, rod: Rod, outer: float | None = None, inner: float | None = None) -> tuple:
         """Actions of the mud on a moving rod: an `AddedMass`, across the rod alone, and a `LinearDrag`, if they are not
@@ -297,6 +339,8 @@ class Mud(InWords, Part):
             SceneError: a diameter that is not positive, or not given where a section is neither `Circle` nor `Tube`.
         """
         actions, across = [], []
+        if self.added_mass is not None and len(self.interfaces):
+            refuse(self, "density", self.density, "one fluid outside and one inside, for a motion with added_mass")
         if self.added_mass is not None:
             for end, section in rod.profile.pieces:
                 outside, inside = self._diameters(rod, section, outer, inner)
@@ -319,3 +363,15 @@ class Mud(InWords, Part):
         inner = own[1] if inner is None else number("Mud.along", "inner", inner, "a diameter from 0 on (m)",
                                                     lambda x: 0 <= x < math.inf)  # fmt: skip
         return outer, inner
+
+
+def _columns(rows):
+    """((md of the lower end, density), ...) of one fluid or of columns; the last one has no end."""
+    return (*rows[:-1], (math.inf, rows[-1][1])) if isinstance(rows, tuple) else ((math.inf, rows),)
+
+
+def _fluid_in_words(rows, units):
+    """The densities of columns, and their lower ends."""
+    told = [f"{x:g} kg/m^3, {x / constants.ppg:.4g} ppg" for _, x in _columns(rows)]
+    ends = [f" to md = {units.told(end, 'm')}; " for end, _ in _columns(rows)[:-1]]
+    return "".join(a + b for a, b in zip(told, [*ends, " below" if ends else ""], strict=True))

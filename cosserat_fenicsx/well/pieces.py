@@ -175,23 +175,26 @@ def pieces_of(hole, string, operation, mud, depth):
         )
     laid = string.laid(depth)
     ends = [place.top for place in laid]
-    cuts = np.concatenate([hole.path.md, ends, [section.to for section in hole.sections], [depth]])
+    interfaces = [] if mud is None else mud.interfaces
+    cuts = np.concatenate([hole.path.md, ends, [section.to for section in hole.sections], interfaces, [depth]])
     cuts = np.unique(cuts[(cuts >= 0) & (cuts <= depth)])
     cuts = cuts[np.diff(cuts, prepend=-1.0) > 1e-9]  # m; rounding of lengths that add up to a station
     cuts[-1] = depth
     top, bottom = cuts[:-1], cuts[1:]
     middle = (top + bottom) / 2
     component = np.searchsorted(-np.array(ends), -middle)
-    weights = np.array([weight_in_mud(place.component, mud) for place in laid])
-    for place, weight in zip(laid, weights, strict=True):
-        if weight < 0:
-            warn(f"{place.component.name} floats: it weighs {weight:g} N/m in mud")
+    weight = np.empty_like(middle)
+    for i, place in enumerate(laid):
+        here = component == i
+        weight[here] = weight_in_mud(place.component, mud, middle[here])
+        if (weight[here] < 0).any():
+            warn(f"{place.component.name} floats: it weighs {weight[here].min():g} N/m in mud")
     radii = np.array([place.component.contact_radius for place in laid])
     slip = np.array([operation.direction(radius) for radius in radii])
     _check_widths(hole, laid)
     section = np.searchsorted(hole.path.md, middle) - 1
     return Pieces(
-        top, bottom, component, weights[component], hole.at(middle, "friction"), radii[component],
+        top, bottom, component, weight, hole.at(middle, "friction"), radii[component],
         hole.at(middle, "diameter") / 2, *slip[component].T, *_downward(hole.path, section, bottom),
     ), laid  # fmt: skip
 

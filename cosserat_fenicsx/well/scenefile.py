@@ -60,7 +60,7 @@ from cosserat_fenicsx.results.result import Result
 from cosserat_fenicsx.results.screen import InWords
 from cosserat_fenicsx.well.answer import TorqueAndDrag
 from cosserat_fenicsx.well.assembly import assembly_of
-from cosserat_fenicsx.well.components import DrillString
+from cosserat_fenicsx.well.components import DrillString, in_columns
 from cosserat_fenicsx.well.hole import Borehole, Mud
 from cosserat_fenicsx.well.operations import Operation
 from cosserat_fenicsx.well.pieces import pieces_of
@@ -229,7 +229,7 @@ class WellScene(InWords, Part):
             if asked.get("model") == ROD:
                 for operation in self.operations:
                     convention = asked.get("torque_convention", CONVENTIONS[0])
-                    check_rod(hole, laid, operation, self.mud, convention)
+                    check_rod(hole, in_columns(laid, self.mud), operation, self.mud, convention)
 
     def sentences(self, units: Units):
         """On hole, mud, string, operations and model, in some units."""

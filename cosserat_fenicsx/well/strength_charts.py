@@ -1,4 +1,5 @@
-"""Charts of the strength of a string over the measured depth, which runs downwards, by matplotlib."""
+"""Charts of the strength of a string, and of the fluids around it and in it, over the measured depth, which runs
+downwards, by matplotlib."""
 
 import numpy as np
 
@@ -9,6 +10,8 @@ from cosserat_fenicsx.well.charts import DEPTH, depths_between, over_depth, rows
 _SHARE = Quantity("share of the limit", unit="1")
 _TENSION = Quantity("effective tension", unit="N", shown="kN")
 _DOGLEG = Quantity("dogleg", unit="rad/m", shown="deg/30m")
+_PRESSURE = Quantity("pressure", unit="Pa", shown="MPa")
+_DENSITY = Quantity("density", unit="kg/m^3")
 _BENDING = Quantity("bending stress", unit="Pa", shown="MPa")
 # The shares that are drawn, with their names; the first in black.
 _SHARES = {"von_mises": "von Mises", "tension": "tension", "torsion": "torsion", "collapse": "collapse",
@@ -78,3 +81,45 @@ def _doglegs(panel, use, rows, depth):
     most = max(np.nanmax(hole, initial=0.0), np.nanmin(allowed) if np.isfinite(allowed).any() else 0.0)
     panel.set_xlim(0.0, _FAR * most if most > 0 else None)
     panel.set_xlabel(heading)
+
+
+def pressures_figure(answer, between=None):
+    """Fluids, pressures and tensions along a string; see `TorqueAndDrag.plot_pressures`."""
+    top, bottom = depths_between("plot_pressures", between, answer.depth)
+    figure, panels, _, length = over_depth([2.4, 2.7, 2.7], DEPTH)
+    rows, room = rows_between(answer.md, top, bottom), 0.01 * (bottom - top)
+    panels[0].set_ylim((bottom + room) / length, (top - room) / length)
+    ends = np.array([top, *(x for x in answer.mud.interfaces if top < x < bottom), bottom])
+    densities = answer.mud.densities((ends[1:] + ends[:-1]) / 2)
+    _fluids(panels[0], ends / length, densities)
+    for panel, quantity, lines in (
+        (panels[1], _PRESSURE, {"in the string": answer.pressure_inside, "around it": answer.pressure_outside}),
+        (panels[2], _TENSION, {"effective tension": answer.tension, "true tension": answer.true_tension}),
+    ):
+        heading, size = scale(quantity)
+        for (name, values), colour in zip(lines.items(), ("black", "tab:blue"), strict=True):
+            panel.plot(values[rows] / size, answer.md[rows] / length, color=colour, label=name)
+        for end in ends[1:-1] / length:
+            panel.axhline(end, color=GREY, linewidth=0.6, linestyle=(0, (6, 3)))
+        panel.set_xlabel(heading.replace("effective tension", "tension"))
+    panels[2].axvline(0.0, color="black", linewidth=0.6)
+    legend(*panels)
+    figure.suptitle(f"Fluids: {title_of(answer, top, bottom)}")
+    return figure
+
+
+def _fluids(panel, ends, densities):
+    """Columns of fluid: around the string at both sides of those in it, darker the heavier, with their densities."""
+    unit, size = unit_of(_DENSITY)
+    low, high = densities.min(), densities.max()
+    for (left, right), column in (((0, 1), densities[0]), ((1, 2), densities[1])):
+        starts = np.flatnonzero(np.diff(column, prepend=np.nan) != 0)
+        for i, j in zip(starts, [*starts[1:], len(column)], strict=True):
+            shade = 0.15 + 0.5 * (column[i] - low) / (high - low or 1.0)
+            panel.fill_between([left, right], ends[i], ends[j], color=COLOURS[0], alpha=shade, linewidth=0)
+            panel.text((left + right) / 2, (ends[i] + ends[j]) / 2, f"{column[i] / size:.4g}", ha="center", va="center")
+    panel.axvline(1.0, color="black", linewidth=2.0)
+    panel.set_xlim(0, 2)
+    panel.set_xticks([0.5, 1.5], ["around", "inside"])
+    panel.set_xlabel(f"density of the fluid ({unit})")
+    panel.grid(visible=False)

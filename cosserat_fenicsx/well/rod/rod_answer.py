@@ -18,7 +18,7 @@ from cosserat_fenicsx.checks import refuse
 from cosserat_fenicsx.errors import NotConverged, SceneError
 from cosserat_fenicsx.well import criteria
 from cosserat_fenicsx.well.answer import TorqueAndDrag, scales_of, share
-from cosserat_fenicsx.well.components import weight_in_mud
+from cosserat_fenicsx.well.components import in_columns
 from cosserat_fenicsx.well.contacts import VERTICAL, WallContact, name_of_side
 from cosserat_fenicsx.well.pieces import bend_of, rings_of
 from cosserat_fenicsx.well.rod.resultants import MOSTLY
@@ -104,9 +104,9 @@ class RodInContact(TorqueAndDrag):
 
     @cached_property
     def _gravity(self):
-        z = np.interp([0.0, *(place.bottom for place in self.laid[::-1])], self.solved.s, self.position[:, 2])
-        weights = [self.pieces.weight[self.pieces.component == i][0] for i in range(len(self.laid))][::-1]
-        return float(np.diff(z) @ weights)
+        places = in_columns(self.laid, self.mud)[::-1]
+        z = np.interp([0.0, *(place.bottom for place in places)], self.solved.s, self.position[:, 2])
+        return float(np.diff(z) @ [place.weight_in(self.mud) for place in places])
 
     @cached_property
     def _piece(self):
@@ -204,7 +204,7 @@ def rod_in_contact(flexible, decided, progress=None, exact=True):
     # imported here, since it needs dolfinx, which the soft string does not
     from cosserat_fenicsx.well.rod.rod_in_hole import NotAccurate, solve_in_hole
 
-    laid = flexible.laid[::-1]  # from the top down
+    laid = in_columns(flexible.laid, flexible.mud)[::-1]  # from the top down
     hole, operation = flexible.hole, flexible.operation
     check_rod(hole, laid, operation, flexible.mud, flexible.torque_convention)
     above = [0.0, *(section.to for section in hole.sections)]
@@ -217,7 +217,7 @@ def rod_in_contact(flexible, decided, progress=None, exact=True):
                 hole.path,
                 [place.bottom - place.top for place in laid],
                 [place.component.stiffness for place in laid],
-                [weight_in_mud(place.component, flexible.mud) for place in laid],
+                [place.weight_in(flexible.mud) for place in laid],
                 [place.component.body_radius for place in laid],
                 radius=[(section.to, section.diameter / 2) for section in reached],
                 friction=[(section.to, section.friction) for section in reached],
@@ -225,7 +225,7 @@ def rod_in_contact(flexible, decided, progress=None, exact=True):
                 bottom_tension=-operation.weight,
                 bottom_torque=operation.torque,
                 rings=[ring[:3] for ring in rings_of(flexible.laid, hole)[::-1]],
-                bends=[bend_of(place) for place in laid if place.component.bend],
+                bends=[bend_of(place) for place in flexible.laid[::-1] if place.component.bend],
                 wall_stiffness=hole.wall_stiffness,
                 helix=helix,
                 tol=flexible.tol,
@@ -269,7 +269,7 @@ def _of_hand(solved):
 
 
 def check_rod(hole, laid, operation, mud, torque_convention):
-    """Refuse components in their places that cannot be a rod in contact, see `rod_in_contact`."""
+    """Refuse components in their places, see `in_columns`, that cannot be a rod in contact, see `rod_in_contact`."""
     turns = any(operation.direction(place.component.contact_radius)[1] for place in laid)
     if torque_convention != "coulomb" and turns:
         refuse("torque_and_drag", "torque_convention", torque_convention,
@@ -278,7 +278,7 @@ def check_rod(hole, laid, operation, mud, torque_convention):
         component = place.component
         if component.stiffness is None:
             raise SceneError(f"{component.name}: stiffness = None: expected a Stiffness for model = 'rod'")
-        weight = weight_in_mud(component, mud)
+        weight = place.weight_in(mud)
         if not weight > 0:
             raise SceneError(
                 f"{component.name}: it weighs {weight:g} N/m in mud: expected a positive weight for model = 'rod'"
