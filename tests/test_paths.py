@@ -249,6 +249,10 @@ def test_step_control_bounds():
     _, scene, _ = torsion_pendulum()
     with pytest.raises(cf.NotConverged, match="3 steps of arc length did not reach it"):
         cf.solve(scene, (0.0, 20.0), elements=4, control="arc", steps=cf.StepControl(most_steps=3))
+    with pytest.raises(
+        cf.NotConverged, match=r"stability at the load factor 8.16\d+ \(limit\): ask for .* up to there;"
+    ):
+        cf.solve(scene, (0.0, 20.0), elements=4, steps=cf.StepControl(most_steps=6))
     path = cf.solve(scene, (0.0, 20.0), elements=4, control="arc", steps=cf.StepControl(largest=1.0))
     assert np.abs(np.diff(path.load_factors)).max() <= 1.0
 

@@ -163,6 +163,17 @@ class Event:
     stage: int = -1
 
 
+def lost_at(path):
+    """Where a path with events loses its stability first, and what to ask for, in words."""
+    first = path.events[0]
+    ahead = "" if path.left else ", or branch=1 or -1 for what a structure does that buckles there"
+    ahead = ahead if first.kind == "bifurcation" else ""
+    return (
+        f"It loses its stability at the load factor {first.load_factor:.7g} ({first.kind}): ask for load factors up to "
+        f"there{ahead}"
+    )
+
+
 # Largest relative difference of the load factors of corresponding events on two meshes.
 _SAME = 1e-2
 _KINDS = {"limit": "a limit point", "bifurcation": "a bifurcation"}

@@ -26,7 +26,7 @@ from cosserat_fenicsx.results.accuracy import (
 )
 from cosserat_fenicsx.results.compared import NAMES, POSITION
 from cosserat_fenicsx.results.contacts import Passes, check_passes
-from cosserat_fenicsx.results.records import find_again, keep_confirmed
+from cosserat_fenicsx.results.records import find_again, keep_confirmed, lost_at
 from cosserat_fenicsx.statics.meshes import (
     balanced,
     halved,
@@ -334,12 +334,9 @@ def _rounding_hides(tol, rounding, elements, formulation):
 
 
 def _lost(tol, path, problem):
-    first = path.events[0]
-    ahead = "" if path.left else ", or branch=1 or -1 for what a structure does that buckles there"
     return (
         f"the accuracy tol = {tol:g} was not reached: finer meshes do not follow the path that coarser ones follow "
-        f"({problem}). It loses its stability at the load factor {first.load_factor:.7g} ({first.kind}): ask for "
-        f"load factors up to there{ahead}. The exception's `path` holds the path of a coarser mesh."
+        f"({problem}). {lost_at(path)}. The exception's `path` holds the path of a coarser mesh."
     )
 
 

@@ -19,7 +19,7 @@ from cosserat_fenicsx.results.accuracy import on_mesh
 from cosserat_fenicsx.results.contacts import check_passes
 from cosserat_fenicsx.results.export import saved
 from cosserat_fenicsx.results.path import Path
-from cosserat_fenicsx.results.records import Event, Record, Records
+from cosserat_fenicsx.results.records import Event, Record, Records, lost_at
 from cosserat_fenicsx.results.rod_contacts import check_apart
 from cosserat_fenicsx.results.staged import StagedPath
 from cosserat_fenicsx.scene.action import rubs
@@ -259,6 +259,8 @@ class Tracing:
             where = "Friction may not hold more; otherwise try"
         elif here and self._options["control"] == "load":
             where = "There may be a limit point, which load control cannot pass (control='auto' can); otherwise try"
+        elif self.path.events:
+            where = f"{lost_at(self.path)}; to go on beyond it try"
         softer = ", a softer wall" if any(action.at_nodes for action in scene.actions) else ""
         return f"{where} load factors in between, more elements{softer}, or {self.model.signature.formulation.advice}."
 
