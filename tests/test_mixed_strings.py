@@ -115,13 +115,10 @@ def test_in_an_inclined_hole_it_lies_on_the_wall_and_hangs_in_the_pipe():
 
 def test_refusals():
     string = drilling()
-    curved = cf.well.WellPath.from_survey([0, 3000, 3200], [0, 0, 0.5], [0, 0, 0], degrees=False)
     cutting = cf.drilling.Cutting(0.108, 60e6, 0.6, 4)
     for scene, depth, words in (
         (string, None, "depth = None: .*lowest DrillPipe"),
         (string, 3300.0, "depth = 3300.0: expected a depth within the string"),
-        (drilling(None, hole=cf.well.Borehole(curved, cf.well.HoleSection(3200.0, 0.2159, 0.2))), 3000.0,
-         "turns by about"),
         (replace(string, drag=cf.drilling.ViscousDrag(0.3)), 3000.0, "drag = .*the same rate"),
         (drilling(cutting, weight=1e4), 3000.0, "law = .*a Stribeck"),
     ):  # fmt: skip

@@ -35,6 +35,8 @@ from cosserat_fenicsx.scene.rod import Rod, RodOrName, StationOrName
 # Half the length of the ramp that replaces a jump of radius or friction, over the smallest radius; upper bound, over
 # the shortest piece.
 _RAMP, _OF_PIECE = 0.05, 0.25
+# How far beside a step of a rod's surface its radii are looked up, over the arc length.
+_BESIDE = 1e-9
 # Points along a tube in a picture.
 _DRAWN = 201
 
@@ -375,6 +377,11 @@ class HoleWall(_InMotion, TubeWall):
     """
 
     has_arm: bool = field(default=True, init=False, repr=False, compare=False)
+
+    def beside(self, s):
+        above, below = s * (1 - _BESIDE), s * (1 + _BESIDE)
+        step = value_at(self.contact_radius, below) - value_at(self.contact_radius, above)
+        return np.where(step < 0, above, np.where(step > 0, below, s))
 
 
 @dataclass(frozen=True)

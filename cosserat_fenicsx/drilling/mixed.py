@@ -1,18 +1,19 @@
 """A drill-string in motion with a rod for its lower part, and waves for the pipe above: `mixed_scene`."""
 
-import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Annotated
 
 import numpy as np
+from mpi4py import MPI
 
-from cosserat_fenicsx.actions.walls import HoleWall, TubeWall
-from cosserat_fenicsx.checks import instance, number, refuse
+from cosserat_fenicsx.actions.walls import HoleRing, HoleWall, TubeRing, TubeWall, value_at
+from cosserat_fenicsx.checks import instance, number, refuse, whole
 from cosserat_fenicsx.drilling.bit_laws import BitLaw
 from cosserat_fenicsx.drilling.pipe_above import PipeAbove
 from cosserat_fenicsx.drilling.scene import Drilling
 from cosserat_fenicsx.drilling.wall_friction import law_of, static_weight
 from cosserat_fenicsx.parts import ForceSize, Inertia, at_least
+from cosserat_fenicsx.results.path import Path
 from cosserat_fenicsx.scene.action import PointAction
 from cosserat_fenicsx.scene.curves import Line
 from cosserat_fenicsx.scene.loads import Force, LineForce
@@ -21,11 +22,14 @@ from cosserat_fenicsx.scene.scene import Scene
 from cosserat_fenicsx.scene.signals import AlongPieces
 from cosserat_fenicsx.scene.supports import Roller
 from cosserat_fenicsx.well.components import DrillPipe
+from cosserat_fenicsx.well.pieces import rings_of
+from cosserat_fenicsx.well.rod.string_scene import StringScene
 
-# Largest curvature times length (rad) of a straight section; length (m) below which a part is absent.
-_STRAIGHT, _NOTHING = 1e-9, 1e-9
-# Default stiffness of the wall, N/m^2.
+# Length (m) below which a part is absent.
+_NOTHING = 1e-9
+# Default stiffness of the wall, N/m^2, and of rings, N/m.
 _WALL = 1e8
+_DOWN = np.array([0.0, 0.0, 1.0])
 
 
 @dataclass(frozen=True)
@@ -33,8 +37,8 @@ class MixedScene:
     """A `Scene` of the lower part of a string, for `simulate`.
 
     Attributes:
-        scene: of the rod, its loads, the wall of the hole, and the pipe above. at_rest: the same rod for `solve`, with
-            a wall without friction, whose equilibrium at the load factor 1 may be the `start` of the motion.
+        scene: of the rod, its loads, the wall of the hole, and the pipe above. at_rest: the same rod with a wall
+            without friction; `rest` finds its equilibrium.
         rod: from the top down. above: the `PipeAbove`. depth: measured depth of the rod's upper end, m.
         why: sentences on approximations.
     """
@@ -45,26 +49,50 @@ class MixedScene:
     above: PipeAbove
     depth: float
     why: tuple
+    _string: StringScene | None = field(default=None, repr=False)
+
+    def rest(self, elements: int, degree: int, *, comm: MPI.Comm | None = None) -> Path:
+        """The equilibrium at the wall without friction, to `start` a motion from: with the same mesh nothing moves.
+
+        Args:
+            elements, degree: those of the motion. comm: MPI communicator; default all ranks.
+
+        Returns:
+            A `Path` of one point; its `stable` says whether the rod would buckle but for friction.
+
+        Raises:
+            SceneError: a string without a hole, whose motion has `start=1.0`.
+            NotConverged: no equilibrium was found.
+        """
+        if self._string is None:
+            refuse("mixed_scene", "drilling.hole", None, "a Borehole for `rest`; without one start=1.0 in `simulate`")
+        # imported here, since it needs dolfinx, which a scene does not
+        from cosserat_fenicsx.well.rod.rod_in_hole import at_rest
+
+        whole("rest", "elements", elements)
+        return at_rest(self._string, elements, degree, comm)
 
 
 def mixed_scene(drilling: Drilling, depth: float | None = None) -> MixedScene:
-    """A rod for a string's lower part, in a straight section of its hole, and waves for the pipe above.
+    """A rod for a string's lower part in its hole, which may bend, and waves for the pipe above.
 
     Components of the axes are north, east, down, as in a `WellPath`; without a hole the string is vertical below the
-    origin. Both ends of the rod are held on the axis of the hole, where they may turn and move along. With a hole, the
-    rod's nodes touch the wall, with the friction of the hole. The bit's law acts at the lower end (`BitTorque`), under
-    a constant weight on bit; the pipe starts with the tension of the equilibrium without friction.
+    origin. The rod is straight where it is free of stress. Its upper end is held on the axis of the hole, where it may
+    turn and move along. With a hole, the rod's nodes touch the wall, and stabilisers and the bit touch it as rings,
+    with the friction of the hole; a string without a `Bit` is centred at its lower end. The bit's law acts there
+    (`BitTorque`), under a constant weight on bit; the pipe starts with the tension of the equilibrium without friction.
 
     Args:
         drilling: a `Drilling` with a `DrillString`.
-        depth: measured depth of the rod's upper end, m; None for the lower end of the lowest `DrillPipe`.
+        depth: measured depth of the rod's upper end, m; None for the lower end of the lowest `DrillPipe`. A joint or
+            two of pipe above, such as 30.0, leave a rod for the whole string.
 
     Returns:
         MixedScene.
 
     Raises:
-        SceneError: discs, a depth outside the string, a hole that is not straight below it, a bit that cuts, or drags
-            of torsion and of axial motion that differ.
+        SceneError: discs, a depth outside the string, a bit that cuts, a bent housing below the depth, or drags of
+            torsion and of axial motion that differ.
     """
     instance("mixed_scene", "drilling", drilling, Drilling, "a Drilling")
     if not hasattr(drilling.string, "components"):
@@ -78,23 +106,41 @@ def mixed_scene(drilling: Drilling, depth: float | None = None) -> MixedScene:
         if part.bend:
             refuse(part, "bend", part.bend, "None in mixed_scene, whose rod is straight where it is free of stress")
     above = [replace(x, length=min(place.bottom, top) - place.top) for place, x in parts if place.top < top - _NOTHING]
-    start, end, t = _line(drilling, top)
-    ends = [bottom - top for _, bottom, _, _ in below]
-    ends[-1] = float(np.linalg.norm(np.subtract(end, start)))
-    sections = [replace(part.stiffness, mass=x.rhoA) for _, _, part, x in below]
-    rod = Rod(Line(start, end), sections[0] if len(sections) == 1 else [*zip(ends, sections, strict=True)],
+    (start, end), (t, along) = _axis(drilling, np.array([top, drilling.bit_depth]))
+    ends = np.array([bottom - top for _, bottom, _, _ in below])
+    sections = [_section(part, x) for _, _, part, x in below]
+    rod = Rod(Line(tuple(start), tuple(start + ends[-1] * t)),
+              sections[0] if len(sections) == 1 else [*zip(ends.tolist(), sections, strict=True)],
               name="lower part", damping=_damping(drilling))  # fmt: skip
-    weights = [(x, (0.0, 0.0, part[3].weight)) for x, part in zip(ends, below, strict=True)]
+    weight = np.array([x.weight for _, _, _, x in below])
+    weights = [(float(x), (0.0, 0.0, float(w))) for x, w in zip(ends, weight, strict=True)]
     on_bit = static_weight(drilling)
-    hanging = math.fsum((bottom - upper) * x.weight for upper, bottom, _, x in below) * t[2] - on_bit
-    pipe = PipeAbove(rod.start, tuple(above), drilling.drive, drilling.hook, hanging, drilling.drag)
+    heights = np.diff([start[2], *(_axis(drilling, np.array([part[1] for part in below]))[0][:, 2])])
+    pipe = PipeAbove(rod.start, tuple(above), drilling.drive, drilling.hook, float(weight @ heights) - on_bit,
+                     drilling.drag)  # fmt: skip
     loads = [LineForce(rod, AlongPieces(weights) if len(weights) > 1 else weights[0][1]), pipe]
-    loads += [Force(rod.end, tuple(-on_bit * t))] if on_bit else []
-    supports = [Roller(x, tuple(across)) for x in (rod.start, rod.end) for across in np.linalg.svd(t[None])[2][1:]]
-    walls = _walls(drilling, rod, top, [(x, part[2].contact_radius) for x, part in zip(ends, below, strict=True)])
-    at_rest = Scene([rod], supports, [*loads, *walls[:1]])
-    scene = Scene([rod], supports, [*loads, *_bit(drilling, rod), *walls[1:]])
-    return MixedScene(scene, at_rest, rod, pipe, top, tuple(_why(drilling, top)))
+    loads += [Force(rod.end, tuple(-on_bit * along))] if on_bit else []
+    held = (rod.start,) if drilling.hole else (rod.start, rod.end)
+    supports = [Roller(x, tuple(across)) for x in held for across in np.linalg.svd(t[None])[2][1:]]
+    resting, moving = _walls(
+        drilling, rod, top, [(float(x), p[2].body_radius) for x, p in zip(ends, below, strict=True)]
+    )
+    at_rest = Scene([rod], supports, [*loads, *resting])
+    scene = Scene([rod], supports, [*loads, *_bit(drilling, rod), *moving])
+    string = None
+    if resting:
+        wall, *rings = resting
+        string = StringScene(drilling.hole.path, at_rest, rod, None, wall, tuple(rings), tuple(sections), ends, weight,
+                             -on_bit * along, wall.clearance, 0.0, "at rest without friction", top)  # fmt: skip
+    return MixedScene(scene, at_rest, rod, pipe, top, tuple(_why(drilling, top)), string)
+
+
+def _section(part, segment):
+    """The `Stiffness` of a component, with the mass and the torsion of its tool joints."""
+    given = replace(part.stiffness, mass=segment.rhoA)
+    if given.matrix is not None:
+        return given
+    return replace(given, torsion=segment.GJ, inertia=(*given.inertia[:2], segment.rhoJ))
 
 
 def _depth(drilling, depth):
@@ -108,18 +154,11 @@ def _depth(drilling, depth):
                   lambda x: 0 < x < drilling.bit_depth)  # fmt: skip
 
 
-def _line(drilling, top):
-    """Ends and direction of the axis below a measured depth."""
+def _axis(drilling, md):
+    """Points (n, 3) and tangents (n, 3) of the axis at measured depths (n,)."""
     if drilling.hole is None:
-        return (0.0, 0.0, top), (0.0, 0.0, drilling.bit_depth), np.array([0.0, 0.0, 1.0])
-    path = drilling.hole.path
-    md = np.linspace(top, drilling.bit_depth, 65)[:-1]
-    bend = np.linalg.norm(path.curvature(md), axis=1).max() * (drilling.bit_depth - top)
-    if bend > _STRAIGHT:
-        refuse("mixed_scene", "depth", top, f"a section of the hole that is straight down to the bit; this turns by "
-               f"about {bend:.3g} rad")  # fmt: skip
-    ends = path.position(np.array([top, drilling.bit_depth]))
-    return tuple(ends[0]), tuple(ends[1]), path.tangent(top)
+        return md[:, None] * _DOWN, np.tile(_DOWN, (len(md), 1))
+    return drilling.hole.path.position(md), drilling.hole.path.tangent(md)
 
 
 def _damping(drilling):
@@ -143,10 +182,10 @@ def _bit(drilling, rod):
 
 
 def _walls(drilling, rod, top, radii):
-    """The walls for equilibria and for motions."""
+    """The walls and rings for equilibria, and those for motions."""
     hole = drilling.hole
     if hole is None:
-        return []
+        return [], []
     radius = [(section.to, section.diameter / 2) for section in hole.sections]
     given = {"stiffness": hole.wall_stiffness or _WALL, "begins": top}
     friction = [(section.to, section.friction) for section in hole.sections]
@@ -156,8 +195,17 @@ def _walls(drilling, rod, top, radii):
             refuse("mixed_scene", "drilling.friction", drilling.friction, "a WallFriction, of which the rod's wall "
                    "takes the kinetic coefficient; other laws act in drilling.simulate")  # fmt: skip
         friction = [(to, law.kinetic * (x if of_hole else 1.0)) for to, x in friction]
-    return [TubeWall(rod, hole.path, radius, radii, **given),
-            HoleWall(rod, hole.path, radius, radii, friction=friction, **given)]  # fmt: skip
+    rings = [(ring.s, ring.clearance, ring.radius, float(value_at(friction, [ring.s])[0]))
+             for ring in rings_of(drilling.laid, hole)[::-1] if ring.s > top + _NOTHING]  # fmt: skip
+    if not rings or rings[-1][0] < drilling.bit_depth - _NOTHING:
+        rings.append((drilling.bit_depth, 0.0, radii[-1][1], 0.0))
+    stations = [rod.end if s > drilling.bit_depth - _NOTHING else rod.at(s - top) for s, *_ in rings]
+    walls = [kind(rod, hole.path, radius, radii, friction=friction, **given) for kind in (TubeWall, HoleWall)]
+    return tuple(
+        [wall, *(kind(at, hole.path, *ring[1:3], friction=ring[3], **given)
+                 for at, ring in zip(stations, rings, strict=True))]
+        for wall, kind in zip(walls, (TubeRing, HoleRing), strict=True)
+    )  # fmt: skip
 
 
 def _why(drilling, top):

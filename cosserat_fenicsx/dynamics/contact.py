@@ -279,24 +279,30 @@ def _places(model, walls):
     along, found = layout.node_s(model.nodes), []
     for wall in walls:
         for i, rod in enumerate(scene.rods):
-            here = np.arange(len(along[i]))
-            lengths = _shares(layout.breaks[i], model.nodes) * rod.length
+            here, at = np.arange(len(along[i])), along[i] * rod.length
+            above, below = _shares(layout.breaks[i], model.nodes) * rod.length
+            lengths = above + below
             if wall.station is not None:
                 if wall.station.rod is not rod:
                     continue
                 here, lengths = here[[layout.vertex(scene, wall.station)[1] * p]], np.ones(1)
             elif not wall.acts_on(rod):
                 continue
-            found.append(_Place(wall, first[i] + here, along[i][here] * rod.length, lengths, scene.origin(rod)))
+            else:  # where the surface has a step, a node touches with the part that stands out
+                beside = wall.beside(at)
+                lengths = np.where(beside < at, above, np.where(beside > at, below, lengths))
+                at = beside
+            found.append(_Place(wall, first[i] + here, at[here], lengths, scene.origin(rod)))
     return found
 
 
 def _shares(breaks, nodes):
-    """The share of a rod's length that belongs to each node: weights of the quadrature rule with these points."""
+    """The share of a rod's length that belongs to each node: weights of the quadrature rule with these points; (2,
+    nodes): of the elements that end there, and of the others."""
     sizes, p = np.diff(breaks), len(nodes) - 1
-    shares = np.zeros(len(sizes) * p + 1)
-    places = np.arange(len(sizes))[:, None] * p + np.arange(p + 1)
-    np.add.at(shares, places, sizes[:, None] * lobatto_weights(nodes))
+    weights, shares = sizes[:, None] * lobatto_weights(nodes), np.zeros((2, len(sizes) * p + 1))
+    shares[0, p::p] = weights[:, -1]
+    shares[1, :-1] = weights[:, :-1].ravel()
     return shares
 
 

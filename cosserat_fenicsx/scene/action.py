@@ -174,6 +174,11 @@ class Action(Part, family="load or action", homes=("cosserat_fenicsx.scene.loads
         """
         return ()
 
+    def beside(self, s):
+        """Of a wall along rods that nodes touch: arc lengths s (n,), m, of a rod; where its surface has a step, those
+        just above or below it, where the part is that stands out and touches."""
+        return s
+
     def tube(self):
         """For pictures, of an action that keeps a rod inside a tube: (n, 3) points of the tube's axis, m, and (n,) how
         far the rod may move from there, m; else None."""

@@ -248,13 +248,8 @@ def _in_walls(string, problem, stability, stages, factor, steps, job):
         if k in decades:
             records[factor * stages[k][0]] = record_of(problem, 1.0, 0, 0, 0)
 
-    of_wall = string.wall.stiffness * float(model.layout.sizes(model.scene).max())
-    stiffest = factor * max([of_wall, *(ring.stiffness for ring in string.rings)])
-    rounding = _WALLS.rounding * np.finfo(float).eps * stiffest
-    steps += settle(problem, string.stages, string.clearance / model.scales.length,
-                    rounding * model.scales.length / model.scales.force,
-                    [(factor * wall, factor * spring, viscous) for wall, spring, viscous in stages],
-                    careful, on_stage, _WALLS.hold if job.helix else 0.0)  # fmt: skip
+    scaled = [(factor * wall, factor * spring, viscous) for wall, spring, viscous in stages]
+    steps += _settled(string, problem, scaled, factor, careful, on_stage, _WALLS.hold if job.helix else 0.0)
     records[factor] = record_of(problem, 1.0, _negative_modes(string, problem, stability), steps, steps)
     answers = []
     for stiffness, record in records.items():
@@ -266,6 +261,50 @@ def _in_walls(string, problem, stability, stages, factor, steps, job):
             f"the contact alternates: the reaction and all other forces differ by {answers[-1].balance:.3g} N"
         )
     return answers
+
+
+def _settled(string, problem, stages, factor=1.0, careful=(), on_stage=None, hold=0.0):
+    """`settle` of a string in a wall stiffer by a factor."""
+    model = problem.model
+    of_wall = string.wall.stiffness * float(model.layout.sizes(model.scene).max())
+    stiffest = factor * max([of_wall, *(ring.stiffness for ring in string.rings)])
+    rounding = _WALLS.rounding * np.finfo(float).eps * stiffest * model.scales.length / model.scales.force
+    return settle(problem, string.stages, string.clearance / model.scales.length, rounding, stages, careful, on_stage,
+                  hold)  # fmt: skip
+
+
+def at_rest(string, elements, degree, comm=None):
+    """The `Path` of one equilibrium of a `StringScene`, with its sections and wall as they are, on equal elements.
+
+    Args:
+        elements, degree, comm: as `simulate` takes them, so that it may start there.
+
+    Raises:
+        NotConverged: no equilibrium was found.
+    """
+    layout, found = Layout.of(string.scene, elements), []
+    with solvers_of(string.scene, layout, degree=degree, comm=communicator(comm)) as (problem, _, stability):
+        problem.set_load_factor(1.0)
+        for way in _STARTS:
+            _begin(problem, string, layout, None, False)
+            try:
+                steps = _settled(string, problem, stages_from(string.spring, way))
+            except NotConverged as failed:
+                reason = failed
+                continue
+            found.append(record_of(problem, 1.0, _negative_modes(string, problem, stability), steps, steps))
+            if not found[-1].negative_modes:
+                break
+        string.leave(1.0)
+        if not found:
+            raise NotConverged(
+                f"no equilibrium of the rod at rest in its hole was found on {elements} elements: {reason}. Expected "
+                "more elements, less weight on bit, or a softer wall (wall_stiffness)"
+            )
+        path = Path.of(problem.model, [f"{string.words}; {problem.model.signature.formulation.words}"],
+                       conservative_along)  # fmt: skip
+        path.append(min(found, key=lambda record: record.negative_modes % _SINGULAR))
+    return path
 
 
 def _negative_modes(string, problem, stability):
@@ -289,7 +328,7 @@ def _begin(problem, string, layout, before, helix):
         problem.begin_at(model.unknowns_of(rq[0]), n[0], before.path._records[0].reactions)
         return
     rod, s = string.rod, layout.node_s(model.nodes)[0] * string.rod.length
-    rq = in_helix(string, s) if helix else on_axis(rod, string.path, s)
+    rq = in_helix(string, s) if helix else on_axis(rod, string.path, s, string.begins)
     rq[:, :3] = (rq[:, :3] - string.scene.origin(rod)) / model.scales.length
     n = np.zeros((sum(layout.counts), len(model.forms.gauss), 3))
     problem.begin_at(model.unknowns_of(rq), n, np.zeros_like(problem.multipliers()))

@@ -54,6 +54,7 @@ class StringScene:
         weight: (n,) N/m; bottom: force at the lower end (3,), N.
         clearance: the smallest one of the wall, m. torque: at the lower end, against the rotation of drilling, N m.
         words: the simplifications, as text.
+        begins: measured depth of the upper end, m.
     """
 
     path: object
@@ -69,6 +70,11 @@ class StringScene:
     clearance: float
     torque: float
     words: str
+    begins: float = 0.0
+
+    def near(self, s):
+        """Points of the hole's axis, see `WellPath.nearest`, beside the rod on it at arc lengths s (n,), m."""
+        return self.path.nearest(None, s + self.begins)
 
     def section_at(self, s):
         """(n,) indices of the sections at arc lengths s (n,)."""
@@ -99,10 +105,10 @@ class StringScene:
     def tension(self, s):
         """(n,) N at arc lengths s (n,) on the axis, without friction."""
         ends = np.append(0.0, self.ends)
-        z, at = (self.path.nearest(None, x).position[:, 2] for x in (ends, s))
+        z, at = (self.near(x).position[:, 2] for x in (ends, s))
         above = np.append(0.0, np.cumsum(self.weight * np.diff(z)))
         part = self.section_at(s)
-        along = self.bottom @ self.path.nearest(None, self.ends[-1:]).tangent[0]
+        along = self.bottom @ self.near(self.ends[-1:]).tangent[0]
         return along + above[-1] - (above[part] + self.weight[part] * (at - z[part]))
 
     @cached_property
@@ -112,7 +118,7 @@ class StringScene:
         stiffness. The moment EI k acts within the length sqrt(8 c/k), which gives EI k^2/(16 c^2); F^2/(4 EI) prevents
         buckling."""
         s = np.linspace(0.0, self.ends[-1], _SET.samples)
-        near, at, tension = self.path.nearest(None, s), self.section_at(s)[1:], self.tension(s)[:-1]
+        near, at, tension = self.near(s), self.section_at(s)[1:], self.tension(s)[:-1]
         down = np.array([0.0, 0.0, 1.0]) - near.tangent[:, 2:] * near.tangent
         load = tension[:, None] * near.curvature[1:] + self.weight[at, None] * down[1:]
         typical = max(np.quantile(np.linalg.norm(load, axis=1), _SET.typical), _SET.least * self.weight.max())
@@ -247,9 +253,9 @@ def bending_of(section):
     return float(min(section.bending) if section.matrix is None else np.diag(section.matrix)[3:5].min())
 
 
-def on_axis(rod, path, s):
-    """Of a rod that lies on the axis without twist, from the path's start."""
-    near = path.nearest(None, s)
+def on_axis(rod, path, s, begins=0.0):
+    """Of a rod that lies on the axis without twist, from the measured depth at which it begins, m."""
+    near = path.nearest(None, s + begins)
     return _untwisted(rod, s, near.position, near.tangent)
 
 
@@ -278,7 +284,7 @@ def in_helix(string, s):
     """Of a `StringScene` that winds along the wall, without twist, where its compression F without friction is beyond
     the load of a snake: with the rate of `turns_of_helix` and the hand that the torque favours. It fades to the
     axis where F is less, within half a turn of both ends and at the rings."""
-    near, part = string.path.nearest(None, s), string.section_at(s)
+    near, part = string.near(s), string.section_at(s)
     EI, weight = string.bending[part], string.weight[part]
     compression = np.maximum(-string.tension(s), 0.0)
     clearance = string.wall.sizes(s, near.md)[0]
@@ -288,7 +294,7 @@ def in_helix(string, s):
     held = np.array([0.0, string.ends[-1], *(ring.station.s for ring in string.rings)])
     turned = rate * np.abs(s[:, None] - held).min(axis=1)
     share = np.clip(compression / snake_load(EI, clearance, weight, side) - 1, 0, 1) * np.clip(turned / np.pi, 0, 1)
-    d = directors(on_axis(string.rod, string.path, s)[:, 3:]) @ string.rod.curve.frame(s)
+    d = directors(_untwisted(string.rod, s, near.position, near.tangent)[:, 3:]) @ string.rod.curve.frame(s)
     away = np.cos(angle)[:, None] * d[:, :, 0] + string.hand * np.sin(angle)[:, None] * d[:, :, 1]
     r = near.position + (share * clearance)[:, None] * away
     along = np.gradient(r, s, axis=0)
