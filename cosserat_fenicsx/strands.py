@@ -253,15 +253,34 @@ class Strands:
 
     def _made(self, x, element, place, node):
         """`Touches` next to pairs of places; node: (m,) of first points that are fixed, or None."""
-        fixed = np.full(len(element), node is not None)
-        element, place, slides = self._nearest(x, element, place, fixed)
-        w = self.at(x, element[:, 1], place[:, 1]) - self.at(x, element[:, 0], place[:, 0])
+        found = self._followed(x, element, place, np.full(len(element), -1) if node is None else node)
+        return found.of(self._may_touch(*((found.element[:, k], found.place[:, k]) for k in (0, 1))))
+
+    def followed(self, x, touches):
+        """The `Touches` next to others, those of positions before."""
+        return self._followed(x, touches.element, touches.place, touches.node)
+
+    def _followed(self, x, element, place, node):
+        element, place, slides = self._nearest(x, element, place, node >= 0)
+        w = self.apart(x, element, place)
         distance = np.linalg.norm(w, axis=1)
         normal = w / np.maximum(distance, np.finfo(float).tiny)[:, None]
         gap = distance - self.radii[element].sum(axis=1)
-        node = np.full(len(element), -1) if node is None else node
-        found = Touches(element, place, slides, gap, distance, normal, node)
-        return found.of(self._may_touch(*((element[:, k], place[:, k]) for k in (0, 1))))
+        return Touches(element, place, slides, gap, distance, normal, node)
+
+    def apart(self, x, element, place):
+        """(m, 3) vectors from the first to the second points of pairs of places (m, 2), linear in the positions x."""
+        return self.at(x, element[:, 1], place[:, 1]) - self.at(x, element[:, 0], place[:, 0])
+
+    def between(self, first, second, share):
+        """Elements and places (m, 2) at a share (m,) of the arc lengths from the points of some `Touches` to those of
+        others of the same rods."""
+        ends = np.cumsum(self.sizes) - self.sizes
+        begin, end = (ends[t.element] + self.sizes[t.element] * t.place for t in (first, second))
+        at = begin + share[:, None] * (end - begin)
+        lowest, highest = (np.sort([first.element, second.element], axis=0))
+        element = np.clip(np.searchsorted(ends, at, side="right") - 1, lowest, highest)
+        return element, (at - ends[element]) / self.sizes[element]
 
     def _once(self, found):
         """Each pair of points once."""
@@ -311,12 +330,21 @@ class Strands:
 
     def nodes_of(self, touches):
         """(m, n) the nodes that move the two points of each pair."""
-        return np.concatenate([self.stencil[touches.element[:, k]] for k in (0, 1)], axis=1)
+        return self.movers(touches.element)
+
+    def movers(self, element):
+        """(m, n) the nodes that move points of pairs of elements (m, 2)."""
+        return np.concatenate([self.stencil[element[:, k]] for k in (0, 1)], axis=1)
 
     def gradients(self, touches):
         """(m, n, 3) derivatives of the gaps by the positions of `nodes_of`."""
-        first, second = (self.basis(touches.element[:, k], touches.place[:, k]) for k in (0, 1))
-        return np.concatenate([-first, second], axis=1)[..., None] * touches.normal[:, None, :]
+        return self.pulls(touches.element, touches.place, touches.normal)
+
+    def pulls(self, element, place, direction):
+        """(m, n, 3) derivatives of how far apart pairs of places are along directions (m, 3), by the positions of
+        `movers`."""
+        first, second = (self.basis(element[:, k], place[:, k]) for k in (0, 1))
+        return np.concatenate([-first, second], axis=1)[..., None] * direction[:, None, :]
 
     def curvatures(self, x, touches):
         """The second derivatives of the gaps by the positions of `nodes_of`, with the points that slide, as sums of

@@ -9,7 +9,7 @@ import numpy as np
 
 from cosserat_fenicsx.checks import refuse
 from cosserat_fenicsx.errors import SceneError, nearest
-from cosserat_fenicsx.parts import Length, at_least
+from cosserat_fenicsx.parts import Length, Number, WallStiffness, at_least
 from cosserat_fenicsx.scene.action import LineAction
 from cosserat_fenicsx.strands import Apart, closest_segments
 
@@ -18,13 +18,62 @@ from cosserat_fenicsx.strands import Apart, closest_segments
 _SIDE, _MOST, _NOTHING = 0.25, 4000, 1e-7
 
 
+class Surface:
+    """The elastic surfaces of rods, dimensionless: the force F = c p^n of a contact at the depth p, see `RodContact`.
+
+    Args:
+        stiffness, damping: of `RodContact`; radii: of the elements of `Strands`; shares: (nodes,) of the rods' length.
+    """
+
+    # Change of a depth, relative to it, below which the mean force of a step is that in its middle.
+    _SAME = 1e-5
+
+    def __init__(self, stiffness, damping, radii, shares):
+        self._stiffness, self.damping, self._radii, self._shares = stiffness, damping, radii, shares
+
+    def law(self, touches):
+        """(c, n), (m,) each, of some `Touches`."""
+        point = touches.node < 0
+        both = self._radii[touches.element].sum(axis=1)
+        c = np.where(point, 4 / 3 * np.sqrt(2 * both), self._shares[touches.node])
+        return self._stiffness * c, np.where(point, 1.5, 1.0)
+
+    @staticmethod
+    def energy(law, depth):
+        """(m,) stored energies."""
+        c, n = law
+        return c / (n + 1) * np.maximum(depth, 0) ** (n + 1)
+
+    @staticmethod
+    def force(law, depth):
+        """(m,) elastic forces, and their derivatives by the depth."""
+        c, n = law
+        depth = np.maximum(depth, 0)
+        return c * depth**n, np.where(depth > 0, c * n * depth ** (n - 1), 0.0)
+
+    def mean_force(self, law, before, after):
+        """(m,) elastic force in a step between two depths whose work is the change of the stored energy exactly (a
+        discrete gradient: Gonzalez, J. Nonlinear Sci. 6 (1996) 449), and its derivative by the depth after."""
+        change = after - before
+        same = np.abs(change) <= self._SAME * np.maximum(np.maximum(before, after), 0)
+        safe = np.where(same | (change == 0), 1.0, change)
+        middle, slope = self.force(law, (before + after) / 2)
+        mean = np.where(same, middle, (self.energy(law, after) - self.energy(law, before)) / safe)
+        return mean, np.where(same, slope / 2, (self.force(law, after)[0] - mean) / safe)
+
+
 @dataclass(frozen=True)
 class RodContact(LineAction):
-    """Rods that do not pass through each other or themselves: hard surfaces, without friction.
+    """Rods that do not pass through each other or themselves, without friction.
 
     It stands among the loads, once in a scene, and is not multiplied by the load factor. Where strands cross at more
     than 11.5 degrees they touch in one point, between the nearest points of both centrelines; otherwise along a line,
-    at the nodes of the strand with the shorter elements. Ends of rods are hemispheres. For `solve` alone.
+    at the nodes of the strand with the shorter elements. Ends of rods are hemispheres.
+
+    In `solve` surfaces are hard, without `stiffness`. In `simulate` they have a `stiffness` k: the force of surfaces
+    that overlap by a depth p is ``k p`` per length along a line, and in a point ``(4/3) k sqrt(2 (r1 + r2)) p^1.5``,
+    which the line's law gives for straight rods that cross at a right angle. Both are multiplied by ``1 + damping p'``,
+    and are never adhesion (Hunt & Crossley 1975, doi:10.1115/1.3423596).
 
     Args:
         radius: of the rods' surfaces, m; None for that of their sections, which are `Circle` or `Tube`.
@@ -32,6 +81,8 @@ class RodContact(LineAction):
         itself: whether rods may touch themselves, where `pairs` is None.
         exclude: arc length next to a point, or to a joint, within which rods do not touch, m; None for pi times the
             radius: on less, a rod cannot bend back onto itself without folding its surface.
+        stiffness: N/m^2, in motions; None for the hard surfaces of equilibria.
+        damping: s/m, over the speed at which surfaces approach.
 
     Raises:
         SceneError: no radius known, or none that is the same all along a rod; one above the radius of curvature at
@@ -42,6 +93,8 @@ class RodContact(LineAction):
     pairs: tuple[tuple[str, ...], ...] | None = None
     itself: bool = True
     exclude: Length | None = None
+    stiffness: WallStiffness | None = None
+    damping: Annotated[float, Number(limits=at_least(0))] = 0.0
 
     rod, work, scaled, rods_touch = None, None, False, True
     #: It depends on the positions of rods, and drives them out of planes.
@@ -53,6 +106,8 @@ class RodContact(LineAction):
         for pair in self.pairs or ():
             if len(pair) != 2:
                 refuse(self, "pairs", self.pairs, "two names of rods each")
+        if self.damping and self.stiffness is None:
+            refuse(self, "damping", self.damping, "0 without a stiffness, since hard surfaces have none")
 
     def acts_on(self, rod):
         return self.pairs is None or any(rod.name in pair for pair in self.pairs)
@@ -85,6 +140,14 @@ class RodContact(LineAction):
         ]
         joints = [(scene.number(x.first.rod), x.first.s, scene.number(x.second.rod), x.second.s) for x in scene.joints]
         return Apart(joints, exclude, allowed)
+
+    def surface(self, strands, weights, scales, time):
+        """The `Surface` of `Strands`, in the units of a model; weights: of the quadrature rule at an element's nodes;
+        time: the unit of time, s."""
+        stiffness = self.stiffness * scales.length**2 / scales.force
+        shares = np.zeros(strands.cells.max() + 1)
+        np.add.at(shares, strands.cells, strands.sizes[:, None] * weights)
+        return Surface(stiffness, self.damping * scales.length / time, strands.radii, shares)
 
     def polygons(self, rods, at):
         """Points (n, 3), m, the rods (n,), arc lengths and radii there, of polygons as fine as rods are thick; at: a

@@ -28,7 +28,6 @@ from cosserat_fenicsx.results.path import Path
 from cosserat_fenicsx.scene.action import path_dependent
 from cosserat_fenicsx.scene.scene import Scene, check_magnitudes, check_tensions
 from cosserat_fenicsx.scene.stages import refuse_stages
-from cosserat_fenicsx.statics.problem import refuse_rod_contact
 from cosserat_fenicsx.statics.meshes import turning_in_law
 from cosserat_fenicsx.storage.store import Nowhere, Store
 from cosserat_fenicsx.storage.stored_history import KIND, StoredHistory
@@ -122,7 +121,11 @@ def simulate(
             "that applies the loads slowly"
         )
     refuse_stages("simulate", scene)
-    refuse_rod_contact("simulate", scene)
+    if scene.rod_contact and (scene.rod_contact.stiffness is None or comm.size > 1):
+        raise SceneError(
+            "simulate: rods touch each other on one process, with elastic surfaces: expected one process, and a "
+            "RodContact.stiffness (N/m^2)"
+        )
     from_equilibrium = isinstance(start, numbers.Real) and not isinstance(start, bool)
     if load_factor is None:
         load_factor = start if from_equilibrium else 1.0

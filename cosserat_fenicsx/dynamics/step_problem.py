@@ -8,6 +8,7 @@ from cosserat_fenicsx.algebra.equations import COMPLIANCE, CONTACT, NODES, RESID
 from cosserat_fenicsx.algebra.packed import Packed
 from cosserat_fenicsx.algebra.tie_rows import TieRows
 from cosserat_fenicsx.dynamics.contact import NodalContact, SpinLaw
+from cosserat_fenicsx.dynamics.touching import RodsTouching
 
 
 class MovingTies(TieRows):
@@ -77,6 +78,7 @@ class StepProblem(Equations):
         self.take_loads((self._known.array, np.ones(1)))
         self._start = model.start.x.array
         self.load_factor, self.fresh, self.contact, self.touching, self._laws = 1.0, True, None, [], []
+        self.rods_touching = None
         self._hooks = self.c.hooks
         self._pack()
 
@@ -91,6 +93,8 @@ class StepProblem(Equations):
         walls = [action for action in scene.actions if action.touches]
         self.contact = NodalContact(self, walls, at_end=self.acting_share == 1) if walls else None
         self._laws = [SpinLaw(self, action) for action in scene.actions if action.resists]
+        self.rods_touching = RodsTouching(self) if scene.rod_contact else None
+        self._laws += [self.rods_touching] if scene.rod_contact else []
         self.touching = [self.contact, *self._laws] if walls else self._laws
         self.c.contact = self.contact.c if walls else self._ffi.NULL
         of_contact = (COMPLIANCE | NODES * (model.comm.size > 1)) * bool(walls)
@@ -249,8 +253,9 @@ class StepProblem(Equations):
         """Accept the step; after its energies are recorded."""
         self.model.accept(self.h)
         self.model.actions.commit()
-        if self.contact:
-            self.contact.accept()
+        for part in (self.contact, self.rods_touching):
+            if part:
+                part.accept()
 
     def energies(self):
         """Kinetic and strain energy of the state, dimensionless, over all ranks."""

@@ -78,6 +78,8 @@ class Stepper:
         unit = problem.h
         guesses = self._predicted(unit)
         solved = self._newton.solve(guesses)
+        if solved.converged and problem.rods_touching and (why := problem.rods_touching.objection()):
+            solved = Solved(False, solved.iterations, why)
         if not solved.converged:
             self._guesses = None
             self._state[:] = self._start
@@ -258,7 +260,7 @@ class StepNewton:
     def solve(self, guesses):
         """Newton's method from the first guess with the current tangent; where that fails, from every guess with a new
         one. Guesses are local arrays of the state, the best first: extrapolations of large rotations can fail."""
-        kept, share = not self.problem.fresh, _WITH_CONTACT if self.problem.contact else 1.0
+        kept, share = not self.problem.fresh, _WITH_CONTACT if self.problem.touching else 1.0
         self._c.increment, self._c.smallest = share * ITERATION.increment, share * ITERATION.smallest
         self._start[:] = self.problem.x.array_r[: self._motions]
         iterations = 0

@@ -74,7 +74,13 @@ def refuse_rod_contact(owner, scene, comm=None):
     comm: of `solve`, which has it for scenes without stages, on one rank; None elsewhere."""
     if scene.rod_contact and comm is None:
         raise SceneError(
-            f"{owner}: RodContact acts in `solve` alone: expected a scene without it, or the equilibrium by solve"
+            f"{owner}: RodContact acts in `solve` and `simulate` alone: expected a scene without it, or the "
+            "equilibrium by solve"
+        )
+    if scene.rod_contact and scene.rod_contact.stiffness is not None:
+        raise SceneError(
+            f"{owner}: rods that touch each other have hard surfaces in equilibria: expected a RodContact without "
+            "stiffness, or a motion by simulate"
         )
     if scene.rod_contact and (scene.stages or comm.size > 1):
         raise SceneError(f"{owner}: a RodContact is solved for on one rank and in one stage: expected a scene without "
