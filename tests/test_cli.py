@@ -1,6 +1,7 @@
 """The command line: output, exit codes, signals, motions, and no tracebacks."""
 
 import csv
+import io
 import math
 import os
 import pty
@@ -25,17 +26,20 @@ from cosserat_fenicsx.scene.signals import Triangle
 pytestmark = pytest.mark.serial
 ROOT = Path(__file__).parent.parent
 DEMO = ROOT / "demos" / "eccentric_cantilever.toml"
+MOTIONS = DEMO.parent / "motions"
+FLIGHT = MOTIONS / "flying_spaghetti_3d.toml"
+SHORT = ("--duration", "1", "--dt", "0.05")
+
+
+def python(*words, **more):
+    """Python in another process, at the top of the checkout."""
+    return subprocess.run(
+        [sys.executable, *map(str, words)], **({"capture_output": True, "encoding": "utf-8", "cwd": ROOT} | more)
+    )
 
 
 def cosserat(*arguments, **environment):
-    """Run the command line in a separate process."""
-    return subprocess.run(
-        [sys.executable, "-m", "cosserat_fenicsx.cli.main", *map(str, arguments)],
-        capture_output=True,
-        encoding="utf-8",
-        cwd=ROOT,
-        env={**os.environ, **environment},
-    )
+    return python("-m", "cosserat_fenicsx.cli.main", *arguments, env={**os.environ, **environment})
 
 
 @pytest.fixture
@@ -54,36 +58,28 @@ def here(capsys, monkeypatch):
 
 
 def test_help_and_version_load_nothing_heavy():
-    code = (
-        "import sys, cosserat_fenicsx.cli.main; print({'numpy', 'dolfinx', 'petsc4py', 'mpi4py', 'pyvista'} &"
-        " set(sys.modules))"
-    )
-    loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT)
+    heavy = "{'numpy', 'dolfinx', 'petsc4py', 'mpi4py', 'pyvista'}"
+    loaded = python("-c", f"import sys, cosserat_fenicsx.cli.main; print({heavy} & set(sys.modules))")
     assert loaded.stdout.strip() == "set()", loaded.stderr
     help_ = cosserat("--help")
     assert help_.returncode == 0 and "run" in help_.stdout and "explain" in help_.stdout
     assert cosserat("--version").stdout.startswith("cosserat_fenicsx 0.")
 
 
-@pytest.mark.parametrize("arguments", [["--help"], ["run", "--help"], ["schema"], ["explain", DEMO]])
+@pytest.mark.parametrize("arguments", [["--help"], ["run", "--help"], ["schema"], ["explain", DEMO], None])
 def test_a_reader_that_has_enough_ends_no_command(arguments):
-    """Such as `head`: the pipe is closed before the first line."""
+    """Such as `head`: the pipe is closed before the first line. A script ends as Python does (None): PETSc takes the
+    signal of a closed pipe, and would abort MPI."""
+    script = ["-c", "import cosserat_fenicsx.compat; print(1, flush=True)"]
     reading, writing = os.pipe()
     os.close(reading)
-    command = [sys.executable, "-m", "cosserat_fenicsx", *map(str, arguments)]
-    done = subprocess.run(command, stdout=writing, stderr=subprocess.PIPE, text=True, cwd=ROOT)
+    done = python(*(["-m", "cosserat_fenicsx", *arguments] if arguments else script), capture_output=False,
+                  stdout=writing, stderr=subprocess.PIPE)  # fmt: skip
     os.close(writing)
-    assert (done.returncode, done.stderr) == (0, "")
-
-
-def test_a_script_whose_reader_has_enough_ends_as_python_does():
-    """PETSC takes the signal of a closed pipe, and would abort MPI."""
-    reading, writing = os.pipe()
-    os.close(reading)
-    command = [sys.executable, "-c", "import cosserat_fenicsx.compat; print(1, flush=True)"]
-    done = subprocess.run(command, stdout=writing, stderr=subprocess.PIPE, text=True, cwd=ROOT)
-    os.close(writing)
-    assert "BrokenPipeError" in done.stderr and "PETSC" not in done.stderr
+    if arguments:
+        assert (done.returncode, done.stderr) == (0, "")
+    else:
+        assert "BrokenPipeError" in done.stderr and "PETSC" not in done.stderr
 
 
 def test_run_prints_a_table_and_writes_files(tmp_path):
@@ -122,8 +118,7 @@ UNUSED = {"pyvista", "vtkmodules", "matplotlib", "meshio", "scipy", "pandas", "x
 
 def test_tables_and_files_wait_for_no_library_of_pictures(tmp_path):
     """Without pictures none is imported, nor others that have nothing to do; else once all other files are written."""
-    command = [sys.executable, "-c", WATCHED.replace("{named}", str(UNUSED)), DEMO, tmp_path]
-    done = subprocess.run(list(map(str, command)), check=True, capture_output=True, encoding="utf-8", cwd=ROOT)
+    done = python("-c", WATCHED.replace("{named}", str(UNUSED)), DEMO, tmp_path, check=True)
     lines = [line for line in done.stdout.splitlines() if line.startswith(("written", "loaded", "pyvista", "matplot"))]
     files = ["path.csv", "path.h5", "path.xdmf", "result.h5"]
     assert lines[:3] == [
@@ -137,68 +132,55 @@ def test_tables_and_files_wait_for_no_library_of_pictures(tmp_path):
 
 def test_the_table_shows_a_station_and_the_reaction(here):
     """Reactions against the equilibrium of the whole column: the force, and its moment about the foot."""
-    from cosserat_fenicsx import euler_load
-
     code, said, trouble = here("run", DEMO, "--load-factors", "0.9", "--station", "column@10")
     assert code == 0 and "rotation: of column@10." in said, trouble
-    P = 0.9 * euler_load(cf.read(DEMO).scene.rods[0])
+    P = 0.9 * cf.euler_load(cf.read(DEMO).scene.rods[0])
     force, moment = re.search(r"Clamp at column.start exerts \((.*?)\) N and \((.*?)\) N m", said).groups()
     assert [float(x) for x in force.split(", ")] == pytest.approx([0, 0, P], rel=1e-5)
     assert [float(x) for x in moment.split(", ")] == pytest.approx([0, -P * (0.2 + 2.200615447827733), 0], rel=1e-5)
     assert re.search(r"bending moment [\d.e+]+ N m \(column.start, load factor 0.9\)", said)
-    assert "'colum', did you mean 'column'?" in here("run", DEMO, "--station", "colum.end")[2]
+    code, said, _ = here("run", DEMO, "--load-factors", "0:0.9", "--elements", "8", "--degree", "3")
+    assert code == 0 and "unknown" in said and "2.2006154" in said, "the solver chooses the steps of a range"
 
 
 def test_pictures_are_asked_for(tmp_path, here):
     """Options for points and magnification; the picture suggests a magnification where displacements are invisible."""
-    from cosserat_fenicsx import solve
     from cosserat_fenicsx.pictures import plot
 
     look = ("--at", "0.01,0.03", "--magnify", "500")
     code, _, trouble = here("run", DEMO, "--load-factors", "0.01,0.02,0.03", "-o", tmp_path, *look)
     assert code == 0 and (tmp_path / "rods.png").stat().st_size > 10_000, trouble
-    scene = cf.read(DEMO).scene
-    path = solve(scene, [0.01, 0.02, 0.03])
+    path = cf.solve(cf.read(DEMO).scene, [0.01, 0.02, 0.03])
     assert plot._small(path, [0, 2], 20.0, 1.0) == "displacements are at most 0.0076 m: magnify=100"
     assert plot._small(path, [0, 2], 20.0, 100.0) == ""
-    code, _, trouble = here("run", DEMO, "--load-factors", "0.01", "-o", tmp_path, "--magnify", "-2")
-    assert code == 2 and "plot.magnify = -2.0" in trouble
-
-
-def test_run_of_a_range_lets_the_solver_choose(here):
-    code, said, _ = here("run", DEMO, "--load-factors", "0:0.9", "--elements", "8", "--degree", "3")
-    assert code == 0 and "unknown" in said and "2.2006154" in said
 
 
 def test_explain(here):
+    """The explained size is the solved size."""
     code, said, trouble = here("explain", DEMO)
     assert code == 0, trouble
     for words in (
-        "length 20 m", "Clamp at column.start", "tol = 1e-06",
+        "length 20 m", "Clamp at column.start", "tol = 1e-06", "24 determinate, 72 planar, 168 spatial",
         "Model: determinate (the angle theta along the rods alone): all rods and loads lie in the x-z plane; one clamp "
         "and",
-        "24 determinate, 72 planar, 168 spatial",
     ):  # fmt: skip
         assert words in said
-    assert "168 unknowns" in here("explain", DEMO, "--model", "spatial")[1]
-
-
-def test_explained_size_is_the_solved_size(here):
-    from cosserat_fenicsx import solve
-
-    scene = cf.read(DEMO).scene
-    for formulation in ("mixed", "multiplier"):
-        _, told, _ = here("explain", DEMO, "--elements", "3", "--formulation", formulation)
-        path = solve(scene, [0.01], elements=3, formulation=formulation)
-        assert f" {path.unknowns} unknowns" in told
+    for options in ({"model": "spatial"}, {"formulation": "mixed"}, {"formulation": "multiplier"}):
+        ((name, value),) = options.items()
+        path = cf.solve(cf.read(DEMO).scene, [0.01], elements=3, **options)
+        assert f" {path.unknowns} unknowns" in here("explain", DEMO, "--elements", "3", f"--{name}", value)[1]
+    assert here("explain", DEMO) == here("explain", DEMO, "--static")
+    code, said, _ = here("explain", FLIGHT, *SHORT, "--elements", "3", "--scheme", "energy")
+    assert code == 0 and "Motion: 1 s" in said and "Scheme: energy" in said
+    history = cf.simulate(cf.read(FLIGHT).scene, 0.1, dt=0.05, elements=3, scheme="energy")
+    assert f" {history.unknowns} unknowns" in said
 
 
 def test_not_converged_is_exit_code_1_with_the_partial_path(tmp_path, here):
     """Two elements cannot carry a load a billion times the critical one."""
     more = ("--elements", "2", "-o", tmp_path, "--no-picture")
     code, said, trouble = here("run", DEMO, "--load-factors", "0.5,1e9", *more)
-    assert code == 1
-    assert "no equilibrium was found beyond the load factor" in trouble
+    assert code == 1 and "no equilibrium was found beyond the load factor" in trouble
     assert "0.5" in said and (tmp_path / "path.xdmf").is_file()
 
 
@@ -208,44 +190,50 @@ def test_not_converged_is_exit_code_1_with_the_partial_path(tmp_path, here):
     (("run", DEMO, "--load-factors", "a"), "load factors 'a'"),
     (("run", DEMO, "--tol", "-1"), "tol = -1.0"),
     (("run", DEMO, "--formulation", "mixt"), "did you mean 'mixed'?"),
+    (("run", DEMO, "--station", "colum.end"), "'colum', did you mean 'column'?"),
     (("run", DEMO, "-o", DEMO), "eccentric_cantilever.toml"),
+    (("run", DEMO, "--load-factors", "0.01", "-o", "{tmp}", "--magnify", "-2"), "plot.magnify = -2.0"),
     (("explain", DEMO, "--degree", "9"), "degree = 9"),
     (("explode",), "invalid choice"),
     ((), "usage"),
+    (("run", FLIGHT, "--load-factors", "0:1"), "--load-factors is for an equilibrium path"),
+    (("run", DEMO, "--dt", "0.1"), "--dt is for a motion, and this scene is an equilibrium path"),
+    (("run", FLIGHT, "--static"),
+     "depends on time, which a static analysis excludes: expected a vector, a function of the arc length"),
+    (("run", "--animate", FLIGHT), "put the scene before --animate"),
+    (("run", FLIGHT, "--animate"), "expected a motion, and -o DIR"),
+    (("run", FLIGHT, "--animate", "a.avi", "-o", "{tmp}"), "expected a name that ends in .gif or .mp4"),
+    (("run", FLIGHT, "--animate", "b/a.gif", "-o", "{tmp}"), "expected a name without folders"),
+    (("run", FLIGHT, "--at", "x", "-o", "{tmp}"), "--at x: expected A,B,..."),
+    (("run", FLIGHT, "--duration", "-1"), "simulate.duration = -1.0"),
+    (("run", DEMO, "--folder", "{tmp}/b"), "--folder is for a motion"),
+    (("resume", "{tmp}/b"), "no motion was found there"),
+    (("explain", FLIGHT, "--scheme", "momentun"), "did you mean 'momentum'?"),
+    (("explain", DEMO, "--duration", "nan"), "simulate.duration = nan"),
+    (("explain", FLIGHT, "--elements", "0"), "simulate.elements = 0"),
 ])  # fmt: skip
-def test_bad_input_is_exit_code_2_without_a_traceback(arguments, words, here):
-    code, said, trouble = here(*arguments)
-    assert code == 2
-    assert words in trouble + said
-    assert "Traceback" not in trouble
+def test_bad_input_is_exit_code_2_without_a_traceback(arguments, words, tmp_path, here):
+    code, said, trouble = here(*(str(x).format(tmp=tmp_path) for x in arguments))
+    assert code == 2 and words in trouble + said and "Traceback" not in trouble, trouble
 
 
-def test_dolfinx_missing(tmp_path):
-    """A dummy module that cannot be imported takes its place."""
+def test_what_cannot_be_used_is_said(tmp_path):
+    """A dummy module that cannot be imported takes the place of dolfinx; PETSc for complex numbers."""
+    from cosserat_fenicsx.compat import require_real_scalars
+
     (tmp_path / "dolfinx.py").write_text("raise ImportError('No module named dolfinx')")
     refused = cosserat("run", DEMO, PYTHONPATH=str(tmp_path))
-    assert refused.returncode == 2
+    assert refused.returncode == 2 and "Traceback" not in refused.stderr
     assert "dolfinx cannot be imported" in refused.stderr and "apt install python3-dolfinx" in refused.stderr
-    assert "Traceback" not in refused.stderr
-
-
-def test_petsc_for_complex_numbers():
-    import numpy as np
-
-    from cosserat_fenicsx.compat import require_real_scalars
-    from cosserat_fenicsx.errors import InstallationError
-
-    with pytest.raises(InstallationError, match="built for complex numbers"):
+    with pytest.raises(cf.InstallationError, match="built for complex numbers"):
         require_real_scalars(np.complex128)
 
 
 def test_a_second_process_compiles_nothing(tmp_path):
     """The names in the code cache must not depend on the forms compiled before."""
-    counts = []
+    words, counts = ("run", DEMO, "--load-factors", "0.5", "--degree", "1", "--elements", "2"), []
     for _ in range(2):
-        done = cosserat(
-            "run", DEMO, "--load-factors", "0.5", "--degree", "1", "--elements", "2", XDG_CACHE_HOME=str(tmp_path)
-        )
+        done = cosserat(*words, XDG_CACHE_HOME=str(tmp_path))
         assert done.returncode == 0, done.stderr
         counts.append(len(list(tmp_path.rglob("*.so"))))
     assert counts[0] == counts[1] > 0
@@ -310,48 +298,27 @@ def test_every_demo_scene(scene, tmp_path, here):
             assert words in said
 
 
-def test_modes(capsys):
+def test_modes(here):
     """Frequencies are those of `modes`; the table gives place and direction of the largest displacement."""
-    from cosserat_fenicsx import modes
-    from cosserat_fenicsx.cli import main as cli
-
-    assert cli.main(["modes", str(DEMO), "--count", "2", "--damped", "--near", "10j"]) == 0
-    assert "eigenvalues with" in capsys.readouterr().out
-    assert cli.main(["modes", str(DEMO), "--count", "2"]) == 0
-    said = capsys.readouterr().out
-    found = modes(cf.read(DEMO).scene, 2)
+    code, said, _ = here("modes", DEMO, "--count", "2", "--damped", "--near", "10j")
+    assert code == 0 and "eigenvalues with" in said
+    code, said, _ = here("modes", DEMO, "--count", "2")
+    found = cf.modes(cf.read(DEMO).scene, 2)
     rows = [line.split("│") for line in said.splitlines() if line.startswith("│")]
-    assert [float(row[2]) for row in rows] == pytest.approx(found.frequencies, rel=1e-6)
+    assert code == 0 and [float(row[2]) for row in rows] == pytest.approx(found.frequencies, rel=1e-6)
     for row in rows:
         along = [float(x) for x in row[-4:-1]]
         assert "column.end" in row[-5] and along[2] == 0 and np.hypot(*along[:2]) == pytest.approx(1, abs=0.01)
 
 
-def test_soft_materials_are_asked_about(tmp_path, capsys):
-    from cosserat_fenicsx.cli import main as cli
-
-    file = tmp_path / "scene.toml"
-    file.write_text(re.sub("E = .*", "E = 210000", DEMO.read_text()))
-    cli.main(["run", str(file), "--load-factors", "1e-9"])
-    assert "than that of steel or cast iron: are the units SI" in capsys.readouterr().err
-
-
 TITLE = "a [/red] title [bold] :smile: \u00e9"
 
 
-def test_titles_and_names_are_printed_as_they_are(tmp_path, monkeypatch):
-    """No markup, no emoji; and ASCII where standard output knows nothing else."""
-    import io
-
-    from cosserat_fenicsx.cli import main as cli
-
-    text = (
-        DEMO.read_text(encoding="utf-8")
-        .replace("Eccentrically compressed cantilever", TITLE)
-        .replace("column", "rod[/red]")
-    )
+def test_titles_and_names_are_printed_as_they_are(tmp_path, monkeypatch, here):
+    """No markup, no emoji; and ASCII where standard output knows nothing else. Soft materials are asked about."""
+    text = DEMO.read_text(encoding="utf-8").replace("Eccentrically compressed cantilever", TITLE)
     file = tmp_path / "scene.toml"
-    file.write_text(text, encoding="utf-8")
+    file.write_text(text.replace("column", "rod[/red]"), encoding="utf-8")
     for encoding, title in (("utf-8", TITLE), ("ascii", "[bold] :smile: \\xe9")):
         out = io.TextIOWrapper(io.BytesIO(), encoding=encoding, write_through=True)
         monkeypatch.setattr(sys, "stdout", out)
@@ -359,11 +326,8 @@ def test_titles_and_names_are_printed_as_they_are(tmp_path, monkeypatch):
         monkeypatch.undo()
         printed = out.buffer.getvalue().decode(encoding)
         assert title in printed and "rod[/red].end" in printed
-
-
-MOTIONS = DEMO.parent / "motions"
-FLIGHT = MOTIONS / "flying_spaghetti_3d.toml"
-SHORT = ("--duration", "1", "--dt", "0.05")
+    file.write_text(re.sub("E = .*", "E = 210000", DEMO.read_text()))
+    assert "than that of steel or cast iron: are the units SI" in here("run", file, "--load-factors", "1e-9")[2]
 
 
 def test_run_of_a_motion(tmp_path, here):
@@ -418,28 +382,16 @@ def test_a_motion_that_is_written_as_it_goes(tmp_path, here):
     assert code == 0 and trouble == "cosserat: --at 7 lies beyond 0 .. 1; the nearest is drawn\n"
     _, whole, _ = here("run", FLIGHT, "--duration", "1", *options)
     assert said.startswith(whole) and (tmp_path / "out" / "rods.png").is_file()
-    for arguments, words in (
-        (("run", DEMO, "--folder", tmp_path / "b"), "--folder is for a motion"),
-        (("resume", tmp_path / "b"), "no motion was found there"),
-        (("resume", tmp_path / "a", "--duration", "0.2"), "at least 1 s"),
-    ):
-        code, _, trouble = here(*arguments)
-        assert code == 2 and words in trouble, trouble
+    code, _, trouble = here("resume", tmp_path / "a", "--duration", "0.2")
+    assert code == 2 and "at least 1 s" in trouble, trouble
 
 
 def test_a_load_that_fails_late_leaves_what_was_reached(tmp_path, here, monkeypatch):
     late = Triangle.__call__
     monkeypatch.setattr(Triangle, "__call__", lambda self, t: late(self, t) if t < 0.5 else (math.nan,) * 3)
-    file = DEMO.parent / "motions" / "flying_spaghetti_3d.toml"
-    code, table, said = here("run", file, "--model", "spatial", *SHORT, "-o", tmp_path, "--no-picture")
+    code, table, said = here("run", FLIGHT, "--model", "spatial", *SHORT, "-o", tmp_path, "--no-picture")
     assert code == 2 and "at the time t = 0.525 s, of the Force at" in said
     assert "0.5" in table and len((tmp_path / "motion.csv").read_text().splitlines()) > 10
-
-
-def test_a_scene_behind_animate(capsys):
-    with pytest.raises(SystemExit) as end:
-        cli.main(["run", "--animate", str(FLIGHT)])
-    assert end.value.code == 2 and "put the scene before --animate" in capsys.readouterr().err
 
 
 WORDS = {
@@ -460,38 +412,8 @@ WORDS = {
 @pytest.mark.parametrize("name", WORDS)
 def test_explain_a_motion(name):
     found = cf.read(MOTIONS / f"{name}.toml")
-    scene, settings = found.scene, found.motion
-    told = explain.explain_motion(scene, settings)
-    for words in WORDS[name]:
-        assert words in told, told
-
-
-def test_explained_is_what_is_done(here):
-    code, said, _ = here("explain", FLIGHT, *SHORT, "--elements", "3", "--scheme", "energy")
-    assert code == 0 and "Motion: 1 s" in said and "Scheme: energy" in said
-    scene = cf.read(FLIGHT).scene
-    history = cf.simulate(scene, 0.1, dt=0.05, elements=3, scheme="energy")
-    assert f" {history.unknowns} unknowns" in said
-    assert here("explain", DEMO) == here("explain", DEMO, "--static")
-
-
-@pytest.mark.parametrize("arguments, words", [
-    (("run", FLIGHT, "--load-factors", "0:1"), "--load-factors is for an equilibrium path"),
-    (("run", DEMO, "--dt", "0.1"), "--dt is for a motion, and this scene is an equilibrium path"),
-    (("run", FLIGHT, "--static"),
-     "depends on time, which a static analysis excludes: expected a vector, a function of the arc length"),
-    (("run", FLIGHT, "--animate"), "expected a motion, and -o DIR"),
-    (("run", FLIGHT, "--animate", "a.avi", "-o", "{tmp}"), "expected a name that ends in .gif or .mp4"),
-    (("run", FLIGHT, "--animate", "b/a.gif", "-o", "{tmp}"), "expected a name without folders"),
-    (("run", FLIGHT, "--at", "x", "-o", "{tmp}"), "--at x: expected A,B,..."),
-    (("run", FLIGHT, "--duration", "-1"), "simulate.duration = -1.0"),
-    (("explain", FLIGHT, "--scheme", "momentun"), "did you mean 'momentum'?"),
-    (("explain", DEMO, "--duration", "nan"), "simulate.duration = nan"),
-    (("explain", FLIGHT, "--elements", "0"), "simulate.elements = 0"),
-])  # fmt: skip
-def test_refused(arguments, words, tmp_path, here):
-    code, _, trouble = here(*(str(x).format(tmp=tmp_path) for x in arguments))
-    assert code == 2 and words in trouble, trouble
+    told = explain.explain_motion(found.scene, found.motion)
+    assert all(words in told for words in WORDS[name]), told
 
 
 def test_damping_by_a_ratio(tmp_path):
@@ -527,16 +449,15 @@ def test_what_a_start_takes_from_loads_in_time():
     def scene(force):
         return cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Force(rod.end, force)])
 
-    for force, factor in ((cf.signals.Step(v), 0), (cf.signals.Step(v, -1, 0), 1), (cf.signals.Ramp(v), 0),
-                          (cf.signals.Ramp(v, -1, 1), 0.5),
-                           (cf.signals.Table((0, 1), (v, v)), 1)):  # fmt: skip
+    step, ramp = cf.signals.Step, cf.signals.Ramp
+    for force, factor in ((step(v), 0), (step(v, -1, 0), 1), (ramp(v), 0), (ramp(v, -1, 1), 0.5),
+                          (cf.signals.Table((0, 1), (v, v)), 1)):  # fmt: skip
         np.testing.assert_allclose(before(scene(force)).loads[0].force, np.multiply(factor, v))
     released = cf.simulate(scene(cf.signals.Step(v, -1, 0)), 0.2, dt=0.01, start=2.0, elements=2, degree=2)
     path = cf.solve(scene(v), [2.0], elements=2, degree=2, model="planar")
     np.testing.assert_allclose(released.position(rod.end)[0], path.position(rod.end)[0], atol=1e-12)
-    assert (
-        released.kinetic[-1] > 0.1 * released.strain[0] and np.abs(released.balance).max() < 1e-3 * released.strain[0]
-    )
+    assert released.kinetic[-1] > 0.1 * released.strain[0]
+    assert np.abs(released.balance).max() < 1e-3 * released.strain[0]
     still = cf.simulate(scene(v), 0.2, dt=0.01, start=2.0, elements=2, degree=2)
     assert np.ptp(still.position(rod.end), axis=0).max() < 1e-12 and still.kinetic.max() < 1e-20
 
@@ -565,9 +486,6 @@ class Hook:
 sys.meta_path.insert(0, Hook)
 from cosserat_fenicsx.__main__ import main
 sys.exit(main())"""
-    command = [sys.executable, "-c", code, "explain", str(DEMO)]
-    done = subprocess.run(
-        command, capture_output=True, encoding="utf-8", cwd=ROOT,
-        preexec_fn=lambda: signal.signal(number, signal.SIG_DFL),  # these tests may run under nohup
-    )  # fmt: skip
+    unhidden = lambda: signal.signal(number, signal.SIG_DFL)  # noqa: E731 - these tests may run under nohup
+    done = python("-c", code, "explain", DEMO, preexec_fn=unhidden)
     assert (done.returncode, done.stdout, done.stderr) == (130, "", "cosserat: interrupted\n")
