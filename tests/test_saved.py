@@ -21,20 +21,17 @@ OF_PATH = (
 )  # fmt: skip
 OF_HISTORY = ("times", "steps", "kinetic", "strain", "work", "dissipated", "balance", "linear_momentum",
               "angular_momentum", "scheme", "time_unit")  # fmt: skip
+LARGEST = ("size", "station", "point")
 
 
 def frame():
     """A path of two joined rods, in their plane, with a clamp, a roller, pieces of sections and loads along."""
     steel = cf.Material(210e9, 0.3, 7850.0)
-    post = cf.Rod(
-        cf.Line((0, 0, 0), (0, 0, 3)), [(1.0, cf.Tube(0.1, 0.08)), (3.0, cf.Circle(0.05))], steel, name="post"
-    )
+    pieces = [(1.0, cf.Tube(0.1, 0.08)), (3.0, cf.Circle(0.05))]
+    post = cf.Rod(cf.Line((0, 0, 0), (0, 0, 3)), pieces, steel, name="post")
     arm = cf.Rod(cf.Arc((0, 0, 2), (0, 0, 3), 1.0, axis=(0, 1, 0)), cf.Rectangle(0.05, 0.1), steel, name="an/arm")
-    loads = [
-        cf.Force(arm.end, (500.0, 0, -900.0)),
-        cf.LineForce(arm, (0, 0, -100.0), permanent=True),
-        cf.Spring(arm.end, 300.0),
-    ]
+    loads = [cf.Force(arm.end, (500.0, 0, -900.0)), cf.LineForce(arm, (0, 0, -100.0), permanent=True),
+             cf.Spring(arm.end, 300.0)]  # fmt: skip
     supports = [cf.Clamp(post.start), cf.Roller(post.at(1.5), (1, 0, 0))]
     return cf.Scene([post, arm], supports, loads, [cf.Joint(post.end, arm.start)], title="a <b> & \u03b1")
 
@@ -71,9 +68,7 @@ def assert_same(one, other, names):
         np.testing.assert_array_equal(one.reaction(mine), other.reaction(theirs))
     largest = other.largest()
     for name, value in one.largest().items():
-        assert (value.size, str(value.station), value.point) == (
-            largest[name].size, str(largest[name].station), largest[name].point
-        )  # fmt: skip
+        assert [str(getattr(value, x)) for x in LARGEST] == [str(getattr(largest[name], x)) for x in LARGEST]
 
 
 @pytest.mark.parametrize("solved", [
@@ -128,15 +123,8 @@ def test_h5py_alone_reads_it(tmp_path):
 def test_damaged_and_foreign_files_are_refused(tmp_path):
     import h5py
 
-    file = tmp_path / "path.h5"
+    file, other = tmp_path / "path.h5", tmp_path / "other.h5"
     cf.solve(column()[1], [0.3], elements=2).save(file)
-
-    def damaged(change):
-        other = tmp_path / "other.h5"
-        shutil.copy(file, other)
-        with h5py.File(other, "r+") as store:
-            change(store)
-        return other
 
     def replace(store, name, value):
         crc = store[name].attrs["crc32"]
@@ -160,26 +148,25 @@ def test_damaged_and_foreign_files_are_refused(tmp_path):
                            "none.h5": "none.h5: there is no such file"}.items():  # fmt: skip
         with pytest.raises(cf.SceneError, match=expected):
             cf.read_path(tmp_path / name)
-    for change, expected in {
-        swap_digit: "is damaged .*check sum of rq is wrong",
-        sparse: "is damaged .*rq is neither a text nor an array",
-        lambda store: replace(store, "scene", "{}"): "is damaged .*check sum of scene",
-        lambda store: store.pop("solution/gauss"): "is damaged .*gauss",
-        lambda store: store.attrs.update(version=99): "its format is 99, and this release reads up to 1",
-        lambda store: store.attrs.update(format="another"): "it is of another program",
-        lambda store: store.attrs.update(kind="History"): "it holds a History: expected a Path; read_result reads any",
-    }.items():
-        with pytest.raises(cf.SceneError, match=f"other.h5.*{expected}"):
-            cf.read_path(damaged(change))
-    for change, expected in {
-        lambda store: store.attrs.update(version=99): "its format is 99, and this release reads up to 1",
-        lambda store: store.attrs.update(format="another"): "it is of another program",
-        lambda store: store.attrs.update(kind="Nothing"): "is damaged .*Nothing",
-    }.items():
-        with pytest.raises(cf.SceneError, match=f"other.h5.*{expected}"):
-            cf.read_result(damaged(change))
-    with pytest.raises(cf.SceneError, match="it holds a Path: expected a History; read_result reads any"):
-        cf.read_history(file)
+    for readers, change, expected in (
+        ([cf.read_path], swap_digit, "is damaged .*check sum of rq is wrong"),
+        ([cf.read_path], sparse, "is damaged .*rq is neither a text nor an array"),
+        ([cf.read_path], lambda store: replace(store, "scene", "{}"), "is damaged .*check sum of scene"),
+        ([cf.read_path], lambda store: store.pop("solution/gauss"), "is damaged .*gauss"),
+        ([cf.read_path, cf.read_result], lambda store: store.attrs.update(version=99),
+         "its format is 99, and this release reads up to 1"),
+        ([cf.read_path, cf.read_result], lambda store: store.attrs.update(format="another"), "it is of another program"),
+        ([cf.read_path], lambda store: store.attrs.update(kind="History"),
+         "it holds a History: expected a Path; read_result reads any"),
+        ([cf.read_result], lambda store: store.attrs.update(kind="Nothing"), "is damaged .*Nothing"),
+        ([cf.read_history], lambda store: None, "it holds a Path: expected a History; read_result reads any"),
+    ):  # fmt: skip
+        shutil.copy(file, other)
+        with h5py.File(other, "r+") as store:
+            change(store)
+        for read in readers:
+            with pytest.raises(cf.SceneError, match=f"other.h5.*{expected}"):
+                read(other)
 
 
 def test_scenes_with_code_are_not_saved(tmp_path_all):
@@ -250,7 +237,7 @@ def test_meshio_reads_the_xdmf(solved, xdmf):
 
 
 @pytest.mark.serial
-def test_pyvista_reads_the_xdmf(solved, xdmf):
+def test_pyvista_reads_the_xdmf_and_one_state_in_other_formats(solved, xdmf, tmp_path):
     import pyvista
 
     rod, path = solved
@@ -259,6 +246,11 @@ def test_pyvista_reads_the_xdmf(solved, xdmf):
     for k, eta in enumerate(ETAS):
         reader.set_active_time_value(eta)
         check(reader.read().point_data, rod, path, k)
+    for ending in (".vtu", ".vtk"):
+        path.write(tmp_path / f"state{ending}", k=1)
+        data = pyvista.read(tmp_path / f"state{ending}")
+        np.testing.assert_allclose(data.points[-1], path.position(rod.end)[1], rtol=1e-6, atol=1e-6)
+        assert data["quaternion"].shape == (17, 4)
 
 
 @pytest.mark.serial
@@ -283,19 +275,6 @@ def test_rods_are_told_apart(tmp_path):
     assert "von_mises: Pa" in told["units"] and "arc_length: m" in told["units"]
 
 
-@pytest.mark.serial
-@pytest.mark.parametrize("ending", [".vtu", ".vtk"])
-def test_one_state_in_other_formats(ending, solved, tmp_path):
-    import pyvista
-
-    rod, path = solved
-    file = tmp_path / f"state{ending}"
-    path.write(file, k=1)
-    data = pyvista.read(file)
-    np.testing.assert_allclose(data.points[-1], path.position(rod.end)[1], rtol=1e-6, atol=1e-6)
-    assert data["quaternion"].shape == (17, 4)
-
-
 @pytest.mark.ranks
 def test_unwritable_and_unknown_files(solved, tmp_path_all):
     _, path = solved
@@ -305,13 +284,8 @@ def test_unwritable_and_unknown_files(solved, tmp_path_all):
         path.write(tmp_path_all / "folder.xdmf")
     with pytest.raises(cf.SceneError, match="the ending '.xyzzy' is not known"):
         path.write(tmp_path_all / "state.xyzzy")
-
-
-@pytest.mark.ranks
-def test_an_empty_path_is_not_written(solved, tmp_path_all):
-    _, scene = column()
     with pytest.raises(cf.NotConverged) as refusal:
-        cf.solve(scene, [0.5], elements=4, steps=cf.StepControl(max_iterations=1), control="load")
+        cf.solve(path.scene, [0.5], elements=4, steps=cf.StepControl(max_iterations=1), control="load")
     with pytest.raises(cf.SceneError, match="no point to write"):
         refusal.value.path.write(tmp_path_all / "path.xdmf")
 
@@ -513,28 +487,30 @@ def test_path(model):
     assert loaded.comm.size == 1 and path.comm.size == copy.deepcopy(path).comm.size == COMM.size
     assert loaded.scene is not scene and copy.deepcopy(path).scene is scene
     assert len(loaded.at_points([1, 2])) == 2
-    np.testing.assert_array_equal(cf.solve(loaded.scene, [0.3], elements=4).force("column.end"),
-                                  cf.solve(scene, [0.3], elements=4).force("column.end"))  # fmt: skip
-
-
-def test_a_copy_is_apart():
-    rod, scene = column()
-    path = cf.solve(scene, [0.3, 0.6], elements=4)
-    before = path.position(rod.end)
-    other = copy.deepcopy(path)
+    before, other = path.position(rod.end), copy.deepcopy(path)
     other._records[0].rq[:] = 0.0
     other.events.append("something")
     np.testing.assert_array_equal(path.position(rod.end), before)
     assert not path.events
+    np.testing.assert_array_equal(cf.solve(loaded.scene, [0.3], elements=4).force("column.end"),
+                                  cf.solve(scene, [0.3], elements=4).force("column.end"))  # fmt: skip
 
 
-def test_history():
+def test_history(tmp_path):
+    """It is refused as a start, because its velocities would be lost silently."""
     rod, scene = swinging()
     history = moved(scene)
     for other in (copy.copy(history), copy.deepcopy(history), pickle.loads(pickle.dumps(history))):
         assert_same(history, other, OF_HISTORY)
         np.testing.assert_array_equal(other.velocity("rod.end"), history.velocity(rod.end))
     assert not isinstance(history, cf.Path) and not hasattr(history, "load_factors")
+    with pytest.raises(cf.SceneError, match="expected a load factor, a Path"):
+        moved(scene, start=history)
+    if COMM.size == 1:
+        for found in (pickle.loads(pickle.dumps(x)) for x in (history, cf.solve(column()[1], [0.3], elements=4))):
+            found.write(tmp_path / "path.xdmf")
+            found.write(tmp_path / "point.vtu", 0)
+            assert (tmp_path / "path.xdmf").stat().st_size > 0 and (tmp_path / "point.vtu").stat().st_size > 0
 
 
 @pytest.mark.serial
@@ -552,15 +528,6 @@ def test_a_stored_history_goes_by_its_folder(tmp_path, monkeypatch):
         pickle.loads(text)
 
 
-@pytest.mark.serial
-def test_files_of_what_was_pickled(tmp_path):
-    for solved in (cf.solve(column()[1], [0.3, 0.6], elements=4), moved(swinging()[1])):
-        path = pickle.loads(pickle.dumps(solved))
-        path.write(tmp_path / "path.xdmf")
-        path.write(tmp_path / "point.vtu", 1)
-        assert (tmp_path / "path.xdmf").stat().st_size > 0 and (tmp_path / "point.vtu").stat().st_size > 0
-
-
 def test_what_cannot_be_pickled_is_named():
     """A deep copy does not need to pickle."""
     _, scene = swinging(lambda t: (0, 0, math.sin(t)))
@@ -574,10 +541,3 @@ def test_what_cannot_be_pickled_is_named():
     with pytest.raises(pickle.PicklingError, match=r"a Path cannot be pickled .* rods\[0\] \(cone\)"):
         pickle.dumps(path)
     assert len(copy.deepcopy(path)) == 1
-
-
-def test_a_history_is_no_start():
-    """It is refused, because its velocities would be lost silently."""
-    _, scene = swinging()
-    with pytest.raises(cf.SceneError, match="expected a load factor, a Path"):
-        moved(scene, start=moved(scene))
