@@ -42,6 +42,7 @@ class ElementRule:
     def __init__(self, nodes, gauss, weights):
         order = np.argsort(gauss)
         self.nodes, self.gauss, self.weights = nodes, gauss[order], weights[order]
+        self._derived = {}  # see `derivative`
 
     @cached_property
     def _to_coefficients(self):
@@ -53,9 +54,12 @@ class ElementRule:
 
     def derivative(self, x, order):
         """(len(x), p + 1) derivatives of an order of the nodal basis at x in [0, 1]."""
-        k, x = np.arange(len(self.nodes)), 2 * np.asarray(x)[:, None] - 1
-        factor = np.prod([2.0 * (k - i) for i in range(order)], axis=0)
-        return factor * x ** np.maximum(k - order, 0) @ self._to_coefficients
+        if order not in self._derived:
+            k = np.arange(order, len(self.nodes))
+            factor = np.prod([2.0 * (k - i) for i in range(order)], axis=0)
+            self._derived[order] = factor[:, None] * self._to_coefficients[order:] if order else self._to_coefficients
+        factors = self._derived[order]
+        return np.vander(2 * np.asarray(x) - 1, len(factors), increasing=True) @ factors
 
     @cached_property
     def at_gauss(self):

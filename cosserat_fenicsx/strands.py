@@ -130,7 +130,8 @@ class Strands:
     def basis(self, element, place, order=0):
         """(n, 3 (p + 1)) derivatives of an order of the basis by the place in the element, of `stencil`."""
         own, slopes = self._rule.derivative(place, order), self._slopes
-        start, end = (np.polynomial.polynomial.polyval(place, self._hermite[order, k]) / 2 for k in (0, 1))
+        powers = np.vander(place, 4, increasing=True) / 2
+        start, end = powers @ self._hermite[order, 0], powers @ self._hermite[order, 1]
         before, after = self._before[element], self._next[element]
         start, end = np.where(before < 0, 0.0, start)[:, None], np.where(after < 0, 0.0, end)[:, None]
         ratio = self.sizes[element][:, None] / self.sizes[[before, after]][..., None]
@@ -174,9 +175,9 @@ class Strands:
         (e, f), (a, b) = element.T.copy(), place.T.copy()
         slides = np.ones((len(e), 2), dtype=bool)
         for step in range(_STEPS):
-            w = self.at(x, f, b) - self.at(x, e, a)
-            t, u = self.at(x, e, a, 1), self.at(x, f, b, 1)
-            tt, uu = self.at(x, e, a, 2), self.at(x, f, b, 2)
+            both = np.concatenate([e, f]), np.concatenate([a, b])
+            (p, q), (t, u), (tt, uu) = (np.split(self.at(x, *both, order), 2) for order in (0, 1, 2))
+            w = q - p
             g, k = -np.sum(w * t, axis=1), np.sum(w * u, axis=1)
             G, K = np.sum(t * t - w * tt, axis=1), np.sum(u * u + w * uu, axis=1)
             C = -np.sum(t * u, axis=1)

@@ -16,8 +16,9 @@ from scipy.sparse import csr_array
 
 from cosserat_fenicsx.strands import Strands, closest_segments
 
-# Gaps of contacts that are looked for, over the largest radius; the gap below which they are looked for again.
-_REACH, _NEAR = 8.0, 4.0
+# Gaps of contacts that are looked for, over the largest radius; movement of a node, over the smallest radius, after
+# which they are looked for again where there are some, and the least gap, over the largest, where there are none.
+_REACH, _AGAIN, _NEAR = 8.0, 0.25, 4.0
 # Largest movement of a node in a step over the smallest radius and the gap (a point between nodes moves up to 1.3 times
 # as far, so that two strands approach each other by less than the sum of their radii); the same of a pair.
 _SHARE, _PAIR = 0.35, 2.6
@@ -27,13 +28,18 @@ _DEEPEST, _DEEP = 0.5, 0.02
 _TO_PLACE, _MOST, _SMALL = 6, 40, 1e-13
 
 
+def _farthest(x, before):
+    """The largest movement of a node between positions (N, 3)."""
+    return np.linalg.norm(x - before, axis=1).max()
+
+
 class _Look:
     """The contacts at positions x (N, 3): `touches` with their `law`, stored `energy`, and a lower bound of the `gap`
-    between any two strands, at most the reach."""
+    between any two strands. They are followed from those, `known`, at positions `of` where they were looked for."""
 
-    def __init__(self, x, touches, reach, surface):
-        self.x, self.touches, self.law = x, touches, surface.law(touches)
-        self.gap = min(touches.gap.min(initial=reach), reach)
+    def __init__(self, x, of, known, touches, gap, surface):
+        self.x, self.of, self.known, self.touches, self.law = x, of, known, touches, surface.law(touches)
+        self.gap = min(touches.gap.min(initial=gap), gap)
         self.energy = float(surface.energy(self.law, -touches.gap).sum())
 
 
@@ -41,13 +47,12 @@ class _Pairs:
     """The contacts of a step, from a `_Look` at its start to positions x at its end, with their forces: `force` (m,)
     with its derivative `slope` by the depth at the end, at the places `element`, `place` (m, 2), along `direction`."""
 
-    def __init__(self, strands, surface, start, x, h, at_end):
+    def __init__(self, strands, surface, start, x, h, at_end, now=None):
         self._strands, self._surface, self._start, self._h, self._at_end = strands, surface, start, h, at_end
         before = start.touches
-        moved = np.linalg.norm(x - start.x, axis=1).max()
-        self.which = np.flatnonzero(before.gap < _PAIR * moved)
+        self.which = np.flatnonzero(before.gap < _PAIR * _farthest(x, start.x))
         self.before, self.law = before.of(self.which), tuple(part[self.which] for part in start.law)
-        self.now = strands.followed(x, self.before)
+        self.now = strands.followed(x, self.before) if now is None else now.of(self.which)
         self.force, self.slope, self.mean = self.forces(-self.now.gap)
         self.element, self.place, self.direction = self.now.element, self.now.place, self.now.normal
         if not at_end and len(self.now):
@@ -132,35 +137,35 @@ class RodsTouching:
 
     def _looked(self, x):
         reach = _REACH * self._largest
-        return _Look(x, self._strands.near(x, reach)[0], reach, self._surface)
+        touches, _ = self._strands.near(x, reach)
+        return _Look(x, x, touches, touches, reach, self._surface)
 
-    def _passed(self, look, x):
-        """A lower bound of the gaps at other positions than those of a look."""
-        return look.gap - _PAIR * np.linalg.norm(x - look.x, axis=1).max()
+    def _moved_on(self, look, x):
+        """The look at other positions, by the same contacts; None where they have to be looked for again."""
+        moved, known, touches = _farthest(x, look.of), look.known, look.known
+        gap = _REACH * self._largest - _PAIR * moved
+        if len(known):
+            touches = self._strands.followed(x, known) if moved <= _AGAIN * self._radius else None
+        elif gap < _NEAR * self._largest:
+            touches = None
+        return None if touches is None else _Look(x, look.of, known, touches, gap, self._surface)
 
     def begin(self, h):
         x = self._x
-        if self._look is None or not (
-            np.array_equal(x, self._look.x) or self._passed(self._look, x) > _NEAR * self._largest
-        ):
+        if self._look is None or not np.array_equal(x, self._look.x):
             self._look = self._looked(x)
-        self._start, self._h, self._columns, self._end = self._look, h, {}, None
-        self._from = x
-        self._longest = _SHARE * (self._radius + max(self._passed(self._look, x), 0.0))
+        self._start, self._h, self._columns = self._look, h, {}
+        self._end = self._pairs = None
+        self._longest = _SHARE * (self._radius + max(self._look.gap, 0.0))
 
     def give_up(self):
         self._end = None
 
-    def _at(self, x):
-        start = self._start
-        if not np.array_equal(start.x, self._from):  # far from any contact
-            return None
-        return _Pairs(self._strands, self._surface, start, x, self._h, self._at_end)
+    def _at(self, x, now=None):
+        return _Pairs(self._strands, self._surface, self._start, x, self._h, self._at_end, now)
 
     def add_forces(self, b):
         self._now = pairs = self._at(self._x)
-        if pairs is None:
-            return
         pressed = np.flatnonzero(pairs.force)
         if len(pressed):
             rows, pulls = (part[pressed] for part in pairs.pulls(self._rows))
@@ -169,7 +174,7 @@ class RodsTouching:
     def meet(self, x, change):
         """Change Newton's step so that the laws hold after it."""
         pairs = self._now
-        if pairs is None or not len(pairs.now):
+        if not len(pairs.now):
             return
         rows, gradients = pairs.gradients(self._rows)
         gradients, rows = np.where(rows < 0, 0.0, gradients), np.maximum(rows, 0)
@@ -209,16 +214,16 @@ class RodsTouching:
     def objection(self):
         """Why the step that has converged must not be accepted, "" where it may be."""
         x = self._x
-        if np.linalg.norm(x - self._from, axis=1).max() > self._longest:
+        if _farthest(x, self._start.x) > self._longest:
             return "a rod moved by more than its radius allows in one step"
-        known = self._passed(self._look, x) > _NEAR * self._largest
-        self._end = look = self._look if known else self._looked(x)
-        touches = look.touches
-        both = self._strands.radii[touches.element].sum(axis=1)
-        if not known and (-touches.gap > _DEEPEST * both).any():
-            k = int(np.argmin(touches.gap / both))
-            return f"{self._in_words(touches, k)}, more than half of both radii: its stiffness is too small"
-        return self._polygons.objection(x, touches if not known else touches.of([]), self._strands)
+        moved_on = self._moved_on(self._start, x)
+        self._pairs = self._at(x, moved_on.touches if moved_on else None)
+        self._end = look = moved_on or self._looked(x)
+        both = self._strands.radii[look.touches.element].sum(axis=1)
+        if (-look.touches.gap > _DEEPEST * both).any():
+            k = int(np.argmin(look.touches.gap / both))
+            return f"{self._in_words(look.touches, k)}, more than half of both radii: its stiffness is too small"
+        return self._polygons.objection(x, look.touches, self._strands)
 
     def _in_words(self, touches, k):
         (a, s), (b, t) = (
@@ -230,26 +235,23 @@ class RodsTouching:
 
     def books(self):
         """Change of the stored energy in the step, and what was dissipated; dimensionless."""
-        pairs = self._at(self._x)
-        if pairs is None:
-            return self._end.energy - self._start.energy, 0.0
-        lost = (pairs.force - pairs.mean) * (self.depth_change(pairs))
+        pairs = self._pairs
+        lost = (pairs.force - pairs.mean) * (pairs.before.gap - pairs.now.gap)
         return self._end.energy - self._start.energy, float(lost.sum())
-
-    @staticmethod
-    def depth_change(pairs):
-        return pairs.before.gap - pairs.now.gap
 
     def accept(self):
         """Accept the step."""
         self._look = self._end
 
     def memory(self):
+        """See `Stepper.memory`; what `_Polygons` has seen decides on no digits."""
         self._look = self._look or self._looked(self._x)
-        return {"looked": self._look.x.copy()}
+        return {"looked": self._look.of.copy()}
 
     def recall(self, memory):
-        self._look = self._looked(memory["looked"])
+        self._look, x = self._looked(memory["looked"]), self._x
+        if not np.array_equal(x, self._look.x):
+            self._look = self._moved_on(self._look, x) or self._looked(x)
 
 
 class _Polygons:
@@ -286,7 +288,7 @@ class _Polygons:
         reach = _NEAR * self._of[2].max()
         if self._seen is not None:
             last, clear = self._seen
-            if clear - _PAIR * np.linalg.norm(x - last, axis=1).max() * self._length > 0:
+            if clear > _PAIR * _farthest(x, last) * self._length:
                 return ""
         rods, s, radii = self._of
         gap, sag, *places = closest_segments(self._matrix @ x * self._length, rods, s, radii, self._apart, reach)
@@ -300,8 +302,8 @@ class _Polygons:
                 if depth[k] > -touches.gap[same].min(initial=0.0) * self._length:
                     first, second = (self._scene.rods[int(i)].name for i in (a, b))
                     return (
-                        f"rod '{first}' at s = {u:.6g} m enters rod '{second}' at s = {v:.6g} m by {-gap[k]:.3g} m "
-                        "where the mesh shows no contact: expected more elements"
+                        f"rod '{first}' at s = {u:.6g} m enters rod '{second}' at s = {v:.6g} m by {-gap[k]:.3g} m, "
+                        "deeper than at the contacts that the mesh shows: expected more elements"
                     )
         self._seen = x, (gap - sag).min(initial=reach)
         return ""

@@ -1,0 +1,104 @@
+"""Rods that touch each other in motion: invariants, closed forms of impacts, refusals, and that none passes through
+another."""
+
+import math
+from itertools import combinations
+
+import numpy as np
+import pytest
+from moving_scenes import drift
+
+import cosserat_fenicsx as cf
+
+pytestmark = pytest.mark.serial
+#: masses, kg; lengths, m; radius, m; distance of the surfaces at the start, m
+MASSES, LENGTHS, RADIUS, APART = (0.5, 0.8), (0.6, 0.9), 0.005, 2e-4
+
+
+def bars(d=(0.0, 0.0), speed=1.0, stiffness=1e7, bending=1e6, slope=0.0, **contact):
+    """Two bars that cross at a right angle; the upper one falls at a speed on the lower one, at distances d from both
+    middles; slope: the angle of the upper one with the horizontal."""
+    rods = []
+    for name, m, L, e, direction in zip("ab", MASSES, LENGTHS, d, ((1, 0, slope), (0, 1, 0)), strict=True):
+        section = cf.Stiffness((1e9, 1e9), 1e9, (bending,) * 2, bending, mass=m / L, inertia=(1e-12, 1e-12, 2e-12))
+        along = np.array(direction) / np.linalg.norm(direction)
+        middle = np.array((0, 0, (2 * RADIUS + APART) / math.cos(slope))) * (name == "a") - e * along
+        curve = cf.Line(tuple(middle - L / 2 * along), tuple(middle + L / 2 * along))
+        rods.append(cf.Rod(curve, section, name=name))
+    touch = cf.RodContact(radius=RADIUS, stiffness=stiffness, **contact)
+    return cf.Scene(rods, [], [touch], velocities=[cf.InitialVelocity(rods[0], linear=(0, 0, -speed))])
+
+
+def middles(history, quantity):
+    return [getattr(history, quantity)(rod.at(rod.length / 2))[-1] for rod in history.scene.rods]
+
+
+@pytest.mark.parametrize("scheme", ["momentum", "energy"])
+def test_bars_that_cross(scheme, truth):
+    """Bars of motions in the truths, after an impact off their middles: 0.2835820895522388 and 0.44776119402985076 m/s,
+    2.388059701492537 and 1.9900497512437811 rad/s. They turn while they touch, and the contact slides."""
+    history = cf.simulate(bars((0.1, 0.3)), 8e-3, dt=8e-5, scheme=scheme, elements=1, degree=2)
+    assert np.ptp(history.linear_momentum, axis=0).max() < 1e-10 * MASSES[0]
+    assert np.ptp(history.angular_momentum, axis=0).max() < 1e-10
+    assert np.abs(history.balance).max() < 1e-8 * history.kinetic[0]
+    assert abs(history.work[-1]) < 1e-7 * history.kinetic[0] < 0.01 * abs(history.work.min())
+    truth(f"bars that cross, speeds, {scheme}", [-v[2] for v in middles(history, "velocity")],
+          [0.2835820895522388, 0.44776119402985076], 1e-3, most=1e-4)  # fmt: skip
+    a, b = middles(history, "angular_velocity")
+    truth(f"bars that cross, spins, {scheme}", [-a[1], -b[0]], [2.388059701492537, 1.9900497512437811], 1e-3, most=1e-4)
+
+
+def test_an_impact_takes_as_long_as_that_of_balls():
+    """Hertz: with the force K p^1.5 masses m1, m2 touch for 2.943 p/v, p = (5 m v^2/(4 K))^(2/5), 1/m = 1/m1 + 1/m2."""
+    stiffness = 1e7
+    history = cf.simulate(bars(stiffness=stiffness), 8e-3, dt=2e-5, elements=1, degree=2)
+    K, m = 4 / 3 * stiffness * math.sqrt(4 * RADIUS), MASSES[0] * MASSES[1] / sum(MASSES)
+    deepest = (5 * m / (4 * K)) ** 0.4
+    gap = np.subtract(*(history.position(rod.at(rod.length / 2))[:, 2] for rod in history.scene.rods)) - 2 * RADIUS
+    assert -gap.min() == pytest.approx(deepest, rel=2e-3)
+    assert history.times[gap < 0][[0, -1]] @ (-1, 1) == pytest.approx(2.9433 * deepest, rel=1e-2)
+
+
+def test_damping_takes_what_hunt_and_crossley_say():
+    """Restitution 1 - (2/3) damping v for small ones, whatever the power of the law; the loss is booked."""
+    damping = 0.03
+    history = cf.simulate(bars(damping=damping), 8e-3, dt=4e-5, elements=1, degree=2)
+    a, b = middles(history, "velocity")
+    assert 1 - (a - b)[2] == pytest.approx(2 / 3 * damping, rel=0.03)
+    assert history.dissipated[-1] == pytest.approx(history.kinetic[0] - history.kinetic[-1], rel=1e-4)
+    assert np.abs(history.balance).max() < 1e-8 * history.kinetic[0]
+
+
+def test_what_motions_need():
+    with pytest.raises(cf.SceneError, match=r"expected one process, and a RodContact.stiffness \(N/m\^2\)"):
+        cf.simulate(bars(stiffness=None), 1.0)
+    with pytest.raises(cf.SceneError, match="rods that touch each other have hard surfaces in equilibria"):
+        cf.solve(bars(), [1.0])
+    with pytest.raises(cf.SceneError, match="0 without a stiffness"):
+        cf.RodContact(damping=0.1)
+    with pytest.raises(cf.SceneError, match="triple-jump"):
+        cf.simulate(bars(), 1e-3, dt=1e-4, scheme="triple-jump", elements=1)
+
+
+def test_a_surface_that_is_too_soft():
+    with pytest.raises(cf.NotConverged, match=r"rod 'a' at s = .* enters rod 'b' .*its stiffness is too small") as found:
+        cf.simulate(bars(stiffness=1e4), 0.1, dt=1e-3, elements=1, degree=2)
+    assert len(found.value.path)
+
+
+def closest(history):
+    """The smallest distance of two rods' centrelines in all states, by samples alone."""
+    smallest = math.inf
+    for k in range(len(history)):
+        points = [history.sample(k, rod, np.linspace(0, 1, 300))[0] for rod in history.scene.rods]
+        smallest = min(smallest, *(np.linalg.norm(p[:, None] - q, axis=2).min() for p, q in combinations(points, 2)))
+    return smallest
+
+
+def test_fast_rods_do_not_pass_through_each_other():
+    """Steps of two diameters at 20 m/s are cut."""
+    history = cf.simulate(bars((0.05, 0.0), speed=20.0, stiffness=2e9), 3e-3, dt=1e-3, elements=1, degree=2)
+    above = np.subtract(*(history.position(rod.at(rod.length / 2 + d))[:, 2]
+                          for rod, d in zip(history.scene.rods, (0.05, 0.0), strict=True)))  # fmt: skip
+    assert above.min() > 0 and closest(history) > 1.5 * RADIUS
+    assert drift(history.linear_momentum) < 1e-10
