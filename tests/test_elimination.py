@@ -148,38 +148,24 @@ def check_solution(problem):
     np.testing.assert_allclose(x.array_r, exact, rtol=0, atol=room * np.abs(exact).max())
 
 
+#: Scenes, elements of a rod, how far they are bent, and options: at a bent state and, where the tangent is not singular
+#: there, at a straight one; pivots of the axial force are zero in every element of a straight rod between two points.
+SOLVED = {
+    **{name: (scene, 2, 0.1, {}) for name, scene in SCENES.items()},
+    **{f"{formulation} {degree}": (hinged_in_the_middle(), 3, 0.1, {"formulation": formulation, "degree": degree})
+       for formulation in ("mixed", "displacement", "multiplier") for degree in (1, 2, 3, 4)},
+    **{f"{name} {degree}": (scene, 3, 0.1, {"model": name.split()[-1], "degree": degree}) for degree in (1, 4)
+       for name, scene in {"planar": in_a_plane(), "rigid planar": in_a_plane(RIGID), "determinate": column()}.items()},
+    **{f"straight {name} {elements}": (straight_between_points(section), elements, 0.0, {}) for elements in (1, 5)
+       for name, section in {"inextensible": INEXTENSIBLE, "rigid": RIGID}.items()},
+}  # fmt: skip
+
+
 @pytest.mark.serial
-@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize("name", SOLVED)
 def test_solution_is_that_of_dense_factors(name):
-    """At a bent state and, where the tangent is not singular there, at a straight one."""
-    with bent(SCENES[name]) as (problem, _, _):
-        check_solution(problem)
-
-
-@pytest.mark.serial
-@pytest.mark.parametrize("degree", [1, 2, 3, 4])
-@pytest.mark.parametrize("formulation", ["mixed", "displacement", "multiplier"])
-def test_every_formulation_and_degree(formulation, degree):
-    with bent(hinged_in_the_middle(), 3, formulation=formulation, degree=degree) as (problem, _, _):
-        check_solution(problem)
-
-
-@pytest.mark.serial
-@pytest.mark.parametrize("degree", [1, 4])
-@pytest.mark.parametrize(
-    ("scene", "model"), [(in_a_plane(), "planar"), (in_a_plane(RIGID), "planar"), (column(), "determinate")]
-)
-def test_plane_models(scene, model, degree):
-    with bent(scene, 3, model=model, degree=degree) as (problem, _, _):
-        check_solution(problem)
-
-
-@pytest.mark.serial
-@pytest.mark.parametrize("section", [INEXTENSIBLE, RIGID])
-@pytest.mark.parametrize("elements", [1, 5])
-def test_forces_of_straight_rods_without_extension_wait_for_their_ends(section, elements):
-    """Pivots of the axial force are zero in every element of a straight rod between two points."""
-    with bent(straight_between_points(section), elements, amount=0.0) as (problem, _, _):
+    scene, elements, amount, options = SOLVED[name]
+    with bent(scene, elements, amount=amount, **options) as (problem, _, _):
         check_solution(problem)
 
 

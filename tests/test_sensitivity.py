@@ -32,7 +32,8 @@ def tip(path):
 
 
 def test_small_loads_have_the_powers_of_beam_theory():
-    """A small force moves the tip of a cantilever by F L^3/(3 EI), a small moment by M L^2/(2 EI)."""
+    """A small force moves the tip of a cantilever by F L^3/(3 EI), a small moment by M L^2/(2 EI); EI of a thin tube
+    has the power four of both diameters."""
     steel = cf.Material(E=210e9, nu=0.3)
     rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, 20.0)), cf.Stiffness(
         shear=(np.inf, np.inf), axial=np.inf, bending=(1e6, 1e6), torsion=1e6), name="column")  # fmt: skip
@@ -43,6 +44,11 @@ def test_small_loads_have_the_powers_of_beam_theory():
     path = cf.solve(cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Moment(rod.end, (0, 1e-3, 0))]), [1.0])
     found = path.sensitivity(tip, [E, DIAMETER, "loads[0].moment[1]"])
     assert [found.relative(name)[0] for name in found] == pytest.approx([-1, -4, 1], rel=1e-9)
+    outer, inner, names = 0.1, 0.0999, [f"rods.column.section.{side}_diameter" for side in ("outer", "inner")]
+    rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, 20.0)), cf.Tube(outer, inner), steel, name="column")
+    path = cf.solve(cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Moment(rod.end, (0, 1e-3, 0))]), [1.0], elements=4)
+    found, power = path.sensitivity(tip, names), 4 / (outer**4 - inner**4)
+    assert [found.relative(name)[0] for name in names] == pytest.approx([-power * outer**4, power * inner**4], rel=1e-6)
 
 
 @pytest.mark.parametrize("model", ["determinate", "planar", "spatial"])
@@ -79,48 +85,31 @@ def solid(scene_of, value, name, query, **given):
     return path
 
 
-def test_foundation_spring_wall_and_prescribed_motion():
-    def rod():
-        return cf.Rod(cf.Line((0, 0, 0), (0, 0, 20.0)), cf.Circle(0.2), cf.Material(E=210e9, nu=0.3), name="column")
+def test_foundation_spring_wall_prescribed_motion_and_forces_across():
+    """A parameter may leave the plane of the scene: the sideways tip, of a determinate and a planar path."""
 
-    def resting(kind):
-        def scene(value):
-            column = rod()
-            return cf.Scene([column], [cf.Clamp(column.start)],
-                            [cf.Force(column.end, (5e4, 0, -1e5)), kind(column, value)])  # fmt: skip
-
-        return scene
+    def scene(*loads, push=0.0, moved=()):
+        rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, 20.0)), cf.Circle(0.2), cf.Material(E=210e9, nu=0.3), name="column")
+        forces = [] if moved else [cf.Force(rod.end, (5e4, push, -1e5)), *(load(rod) for load in loads)]
+        return cf.Scene([rod], [cf.Clamp(rod.start), *(cf.Prescribed(rod.end, displacement=u) for u in moved)], forces)
 
     for kind, value in (
         (lambda column, k: cf.Foundation(column, k), 2e3),
         (lambda column, k: cf.Spring(column.end, k), 1e4),
         (lambda column, k: cf.Wall(column, (0, 0, 0), (0, 0, 1), clearance=0.5, stiffness=k), 1e4),
     ):
-        solid(resting(kind), value, "loads[1].stiffness", tip, elements=8)
+        solid(lambda k, kind=kind: scene(lambda rod: kind(rod, k)), value, "loads[1].stiffness", tip, elements=8)
+    solid(lambda u: scene(moved=[(u, 0, -0.5)]), 3.0, "supports[1].displacement[0]",
+          lambda path: path.reaction("column.end")[0], elements=6)  # fmt: skip
 
-    def held(u):
-        column = rod()
-        supports = [cf.Clamp(column.start), cf.Prescribed(column.end, displacement=(u, 0, -0.5))]
-        return cf.Scene([column], supports)
+    def sideways(path):
+        return path.displacement("column.end")[:, 1]
 
-    solid(held, 3.0, "supports[1].displacement[0]", lambda path: path.reaction("column.end")[0], elements=6)
-
-
-def test_out_of_the_plane_it_takes_the_spatial_model():
-    """The load keeps its plane and the parameter leaves it: the sideways tip, of a determinate and a planar path."""
-
-    def scene(force):
-        rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, 20.0)), cf.Circle(0.2), cf.Material(E=210e9, nu=0.3), name="column")
-        return cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Force(rod.end, (5e4, force, -1e5))])
-
+    low, high = (sideways(cf.solve(scene(push=push), [0.5, 1.0], elements=6)) for push in (-1e3, 1e3))
     for model in ("determinate", "planar"):
-        path = cf.solve(scene(0.0), [0.5, 1.0], model=model, elements=6)
-        found = path.sensitivity(lambda path: path.displacement("column.end")[:, 1], ["loads[0].force[1]"])
-        sideways = [
-            cf.solve(scene(force), [0.5, 1.0], elements=6).displacement("column.end")[:, 1] for force in (-1e3, 1e3)
-        ]
-        rough = (sideways[1] - sideways[0]) / 2e3
-        assert found["loads[0].force[1]"] == pytest.approx(rough, rel=1e-3)
+        path = cf.solve(scene(), [0.5, 1.0], model=model, elements=6)
+        found = path.sensitivity(sideways, ["loads[0].force[1]"])
+        assert found["loads[0].force[1]"] == pytest.approx((high - low) / 2e3, rel=1e-3)
 
 
 def test_the_length_scales_curve_stations_and_mesh():
@@ -164,6 +153,9 @@ def test_uncertainty_adds_up():
     assert str(path.sensitivity(lambda path: 1.0, [E])).startswith("value = 1\n")
     together = path.uncertainty(given, tip, correlation=np.ones((3, 3)))
     assert together.standard_deviation == pytest.approx(np.abs(parts.sum(axis=0)), rel=1e-9)
+    for rho in ([[1, 0.9, 0.9], [0.9, 1, -0.9], [0.9, -0.9, 1]], [[1, 2], [3]], np.full((3, 3), np.nan), np.eye(2)):
+        with pytest.raises(cf.SceneError, match="correlation"):
+            path.uncertainty(given, tip, correlation=rho)
     with pytest.raises(cf.SceneError, match="ones on its diagonal"):
         path.uncertainty(given, tip, correlation=np.eye(2))
     with pytest.raises(cf.SceneError, match="0 or more"):
@@ -173,25 +165,28 @@ def test_uncertainty_adds_up():
 def test_refusals_in_words():
     _, scene = column()
     path = cf.solve(scene, [0.5], elements=4)
-    for name, words in (
-        ("rods.colum.material.E", "did you mean 'column'"),
-        ("rods.column.section.diametre", "did you mean 'diameter'"),
-        ("load[0].force[2]", "did you mean 'loads'"),
-        ("loads[0].force", r"expected the name of a number, such as 'loads\[0\].force\[0\]'"),
-        ("loads[7].force[2]", "2 items, numbered from 0"),
-        ("supports[0]", "expected the name of a number"),
-        (3.0, "expected a name"),
-    ):
+    loaded, stepped = cf.solve(mast(at=10.0), [1.0], elements=4), [(8.0, cf.Circle(0.2)), (None, cf.Circle(0.1))]
+    moves = "moves a load, support, joint or end of a section"
+    for of, query, parameters, words in (
+        *((path, tip, [name], words) for name, words in (
+            ("rods.colum.material.E", "did you mean 'column'"),
+            ("rods.column.section.diametre", "did you mean 'diameter'"),
+            ("load[0].force[2]", "did you mean 'loads'"),
+            ("loads[0].force", r"expected the name of a number, such as 'loads\[0\].force\[0\]'"),
+            ("loads[7].force[2]", "2 items, numbered from 0"),
+            ("supports[0]", "expected the name of a number"),
+            (3.0, "expected a name"),
+            (cf.Parameter("sign", 1.0, lambda value: column(diameter=value - 1)[1]), "its neighbourhood.*is refused"))),
+        (path, "tip", [E], "expected a function of the path"),
+        (path.at_points([]), tip, [E], "no converged point"),
+        (loaded, tip_of, ["loads[0].station.s"], moves),
+        (loaded, tip_of, [cf.Parameter("place", 10.0, lambda s: mast(at=s))], moves),
+        (cf.solve(mast(section=stepped), [1.0], elements=4), tip_of, ["rods.mast.curve.end[2]"], moves),
+    ):  # fmt: skip
         with pytest.raises(cf.SceneError, match=words):
-            path.sensitivity(tip, [name])
-    with pytest.raises(cf.SceneError, match="expected a function of the path"):
-        path.sensitivity("tip", [E])
-    with pytest.raises(cf.SceneError, match="no converged point"):
-        path.at_points([]).sensitivity(tip, [E])
+            of.sensitivity(query, parameters)
     with pytest.raises(cf.SceneError, match="its value is 0"):
         cf.Parameter("none", 0.0, lambda value: scene)
-    with pytest.raises(cf.SceneError, match="its neighbourhood.*is refused"):
-        path.sensitivity(tip, [cf.Parameter("sign", 1.0, lambda value: column(diameter=value - 1)[1])])
     with pytest.raises(cf.SceneError, match="did you mean"):
         path.sensitivity(tip, [E])["rods.column.material.nu"]
 
@@ -274,13 +269,10 @@ def tip_of(path):
 
 
 def mast(x=0.0, lean=0.0, at=None, section=None):
-    rod = cf.Rod(cf.Line((x, 0, 0), (x + lean, 0, 20.0)), section or cf.Circle(0.2), cf.Material(E=210e9, nu=0.3),
-                 name="mast")  # fmt: skip
-    return cf.Scene(
-        [rod],
-        [cf.Clamp(rod.start)],
-        [cf.Force(rod.at(at) if at else rod.end, (20e3, 0, -60e3)), cf.Foundation(rod, 500.0)],
-    )
+    curve, steel = cf.Line((x, 0, 0), (x + lean, 0, 20.0)), cf.Material(E=210e9, nu=0.3)
+    rod = cf.Rod(curve, section or cf.Circle(0.2), steel, name="mast")
+    force = cf.Force(rod.at(at) if at else rod.end, (20e3, 0, -60e3))
+    return cf.Scene([rod], [cf.Clamp(rod.start)], [force, cf.Foundation(rod, 500.0)])
 
 
 def by_end(scene):
@@ -322,26 +314,6 @@ def test_a_line_that_becomes_vertical_needs_its_d1():
     assert found == pytest.approx((tip_of(solved(0.01)) - tip_of(solved(-0.01))) / 0.02, rel=1e-5)
 
 
-def test_parameters_that_move_elements_are_refused():
-    path = cf.solve(mast(at=10.0), [1.0], elements=4)
-    stepped = [(8.0, cf.Circle(0.2)), (None, cf.Circle(0.1))]
-    for path, name in (
-        (path, "loads[0].station.s"), (path, cf.Parameter("place", 10.0, lambda s: mast(at=s))),
-        (cf.solve(mast(section=stepped), [1.0], elements=4), "rods.mast.curve.end[2]"),
-    ):  # fmt: skip
-        with pytest.raises(cf.SceneError, match="moves a load, support, joint or end of a section"):
-            path.sensitivity(tip_of, [name])
-
-
-def test_diameters_of_a_thin_tube():
-    """EI has the power four of both diameters."""
-    outer, inner, names = 0.1, 0.0999, [f"rods.mast.section.{side}_diameter" for side in ("outer", "inner")]
-    rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, 20.0)), cf.Tube(outer, inner), cf.Material(E=210e9, nu=0.3), name="mast")
-    path = cf.solve(cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Moment(rod.end, (0, 1e-3, 0))]), [1.0], elements=4)
-    found, power = path.sensitivity(tip_of, names), 4 / (outer**4 - inner**4)
-    assert [found.relative(name)[0] for name in names] == pytest.approx([-power * outer**4, power * inner**4], rel=1e-6)
-
-
 def test_a_number_that_two_rods_share_counts_once():
     steel = cf.Material(E=210e9, nu=0.3)
     lower = cf.Rod(cf.Line((0, 0, 0), (0, 0, 5.0)), cf.Circle(0.2), steel, name="lower")
@@ -352,18 +324,6 @@ def test_a_number_that_two_rods_share_counts_once():
     with pytest.raises(cf.SceneError, match="is the same number of the scene as 'rods.lower.material.E'"):
         path.uncertainty(dict.fromkeys(names, 1e9), tip_of)
     assert path.sensitivity(tip_of, names[1:]).relative(names[1]) == pytest.approx(-1.0, rel=1e-3)
-
-
-@pytest.mark.parametrize(
-    "rho", [[[1, 0.9, 0.9], [0.9, 1, -0.9], [0.9, -0.9, 1]], [[1, 2], [3]], np.full((3, 3), np.nan)]
-)
-def test_what_is_no_correlation_is_refused(rho):
-    found = cf.Sensitivity(
-        np.ones(1), *({name: np.ones(1) for name in "abc"} for _ in range(3)), dict.fromkeys("abc", "")
-    )
-    with pytest.raises(cf.SceneError, match="correlation"):
-        found.uncertainty(dict.fromkeys("abc", 1.0), rho)
-    assert found.uncertainty(dict.fromkeys("abc", 1.0), np.ones((3, 3))).standard_deviation == pytest.approx([3.0])
 
 
 def euler(*, E=210e9, diameter=0.2, length=20.0, loads=lambda rod: ()):
@@ -424,7 +384,9 @@ def test_bifurcation_of_a_column():
     y /= 1 + y
     for name, power in zip(found, (1.0, (4 + 2 * y) / (1 + y), -1.0, -2 / (1 + y)), strict=True):
         assert found.relative(name) == pytest.approx(power, rel=1e-8)
-    with pytest.raises(cf.SceneError, match="'loads.0..force.0.': it is an imperfection, with which the bifurcation disappears"):
+    with pytest.raises(
+        cf.SceneError, match="'loads.0..force.0.': it is an imperfection, with which the bifurcation disappears"
+    ):
         path.sensitivity(path.events[0], ["loads[0].force[0]"])
     again = cf.solve(scene, (0.0, 5.0), model="spatial", elements=8)
     with pytest.raises(cf.SceneError, match="the event does not belong to this path"):

@@ -147,15 +147,15 @@ def test_every_point_of_a_path(scene, etas, tol):
     "etas", [(0.0, 1.0), [0.0, 0.5, 1.0], np.linspace(-1, 1, 9), [1e-12, 1e-3, 0.3, 0.6, 1.0]], ids=str
 )
 def test_points_without_load(etas):
-    """Where nothing moves the estimated error is negligible."""
-    rod, scene = column()
-    path = cf.solve(scene, etas if isinstance(etas, tuple) else list(etas))
-    assert path.error.max() <= 1e-6 and max(path.elements) <= 16
+    """Where nothing moves the estimated error is negligible, of forces too."""
+    for scene in (column()[1], in_space()):
+        path = cf.solve(scene, etas if isinstance(etas, tuple) else list(etas))
+        assert path.error.max() <= 1e-6 and max(path.elements) <= 16
+    assert path.bounded == ("position", "rotation", "force", "moment") and np.array(path.errors).max() <= 1e-6
 
 
 def test_a_smooth_rod_does_not_hide_another():
-    """A long beam under a line load, whose deflection P4 represents
-    exactly, next to a short arc that is pulled straight."""
+    """A long beam under a line load, whose deflection P4 represents exactly, next to a short arc that is drawn out."""
 
     def stiff(bending):
         return cf.Stiffness((1e6, 1e6), 1e6, (bending, bending), bending)
@@ -179,12 +179,8 @@ def test_an_interrupted_search_hands_over_what_is_complete(monkeypatch):
         raise KeyboardInterrupt
 
     _, scene = column()
-    corrected = recorder.Tracing.corrected
-    monkeypatch.setattr(
-        recorder.Tracing,
-        "corrected",
-        lambda *arguments: monkeypatch.setattr(load_control, "obey", stop) or corrected(*arguments),
-    )
+    corrected, late = recorder.Tracing.corrected, lambda: monkeypatch.setattr(load_control, "obey", stop)
+    monkeypatch.setattr(recorder.Tracing, "corrected", lambda *arguments: late() or corrected(*arguments))
     with pytest.raises(cf.Interrupted) as stopped:
         cf.solve(scene, np.linspace(0.1, 0.9, 8).tolist())
     assert len(stopped.value.path) == 8
@@ -204,20 +200,18 @@ def twisted(turns, *, by_moment=False):
 
 @pytest.mark.parametrize(("turns", "tol"), [(10, 1e-4), (20, 1e-2), (20, 1e-6)])
 def test_the_torque_of_a_bar_that_is_turned_often(turns, tol):
-    """M = 2 pi n GJ/L. Observed before: 6.8e-4 and 4.1 % off, with an estimated error of 0, whatever tol."""
+    """M = 2 pi n GJ/L, and its turns under a torque. Observed before: 6.8e-4 and 4.1 % off, with an estimated error of
+    0, whatever tol; the end 0.13 rad from where it belongs."""
     rod, scene = twisted(turns)
     path = cf.solve(scene, [1.0], tol=tol)
     off = abs(path.moment(rod.at(0.37))[-1, 0] / (2 * np.pi * turns) - 1)
     assert off <= max(path.errors.moment[-1], 1e-10) and 0 < path.error[-1] <= tol
     assert path.errors.rotation[-1] > 0 and path.errors.position[-1] < 1e-10
-
-
-def test_the_turns_of_a_bar_under_a_torque():
-    """Observed before: the end 0.13 rad from where it belongs, with an estimated error of 0."""
-    rod, scene = twisted(20, by_moment=True)
-    path = cf.solve(scene, [1.0])
-    q = path.rotation(rod.end)[-1]
-    assert abs(2 * np.arcsin(np.linalg.norm(q[1:]))) <= 2 * max(path.errors.rotation[-1], 1e-9) <= 2e-6
+    if tol == 1e-6:
+        rod, scene = twisted(turns, by_moment=True)
+        path = cf.solve(scene, [1.0])
+        q = path.rotation(rod.end)[-1]
+        assert abs(2 * np.arcsin(np.linalg.norm(q[1:]))) <= 2 * max(path.errors.rotation[-1], 1e-9) <= 2e-6
 
 
 def true_errors(path, fine):
@@ -315,12 +309,9 @@ def test_what_is_bounded_is_asked_for():
     assert positions.errors.moment[0] > 1e-6 and positions.unknowns < both.unknowns
     assert both.bounded == ("position", "rotation", "force", "moment") and positions.bounded == ("position",)
     assert np.isnan(cf.solve(scene, [1.0], elements=8).errors).all()
-
-
-@pytest.mark.parametrize("bound", ["position", [], ["positions"], [3], None])
-def test_other_bounds_are_refused(bound):
-    with pytest.raises(cf.SceneError, match="bound"):
-        cf.solve(spring(), bound=bound)
+    for bound in ("position", [], ["positions"], [3], None):
+        with pytest.raises(cf.SceneError, match="bound"):
+            cf.solve(scene, bound=bound)
 
 
 def test_rounding_of_the_forces_of_slender_rods_is_told_and_not_refined_for():
@@ -328,20 +319,13 @@ def test_rounding_of_the_forces_of_slender_rods_is_told_and_not_refined_for():
     that of statics alone."""
     rod = cf.Rod(cf.Line((0, 0, 0), (1.0, 0, 0)), cf.Circle(5e-5), cf.Material(210e9), name="hair")
     unit = rod.stiffness.bending[0]
-    scene = cf.Scene(
-        [rod], [cf.Clamp(rod.start), cf.Roller(rod.end, (0, 0, 1))], [cf.Force(rod.at(0.5), (0, 0, -5 * unit))]
-    )
+    held = [cf.Clamp(rod.start), cf.Roller(rod.end, (0, 0, 1))]
+    scene = cf.Scene([rod], held, [cf.Force(rod.at(0.5), (0, 0, -5 * unit))])
     path = cf.solve(scene, [1.0], tol=1e-7)
     assert path.errors.force[0] > 1e-7 and "force" not in path.bounded and path.error[0] <= 1e-7
     assert any("rounding leaves an error" in sentence for sentence in path.why) and max(path.elements) <= 32
     fine = cf.solve(scene, [1.0], elements=3 * max(path.elements))
     assert (true_errors(path, fine)[:, 0] <= 3 * np.array(path.errors)[:, 0]).all()  # the finer one rounds more
-
-
-def test_a_path_that_begins_without_load_bounds_forces_too():
-    path = cf.solve(in_space(), (0.0, 1.0))
-    assert path.bounded == ("position", "rotation", "force", "moment") and path.load_factors[0] == 0
-    assert np.array(path.errors).max() <= 1e-6
 
 
 def test_errors_are_saved(tmp_path):
