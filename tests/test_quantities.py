@@ -120,9 +120,6 @@ def test_definitions():
     assert 180 * units.deg == math.pi and 60 * units.rpm == pytest.approx(2 * math.pi, rel=1e-15)
     assert units.deg_per_100ft / units.deg_per_30m == pytest.approx(30 / 30.48, rel=1e-15)
     assert (units.mm, units.kN, units.GPa, units.minute) == (1e-3, 1e3, 1e9, 60.0)
-
-
-def test_all_are_floats_and_easy_to_reach():
     assert cf.units is units
     given = {name: value for name, value in vars(units).items() if not name.startswith("_") and name != "math"}
     assert all(type(value) is float and value > 0 for value in given.values()) and len(given) > 30
@@ -167,6 +164,10 @@ def test_xarray_over_cases_one_by_one():
     assert data["how"].values.tolist() == ["trip out", "trip in"]
     np.testing.assert_array_equal(data["s"], [np.nan, 2.0])
     assert found.to_dataframe()["how"].tolist() == operations
+    found = cf.study(lambda n: np.arange(n), {"n": [2, 3]})
+    assert [len(x) for x in found.to_dataframe()["result"]] == [2, 3]
+    with pytest.raises(cf.SceneError, match="arrays of 'result' differ in shape"):
+        found.to_xarray()
 
 
 @pytest.mark.parametrize("cases", [{"s": [1.0, 2.0]}, [{"s": 1.0}, {"s": 2.0}]])
@@ -179,18 +180,8 @@ def test_xarray_in_other_units(cases):
         data = found.to_xarray(asked)
         np.testing.assert_allclose(data["depth"], np.array([2.0, 4.0]) / size, rtol=1e-15)
         np.testing.assert_allclose(data["s"], np.array([1.0, 2.0]) / size, rtol=1e-15)
-        assert data["depth"].attrs["units"] == data["s"].attrs["units"] == unit and data["count"].values.tolist() == [
-            7,
-            7,
-        ]
-
-
-def test_arrays_of_different_shapes():
-    pytest.importorskip("xarray")
-    found = cf.study(lambda n: np.arange(n), {"n": [2, 3]})
-    assert [len(x) for x in found.to_dataframe()["result"]] == [2, 3]
-    with pytest.raises(cf.SceneError, match="arrays of 'result' differ in shape"):
-        found.to_xarray()
+        assert data["depth"].attrs["units"] == data["s"].attrs["units"] == unit
+        assert data["count"].values.tolist() == [7, 7]
 
 
 def test_long_tables_are_shown_in_part():
