@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import COMM, column
+from conftest import COMM, column, refused
 from test_requests import Terminal
 
 import cosserat_fenicsx as cf
@@ -73,11 +73,21 @@ def test_what_matters_colours_the_rods(solved):
 
 @pytest.mark.serial
 def test_the_colour_bar_names_its_field(solved):
+    """Tension alone is coloured from zero; an unknown name lists those that there are."""
     for asked_for, said in ((None, "bending moment (MN m)"), ("tension", "tension (kN)"), ("strain.3", "stretch")):
         plotter = solved.plot(color=asked_for)
         (title,) = plotter.scalar_bars.keys()
         plotter.close()
         assert " ".join(title.split()) == said
+    tension = colour_of("tension")
+    for array, signed in (([0.0, 3.0], False), ([-1e-9, 3.0], False), ([-0.1, 3.0], True), ([-3.0, -1.0], True)):
+        assert seen(tension, [np.array(array)], 3.0).signed == signed
+    assert seen(tension, [np.zeros(2)], 0.0).signed and not seen(colour_of("shear_force"), [np.ones(2)], 1.0).signed
+    for more, words in (({"color": "bendng_moment"}, "plot.color = 'bendng_moment'.* shear_force, displacement"),
+                        ({"color": "bendng_moment"}, "did you mean 'bending_moment'?"),
+                        ({"color": "velocity"}, "'velocity'"), ({"units": "metric"}, "units")):  # fmt: skip
+        with pytest.raises(cf.SceneError, match=words):
+            solved.plot(**more)
 
 
 @pytest.mark.serial
@@ -97,24 +107,9 @@ def test_tangled_shapes_stand_side_by_side():
         assert (not coloured[first:last].all()) == gap
 
 
-def test_tension_alone_is_coloured_from_zero():
-    tension = colour_of("tension")
-    for array, signed in (([0.0, 3.0], False), ([-1e-9, 3.0], False), ([-0.1, 3.0], True), ([-3.0, -1.0], True)):
-        assert seen(tension, [np.array(array)], 3.0).signed == signed
-    assert seen(tension, [np.zeros(2)], 0.0).signed and not seen(colour_of("shear_force"), [np.ones(2)], 1.0).signed
-
-
-def test_an_unknown_colour_lists_the_names(solved):
-    with pytest.raises(cf.SceneError) as refused:
-        solved.plot(color="bendng_moment")
-    told = str(refused.value)
-    assert "plot.color = 'bendng_moment'" in told and "shear_force, displacement" in told
-    assert "did you mean 'bending_moment'?" in told
-    with pytest.raises(cf.SceneError, match="'velocity'"):  # a path has none
-        solved.plot(color="velocity")
-
-
 def test_ticks_are_round_and_free_of_rounding():
+    """In the units that are asked for."""
+
     def texts(low, high):
         points = np.array([[low, -1e-17, 0.0], [high, 1e-17, 0.0]])
         x, y, _ = axes_of(points)
@@ -125,26 +120,19 @@ def test_ticks_are_round_and_free_of_rounding():
     assert texts(0.0, 1e-6) == ("x (µm)", ["0.0", "0.2", "0.4", "0.6", "0.8", "1.0"])
     assert texts(1e6, 1e6 + 10) == ("x (m)", ["1000000", "1000002", "1000004", "1000006", "1000008", "1000010"])
     assert texts(0, 4e5) == ("x (km)", ["0", "100", "200", "300", "400"])
-    assert (
-        quantity(3.04e-16, "N m") == "304 aN m" and quantity(1e3, "N") == "1 kN" and quantity(0.02, "1/m") == "0.02 1/m"
-    )
-
-
-def test_drawings_take_the_units_that_are_asked_for(solved):
+    assert quantity(3.04e-16, "N m") == "304 aN m" and quantity(1e3, "N") == "1 kN"
+    assert quantity(0.02, "1/m") == "0.02 1/m" and quantity(4448.2216, "N") == "4.45 kN"
     with asked(units="field"):
-        x, _, z = axes_of(np.array([[0.0, 0, 0], [30.48, 0, 1.0]]))
-        assert x.name == "x (ft)" and [text for _, text in x.ticks] == ["0", "20", "40", "60", "80", "100"]
-        assert x.ticks[-1][0] == pytest.approx(30.48) and z.name == "z (ft)"
+        assert texts(0.0, 30.48) == ("x (ft)", ["0", "20", "40", "60", "80", "100"])
+        assert axes_of(np.array([[0.0, 0, 0], [30.48, 0, 1.0]]))[0].ticks[-1][0] == pytest.approx(30.48)
         assert quantity(4448.2216, "N") == "1 klbf" and quantity(0.02, "1/m") == "0.0061 1/ft"
-    assert quantity(4448.2216, "N") == "4.45 kN"
-    with pytest.raises(cf.SceneError, match="units"):
-        solved.plot(units="metric")
+
+
+VIEW = View.of(np.array([[0.0, 0, 0], [10, 0, 5]]), np.array([10.0, 0, 5]), (700, 500))
 
 
 def test_labels_keep_off_each_other_and_off_the_edge():
-    line = np.column_stack([np.linspace(0, 10, 50), np.zeros(50), np.zeros(50)])
-    view = View.of(np.array([[0.0, 0, 0], [10, 0, 5]]), np.array([10.0, 0, 5]), (700, 500))
-    labels = Labels(view, [line])
+    labels = Labels(VIEW, [np.linspace(0, 10, 50)[:, None] * [1.0, 0, 0]])
     placed = [labels.near(f"label {i}", np.array([10.0, 0, 0]), np.array([1.0, 0, 0]), size=20) for i in range(60)]
     assert 8 < sum(placed) < 60 and len(labels.left_out) == 60 - sum(placed)
     boxes = labels.boxes
@@ -184,34 +172,27 @@ def test_labels_of_the_lower_end_keep_off_the_string():
 
 def test_numbers_of_an_axis_are_even():
     """Every n-th one, from that on which leaves most room where another label stands at an end."""
-    view = View.of(np.array([[0.0, 0, 0], [10, 0, 5]]), np.array([10.0, 0, 5]), (700, 500))
     ticks = [(f"{k:.3f}", np.array([2.0 * k, 0, 0])) for k in range(6)]
-    kept = {}
-    for size, taken in ((10, None), (32, None), (32, ticks[0])):
-        labels = Labels(view)
+    for size, taken, kept in ((10, None, [text for text, _ in ticks]), (32, None, ["0.000", "2.000", "4.000"]),
+                              (32, ticks[0], ["1.000", "3.000", "5.000"])):  # fmt: skip
+        labels = Labels(VIEW)
         if taken:
             labels.fix("x", [(taken[1], (0.0, 0.0))], size=size)
         before = len(labels.boxes)
         labels.evenly(ticks, size=size, away=(0, 0))
-        kept[size, taken is None] = [text for text, *_ in labels._texts[before:]]
-    assert kept == {
-        (10, True): [text for text, _ in ticks],
-        (32, True): ["0.000", "2.000", "4.000"],
-        (32, False): ["1.000", "3.000", "5.000"],
-    }
+        assert [text for text, *_ in labels._texts[before:]] == kept
 
 
 @pytest.mark.serial
 def test_labels_that_are_close_are_all_drawn():
     """VTK would leave one of these out."""
     pyvista = pytest.importorskip("pyvista")
-    view = View.of(np.array([[0.0, 0, 0], [10, 0, 5]]), np.array([10.0, 0, 5]), (700, 500))
-    labels = Labels(view)
+    labels = Labels(VIEW)
     for text, x in (("1.3 (unstable)", 6.0), ("1.85", 3.5)):
         assert labels.near(text, np.array([x, 0, 2.5]), np.array([0.0, 0, 1]), size=20)
-    plotter = pyvista.Plotter(off_screen=True, window_size=view.window)
+    plotter = pyvista.Plotter(off_screen=True, window_size=VIEW.window)
     labels.draw(plotter, pyvista)
-    view.place(plotter)
+    VIEW.place(plotter)
     dark = plotter.screenshot(return_img=True).max(axis=2) < 128
     plotter.close()
     for x0, y0, x1, y1 in np.array(labels.boxes).astype(int):
@@ -464,25 +445,19 @@ def test_nothing_found_is_written_as_such(tmp_path_all):
     found.write(tmp_path_all / "none.csv")
     COMM.barrier()
     assert len((tmp_path_all / "none.csv").read_text(encoding="utf-8").splitlines()) == 1
-    for refused in (lambda: found.write(tmp_path_all / "none.xdmf"), found.plot):
-        with pytest.raises(cf.SceneError, match="there is no mode to show"):
-            refused()
-
-
-def test_the_words_of_a_result(bent):
-    _, _, found = bent
-    assert repr(found).startswith("<Modes: 0.2")
-    assert "Hz, eigenvalues with error not estimated, at the load factor 0.5" in repr(found)
-    buckled = cf.buckling(column(eccentricity=0.0)[1], elements=4)
-    assert repr(buckled).startswith("<Buckling: critical load factors 0.9999")
-    assert "<td>0</td><td>0.99995" in buckled._repr_html_()
-    assert found.label(0).endswith(" Hz") and buckled.label(0) == "critical load factor 0.99995"
+    for show in (lambda: found.write(tmp_path_all / "none.xdmf"), found.plot):
+        with refused("there is no mode to show"):
+            show()
 
 
 def test_equal_eigenvalues_are_combined_along_axes():
     """Of a round column: the first of each pair moves along x, the second along y, in both kinds of results."""
     rod, scene = column(eccentricity=0.0)
-    for found in (cf.modes(scene, 4, elements=4), cf.buckling(scene, 4, elements=4)):
+    buckled = cf.buckling(scene, 4, elements=4)
+    assert repr(buckled).startswith("<Buckling: critical load factors 0.9999")
+    assert "<td>0</td><td>0.99995" in buckled._repr_html_()
+    assert buckled.label(0) == "critical load factor 0.99995"
+    for found in (cf.modes(scene, 4, elements=4), buckled):
         for k in range(4):
             moved = found.mode(k, rod)
             assert moved[:, k % 2].max() == pytest.approx(1, abs=1e-9)
@@ -504,28 +479,38 @@ def test_shapes_belong_to_their_equilibrium(bent, tmp_path_all):
     loaded = pickle.loads(pickle.dumps(found))
     assert repr(loaded) == repr(found) and loaded.comm.size == 1
     np.testing.assert_array_equal(loaded.mode(1, "column"), found.mode(1))
-    with pytest.raises(cf.SceneError, match="the ending '.xyzzy' is not known"):
-        found.write(tmp_path_all / "one.xyzzy")
-
-
-def test_unknown_modes_are_refused(bent, tmp_path_all):
-    _, _, found = bent
-    words = r"Modes.k = {}: expected the number of a mode, from 0 to 2"
-    film = tmp_path_all / "film.gif"
-    for k, ask in ((3, found.mode), (-4, found.turns), (1.0, found.mode)):
-        with pytest.raises(cf.SceneError, match=words.format(k)):
-            ask(k)
-    with pytest.raises(cf.SceneError, match="plot.which = 2: expected a list of the numbers of one to 6 modes"):
-        found.plot(film.with_suffix(".png"), 2)
-    for ask in (lambda: found.animate(film, 7), lambda: found.plot(film.with_suffix(".png"), [7])):
-        with pytest.raises(cf.SceneError, match=words.format(7)):
+    assert repr(found).startswith("<Modes: 0.2") and found.label(0).endswith(" Hz")
+    assert "Hz, eigenvalues with error not estimated, at the load factor 0.5" in repr(found)
+    words, film, picture = (
+        "Modes.k = {}: expected the number of a mode, from 0 to 2",
+        "film.gif",
+        tmp_path_all / "a.png",
+    )
+    film = tmp_path_all / film
+    for ask, said in (
+        (lambda: found.write(tmp_path_all / "one.xyzzy"), "the ending '.xyzzy' is not known"),
+        (lambda: found.mode(3), words.format(3)), (lambda: found.turns(-4), words.format(-4)),
+        (lambda: found.mode(1.0), words.format(1.0)), (lambda: found.animate(film, 7), words.format(7)),
+        (lambda: found.plot(picture, [7]), words.format(7)),
+        (lambda: found.plot(picture, 2), "plot.which = 2: expected a list of the numbers of one to 6 modes"),
+        (lambda: found.animate(film, cycles=0), "animate.cycles = 0"),
+        (lambda: found.animate(film, seconds=0), "animate.seconds = 0"),
+        (lambda: found.animate(film, amplitude=-1), "animate.amplitude = -1"),
+        (lambda: found.animate(film, fps=1e9), "animate.fps"),
+        (lambda: found.animate(film, seconds=60, cycles=10), "at most 10000 frames, not 15000"),
+    ):  # fmt: skip
+        with refused(said):
             ask()
-    for more, said in (({"cycles": 0}, "animate.cycles = 0"), ({"seconds": 0}, "animate.seconds = 0"),
-                       ({"amplitude": -1}, "animate.amplitude = -1"), ({"fps": 1e9}, "animate.fps"),
-                       ({"seconds": 60, "cycles": 10}, "at most 10000 frames, not 15000")):  # fmt: skip
-        with pytest.raises(cf.SceneError, match=said):
-            found.animate(film, **more)
-    assert not film.exists()
+    assert not film.exists() and not picture.exists()
+
+
+@pytest.mark.serial
+def test_every_mode_has_its_panel(bent, tmp_path):
+    from matplotlib.image import imread
+
+    bent[2].plot(tmp_path / "modes.png")
+    vivid = np.ptp(imread(tmp_path / "modes.png")[70:, :, :3], axis=2) > 0.15
+    assert all(1e-3 < panel.mean() < 0.2 for panel in np.split(vivid, 3, axis=1))
 
 
 def test_a_shape_is_drawn_as_large_as_the_picture_says(bent):
@@ -578,19 +563,6 @@ def test_a_film_swings_to_both_sides(tmp_path):
     for beside in (-1, 0, 1):  # the centre is known to a pixel
         mirrored[rows, np.clip(np.round(2 * centre - columns).astype(int) + beside, 0, 319)] = True
     assert (mirrored & middle).sum() > 0.9 * middle.sum()
-
-
-@pytest.mark.serial
-def test_picture(bent, tmp_path):
-    """A panel for each mode, none of them empty."""
-    from matplotlib.image import imread
-
-    _, _, found = bent
-    found.plot(tmp_path / "modes.png")
-    image = imread(tmp_path / "modes.png")[70:, :, :3]
-    vivid = np.ptp(image, axis=2) > 0.15
-    for panel in np.split(vivid, 3, axis=1):
-        assert 1e-3 < panel.mean() < 0.2
 
 
 @pytest.mark.serial
