@@ -18,7 +18,7 @@ export VTK_DEFAULT_OPENGL_WINDOW = vtkEGLRenderWindow
 # A numpy in the user's own site directory would hide the distribution's.
 export PYTHONNOUSERSITE = 1
 
-.PHONY: help setup packages demo animation motion gallery well string whirl recipes test docs tutorials tables figure3 work-precision benchmarks cosseratbench failures rods-in-wells folders tangles truths random random-wells imperfect mutants release clean
+.PHONY: help setup packages demo animation motion gallery well string whirl recipes test docs tutorials tables figure3 work-precision benchmarks cosseratbench failures rods-in-wells folders tangles truths random random-wells imperfect mutants sanitizers release clean
 
 help:
 	@echo "Times are those of two cores and an empty cache of compiled forms, after \`make setup\`."
@@ -45,6 +45,7 @@ help:
 	@echo "make random-wells  100 random wells, strings and operations against finer meshes in a stiffer wall (about half an hour)"
 	@echo "make imperfect  60 symmetric structures with small imperfections against paths in small steps (about 20 minutes)"
 	@echo "make mutants  120 small errors put into the code: how many do the tests find? (two hours)"
+	@echo "make sanitizers  the tests on C that checks its bounds and what it leaves undefined (half an hour)"
 	@echo "make release  the sdist, the wheel and the conda recipe, checked; writes dist/"
 	@echo "make setup   only what all of these need first: the Debian packages and the environment .venv"
 	@echo "make clean   remove .venv, out and whatever else was built here"
@@ -185,6 +186,9 @@ mutants: setup
 	$(PYTHON) -m pip install --disable-pip-version-check --constraint .venv/constraints.txt pytest-cov
 	$(PYTHON) demos/evidence/mutants.py
 	$(PYTHON) demos/evidence/put_in_docs.py mutants
+
+sanitizers: setup
+	$(PYTHON) demos/evidence/sanitizers.py
 
 release: setup
 	$(PYTHON) -m pip install --disable-pip-version-check --constraint .venv/constraints.txt --editable '.[release]'

@@ -82,6 +82,25 @@ def test_quick(name, tmp_path):
     assert all(said in text for said in words), text
 
 
+@pytest.mark.skipif(not shutil.which("gcc"), reason="needs gcc")
+def test_sanitizers_find_what_is_read_out_of_bounds(tmp_path, monkeypatch):
+    import sanitizers
+
+    (tmp_path / "third.h").write_text("double third(const double *x, int n);\n")
+    (tmp_path / "third.c").write_text("double third(const double *x, int n) { return x[n]; }\n")
+    test = tmp_path / "test_third.py"
+    test.write_text(
+        "from pathlib import Path\nimport pytest\nfrom cosserat_fenicsx.algebra.building import module\n"
+        "@pytest.mark.parametrize('n', [2, 3])\n"
+        f"def test(n):\n    ffi, lib = module(Path({str(tmp_path / 'third.c')!r}))\n"
+        "    assert lib.third(ffi.new('double[]', [1.0, 2.0, 3.0]), n) == 3\n"
+    )
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "none"))
+    assert sanitizers.main([f"{test}::test[2]"], tmp_path / "out") [0] == 0
+    code, said = sanitizers.main([f"{test}::test[3]"], tmp_path / "out")
+    assert code and "heap-buffer-overflow" in said and "third.c:1 in third" in said
+
+
 def test_mutants_quick():
     """A wrong sign in the direction of a line is found by the tests of curves, and they pass without it."""
     import mutants
