@@ -302,10 +302,8 @@ def test_the_estimate_at_kinks_covers_the_error():
     """Wells in a vertical plane, whose wall force has kinks; truth: the same at 1e-12."""
     rng = np.random.default_rng(11)
     for _ in range(20):
-        md = np.cumsum(np.r_[0, rng.uniform(100, 900, 7)])
-        path = cf.well.WellPath.from_survey(
-            md, np.r_[0, np.cumsum(rng.uniform(-25, 40, 7))].clip(0, 120), np.full(8, 77.0)
-        )
+        md, inc = (np.r_[0, np.cumsum(rng.uniform(*ends, 7))] for ends in ((100, 900), (-25, 40)))
+        path = cf.well.WellPath.from_survey(md, inc.clip(0, 120), np.full(8, 77.0))
         for operation in (cf.well.TripOut(-2e5), cf.well.TripIn(1e5), cf.well.RotateOffBottom()):
             truth = solved(path, operation, 0.35, tol=1e-12)
             for tol in (1e-2, 1e-4, 1e-7):
@@ -330,12 +328,10 @@ def test_a_well_of_200_stations_takes_5_ms():
     path = cf.well.WellPath.from_survey(np.arange(200) * 25.0, np.abs(inc), azi)
     hole = cf.well.Borehole(path, [cf.well.HoleSection(2000, 0.22, 0.2), cf.well.HoleSection(path.length, 0.2159, 0.3)])
     string = cf.well.DrillString([cf.well.Collar(180, "NC46-65"), cf.well.DrillPipe(size="5 in 19.50 lb/ft")])
-    best = np.inf
+    best, mud = np.inf, cf.well.Mud(1200.0)
     for _ in range(30):
         before = time.process_time()
-        answer = cf.well.torque_and_drag(
-            hole, string, cf.well.TripOut(), mud=cf.well.Mud(1200.0), model="soft", tol=1e-8
-        )
+        answer = cf.well.torque_and_drag(hole, string, cf.well.TripOut(), mud=mud, model="soft", tol=1e-8)
         best = min(best, time.process_time() - before)
     assert answer.error <= 1e-8 and best < 5e-3
 
@@ -344,28 +340,20 @@ PATH = well("P")
 COLLAR = cf.well.Collar(200.0, outer_diameter=0.165, inner_diameter=0.07)
 STEEL_PIPE = cf.well.DrillPipe(outer_diameter=0.127, inner_diameter=0.1086)
 #: names of parameters, the argument of `answer` and its value
-NAMES = {
-    "hole.sections[0].friction": ("cased", 0.2),
-    "hole.sections[1].friction": ("open", 0.32),
-    "mud.density": ("density", 1200.0),
-    "operation.weight": ("weight", 5e4),
-    "operation.torque": ("torque", 3e3),
-}
+NAMES = {"hole.sections[0].friction": ("cased", 0.2), "hole.sections[1].friction": ("open", 0.32),
+         "mud.density": ("density", 1200.0), "operation.weight": ("weight", 5e4),
+         "operation.torque": ("torque", 3e3)}  # fmt: skip
 
 
-def answer(operation, convention, *, cased=0.2, open=0.32, density=1200.0, weight=5e4, torque=3e3, tol=1e-11):
-    hole = cf.well.Borehole(
-        PATH, [cf.well.HoleSection(2000, 0.22, cased), cf.well.HoleSection(PATH.length, 0.2159, open)]
-    )
-    return cf.well.torque_and_drag(
-        hole,
-        cf.well.DrillString([COLLAR, STEEL_PIPE]),
-        operation(weight=weight, torque=torque),
-        mud=cf.well.Mud(density),
-        model="soft",
-        tol=tol,
-        torque_convention=convention,
-    )
+def cased_and_open(cased=0.2, open=0.32):
+    sections = [cf.well.HoleSection(2000, 0.22, cased), cf.well.HoleSection(PATH.length, 0.2159, open)]
+    return cf.well.Borehole(PATH, sections)
+
+
+def answer(operation, convention, *, density=1200.0, weight=5e4, torque=3e3, tol=1e-11, **friction):
+    string, acting = cf.well.DrillString([COLLAR, STEEL_PIPE]), operation(weight=weight, torque=torque)
+    given = {"mud": cf.well.Mud(density), "model": "soft", "tol": tol, "torque_convention": convention}
+    return cf.well.torque_and_drag(cased_and_open(**friction), string, acting, **given)
 
 
 def capstan(pull=900e3, mu=0.3, weight=0.0):
@@ -402,22 +390,14 @@ def test_a_well_as_by_differences_of_answers(operation, convention):
     assert along.shape == here.md.shape
     sections = [here.sensitivity([f"hole.sections[{i}].friction"])[f"hole.sections[{i}].friction"] for i in (0, 1)]
     assert along[0] == pytest.approx(sum(sections), rel=1e-12, abs=1e-6)
-
-
-def test_weights_of_components_add_up():
-    found = answer(cf.well.TripOut, "coulomb").sensitivity(
-        ["weight", "string.components[0].weight", "string.components[1].weight"]
-    )
-    all_of_it, *parts = found.values()
+    all_of_it, *parts = here.sensitivity(["weight", *(f"string.components[{i}].weight" for i in (0, 1))]).values()
     assert all_of_it == pytest.approx(sum(parts), rel=1e-12)
 
 
 def test_uncertainty_of_a_hook_load_with_a_fit():
     """The coefficients of a fit, with their correlation, tell how uncertain a hook load is: as readings of exactly
     this load would."""
-    hole = cf.well.Borehole(
-        PATH, [cf.well.HoleSection(2000, 0.22, 0.2), cf.well.HoleSection(PATH.length, 0.2159, 0.32)]
-    )
+    hole = cased_and_open()
     string, rng, measurements = cf.well.DrillString([COLLAR, STEEL_PIPE]), np.random.default_rng(5), []
     for depth in (1500.0, 2500.0, 3500.0, 4500.0):
         for operation in (cf.well.TripOut(), cf.well.TripIn()):
@@ -449,7 +429,7 @@ def test_refusals_in_words():
             "operation.rpm",
             r"known: friction, weight, operation.weight, operation.torque, hole.sections\[i\].friction "
             r"with i from 0 to 0, string.components\[i\].weight with i from 0 to 0$",
-        ),
+        ),  # fmt: skip
         ("mud.density", "known: friction"),  # there is no mud
         (3, "known"),
     ):
@@ -458,9 +438,8 @@ def test_refusals_in_words():
     with pytest.raises(cf.SceneError, match="did you mean 'hook_load'"):
         here.sensitivity(["friction"], "hook")
     hole = cf.well.Borehole(PATH, [cf.well.HoleSection(PATH.length, 0.2159, 0.25)])
-    buckled = cf.well.torque_and_drag(
-        hole, cf.well.DrillString([COLLAR, STEEL_PIPE]), cf.well.Sliding(90e3), mud=cf.well.Mud(1200.0), model="buckled"
-    )
+    string, given = cf.well.DrillString([COLLAR, STEEL_PIPE]), {"mud": cf.well.Mud(1200.0), "model": "buckled"}
+    buckled = cf.well.torque_and_drag(hole, string, cf.well.Sliding(90e3), **given)
     assert buckled.solved.helical.any()
     with pytest.raises(cf.SceneError, match="a string with a helix .model = 'buckled'.*model='soft'"):
         buckled.sensitivity(["friction"])
@@ -531,11 +510,8 @@ def test_critical_loads_along_a_string():
     assert answer.critical_load("He-Kyllingstad")[inclined] == pytest.approx(137276.68, rel=1e-7)
     assert (answer.critical_load("He-Kyllingstad")[bent] > 2 * answer.critical_load("Dawson-Paslay")[bent]).all()
     assert answer.critical_load("Lubinski") == pytest.approx(criteria.lubinski(case["EI"], case["w"]))
-    assert np.isnan(
-        cf.well.torque_and_drag(
-            hole, cf.well.DrillString([cf.well.Component(None, None, 241.13, 0.06)]), cf.well.TripIn()
-        ).critical_load("Wu")
-    ).all()
+    bare = cf.well.DrillString([cf.well.Component(None, None, 241.13, 0.06)])
+    assert np.isnan(cf.well.torque_and_drag(hole, bare, cf.well.TripIn()).critical_load("Wu")).all()
 
 
 @pytest.mark.parametrize("name", ["wicks_steel", "wicks_composite", "drill_pipe_F_bit_50kN"])

@@ -54,11 +54,6 @@ def test_a_sweep_is_its_answers():
         assert found.hook_load[i, 1, 3] == answer.hook_load and found.surface_torque[i, 1, 3] == answer.surface_torque
     assert (found.hook_load[0] > found.hook_load[2]).all() and (found.hook_load[2] > found.hook_load[1]).all()
     assert found.label(1, 1) == "trip in, friction 0.2, 0.4" and f"{found.hook_load[1, 1, 2] / 1e3:.2f}" in str(found)
-    assert cf.well.depth_sweep(HOLE, STRING, cf.well.TripOut(), 2000.0, mud=MUD, model="soft").hook_load.shape == (
-        1,
-        1,
-        1,
-    )
 
 
 def test_a_depth_without_an_answer_is_a_row_that_says_so(monkeypatch, tmp_path):
@@ -80,10 +75,8 @@ def test_a_depth_without_an_answer_is_a_row_that_says_so(monkeypatch, tmp_path):
     for _ in range(2):  # solved, and read from the file
         found = cf.well.depth_sweep(*given, mud=MUD, model="rod", folder=tmp_path / "sweep")
         assert calls == [800, 1200, 1600] and len(found) == 3 and found.done.all()
-        assert np.isnan(found.hook_load[0, 0]).tolist() == [True, False, False] and sorted(found.notes) == [
-            (0, 0, 0),
-            (0, 0, 1),
-        ]
+        assert np.isnan(found.hook_load[0, 0]).tolist() == [True, False, False]
+        assert sorted(found.notes) == [(0, 0, 0), (0, 0, 1)]
         assert "trip out, bit at 800 m: the contact alternates" in str(found)
         assert f"the estimated error of the rod in contact is {found.values['error'][0, 0, 1]:.1e}" in found.noted(1)[0]
     found.write(tmp_path / "sweep.csv")
@@ -124,13 +117,24 @@ def test_a_sweep_by_the_rod_is_stopped_and_goes_on(monkeypatch, tmp_path):
     assert np.isnan(found.values["model_error"]).all() and (found.values["error"] <= 1e-4).all()
 
 
-def test_depths_that_do_not_fit_are_refused_first():
-    with pytest.raises(cf.SceneError, match="hole, which ends at 2500 m"):
-        cf.well.depth_sweep(HOLE, STRING, OPERATIONS, [1000, 2600], mud=MUD)
-    with pytest.raises(cf.SceneError, match="at least one measured depth"):
-        cf.well.depth_sweep(HOLE, STRING, OPERATIONS, [], mud=MUD)
-    with pytest.raises(cf.SceneError, match="above the surface at the depth 50 m"):
-        cf.well.depth_sweep(HOLE, STRING, OPERATIONS, [1000, 50], mud=MUD)
+@pytest.mark.parametrize(("depths", "words"), [
+    ([1000, 2600], "hole, which ends at 2500 m"), ([], "at least one measured depth"),
+    ([1000, 50], "above the surface at the depth 50 m"),
+    (["3000 psi"], r"depths\[0\] = '3000 psi': psi is a unit of pressure"),
+])  # fmt: skip
+def test_depths_that_do_not_fit_are_refused_first(depths, words):
+    with pytest.raises(cf.SceneError, match=words):
+        cf.well.depth_sweep(HOLE, STRING, OPERATIONS, depths, mud=MUD)
+
+
+def test_depths_as_text():
+    given = {"mud": MUD, "model": "soft"}
+    swept = cf.well.depth_sweep(HOLE, STRING, [cf.well.TripOut()], ["3000 ft", 1828.8], **given)
+    np.testing.assert_allclose(swept.depths, [914.4, 1828.8], rtol=1e-12)
+    alone = cf.well.depth_sweep(HOLE, STRING, cf.well.TripOut(), "3000 ft", **given)
+    assert alone.hook_load.shape == (1, 1, 1) and alone.hook_load[0, 0, 0] == swept.hook_load[0, 0, 0]
+    with pytest.raises(cf.SceneError, match="known of this diameter: 5 in 19.50 lb/ft, 5 in 25.60 lb/ft"):
+        cf.well.DrillPipe(size="5 in 20 lb/ft")
 
 
 def test_lock_up_in_a_sweep_is_told():
@@ -256,6 +260,10 @@ def test_charts(tmp_path):
     assert len(rows) == 6 and rows[0].startswith('depth (m),"trip out, friction 0.1: hook load (N)"')
     assert ": model" in rows[0] and "soft" in rows[1] and "model: soft" in str(found)
     assert float(rows[5].split(",")[1]) == pytest.approx(found.hook_load[0, 0, 4])
+    pytest.importorskip("pandas")
+    along = answer.to_dataframe()
+    assert (along["side force (N/m)"] == answer.side_force).all() and along["component"].iloc[-1] == "bit"
+    assert (found.to_dataframe()["trip in, friction 0.1: hook load (N)"] == found.hook_load[1, 0]).all()
 
 
 def test_torques_below_their_error_are_shown_as_none():
@@ -263,10 +271,8 @@ def test_torques_below_their_error_are_shown_as_none():
     enlarged by an axis, and the friction of a string that rotates off bottom is none."""
     pytest.importorskip("matplotlib")
     answer = cf.well.torque_and_drag(HOLE, STRING, cf.well.Sliding(1e5, torque=2e3), mud=MUD, model="soft")
-    solved = answer.solved._replace(
-        torque=answer.solved.torque
-        + 0.05 * np.sin(np.arange(answer.solved.torque.size)).reshape(answer.solved.torque.shape)
-    )
+    torque = answer.solved.torque
+    solved = answer.solved._replace(torque=torque + 0.05 * np.sin(np.arange(torque.size)).reshape(torque.shape))
     panel = replace(answer, solved=solved).plot(units="field").axes[2]
     panel.figure.canvas.draw()
     low, high = panel.get_xlim()
@@ -280,21 +286,11 @@ def test_torques_below_their_error_are_shown_as_none():
     assert off.drag > 10 and "(no drag)" in off.summary("field")
 
 
-def test_tables_of_pandas():
-    pytest.importorskip("pandas")
-    answer, found = cf.well.torque_and_drag(HOLE, STRING, cf.well.TripOut(), mud=MUD, model="soft"), sweep()
-    along = answer.to_dataframe()
-    assert (along["side force (N/m)"] == answer.side_force).all() and along["component"].iloc[-1] == "bit"
-    assert (found.to_dataframe()["trip in, friction 0.1: hook load (N)"] == found.hook_load[1, 0]).all()
-
-
 def test_the_chart_of_a_sweep_marks_lock_up_and_thrusts_beyond_all_others():
     pytest.importorskip("matplotlib")
     loads = np.array([[[-1e5, -2e5, -3e5, -7e7, np.nan]], [[2e5, 3e5, np.nan, np.nan, np.nan]]])
-    values = {name: np.full(loads.shape, np.nan) for name in module.KEPT} | {
-        "hook_load": loads,
-        "surface_torque": 0 * loads,
-    }
+    values = {name: np.full(loads.shape, np.nan) for name in module.KEPT}
+    values |= {"hook_load": loads, "surface_torque": 0 * loads}
     values["locked"][0, 0, 4] = 90.0
     values["model"][0, 0], values["model"][1, 0] = 0, 2  # soft, rod
     operations, depths = (cf.well.TripIn(), cf.well.RotateOffBottom()), np.arange(1e3, 6e3, 1e3)
@@ -361,13 +357,7 @@ def hole(**given):
 
 
 def swept(file, **given):
-    given = {
-        "hole": hole(),
-        "string": cf.well.DrillString([PIPE]),
-        "mud": cf.well.Mud(1200.0),
-        "model": "soft",
-        **given,
-    }
+    given = {"hole": hole(), "string": cf.well.DrillString([PIPE]), "mud": cf.well.Mud(1200.0), "model": "soft"} | given
     return cf.well.depth_sweep(operations=[cf.well.TripOut()], depths=TWO_DEPTHS, folder=file, progress=False, **given)
 
 
@@ -490,9 +480,8 @@ def test_snakes_that_a_helix_above_multiplies(length):
         angle = min(math.atan(k * end), math.atan(k * thrust) + mu * w * k * (length - place))
         place += (angle - math.atan(k * thrust)) / (mu * w * k)
         thrust = math.tan(angle) / k if angle < math.pi / 2 - 1e-12 else math.inf
-    hole = cf.well.Borehole(
-        cf.well.WellPath.from_survey([0, 6000], [90, 90], [0, 0]), [cf.well.HoleSection(6000, 2 * (0.064 + r), mu)]
-    )
+    level = cf.well.WellPath.from_survey([0, 6000], [90, 90], [0, 0])
+    hole = cf.well.Borehole(level, [cf.well.HoleSection(6000, 2 * (0.064 + r), mu)])
     string = cf.well.DrillString([cf.well.Component(None, cf.Stiffness((1e9, 1e9), 2.6e9, (EI, EI), 1.59e6), w, 0.064)])
     for model in ("soft", "buckled"):
         answer = cf.well.torque_and_drag(hole, string, cf.well.TripIn(), depth=length, model=model)
@@ -587,12 +576,7 @@ def test_the_snake_begins_at_its_load_and_has_its_amplitude():
     with solvers_of(scene, layout, degree=3) as (problem, _, stability):
         model = problem.model
         s = layout.node_s(model.nodes)[0] * rod.length
-        for share, amplitude, negative in (
-            (0.9999, 0.0, 0),
-            (1.0001, 0.0, 1),
-            (1.05, 0.27089361, 0),
-            (1.2, 0.5486839, 0),
-        ):
+        for share, amplitude, negative in ((0.9999, 0, 0), (1.0001, 0, 1), (1.05, 0.27089361, 0), (1.2, 0.5486839, 0)):
             problem.set_load_factor(share)
             theta, slope = amplitude * np.sin(K * s), amplitude * K * np.cos(K * s)
             side, down = np.sin(theta), np.cos(theta)
@@ -641,20 +625,3 @@ def test_a_string_in_a_plane_hole_leaves_the_plane_where_it_would_buckle(inclina
     found = cf.well.torque_and_drag(hole, string, operation, mud=cf.well.Mud(1200.0), depth=600.0, model="rod")
     assert found.solved.negative_modes == 0 and found.enough and any("begun as a helix" in line for line in found.why)
     assert np.abs(found.offset[:, 1]).max() > 0.01
-
-
-def test_depths_as_text():
-    hole = cf.well.Borehole(
-        cf.well.WellPath.from_survey([0, 2600], [0, 0], [0, 0]), cf.well.HoleSection(2600.0, 0.2159, 0.25)
-    )
-    string = cf.well.DrillString([cf.well.DrillPipe(size="5 in 19.50 lb/ft")])
-    swept = cf.well.depth_sweep(
-        hole, string, [cf.well.TripOut()], ["3000 ft", 1828.8], mud=cf.well.Mud(1200.0), model="soft"
-    )
-    np.testing.assert_allclose(swept.depths, [914.4, 1828.8], rtol=1e-12)
-    alone = cf.well.depth_sweep(hole, string, cf.well.TripOut(), "3000 ft", mud=cf.well.Mud(1200.0), model="soft")
-    assert alone.hook_load[0, 0, 0] == swept.hook_load[0, 0, 0]
-    with pytest.raises(cf.SceneError, match=r"depths\[0\] = '3000 psi': psi is a unit of pressure"):
-        cf.well.depth_sweep(hole, string, [cf.well.TripOut()], ["3000 psi"], model="soft")
-    with pytest.raises(cf.SceneError, match="known of this diameter: 5 in 19.50 lb/ft, 5 in 25.60 lb/ft"):
-        cf.well.DrillPipe(size="5 in 20 lb/ft")
