@@ -146,9 +146,8 @@ def test_values_that_are_refused(given, words):
 
 def test_text_with_units_is_accepted_in_python_as_in_files():
     assert cf.drilling.TopDrive("60 rpm", "2900 kg m^2").speed == pytest.approx(2 * math.pi)
-    assert (
-        cf.drilling.BitOnRock(cf.drilling.Stribeck("6 kN m", "4 kft-lbf", "30 rpm"), "20 klbf").weight == 20 * units.kip
-    )
+    law = cf.drilling.Stribeck("6 kN m", "4 kft-lbf", "30 rpm")
+    assert cf.drilling.BitOnRock(law, "20 klbf").weight == 20 * units.kip
     assert cf.drilling.Hook("5 MN/m", "10 m/h") == cf.drilling.Hook(5e6, 10 / 3600)
     assert cf.drilling.WallFriction(0.3, 0.2, "10 rpm", of_rotation=True).speed == 10 * units.rpm
     assert cf.drilling.WallFriction(0.3, 0.2, "10 ft/min").speed == pytest.approx(0.0508)
@@ -246,10 +245,7 @@ def test_what_has_no_form_as_data_is_named():
 
     for scene, words in (
         (cf.Scene([cone]), r"rods\[0\].section: a function written in Python"),
-        (
-            cf.Scene([rod], loads=[cf.Force(rod.end, lambda t: (t, 0, 0))]),
-            r"loads\[0\].force: a function",
-        ),
+        (cf.Scene([rod], loads=[cf.Force(rod.end, lambda t: (t, 0, 0))]), r"loads\[0\].force: a function"),
         (cf.Scene([rod], loads=[Own()]), r"loads\[0\]: a part of the class Own cannot"),
     ):
         with pytest.raises(NotData, match=words):

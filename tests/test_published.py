@@ -57,14 +57,8 @@ def test_a_run_that_is_broken_off_goes_on(tmp_path, monkeypatch, capsys):
     spec = importlib.util.spec_from_file_location("published_command", manual.HERE / "__main__.py")
     command = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(command)
-    row = {
-        "quantity": "length, m",
-        "published": 1.0,
-        "ours": 1.5,
-        "estimate": 0.0,
-        "allowed": 0.1,
-        "because": "no reason",
-    }
+    row = {"quantity": "length, m", "published": 1.0, "ours": 1.5, "estimate": 0.0, "allowed": 0.1,
+           "because": "no reason"}  # fmt: skip
     found, asked = {"seconds": 0.25, "rows": [row | {"difference": 0.5, "agrees": False}]}, []
 
     def broken(problem, picture):
