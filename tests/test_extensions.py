@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from conftest import column
 from extensions.gust import Gust
-from extensions.karnopp import Karnopp
+from extensions.held_in_band import HeldInBand
 from extensions.own_criteria import BendingEnergy, Sway
 from extensions.pull_rotating import PullRotating
 from extensions.sampled_speed import LimitedSpeed
@@ -451,12 +451,12 @@ def test_a_bit_law_as_a_function_starts_steadily_and_is_linearised():
 
 
 @pytest.mark.parametrize("model", [TORSION, BOTH])
-def test_karnopp(model):
+def test_held_in_band(model):
     """With a narrow band it is the law that drops at once; with a wide one the bit needs more to leave it."""
     options = {"model": model, "progress": False} | ({"elements": 60} if model == BOTH else {})
     histories = {
         law: cf.drilling.simulate(scene(law), 8.0, **options)
-        for law in (cf.drilling.Stribeck(6e3, 4e3), Karnopp(6e3, 4e3, 1e-5), Karnopp("6 kN m", "4 kN m", 0.5))
+        for law in (cf.drilling.Stribeck(6e3, 4e3), HeldInBand(6e3, 4e3, 1e-5), HeldInBand("6 kN m", "4 kN m", 0.5))
     }
     expected, narrow, wide = histories.values()
     np.testing.assert_allclose(narrow.bit_angle, expected.bit_angle, atol=0.1)
@@ -515,7 +515,7 @@ def test_a_control_called_once_a_sample(model, tmp_path):
 
 
 DRIVE = """
-use = ["extensions.karnopp", "extensions.sampled_speed", "extensions.stribeck_wall"]
+use = ["extensions.held_in_band", "extensions.sampled_speed", "extensions.stribeck_wall"]
 
 [well]
 stations = [[0, 0, 0], [200, 0, 0], [600, 40, 0], [1000, 40, 0]]
@@ -537,7 +537,7 @@ control = { type = "LimitedSpeed", Kp = 2e3, Ki = 1e3, most = "20 kN m" }
 
 [bit]
 weight = "50 kN"
-law = { type = "Karnopp", static = "3 kN m", dynamic = "2 kN m" }
+law = { type = "HeldInBand", static = "3 kN m", dynamic = "2 kN m" }
 
 [wall_friction]
 type = "StribeckCurve"
@@ -554,7 +554,7 @@ def test_all_three_in_a_scene_file_stored_and_resumed(tmp_path):
     """Another process, which has not imported them, goes on from the folder to the same digits."""
     (tmp_path / "rig.toml").write_text(DRIVE)
     found = cf.read(tmp_path / "rig.toml")
-    assert found.scene.bit.law == Karnopp(3e3, 2e3) and found.scene.friction == StribeckCurve(0.3, 0.2, 0.1)
+    assert found.scene.bit.law == HeldInBand(3e3, 2e3) and found.scene.friction == StribeckCurve(0.3, 0.2, 0.1)
     assert found.scene.drive.control == LimitedSpeed(2e3, 1e3, 2e4)
     found.run(folder=tmp_path / "run", duration=0.5, progress=False).plot(tmp_path / "run.png")
     code = f"import cosserat_fenicsx as cf; cf.resume({str(tmp_path / 'run')!r}, duration=1.0, progress=False)"
@@ -563,9 +563,9 @@ def test_all_three_in_a_scene_file_stored_and_resumed(tmp_path):
     resumed, whole = cf.resume(tmp_path / "run"), found.run(profile_every=0.5 / 400, progress=False)
     np.testing.assert_array_equal(resumed.rows, whole.rows)
     for name, wrong, words in (
-        ("Karnopp", "Karnop", "'Karnop': did you mean 'Karnopp'"),
-        ('"2 kN m"', '"2 kN"', "Karnopp.dynamic = '2 kN': .*N m"),
-        ('"3 kN m"', '"1 kN m"', "line 24, column 27: .*Karnopp.static = 1000.0: expected at least the dynamic"),
+        ("HeldInBand", "HeldInBan", "'HeldInBan': did you mean 'HeldInBand'"),
+        ('"2 kN m"', '"2 kN"', "HeldInBand.dynamic = '2 kN': .*N m"),
+        ('"3 kN m"', '"1 kN m"', "line 24, column 30: .*HeldInBand.static = 1000.0: expected at least the dynamic"),
     ):
         (tmp_path / "wrong.toml").write_text(DRIVE.replace(name, wrong))
         with pytest.raises(cf.SceneError, match=words):

@@ -1,5 +1,6 @@
 """The public names of this package and their modules, see the stub of `cosserat_fenicsx`."""
 
+from cosserat_fenicsx.drilling.bit_curves import Karnopp as Karnopp
 from cosserat_fenicsx.drilling.bit_curves import RateLaw as RateLaw
 from cosserat_fenicsx.drilling.bit_curves import Rational as Rational
 from cosserat_fenicsx.drilling.bit_curves import TableLaw as TableLaw
@@ -28,6 +29,8 @@ from cosserat_fenicsx.drilling.linear.response import FrequencyResponse as Frequ
 from cosserat_fenicsx.drilling.linear.response import frequency_response as frequency_response
 from cosserat_fenicsx.drilling.linear.stability import Stability as Stability
 from cosserat_fenicsx.drilling.linear.stability import stability as stability
+from cosserat_fenicsx.drilling.linear_control import LinearControl as LinearControl
+from cosserat_fenicsx.drilling.linear_control import ZTorque as ZTorque
 from cosserat_fenicsx.drilling.mixed import BitTorque as BitTorque
 from cosserat_fenicsx.drilling.mixed import MixedScene as MixedScene
 from cosserat_fenicsx.drilling.mixed import mixed_scene as mixed_scene
@@ -47,6 +50,7 @@ from cosserat_fenicsx.drilling.top_drive import Matched as Matched
 from cosserat_fenicsx.drilling.top_drive import Motor as Motor
 from cosserat_fenicsx.drilling.top_drive import Sample as Sample
 from cosserat_fenicsx.drilling.top_drive import SampledControl as SampledControl
+from cosserat_fenicsx.drilling.top_drive import StateSpace as StateSpace
 from cosserat_fenicsx.drilling.top_drive import Stiff as Stiff
 from cosserat_fenicsx.drilling.top_drive import TopDrive as TopDrive
 from cosserat_fenicsx.drilling.top_drive import TorqueOverTime as TorqueOverTime

@@ -32,12 +32,13 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 
 from cosserat_fenicsx.checks import refuse, warn
-from cosserat_fenicsx.drilling.laws import Resistance, by_method, checked, tabulated
-from cosserat_fenicsx.drilling.signals import doubt_decay
+from cosserat_fenicsx.drilling.laws import Resistance, by_method, checked, hashable, surface_of, tabulated
+from cosserat_fenicsx.drilling.signals import ScalarSignal, doubt_decay
 from cosserat_fenicsx.parts import (
     AngularVelocity,
     ForceSize,
     Inertia,
+    InTime,
     Length,
     Mass,
     Number,
@@ -50,6 +51,10 @@ from cosserat_fenicsx.parts import (
     positive,
 )
 
+# Time (s) up to which a smooth weight on bit is looked at for its largest one.
+_LONG = 600.0
+# Weights on bit up to this many static ones are tabulated.
+_TABULATED = 4.0
 # Static penetration (m) above which the rock stiffness is probably given in other units.
 _DEEP = 0.1
 # Shortest rotation (rad) that adds a point to the surface of the rock.
@@ -87,12 +92,17 @@ class BitLaw(Part, family="bit law"):
         """
         return by_method(self, "torque", weight if self.needs_weight else math.nan)
 
-    def in_c(self):
-        """The torque as a function of speed and weight on bit, which C calls where `resistance` has a function; None
-        for a smooth one of the speed alone, which is tabulated."""
-        if not self.needs_weight and tabulated(self.resistance(None)) is not None:
-            return None
-        return lambda speed, weight: checked(self, "torque", weight if self.needs_weight else math.nan)(speed)
+    def in_c(self, weight: float | None):
+        """(function, surface) for C where `resistance` has a function, under a static weight on bit (N): the torque as
+        a function of speed and weight, which C calls, and its `Surface`, which C takes in its place; (None, None) for
+        a smooth torque of the speed alone, which is tabulated."""
+        surface = None
+        if not self.needs_weight:
+            if tabulated(self.resistance(None)) is not None:
+                return None, None
+        elif weight and hashable(self):
+            surface = surface_of(self, "torque", _TABULATED * weight)
+        return lambda speed, weight: checked(self, "torque", weight if self.needs_weight else math.nan)(speed), surface
 
     def end(self, weight: float, place: np.ndarray, motion: np.ndarray) -> "EndCondition | None":
         """The memory of the law in a motion by elements, None where it has none.
@@ -268,8 +278,8 @@ class Lobes(BitLaw):
     def resistance(self, weight):
         return self.law and self.law.resistance(weight)
 
-    def in_c(self):
-        return self.law and self.law.in_c()
+    def in_c(self, weight):
+        return self.law.in_c(weight) if self.law else (None, None)
 
     def end(self, weight, place, motion):
         return LobedEnd(self, place[1], motion[1])
@@ -281,7 +291,9 @@ class BitOnRock(Part):
 
     Args:
         law: `Stribeck(...)`, `Cutting(...)`, `Lobes(...)`, or another `BitLaw`.
-        weight: static weight on bit, N. None where the law needs none, or where the speed of drilling decides it.
+        weight: static weight on bit, N. None where the law needs none, or where the speed of drilling decides it. It
+            may be a function of time, such as a `Ramp` or a `Table`, in motions of torsion alone and for a law that
+            follows it; along the axis the motion of the block decides.
         inertia: of the bit beyond the string's sections, kg m^2.
         mass: the same for axial motion, kg.
         rock_stiffness: of the rock below a bit with a weight, N/m: weight on bit per depth by which the bit presses
@@ -291,11 +303,11 @@ class BitOnRock(Part):
 
     Raises:
         SceneError: an unknown law, a weight that is missing, or a negative number; a stiffness of rock beside
-            `Cutting`, or without a weight.
+            `Cutting`, or without a weight; a weight over time for a law that does not follow it.
     """
 
     law: BitLaw
-    weight: Annotated[ForceSize, positive()] | None = None
+    weight: InTime[Annotated[ForceSize, positive()]] | None = None
     inertia: Inertia = 0.0
     mass: Mass = 0.0
     rock_stiffness: Stiffness = math.inf
@@ -306,7 +318,13 @@ class BitOnRock(Part):
             refuse(self, "rock_stiffness", self.rock_stiffness, f"infinity: {name} has a depth of cut in its place")
         if self.weight is None and self.rock_stiffness < math.inf:
             refuse(self, "weight", None, "the weight on bit (N), where the rock has a stiffness")
-        if self.weight is not None:
+        if self.varies:
+            if not self.law.needs_weight or self.law.lifts or self.rock_stiffness < math.inf:
+                refuse(self, "weight", self.weight, "a number (N): over time it acts where the torque alone follows "
+                       "it, as that of Stribeck(..., radius=) and TableLaw(..., weights=)")  # fmt: skip
+            if not self.signal()(0.0) >= 0:
+                refuse(self, "weight", self.signal()(0.0), "a weight on bit that is not negative (N), at t = 0")
+        elif self.weight is not None:
             pressed = self.weight / self.rock_stiffness
             if pressed > _DEEP:
                 warn(
@@ -315,6 +333,30 @@ class BitOnRock(Part):
                 )
         elif self.law.needs_weight or (self.law.lifts and not self.law.drills):
             refuse(self, "weight", None, "the weight on bit (N), which the law needs")
+
+    @property
+    def varies(self) -> bool:
+        """Whether the weight on bit is a function of time."""
+        return callable(self.weight)
+
+    def signal(self) -> ScalarSignal:
+        """The weight on bit at every time, N."""
+        return ScalarSignal(self, "weight", self.weight or 0.0, "N")
+
+    @property
+    def resting(self) -> float | None:
+        """The static weight on bit at the start, N, or None."""
+        return self.signal()(0.0) if self.varies else self.weight
+
+    @property
+    def most(self) -> float | None:
+        """The largest static weight on bit up to the last time at which it is not smooth, N, or None."""
+        if not self.varies:
+            return self.weight
+        signal = self.signal()
+        return max(
+            signal(t) for t in (*signal.jumps, *np.linspace(0.0, max(signal.jumps, default=_LONG), 201).tolist())
+        )
 
 
 class EndForce(NamedTuple):

@@ -135,7 +135,9 @@ def title_of(history):
     words.append("off bottom" if bit is None else f"{type(bit.law).__name__} bit")
     if bit is not None and bit.weight:
         unit, size = unit_of(WEIGHT)
-        words.append(f"{bit.weight / size:.4g} {unit} on bit")
+        words.append(
+            f"up to {bit.most / size:.4g} {unit} on bit" if bit.varies else f"{bit.weight / size:.4g} {unit} on bit"
+        )
     return f"{history.model}: {', '.join(words)}"
 
 

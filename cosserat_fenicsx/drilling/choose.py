@@ -62,6 +62,8 @@ def _left_out(scene, name):
     """Sentences on the approximations of a string on the axis of the hole."""
     bent = scene.string.bent
     found = [f"APPROXIMATE: the bend of {bent} is left out: the string lies on the axis"] if bent else []
+    if scene.bit is not None and scene.bit.varies and scene.hole is not None:
+        found.append("APPROXIMATE: friction at the wall is that under the weight on bit at the start")
     return found + _pushed(scene) + (_buckled(scene, name) if scene.hole is not None else [])
 
 
@@ -103,7 +105,7 @@ def _buckled(scene, name):
 def _operations(scene):
     """Steady operations, of which the one that compresses the string most is not known in advance."""
     bit, weight = scene.bit, static_weight(scene)
-    law = None if bit is None else bit.law.resistance(bit.weight)
+    law = None if bit is None else bit.law.resistance(bit.most)
     torque = law.kinetic if law else 0.0
     if weight > 0:
         doubt_on_bit("BitOnRock.weight", weight, "weight")

@@ -47,6 +47,18 @@ static inline friction law_on_wall(const model *m, int i)
     return f;
 }
 
+/* What a linear control of the drive gives in a step of the length h, with the mean speed asked for. The factor on the
+   speed follows from h alone. */
+static void command_drive(model *m, double h, double asked)
+{
+    upper *top = m->top + m->dofs - 1;
+    if (!m->control.used || top->rigid) return;
+    const command f = commanded(&m->control, h, top->inertia);
+    const double more = 2 / h * (top->inertia - f.inertia); /* the node's mass has all of the inertia */
+    top->proportional = f.gain - more;
+    top->given = f.given + more * (asked - m->v[m->dofs - 1]);
+}
+
 /* The matrix for steps of the length h, and the inverse compliances of the nodes, 1/(A^-1)_ii, the best factors of
    proximal steps. 0 where the matrix is not positive. */
 int build(model *m, double h)
@@ -64,6 +76,7 @@ int build(model *m, double h)
                 m->o[j] = 2 / h * m->mass_off[j] + m->drag_off[j] - h / 2 * m->spring[j];
             }
         }
+    command_drive(m, h, 0);
     for (int d = 0; d < n; d++) {
         const upper *top = m->top + d;
         if (!top->rigid) m->a[d] += top->proportional + h / 2 * top->integral;

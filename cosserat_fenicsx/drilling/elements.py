@@ -16,6 +16,7 @@ from scipy.optimize import brentq
 from cosserat_fenicsx.checks import number, positive, refuse
 from cosserat_fenicsx.drilling.chain import chain_of, unresolved, usual_step
 from cosserat_fenicsx.drilling.laws import InC, check_bit
+from cosserat_fenicsx.drilling.linear_control import step_for
 from cosserat_fenicsx.drilling.protocol import StringModel
 from cosserat_fenicsx.drilling.signals import ScalarSignal, intervals
 from cosserat_fenicsx.drilling.steady_start import (
@@ -80,6 +81,9 @@ class AxialTorsional(StringModel):
         controls = [scene.drive.control, scene.hook and self._axial and scene.hook.autodriller]
         periods = [divided(x, self.dt, dt is not None) for x in controls if x]
         period = min((x for x in periods if x), default=None)
+        if dt is None and not scene.drive.control.sampled:
+            Z = None if scene.discs else scene.segments[0].torsional_impedance
+            self.dt = step_for(scene.drive.control.gains(Z), self.dt)
         if period:
             self.dt = period / max(2, math.ceil(period / self.dt * (1 - 1e-9)))
             dt = dt and self.dt
@@ -151,12 +155,17 @@ class AxialTorsional(StringModel):
             m.mass, m.hanging = mass[0] if self._m.at_end else bit.mass, m.weight
         m.rock, m.share = self._axial and bit.weight is not None and not bit.law.drills, 1.0
         m.stiffness = bit.rock_stiffness if m.rock and np.isfinite(bit.rock_stiffness) else 0.0
-        law = bit.law.resistance(bit.weight)
+        if bit.varies and self._axial:
+            refuse(bit, "weight", bit.weight, "a number (N) with axial motion, in which block and string decide it: "
+                   "Hook(speed=...), or an Autodriller whose weight is a function of time")  # fmt: skip
+        law, m.over_time = bit.law.resistance(bit.most), bit.varies
+        if bit.varies:
+            m.weight = bit.most
         if law is not None:
             closed = law.function is None
             m.law, m.weighs = 1, bit.law.needs_weight
             per_weight = bit.law.resistance(1.0) if closed else law
-            self._laws.append(InC(self._ffi, per_weight, None if closed else bit.law.in_c()))
+            self._laws.append(InC(self._ffi, per_weight, *(() if closed else bit.law.in_c(bit.most))))
             self._laws[1].put(*(self._ffi.addressof(m, name) for name in ("given", "curve")))
 
     def _set_hook(self, hook):
@@ -173,7 +182,10 @@ class AxialTorsional(StringModel):
             top.rigid = drive.control.of_speed
         else:
             gains = drive.control.gains(segments and segments[0].torsional_impedance)
-            top.rigid, top.given, top.proportional, top.integral = gains
+            top.rigid, top.given, top.proportional, top.integral, self._space = gains
+            if self._space is not None:
+                top.rigid = self._space.of_speed and drive.control.late > 0
+                self._set_linear(self._m.control, drive, self._space)
         return drive.signal()
 
     # -- the start -----------------------------------------------------------------------------------------------------
@@ -228,7 +240,7 @@ class AxialTorsional(StringModel):
         def found(down):
             motion[0] = down
             bit = self.scene.bit
-            bears = np.zeros(2) if bit is None else bit.law.steady_forces(bit.weight or 0.0, motion)
+            bears = np.zeros(2) if bit is None else bit.law.steady_forces(bit.resting or 0.0, motion)
             extra = (bears - [m.bit.hanging, 0.0])[unknowns]
             return bears, *steady_state(motion[unknowns], self._chain, limits, (self._wall, m.of_rotation), extra)
 
@@ -245,6 +257,8 @@ class AxialTorsional(StringModel):
             top.force = force
             if not top.rigid and top.integral:
                 top.error = force / top.integral
+        if m.control.used:
+            self._settle_linear(m.control, self.scene.drive, self._space, above[-1])
 
     # -- the protocol of string models ---------------------------------------------------------------------------------
 
@@ -264,12 +278,13 @@ class AxialTorsional(StringModel):
         parts, start = intervals(self._signals, (self.steps, self.steps + steps), self.dt), self.steps
         if self._axial and "hook" not in self._samplers:
             parts[:, [1, 3]] *= -1  # the hook's speed is positive upwards
+        weights = self._weights(self.steps, steps)
         for part in [parts] if self.end is None else parts[:, None]:
             if self.end is not None:
                 self._take(self.end.begin(self, part[0, 0]))
             cast, out = self._ffi.cast, rows[self.steps - start :]
             done = self._lib.advance_elements(
-                self._m, len(part), cast("double *", part.ctypes.data), cast("double *", out.ctypes.data)
+                self._m, len(part), cast("double *", part.ctypes.data), weights, cast("double *", out.ctypes.data)
             )
             self.steps += int(part[:done, -1].sum())
             if done < len(part):

@@ -30,6 +30,8 @@ _STEP, _STAYS, _HALVINGS = 1e-5, 0.5, 45
 _ROUGH = 0.02
 # Value at the least slip, over the largest one, of a law that is smooth through zero; error of a table, likewise.
 _SMOOTH, _CLOSE = 1e-3, 1e-8
+# Intervals of loads, at first and at most.
+_FEWEST, _MOST = 8, 64
 
 
 @dataclass(frozen=True)
@@ -101,11 +103,16 @@ def by_method(owner, name, *more) -> Resistance:
     Raises:
         SceneError: its value is 0 at rest and not beyond; see `checked`.
     """
+    return (_sampled if hashable(owner) else _sampled.__wrapped__)(owner, name, *more)
+
+
+def hashable(owner) -> bool:
+    """Whether what is found for an object can be kept for equal ones: not where a field is an array, for example."""
     try:
         hash(owner)
-    except TypeError:  # a field that is an array, for example
-        return _sampled.__wrapped__(owner, name, *more)
-    return _sampled(owner, name, *more)
+    except TypeError:
+        return False
+    return True
 
 
 @functools.lru_cache(64)
@@ -156,11 +163,10 @@ def _steepest_fall(function, values):
     return 0.0, drops
 
 
-def _cubics(values):
-    """Cubics over ln s through values at `SLIPS`, of the fourth order where these are smooth, and monotone where these
-    are."""
-    x, secants = np.log(SLIPS), np.diff(values) / np.diff(np.log(SLIPS))
-    slopes, h = np.empty_like(values), x[1] - x[0]
+def _slopes(values, h):
+    """Slopes at points of a distance h, along the first axis of values: of the fourth order where these are smooth, and
+    such that cubics are monotone where the values are."""
+    secants, slopes = np.diff(values, axis=0) / h, np.empty_like(values)
     slopes[2:-2] = (8 * (values[3:-1] - values[1:-3]) - (values[4:] - values[:-4])) / (12 * h)
     ends = np.array([[-25, 48, -36, 16, -3], [-3, -10, 18, -6, 1]]) / (12 * h)
     slopes[:2], slopes[-1:-3:-1] = ends @ values[:5], -ends @ values[-1:-6:-1]
@@ -169,7 +175,65 @@ def _cubics(values):
     # beside a smooth maximum a secant may vanish, but slopes of second and fourth order agree
     rough = np.abs(slopes[1:-1] - (before + after) / 2) > _ROUGH * np.abs(after - before)
     slopes[1:-1] = np.where(rough, np.clip(slopes[1:-1], -most, most), slopes[1:-1])
-    return CubicHermiteSpline(x, values, slopes)
+    return slopes
+
+
+def _cubics(values):
+    """Cubics over ln s through values at `SLIPS`."""
+    x = np.log(SLIPS)
+    return CubicHermiteSpline(x, values, _slopes(values, x[1] - x[0]))
+
+
+@dataclass(frozen=True)
+class Surface:
+    """R over slip and load: cubics over the slip at some loads, and cubics between the loads.
+
+    Attributes:
+        loads: (m,) ascending, N, or (1,) where R does not depend on them. values, rise: splines over ln s, or over s
+            where not `logarithmic`, of R (m,) and of its slope by the load at these loads; constant beyond.
+        still: (2, m) the same at rest.
+    """
+
+    loads: np.ndarray
+    values: CubicHermiteSpline
+    rise: CubicHermiteSpline
+    still: np.ndarray
+    logarithmic: bool = False
+
+    def __call__(self, slip: float, load: float) -> float:
+        x = np.clip(math.log(slip) if self.logarithmic else slip, *self.values.x[[0, -1]])
+        if len(self.loads) == 1:
+            return float(self.values(x)[0])
+        return max(0.0, float(CubicHermiteSpline(self.loads, self.values(x), self.rise(x))(load)))
+
+
+@functools.lru_cache(16)
+def surface_of(owner, name: str, most: float) -> Surface | None:
+    """A method (slip, load) of a user's object as a `Surface` for loads up to `most` (N), None where none is within
+    1e-8 of its range: it drops, or has a kink."""
+    loads, x = np.linspace(0.0, most, _FEWEST + 1), np.log(SLIPS)
+    for load in loads[:: _FEWEST // 2]:
+        if tabulated(by_method(owner, name, float(load))) is None:
+            return None
+
+    def at(load):
+        function = checked(owner, name, float(load))
+        return np.array([function(0.0), *map(function, SLIPS)])
+
+    rows = np.array([at(load) for load in loads]).T
+    while len(loads) <= _MOST + 1:
+        rise = _slopes(rows.T, loads[1]).T
+        values, rises = (CubicHermiteSpline(x, y[1:], _slopes(y[1:], x[1] - x[0])) for y in (rows, rise))
+        middles = (loads[:-1] + loads[1:]) / 2
+        between = np.array([at(load) for load in middles]).T
+        found = CubicHermiteSpline(loads, rows, rise, axis=1)(middles)
+        if np.abs(found - between).max() <= _CLOSE * rows.max():
+            return Surface(loads, values, rises, np.array([rows[0], rise[0]]), True)
+        loads = np.sort(np.append(loads, middles))
+        both = np.empty((len(rows), len(loads)))
+        both[:, ::2], both[:, 1::2] = rows, between
+        rows = both
+    return None
 
 
 def tabulated(resistance: Resistance) -> CubicHermiteSpline | None:
@@ -187,19 +251,26 @@ class InC:
 
     Args:
         ffi: of the module in C. resistance: the `Resistance`. function: of slip (a number) and load (N), which C calls
-            for every value; None to sample the resistance's own function, if it has one.
+            for every value, or beyond the loads of the surface; None to sample the resistance's own function, if it has
+            one. surface: a `Surface`, or None.
 
     Attributes:
         failure: the exception that ended the last call of the function, if any.
     """
 
-    def __init__(self, ffi, resistance: Resistance, function=None):
+    def __init__(self, ffi, resistance: Resistance, function=None, surface=None):
         self.failure, self.function, self._ffi, self._resistance = None, function, ffi, resistance
         if function is not None:
             _answers(ffi)
             self._handle = ffi.new_handle(weakref.ref(self))
-        elif resistance.function is not None:
-            self._cubics = np.ascontiguousarray(_cubics(resistance(SLIPS)).c.T)
+        elif surface is None and resistance.function is not None:
+            values = _cubics(resistance(SLIPS)[:, None])
+            surface = Surface(np.zeros(1), values, values, np.zeros((2, 1)), True)
+        self._surface = surface
+        if surface is not None:
+            splines = [np.ascontiguousarray(x.c.transpose(2, 1, 0)) for x in (surface.values, surface.rise)]
+            self._arrays = {"cubics": splines[0], "rise": splines[1], "loads": np.array(surface.loads),
+                            "still": np.array(surface.still), "knots": np.array(surface.values.x)}  # fmt: skip
 
     def fill(self, curve):
         """Fill C's record of a `curve`; a law in closed form needs none, and leaves it empty."""
@@ -209,10 +280,16 @@ class InC:
         curve.fall, curve.drop = law.fall, math.inf if law.drops else law.fall
         if self.function is not None:
             curve.self = self._handle
-        else:
-            curve.count, curve.first = len(self._cubics), math.log(SLIPS[0])
-            curve.width = math.log(SLIPS[-1] / SLIPS[0]) / len(self._cubics)
-            curve.cubics = self._ffi.cast("double *", self._cubics.ctypes.data)
+        if self._surface is not None:
+            knots = self._surface.values.x
+            curve.count, curve.rows, curve.logarithmic = (
+                len(knots) - 1,
+                len(self._surface.loads),
+                self._surface.logarithmic,
+            )
+            curve.first, curve.width = knots[0], (knots[-1] - knots[0]) / curve.count
+            for name, array in self._arrays.items():
+                setattr(curve, name, self._ffi.cast("double *", array.ctypes.data))
 
     def put(self, friction, curve):
         """Fill C's record of a `friction`, and that of its curve; both are pointers."""
@@ -274,7 +351,7 @@ def check_bit(scene) -> None:
     Raises:
         SceneError: see `refuse_several_speeds`.
     """
-    law = None if scene.bit is None else scene.bit.law.resistance(scene.bit.weight)
+    law = None if scene.bit is None else scene.bit.law.resistance(scene.bit.most)
     if law is not None and scene.discs is None:  # the last one of Discs has inertia
         impedance = scene.segments[-1].torsional_impedance
         refuse_several_speeds(-law.steepest, impedance, scene.bit.inertia, " at slow rotation")

@@ -178,6 +178,8 @@ def _bit(drilling, rod):
     if bit is None:
         return []
     _check_law("mixed_scene", "drilling.bit.law", bit.law)
+    if bit.varies:
+        refuse("mixed_scene", "drilling.bit.weight", bit.weight, "a number (N): it does not change in motions of a rod")
     return [BitTorque(rod.end, bit.law, bit.weight or 0.0, bit.inertia)]
 
 

@@ -85,7 +85,7 @@ class PipeAbove(PointAction):
         found = [x for part in self.segments for x in (part.length, part.GJ, part.rhoJ, part.EA, part.rhoA)]
         found += [
             drag.torsion, drag.axial, hook.stiffness, self.drive.inertia,
-            *map(float, self.drive.control.gains(self.segments[0].torsional_impedance)),
+            *map(float, _gains(self.drive, self.segments[0].torsional_impedance)),
         ]  # fmt: skip
         for signal in (self.drive.signal(), hook.signal()):
             found += [signal(t) for t in (0.0, 1.0, 10.0)]
@@ -196,8 +196,15 @@ def _hook_end(hook):
     return TopEnd(lambda start, end: -mean(start, end), stiff=rigid, Ki=0.0 if rigid else hook.stiffness)
 
 
+def _gains(drive, impedance):
+    *gains, linear = drive.control.gains(impedance)
+    if linear is not None:
+        refuse("TopDrive", "control", drive.control, "Stiff(), PI(Kp, Ki), Matched() or Motor(torque) above a rod")
+    return gains
+
+
 def _drive_end(drive, impedance):
-    rigid, given, Kp, Ki = drive.control.gains(impedance)
+    rigid, given, Kp, Ki = _gains(drive, impedance)
     return TopEnd(drive.signal().mean, stiff=rigid, inertia=drive.inertia, Kp=Kp, Ki=Ki, given=given)
 
 

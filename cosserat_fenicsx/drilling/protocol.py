@@ -10,7 +10,10 @@ from typing import Any
 import numpy as np
 
 from cosserat_fenicsx.algebra.building import Pointers
+from cosserat_fenicsx.checks import refuse
 from cosserat_fenicsx.drilling.laws import SOURCES
+from cosserat_fenicsx.drilling.linear_control import arrays_of, check_step, steady_control
+from cosserat_fenicsx.drilling.signals import means
 from cosserat_fenicsx.drilling.top_drive import Sample, Sampler
 from cosserat_fenicsx.errors import NotConverged
 
@@ -71,6 +74,34 @@ class StringModel(Pointers):
             self._samplers["drive"] = Sampler(control, name, self.dt, drive.signal(), first)
             self._given()
 
+    def _set_linear(self, record, drive, space):
+        """Fill C's record of a linear control, a `StateSpace`, for steps of `dt`, at rest."""
+        A, B, C, D = arrays_of(space)
+        n, late = len(A), round(drive.control.late / self.dt)
+        record.used, record.size, record.late = 1, n, late
+        record.of_speed, record.level, record.step = space.of_speed, space.level or 0.0, self.dt
+        for name, values in (("A", A), ("B", B), ("C", C), ("D", D), ("state", np.zeros(n)), ("mean", np.zeros(n)),
+                             ("waiting", np.zeros(late + 1)), ("work", np.zeros((n, 2 * n)))):  # fmt: skip
+            self._array(record, name, values)
+        if not (late or space.of_speed):
+            x = np.linalg.solve(np.eye(n) - self.dt / 2 * A, B[:, 1])
+            check_step(drive.control, float(D[1] + self.dt / 2 * C @ x), self.dt)
+
+    def _settle_linear(self, record, drive, space, torque):
+        """The state of a linear control in steady rotation under a torque (N m)."""
+        record.level, self._kept["state"][:], self._kept["waiting"][:] = steady_control(drive.control, space, torque)
+
+    def _weights(self, first, steps):
+        """For C: the mean weight on bit of steps (N), where it is a function of time."""
+        bit = self.scene.bit
+        if bit is None or not bit.varies:
+            return self._ffi.NULL
+        found = means(bit.signal(), first, steps, self.dt)
+        if (low := found.min()) < 0:
+            t = (first + int(found.argmin())) * self.dt
+            refuse(bit, "weight", low, f"a weight on bit that is not negative (N), at t = {t:g} s")
+        return self._ffi.from_buffer("double[]", found)
+
     def _given(self):
         """Give C the torque that a sampled control of the drive commands."""
         sampler = self._samplers.get("drive")
@@ -122,15 +153,20 @@ class StringModel(Pointers):
         """(len(PROFILE), m) along the string, now."""
         raise NotImplementedError
 
+    @property
+    def _remembered(self):
+        """Names of the arrays that change in a step."""
+        return (*self._changing, *(("state", "waiting") if "state" in self._kept else ()))
+
     def memory(self) -> dict[str, Any]:
         """All that later steps depend on, arrays and numbers, such that `recall` leads to the same digits."""
-        found = {name: self._kept[name].copy() for name in self._changing}
+        found = {name: self._kept[name].copy() for name in self._remembered}
         found |= {f"sampled_{name}": sampler.memory() for name, sampler in self._samplers.items()}
         return found
 
     def recall(self, memory: dict[str, Any]) -> None:
         """Restore the result of `memory`."""
-        for name in self._changing:
+        for name in self._remembered:
             self._kept[name][:] = memory[name]
         for name, sampler in self._samplers.items():
             sampler.recall(memory[f"sampled_{name}"])

@@ -132,7 +132,9 @@ class Drilling(InWords, Part):
             asked = _over_time(drive.signal(), "rad/s", "angular velocity", units, duration)
         inertia = f", inertia {units.told(drive.inertia, 'kg m^2')}" if drive.inertia else ""
         yield f"Drive: {asked}, {drive.control.in_words(units)}{inertia}."
-        yield "Bit: none, the lower end is free." if bit is None else f"Bit: {', '.join(_at_bit(bit, units))}."
+        yield (
+            "Bit: none, the lower end is free." if bit is None else f"Bit: {', '.join(_at_bit(bit, units, duration))}."
+        )
         if hook is not None:
             stiff = units.told(hook.stiffness, "N/m", "stiffness") if math.isfinite(hook.stiffness) else "rigid"
             upwards = _over_time(hook.signal(), "m/s", "speed", units, duration)
@@ -179,10 +181,13 @@ def _over_time(signal, unit, dimension, units, duration):
     return f"{told(min(values))} to {told(max(values))}, which depends on time"
 
 
-def _at_bit(bit, units):
+def _at_bit(bit, units, duration):
     yield bit.law.in_words(units)
     if bit.weight:
-        yield f"{units.told(bit.weight, 'N')} on bit"
+        if bit.varies:
+            yield f"on bit {_over_time(bit.signal(), 'N', 'force', units, duration)}"
+        else:
+            yield f"{units.told(bit.weight, 'N')} on bit"
     if bit.inertia:
         yield f"inertia {units.told(bit.inertia, 'kg m^2')}"
     if bit.weight and isinstance(bit.law, Stribeck) and bit.law.radius is None:

@@ -81,6 +81,13 @@ class ScalarSignal:
         return total / (end - start)
 
 
+def means(signal, first: int, steps: int, dt: float) -> np.ndarray:
+    """(steps,) means of a signal over steps of dt (s), from one of a number on."""
+    if signal.constant:
+        return np.full(steps, signal(0.0))
+    return np.array([signal.mean(n * dt, (n + 1) * dt) for n in range(first, first + steps)])
+
+
 def intervals(signals, steps, dt):
     """Rows (length, signals at the begin, signals at the end, 1 where a step ends) of steps, cut at jumps.
 

@@ -19,9 +19,9 @@ def check_steady(scene) -> None:
     drive = scene.drive
     gains = None if drive.speed is None or drive.control.sampled else drive.control.gains(1.0)
     sampled = drive.speed is not None and drive.control.sampled
-    if not sampled and (gains is None or not (gains.rigid or gains.Ki > 0)):
-        refuse("Drilling", "start", "steady", "'rest' with this drive: only Stiff(), and PI(Kp, Ki) with Ki above 0, "
-               "have the speed asked for in steady rotation")  # fmt: skip
+    if not sampled and (gains is None or not (gains.rigid or gains.Ki > 0 or gains.linear)):
+        refuse("Drilling", "start", "steady", "'rest' with this drive: only Stiff(), PI(Kp, Ki) with Ki above 0, and "
+               "linear controls have the speed asked for in steady rotation")  # fmt: skip
     speed = drive.signal()(0.0)
     if not speed > 0:
         refuse("Drilling", "start", "steady", "'rest' where the drive does not turn at the start, or a speed above 0")

@@ -186,6 +186,12 @@ static void commit(model *m, double h, const double *signal)
             sums->hook += h * (top->force - m->hanging_top) * signal[d];
         top->force -= top->inertia * 2 * (w - m->v[d]) / h;
     }
+    if (m->control.used) {
+        linear *c = &m->control;
+        prepare(c, h);
+        const double late = m->top[turn].rigid ? imposed(c, c->spent + h / 2) : 0;
+        observe(c, signal[turn] - late - m->w[turn], m->top[turn].force);
+    }
     for (int i = 0; i <= last; i++) {
         const double *F = m->force + (size_t)i * n, *w = m->w + (size_t)i * n;
         const double *limit = m->limit + 3 * (size_t)i;
@@ -238,7 +244,7 @@ static void rub_by_weight(lower *bit)
         double slope;
         f.load = bit->weighs ? load : bit->hanging;
         f.scale = bit->weighs ? load > 0 : stands;
-        if (f.other->self) f.still = f.scale > 0 ? resistance_of_other(&f, 0, &slope) : 0;
+        if (bit->weighs) f.still = f.scale > 0 ? rests(&f) : 0;
         else f.still *= f.scale;
         f.slipping = f.scale > 0 ? resistance_of_other(&f, 1e-6, &slope) : 0;
     } else {
@@ -255,6 +261,7 @@ static int step(model *m, double h, const double *from, const double *to)
     const size_t size = (size_t)m->nodes * m->dofs * sizeof(double);
     for (int d = 0; d < m->dofs; d++) signal[d] = (from[d] + to[d]) / 2;
     if (!build(m, h)) return 0;
+    command_drive(m, h, signal[m->dofs - 1]);
     if (!m->fixed) limits(m);
     rub_by_weight(&m->bit);
     /* a step that fails leaves the guess as it was */
@@ -292,8 +299,9 @@ static void write_record(const model *m, double *row)
         strain += m->top[0].integral * error * error / 2 - m->hanging_top * error;
     }
     const double drive = m->top[turn].force, hook = n == 2 ? m->hanging_top - m->top[0].force : NAN;
+    const double weight_on_bit = n == 2 ? m->bit.recorded[0] : m->bit.over_time ? m->bit.weight : NAN;
     const double series[] = {w[turn], x[turn], drive, w[last * n + turn], x[last * n + turn], m->bit.recorded[1], hook,
-                             n == 2 ? w[2 * last] : NAN, n == 2 ? x[2 * last] : NAN, n == 2 ? m->bit.recorded[0] : NAN,
+                             n == 2 ? w[2 * last] : NAN, n == 2 ? x[2 * last] : NAN, weight_on_bit,
                              n == 2 ? m->bit.impulse : NAN, kinetic, strain, m->sums.drive, m->sums.hook, weight,
                              m->sums.bit, m->sums.wall, m->sums.mud};
     memcpy(row, series, sizeof series);
@@ -301,16 +309,25 @@ static void write_record(const model *m, double *row)
 
 /* Do intervals, rows (h, velocities asked for at the begin, at the end, whether a record is written). Returns how many
    were done; of one that fails nothing, or its first parts, have been done, which nobody may use. */
-int advance_elements(model *m, int intervals, const double *interval, double *rows)
+int advance_elements(model *m, int intervals, const double *interval, const double *weights, double *rows)
 {
     const int n = m->dofs;
     for (int i = 0; i < intervals; i++, interval += 2 + 2 * n) {
-        const double h = interval[0], *from = interval + 1, *to = from + n;
-        for (int d = 0; d < n; d++)
-            if (m->top[d].rigid && m->v[d] != from[d]) {
+        const double h = interval[0];
+        if (weights) m->bit.weight = *weights;
+        double from[2], to[2];
+        for (int d = 0; d < n; d++) {
+            const linear *c = &m->control;
+            const int rigid = m->top[d].rigid, own = d == n - 1 && imposes(c);
+            double speed = from[d] = interval[1 + d];
+            to[d] = interval[1 + n + d];
+            if (own) speed += imposed(c, c->spent);
+            if (own && rigid) from[d] = speed, to[d] += imposed(c, c->spent + h);
+            if ((own || rigid) && m->v[d] != speed) {
                 double *work = d == n - 1 ? &m->sums.drive : &m->sums.hook;
-                *work += set_velocity(m, 0, d, from[d]);
+                *work += set_velocity(m, 0, d, speed);
             }
+        }
         const double face = m->bit.face, sinks = m->bit.floor - face;
         double done = 0, size = 1;
         while (done < 1) {
@@ -332,6 +349,8 @@ int advance_elements(model *m, int intervals, const double *interval, double *ro
             }
         }
         if (interval[1 + 2 * n] != 0) {
+            if (m->control.used) wait_on(&m->control);
+            if (weights) weights++;
             write_record(m, rows + 1); /* after the time */
             rows += 20;
         }

@@ -4,12 +4,16 @@
 #ifndef COSSERAT_STRINGS_H
 #define COSSERAT_STRINGS_H
 
-/* A law of friction that is a function in Python, see laws.py: sampled over the logarithm of the slip, or called. */
+/* A law of friction that is a function in Python, see laws.py: tabulated over slip and load, or called. */
 typedef struct {
-    void *self;                     /* of `call_law`; or NULL: it is sampled */
-    int count;                      /* cubics over ln s from `first` on, each `width` wide */
+    void *self;                     /* of `call_law`; or NULL: it is tabulated for all loads */
+    int count, logarithmic;         /* cubics over s or ln s from `first` on; of ln s each is `width` wide */
     double first, width;
-    const double *cubics;           /* (count, 4) coefficients of the powers 3 to 0 */
+    const double *knots;            /* (count + 1,) where they begin and end */
+    int rows;                       /* loads; 0: it is called, 1: it does not depend on them */
+    const double *loads;            /* (rows,) N */
+    const double *cubics, *rise;    /* (rows, count, 4) coefficients of the powers 3 to 0; of the slope by the load */
+    const double *still;            /* (2, rows) at rest, and its slope by the load */
     double fall, drop;              /* its steepest fall where it is continuous; infinite, if it drops somewhere */
 } curve;
 
@@ -26,6 +30,20 @@ typedef struct {
 extern "Python" double call_law(void *self, double slip, double load, double *slope);
 #endif
 
+/* A linear control of the drive: x' = A x + B u, y = C x + D u, u = (Om - om, M - level), by the midpoint rule; y is its
+   torque, or its speed less the one asked for. See linear_control.py. */
+typedef struct {
+    int size, late;                  /* of x; steps by which y acts late */
+    int used, of_speed;              /* whether there is one; whether y is a speed */
+    double level, step;              /* N m; length of a whole step, s */
+    const double *A, *B, *C, *D;     /* (size, size), (size, 2), (size,), (2,) */
+    double *state, *mean;            /* (size,) x at the end of the last step, its mean in this one */
+    double *waiting;                 /* (late + 1,) means of y over past steps, that which acts now after the first */
+    double *work;                    /* (size, 2 size): its right half is the inverse of 1 - h/2 A */
+    double h, answer[2];             /* length of a part of a step, and y of the mean u of that part */
+    double sum, spent;               /* of y over time, and time, in the parts of the present step */
+} linear;
+
 /* Cells lie between nodes 0 (drive) to cells (bit). See torsion.py for the method and for what a row holds. */
 typedef struct {
     int cells, filters;
@@ -37,10 +55,11 @@ typedef struct {
     const double *turn;                      /* (filters,) coefficients of their all-pass filters */
     double *down_kept, *up_kept;             /* (filters,) what the filters hold */
     const double *drag;                      /* (nodes,) N m s/rad */
-    const double *hold, *slide, *decay;      /* (nodes,) static and kinetic torque, N m, and decay, rad/s; 0: at once */
+    double *hold, *slide;                    /* (nodes,) static and kinetic torque, N m */
+    const double *decay;                     /* (nodes,) rad/s; 0: it drops at once */
     const double *grip, *reach;              /* (nodes,) scale of the wall's curve and of its slip, if it has one */
     curve wall, rock;                        /* laws of wall and bit that are functions in Python; empty: none */
-    double load;                             /* weight on bit, N */
+    double load, per_weight[2];              /* weight on bit, N; static and kinetic torque per weight, if it changes */
     double *speed, *angle, *torque;          /* (nodes,) mean of the last step; at its end; of friction, its mean */
     double *moment;                          /* (nodes,) torque handed down to a node, its mean */
     double *last_speed, *last_moment;        /* (nodes,) of the step before */
@@ -51,6 +70,7 @@ typedef struct {
     double last_on_bit;                      /* torque on bit of the step before */
     double work, at_bit, at_wall, in_mud;    /* since the start, J */
     long long iterations;
+    linear control;
 } waves;
 
 /* The condition of one unknown at the uppermost node, with a velocity asked for, the signal. */
@@ -64,6 +84,7 @@ typedef struct {
 
 /* The lower end. Its force against the motion of the last node is force + tangent w + the law. */
 typedef struct {
+    int over_time;                  /* whether its weight is given for every step */
     int law, weighs, rock;          /* whether there is a law of friction, whether its torques are per weight on bit,
                                        whether the bit stands on a rock */
     double stiffness;               /* of that rock, N/m; 0: it is rigid */
@@ -115,10 +136,11 @@ typedef struct {
     int *mask, *broken;             /* (nodes,) */
     long halved, iterations, most;  /* counts: steps that were halved, iterations, most of them in a step */
     long long inner;                /* iterations for the slips that belong to forces */
+    linear control;
 } model;
 
-int advance_waves(waves *w, int steps, const double *speeds, double *rows);
-int advance_elements(model *m, int intervals, const double *interval, double *rows);
+int advance_waves(waves *w, int steps, const double *speeds, const double *weights, double *rows);
+int advance_elements(model *m, int intervals, const double *interval, const double *weights, double *rows);
 void limits(model *m);
 int build(model *m, double h);
 double steepest(model *m, double h);

@@ -4,6 +4,7 @@ A drive with the speed om and the inertia I hands the torque M down to the strin
 
     Stiff      om = Om
     PI         I om' = Kp (Om - om) + Ki int (Om - om) dt - M
+    ZTorque    om = Om - H (M - M0)/Z, H a filter and a delay; it and `LinearControl` are those of linear_control.py
     Matched    M = M0 + Z (Om - om): it absorbs the waves of a string of the impedance Z
     Motor      I om' = M0 - c om - M: a given torque
 
@@ -40,24 +41,37 @@ RULES = {"SoftTorque": 1.0, "SoftSpeed": 4.0}
 _GAINS = "a gain: SoftTorque(pipe), SoftSpeed(string) choose them, or give Kp and Ki"
 
 
+class StateSpace(NamedTuple):
+    """x' = A x + B u, y = C x + D u with u = (Om - om, M - level): y is the torque of the drive (N m), or, of a control
+    `of_speed`, its speed less Om (rad/s). A level (N m) of None is the torque of a steady start, 0 from rest."""
+
+    A: tuple
+    B: tuple
+    C: tuple
+    D: tuple
+    of_speed: bool = False
+    level: float | None = 0.0
+
+
 class Gains(NamedTuple):
     """A control as models take it: the drive turns at the speed Om asked for where it is rigid, or feels the torque
-    given + Kp (Om - om) + Ki int (Om - om) dt, N m."""
+    given + Kp (Om - om) + Ki int (Om - om) dt, N m; or a `StateSpace` in the place of all that."""
 
     rigid: bool = False
     given: float = 0.0
     Kp: float = 0.0
     Ki: float = 0.0
+    linear: StateSpace | None = None
 
 
-class DriveControl(Part, family="control of a drive"):
+class DriveControl(Part, family="control of a drive", homes=("cosserat_fenicsx.drilling.linear_control",)):
     """Base of the controls of a top drive.
 
     Attributes:
         sampled: whether it is a `SampledControl`, called once a sample; the gains of others say all.
     """
 
-    # s by which it acts late in the linear theory.
+    # s by which it acts late: in motions those of a `StateSpace`, in the linear theory all.
     late = 0.0
     sampled = False
     # In words, a control that needs a drive with an inertia.
@@ -248,17 +262,19 @@ class Sampler:
 
 
 def divided(control, dt: float, given: bool) -> float | None:
-    """The sample (s) that steps of a motion divide, None for controls of continuous time.
+    """The sample (s) that steps of a motion divide, or the delay of a control of continuous time, if any.
 
     Raises:
         SceneError: a step dt (s) that is `given` is longer than half of it, or the control has no such sample.
     """
-    if not control.sampled:
+    name = "sample" if control.sampled else "delay"
+    if control.sampled:
+        period = positive_number(control, "sample", control.sample, "s")
+        number(control, "delay", control.delay, "a delay from 0 on (s)", lambda x: 0 <= x < math.inf)
+    elif not (period := control.late):
         return None
-    period = positive_number(control, "sample", control.sample, "s")
-    number(control, "delay", control.delay, "a delay from 0 on (s)", lambda x: 0 <= x < math.inf)
     if given and period < 2 * dt * (1 - 1e-9):
-        refuse(control, "sample", period, f"at least two steps: {2 * dt:g} s for dt = {dt:g} s, or a shorter dt")
+        refuse(control, name, period, f"at least two steps: {2 * dt:g} s for dt = {dt:g} s, or a shorter dt")
     return period
 
 
@@ -364,7 +380,7 @@ class TopDrive(Part):
             `Motor`. Numbers above 32, at the start or at a jump, look like revolutions a minute: they are taken, with a
             warning.
         inertia: of the drive, at the string's speed, kg m^2.
-        control: `Stiff()`, `PI(Kp, Ki)`, `Matched()`, `Motor(torque)`, or another `DriveControl`.
+        control: `Stiff()`, `PI(Kp, Ki)`, `Matched()`, `ZTorque()`, `Motor(torque)`, or another `DriveControl`.
 
     Raises:
         SceneError: a control that is unknown or lacks an inertia or a speed that it needs, or a number out of range.
@@ -383,7 +399,10 @@ class TopDrive(Part):
     @property
     def imposes_speed(self) -> bool:
         """Whether the string's upper end has the speed asked for, whatever the torque."""
-        return not self.control.sampled and self.control.gains(1.0).rigid
+        if self.control.sampled:
+            return False
+        rigid, *_, linear = self.control.gains(1.0)
+        return rigid or (linear is not None and linear.of_speed and (self.control.late > 0 or not linear.D[1]))
 
     def signal(self) -> ScalarSignal:
         """The speed asked for at every time, rad/s."""

@@ -28,8 +28,10 @@ import numpy as np
 
 from cosserat_fenicsx.checks import instance, positive, refuse
 from cosserat_fenicsx.drilling.laws import InC, check_bit
+from cosserat_fenicsx.drilling.linear_control import step_for
 from cosserat_fenicsx.drilling.protocol import PROFILE, StringModel
 from cosserat_fenicsx.drilling.scene import Drilling
+from cosserat_fenicsx.drilling.signals import means
 from cosserat_fenicsx.drilling.steady_start import check_steady, steady_velocities
 from cosserat_fenicsx.drilling.top_drive import Sample, divided
 from cosserat_fenicsx.drilling.wall_friction import law_of, wall_of
@@ -184,7 +186,7 @@ class TorsionWaves(StringModel):
         super().__init__()
         _check(scene)
         self.scene, self.normal_force = scene, normal_force
-        self._law = None if scene.bit is None else scene.bit.law.resistance(scene.bit.weight)
+        self._law = None if scene.bit is None else scene.bit.law.resistance(scene.bit.most)
         self._wall = law_of(scene.friction)[0]
         drag = 0.0 if scene.drag is None else scene.drag.torsion
         time = math.fsum(x.length / x.torsional_speed for x in scene.segments)
@@ -196,6 +198,9 @@ class TorsionWaves(StringModel):
         asked = dt = dt or time / min(max(scene.bit_depth / _SET.length, _SET.fewest), _SET.cells)
         period = divided(scene.drive.control, dt, given)
         dt = min(dt, period / 2) if period else dt
+        if not scene.drive.control.sampled:
+            self._gains = scene.drive.control.gains(scene.segments[0].torsional_impedance)
+            dt = dt if given else step_for(self._gains, dt)
         if time / dt > _SET.most:
             refuse(
                 "TorsionWaves", "dt", dt, f"at least {1 / _SET.most:g} of the travel time of the string, {time:.4g} s"
@@ -291,21 +296,26 @@ class TorsionWaves(StringModel):
         if drive.control.sampled:
             c.stiff = drive.control.of_speed
         else:
-            c.stiff, c.given, c.Kp, c.Ki = drive.control.gains(scene.segments[0].torsional_impedance)
+            c.stiff, c.given, c.Kp, c.Ki, linear = self._gains
+            if linear is not None:
+                c.stiff = linear.of_speed and drive.control.late > 0
+                self._set_linear(c.control, drive, linear)
         c.bit_inertia = 0.0 if bit is None else bit.inertia
         self._laws = [InC(self._ffi, self._wall)]
         self._laws[0].fill(c.wall)
         if self._law is not None and self._law.function is not None:
-            self._laws.append(InC(self._ffi, self._law, bit.law.in_c()))
+            self._laws.append(InC(self._ffi, self._law, *bit.law.in_c(bit.most)))
             self._laws[1].fill(c.rock)
-            c.load = bit.weight or 0.0
+            c.load = bit.resting or 0.0
+        elif self._law is not None and bit.varies:
+            c.per_weight = [self._law.still / bit.most, self._law.slipping / bit.most]
 
     def _set_steady(self, speed):
         """A steady start at the drive's speed (rad/s), twisted by friction and drag."""
         cells, now, c = self.cells, self._kept, self.c
         law = np.where(self._hold > 0, self._grip * self._wall(speed * self._reach), 0.0)
         if self._law is not None:
-            law[-1] = self._law(speed)
+            law[-1] = self.scene.bit.law.resistance(self.scene.bit.resting)(speed)
         above = np.cumsum((law + self._drag * speed)[::-1])[::-1]  # handed down to the nodes
         torque, Z = above[1:], cells.impedance
         now["down"][:], now["up"][:] = torque + Z * speed, torque - Z * speed
@@ -318,6 +328,8 @@ class TorsionWaves(StringModel):
         c.drive_speed = c.bit_speed = speed
         c.last_on_bit = law[-1]
         c.integral = above[0] / c.Ki if c.Ki else 0.0
+        if c.control.used:
+            self._settle_linear(c.control, self.scene.drive, self._gains.linear, float(above[0]))
         self._sample_torque(self.scene.drive, c, speed if c.stiff else above[0])
 
     @property
@@ -332,12 +344,11 @@ class TorsionWaves(StringModel):
     def _record(self, steps, rows):
         dt, buffer = self.dt, self._ffi.from_buffer
         signal = self._samplers["drive"] if self.scene.drive.control.sampled and self.c.stiff else self._signal
-        if signal.constant:
-            speeds = np.full(steps, signal(0.0))
-        else:
-            speeds = np.array([signal.mean(n * dt, (n + 1) * dt) for n in range(self.steps, self.steps + steps)])
+        speeds = means(signal, self.steps, steps, dt)
         rows = buffer("double[]", rows, require_writable=True)
-        self.steps += self._lib.advance_waves(self.c, steps, buffer("double[]", speeds), rows)
+        self.steps += self._lib.advance_waves(
+            self.c, steps, buffer("double[]", speeds), self._weights(self.steps, steps), rows
+        )
 
     def profile(self) -> np.ndarray:
         # speeds and torques are means over the last two steps; a bit that sticks counts, too

@@ -121,7 +121,7 @@ _RULE = gauss(4)
 
 def static_weight(scene) -> float:
     """The static weight on bit of a `Drilling`, N; 0 without one."""
-    return 0.0 if scene.bit is None else scene.bit.weight or 0.0
+    return 0.0 if scene.bit is None else scene.bit.resting or 0.0
 
 
 class _Drills(RotaryDrilling):

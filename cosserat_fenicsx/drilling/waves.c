@@ -65,20 +65,24 @@ static void drive(waves *w, double asked)
 {
     double Q = w->up[0], Z = w->below[0], S = Z + w->drag[0], dt = w->dt, om, torque;
     double I = w->drive_inertia, before = w->drive_speed;
+    linear *control = &w->control;
+    const command f = control->used
+        ? commanded(control, dt, I)
+        : (command){w->given + w->Ki * w->integral, w->Kp + w->Ki * dt / 2, I};
     if (w->stiff) {
         const friction law = law_at(w, 0);
-        om = asked;
+        w->drive_speed = om = asked + (control->used ? f.given : 0);
         if (om == 0) w->torque[0] = fmax(-law.still, fmin(law.still, -Q));
         else w->torque[0] = law.still > 0 ? copysign(resistance(&law, fabs(om)), om) : 0.0;
-        torque = Q + S * om + w->torque[0];
-        w->work += dt * torque * om + I * (om * om - before * before) / 2;
-        w->drive_speed = om;
     } else {
-        double gain = w->Kp + w->Ki * dt / 2, F = w->given + gain * asked + w->Ki * w->integral;
-        om = turned(w, 0, F - Q, S + gain, I, &w->drive_speed);
-        torque = Q + S * om + w->torque[0];
-        w->work += dt * (F - gain * om) * om;
+        om = turned(w, 0, f.given + f.gain * asked - Q, S + f.gain, f.inertia, &w->drive_speed);
         w->integral += dt * (asked - om);
+    }
+    torque = Q + S * om + w->torque[0];
+    w->work += dt * torque * om + I * (w->drive_speed * w->drive_speed - before * before) / 2;
+    if (control->used) {
+        observe(control, asked - om, torque);
+        wait_on(control);
     }
     book(w, 0, om, torque);
 }
@@ -148,12 +152,24 @@ static void pass(double turn, double root, double *wave, double *kept)
     *kept = root * x - turn * s;
 }
 
-/* Do so many steps; each writes a row, its first number left to the time. Returns how many were done: fewer where a number is not finite. */
-int advance_waves(waves *w, int steps, const double *speeds, double *rows)
+/* The law of the bit under another weight. */
+static void press(waves *w, double load)
+{
+    const int n = w->cells;
+    w->load = load;
+    const friction law = law_at(w, n);
+    w->hold[n] = law.other ? load > 0 ? rests(&law) : 0 : w->per_weight[0] * load;
+    w->slide[n] = law.other ? w->hold[n] : w->per_weight[1] * load;
+}
+
+/* Do so many steps, of given mean speeds and, where these change, weights on bit; each writes a row, its first number
+   left to the time. Returns how many were done: fewer where a number is not finite. */
+int advance_waves(waves *w, int steps, const double *speeds, const double *weights, double *rows)
 {
     const int n = w->cells;
     for (int k = 0; k < steps; k++) {
         double P = w->down[0], kinetic, strain;
+        if (weights) press(w, weights[k]);
         drive(w, speeds[k]);
         w->down[0] = w->up[0] + 2 * w->below[0] * w->speed[0];
         end(w, between(w, P));
@@ -165,11 +181,13 @@ int advance_waves(waves *w, int steps, const double *speeds, double *rows)
         }
         energies(w, &kinetic, &strain);
         const double series[] = {
-            w->stiff || w->drive_inertia > 0 ? w->drive_speed : (w->last_speed[0] + w->speed[0]) / 2, w->angle[0],
+            w->stiff || (w->drive_inertia > 0 && !w->control.of_speed) ? w->drive_speed
+                                                                       : (w->last_speed[0] + w->speed[0]) / 2,
+            w->angle[0],
             (w->last_moment[0] + w->moment[0]) / 2,
             w->bit_inertia > 0 ? w->bit_speed : (w->last_speed[n] + w->speed[n]) / 2, w->angle[n],
-            w->bit ? (w->last_on_bit + w->torque[n]) / 2 : 0, NAN, NAN, NAN, NAN, NAN, kinetic, strain, w->work, 0, 0,
-            w->at_bit, w->at_wall, w->in_mud};
+            w->bit ? (w->last_on_bit + w->torque[n]) / 2 : 0, NAN, NAN, NAN, weights ? weights[k] : NAN, NAN, kinetic,
+            strain, w->work, 0, 0, w->at_bit, w->at_wall, w->in_mud};
         memcpy(rows + 20 * (size_t)k + 1, series, sizeof series);
         if (!isfinite(kinetic + strain)) return k;
     }

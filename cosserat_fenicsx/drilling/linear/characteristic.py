@@ -217,6 +217,10 @@ class Steady:
     """
 
     def __init__(self, scene, kind="torsion"):
+        if scene.bit is not None and scene.bit.varies:
+            refuse(
+                scene.bit, "weight", scene.bit.weight, "a number (N) for the linear theory: scene.with_case(weight=...)"
+            )
         self.scene, self.kind = scene, kind
         self.law = scene.bit.law if scene.bit else None
         self.cuts = self.law is not None and self.law.drills
@@ -333,7 +337,7 @@ def speeds_and_weights(owner, scene, speeds, weights):
     speeds = numbers(owner, "speeds", speeds, "angular velocity", at_least(0) if scene.bit is None else positive())
     doubt_speed(owner, "speeds", float(speeds.max()))
     if weights is None:
-        own = scene.bit.weight if scene.bit else None
+        own = scene.bit.resting if scene.bit else None
         return speeds, np.array([np.nan if own is None else own])
     if scene.bit is None:
         refuse(scene, "bit", None, "a BitOnRock, whose weight is to change")

@@ -19,6 +19,7 @@ from operator import itemgetter
 import numpy as np
 
 from cosserat_fenicsx.checks import refuse
+from cosserat_fenicsx.drilling.linear_control import polynomials_of
 from cosserat_fenicsx.drilling.steady_start import follows_the_bit
 from cosserat_fenicsx.drilling.top_drive import Hook
 
@@ -174,7 +175,8 @@ class Guide:
 
     Attributes:
         kind: "torsion" or "axial". parts: `Uniform` parts or `Disc`s from the top down. inertia: of the bit, kg m^2 or
-        kg. top: function of s that gives (w, P) there and their derivatives. top_inertia: kg m^2, of the drive.
+        kg. top: function of s that gives (w, P) there and their derivatives. top_inertia: kg m^2, of the drive. fed:
+        the largest growth (1/s) that the drive feeds, see `_fed`.
     """
 
     kind: str
@@ -182,6 +184,7 @@ class Guide:
     inertia: float
     top: object
     top_inertia: float = 0.0
+    fed: float = 0.0
 
     @property
     def travel(self):
@@ -228,8 +231,8 @@ class Guide:
 
     @property
     def drive(self):
-        """The largest rate at which friction that falls with the slip feeds motions, 1/s; 0 where none does."""
-        return max(0.0, *(-part.drag for part in self.parts if part.length), 0.0)
+        """The largest rate at which drive or friction that falls with the slip feeds motions, 1/s; 0 for none."""
+        return max(self.fed, *(-part.drag for part in self.parts if part.length), 0.0)
 
     def least(self, x):
         """A lower bound of Re Z at the bit for all s of the real part x (1/s) above `drive`, without its inertia.
@@ -244,6 +247,7 @@ class Guide:
             if not part.length or not np.isclose(part.impedance, lowest.impedance, rtol=1e-9):
                 break
             travel, drag = travel + part.travel, max(drag, part.drag)
+        travel -= self.fed > 0 and self.parts[0].travel / 2  # spent on what the drive feeds
         fed, lost = x - self.drive, x + drag / 2
         theta = np.sqrt(fed / lost) * np.tanh(2 * travel * np.sqrt(fed * lost))
         return float(lowest.impedance * theta / (1 + np.sqrt(max(1 - theta**2, 0.0))))
@@ -258,21 +262,57 @@ def _free(s):
 
 
 def _drive_top(drive, impedance):
-    """The condition of the drive: (om, M) at the top and their derivatives, free of poles; a control that is called
-    once a sample acts late by half a sample and its delay, exp(-s late)."""
-    control, inertia = drive.control, drive.inertia
-    (rigid, _, Kp, Ki), late = control.gains(impedance), control.late
-    if rigid:
+    """The condition of the drive: (om, M) at the top and their derivatives, free of poles. It acts late by
+    exp(-s late), where it is called once a sample by half of that and its delay."""
+    gains, inertia, late = drive.control.gains(impedance), drive.inertia, drive.control.late
+    if gains.rigid:
         return _held
+    rest, *answers = map(np.poly1d, polynomials_of(gains))
 
     def top(s):
-        hold = np.exp(-late * s)
-        gain, slope = (Kp * s + Ki) * hold, (Kp - late * (Kp * s + Ki)) * hold
-        if Ki:
-            return s, -(inertia * s**2 + gain), 1.0, -(2 * inertia * s + slope)
-        return 1.0, -(inertia * s + Kp * hold), 0.0, -(inertia - late * Kp * hold)
+        hold, q, dq = np.exp(-late * s), rest(s), rest.deriv()(s)
+        e, M = (p(s) * hold for p in answers)
+        de, dM = ((p.deriv()(s) - late * p(s)) * hold for p in answers)
+        if gains.linear and gains.linear.of_speed:
+            return M, q + e, dM, dq + de
+        return q - M, -(inertia * s * q + e), dq - dM, -(inertia * (q + s * dq) + de)
 
     return top
+
+
+# Samples of a line, their range over the rate of the first part, ratio of lines.
+_SAMPLES, _RANGE, _RATIO = 600, (1e-4, 1e5), 1.3
+
+
+def _fed(drive, first, top):
+    """The growth (1/s) above which string and drive only take energy, seen from the middle of the first part; 0 for
+    controls that do so everywhere.
+
+    A drive reflects the wave Q that comes up as P = R Q. In the middle of the part waves have lost exp(x T) on their
+    way up and down, for the growth x: there R decides where it is above that. Lines of one x are sampled, from the
+    right, beside the frequencies of the control's own roots, and x is not below the growth of these.
+    """
+    gains = drive.control.gains(first.impedance if first.length else None)
+    if gains.rigid or (gains.linear is None and not drive.control.late):
+        return 0.0
+    q, e, M = map(np.poly1d, polynomials_of(gains))
+    Z, rate = float(first.impedance), 1 / first.travel if first.travel else 1.0
+    own = np.concatenate([q.roots, (Z * (q - M) + np.poly1d([drive.inertia, 0]) * q + e).roots, [0.0]])
+    if gains.linear and gains.linear.of_speed:
+        own = np.concatenate([q.roots, (q + e - Z * M).roots, [0.0]])
+    heights = np.concatenate([[0.0], np.abs(own.imag), np.geomspace(*_RANGE, _SAMPLES) * rate])
+    least, x = max(0.0, own.real.max()) * (1 + 1e-6) + _RANGE[0] * rate, max(_RANGE[1] * rate, 2 * abs(own).max())
+    while x > least:
+        s = x + 1j * heights
+        w, P, *_ = top(s)
+        if first.length:
+            fits = np.exp(-x * first.travel) * np.abs(P + Z * w) <= np.abs(P - Z * w)
+        else:
+            fits = (-np.conj(w) * P).real + x * first.inertia / 2 * np.abs(w) ** 2 >= 0
+        if not fits.all():
+            break
+        x /= _RATIO
+    return max(x, least / _RATIO) * _RATIO
 
 
 def torsional(scene, walls=None) -> Guide:
@@ -284,9 +324,10 @@ def torsional(scene, walls=None) -> Guide:
             Disc(J, c, k, d, f"disc {i + 1}")
             for i, (J, c, (k, d)) in enumerate(zip(string.inertias, string.drags, lower, strict=True))
         )
-        return Guide("torsion", parts, bit, _drive_top(drive, None), drive.inertia)
-    parts = _uniform(scene, "torsion", walls)
-    return Guide("torsion", parts, bit, _drive_top(drive, parts[0].impedance), drive.inertia)
+    else:
+        parts = _uniform(scene, "torsion", walls)
+    top = _drive_top(drive, None if string else parts[0].impedance)
+    return Guide("torsion", parts, bit, top, drive.inertia, _fed(drive, parts[0], top))
 
 
 def axial(scene, walls=None) -> Guide:

@@ -1,4 +1,4 @@
-"""A bit law: the static torque within a band of speeds, the dynamic one beyond (Karnopp)."""
+"""A bit law: the static torque within a band of speeds, the dynamic one beyond."""
 
 from dataclasses import dataclass
 
@@ -8,7 +8,7 @@ from cosserat_fenicsx.parts import AngularVelocity, Torque
 
 
 @dataclass(frozen=True)
-class Karnopp(BitLaw):
+class HeldInBand(BitLaw):
     """A torque that drops when the bit leaves a band of slow speeds.
 
     Args:
