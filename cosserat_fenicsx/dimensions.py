@@ -71,7 +71,7 @@ DIMENSIONS = {
     "rotation": Dimension("1/min", _same(1.0, "rpm", "RPM", "1/min"), "rpm", 1e6),
     "angular velocity": Dimension("rad/s", {"rad/s": 1.0, **_same(units.rpm, "rpm", "RPM", "1/min")}, "rpm", 1e5),
     "pressure": Dimension(
-        "Pa", {**_same(1.0, "Pa", "N/m^2"), "kPa": units.kPa, "MPa": units.MPa, "GPa": units.GPa, "psi": units.psi,
+        "Pa", {**_same(1.0, "Pa", "N/m^2"), "kPa": units.kPa, "MPa": units.MPa, "GPa": units.GPa, "bar": units.bar, "psi": units.psi,
                "ksi": units.ksi, **_same(units.kPa, "kN/m^2", "kN/m2"), **_same(1e4 * units.kPa, "kN/cm^2", "kN/cm2"),
                **_same(units.MPa, "N/mm^2", "N/mm2", "N/mm²", "MN/m^2", "MN/m2"), "N/cm^2": 1e4,
                **_same(units.GPa, "kN/mm^2", "kN/mm2", "kN/mm²"), **_same(1.0, "N/m2", "N/m²")}, "psi", 1e15),
@@ -102,6 +102,10 @@ DIMENSIONS = {
                   "lbf ft^2": units.lbf * units.foot**2}, "lbf in^2"),
     "energy": Dimension("J", {"J": 1.0, "kJ": 1e3, "MJ": 1e6, "ft-lbf": units.ft_lbf}, "ft-lbf"),
     "power": Dimension("W", {"W": 1.0, "kW": 1e3, "MW": 1e6, "hp": 550 * units.ft_lbf}, "hp"),
+    "volume": Dimension("m^3", {"m^3": 1.0, "l": units.litre, "gal": units.gallon}, "gal"),
+    "flow": Dimension(
+        "m^3/s", {"m^3/s": 1.0, "l/s": units.litre, "l/min": units.litre / units.minute,
+                  **_same(units.gallon / units.minute, "gpm", "gal/min")}, "gpm", 10.0),
     "curvature": Dimension("1/m", {"1/m": 1.0, "1/ft": 1 / units.foot}, "1/ft"),
 }  # fmt: skip
 #: {SI unit: dimension}, the first one with that unit.

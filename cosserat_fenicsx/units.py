@@ -31,6 +31,9 @@ lbf_per_ft = lbf / foot
 # density, kg/m^3; ppg: pounds per US gallon
 g_per_cm3 = 1e3  # water has one
 ppg = pound / (231 * inch**3)
+# volume, m^3
+litre = 1e-3
+gallon = 231 * inch**3
 # angle, rad; angular velocity, rad/s
 deg = math.pi / 180
 rpm = 2 * math.pi / 60
