@@ -199,7 +199,8 @@ class Table(FunctionOfTime):
         rows = self.values
         if not _as_text(rows):
             rows = _numbers_of(self, "values", rows, "finite numbers, one row a time")
-        if np.ndim(rows) not in (1, 2) or len(rows) != len(times):
+        ragged = _as_text(rows) and len({len(x) if isinstance(x, list | tuple) else 0 for x in rows}) > 1
+        if ragged or np.ndim(rows) not in (1, 2) or len(rows) != len(times):
             refuse(self, "values", self.values, f"one vector for each of the {len(times)} times")
 
     @property
@@ -238,7 +239,7 @@ def _numbers_of(owner, field, given, expected):
     """An array of finite numbers, also of those that a data frame of mixed columns or a list of fractions holds."""
     try:
         given_as_floats = np.asarray(given, dtype=float)
-    except (TypeError, ValueError):
+    except (OverflowError, TypeError, ValueError):
         refuse(owner, field, given, expected)
     return finite_array(owner, field, given_as_floats, expected)
 
