@@ -6,6 +6,7 @@ python demos/strings.py stick_slip         some
 python demos/strings.py --quick            without pictures
 """
 
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -110,7 +111,28 @@ def autodriller(found, history, folder):
     yield Check("in the end (kN)", weight[-1] / 1e3, 100.0, 0.6, "the weight asked for")
 
 
-STRINGS = (stick_slip, tuned_drive, off_bottom, stopped_block, four_discs, autodriller)
+def mud_motor(found, history, folder):
+    """Speed and pressure of the motor while it runs; what it is while it stalls."""
+    scene, motor = found.scene, found.scene.motor
+    below = scene.drag.torsion * sum(part.rhoJ * part.length for part in scene.turned)
+    runs, torque = history.times < 19.0, history.torque_on_bit + below * history.bit_speed
+    known = [motor.speed(torque[runs].mean()), motor.pressure(torque[runs].mean()) / 1e5]
+    given = [history.motor_speed[runs].mean(), history.pressure[runs].mean() / 1e5]
+    yield Check("speed (rad/s) and pressure (bar) of the motor", given, known, 1e-3, "its law")
+    yield Check("stalls (share of the last 20 s)", history.stalled[history.times > 40.0].mean(), 1.0, 0.0, "its law")
+    if folder is not None:
+        steady = replace(motor, flow="2400 l/min")
+        curve = cf.well.power_curve(steady, ["1200 l/min", "1800 l/min", "2400 l/min"])
+        draw_both(curve.plot, folder / "power_curve.png", MPI.COMM_WORLD)
+
+
+def oscillation_tool(found, history, folder):
+    """The mean pull at the hook with the tool at work."""
+    pull = history.mean("hook_load", periods=160, frequency=16.0)
+    yield Check("mean pull (kN)", pull / 1e3, 49.041609, 0.7, "elements of its own, 2000")
+
+
+STRINGS = (stick_slip, tuned_drive, off_bottom, stopped_block, four_discs, autodriller, mud_motor, oscillation_tool)
 
 
 def run(demo, out="out/strings"):

@@ -249,7 +249,7 @@ def test_tables_and_files(history, tmp_path):
     xarray = pytest.importorskip("xarray")
     found = history.to_xarray()
     assert found.speed.dims == ("profile_time", "depth") and found.bit_speed.attrs["units"] == "rad/s"
-    assert set(found) == {*SERIES, *LEDGER, *PROFILE, "balance"}
+    assert set(found) == {*SERIES, *LEDGER, *PROFILE, "balance", "pressure"}
     pytest.importorskip("h5netcdf")
     history.write(tmp_path / "out.nc")
     again = xarray.open_dataset(tmp_path / "out.nc", engine="h5netcdf")
@@ -630,7 +630,9 @@ def test_the_reference_has_every_key_and_unit():
     arguments = {name for cls in classes for name in inspect.signature(cls).parameters}
     keys = {key for cls in (SimulateDrilling, StabilityMap) for key in arguments_of(cls)}
     keys |= {f"[{key}]" for key in arguments_of(DrillingScene)} - {"[title]", "[depth]", "[start]"}
-    units = {unit for name in ("angular velocity", "time", "stiffness") for unit in DIMENSIONS[name].units}
+    units = {
+        unit for name in ("angular velocity", "time", "stiffness", "volume", "flow") for unit in DIMENSIONS[name].units
+    }
     for expected in (arguments, keys, units):
         assert expected <= told, expected - told
     assert math.isclose(DIMENSIONS["angular velocity"].units["rpm"], math.pi / 30)

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cosserat_fenicsx.checks import refuse
 from cosserat_fenicsx.drilling.wall_friction import law_of, scene_pieces, static_weight
 from cosserat_fenicsx.well.pieces import down_along
 
@@ -27,6 +28,7 @@ class _Settings:
     elements: int = 250  # default number without a step
     fewest: int = 40  # elements for a given step
     most: int = 400
+    period: tuple[float, float] = (80.0, 10.0)  # default and fewest steps in a period of a tool
     disc: float = 0.1  # longest step over 1/omega of the stiffest disc
     impact: float = 0.2  # default step over the time in which rock stops a bit
     # Longest step, and passing time of a wave along the lowest element, over that time, for a largest weight on bit to
@@ -47,6 +49,7 @@ class Chain:
             matrix. spring: (nodes - 1, dofs), N/m and N m/rad.
         hanging: (nodes - 1,) tension of elements at rest, N; hanging_top: at the top.
         wall: the `Wall`.
+        joints: (element, unknown, `Joint`) of what parts the string.
     """
 
     depths: np.ndarray
@@ -58,6 +61,7 @@ class Chain:
     hanging: np.ndarray
     hanging_top: float
     wall: "Wall"
+    joints: tuple = ()
 
 
 @dataclass(frozen=True)
@@ -88,7 +92,8 @@ _NO_WALL = Wall(*[np.zeros(0, dtype=np.int32)] * 3, *[np.zeros(0)] * 8)
 
 def usual_step(scene, elements: int | None, axial: bool) -> float:
     """The time step (s) of a `Drilling` for so many elements, where none is asked for."""
-    longest = min(_SET.longest, _SET.impact * time_of_impact(scene)) if axial else _SET.longest
+    longest = min(_SET.longest, _SET.impact * time_of_impact(scene), period_of_tools(scene) / _SET.period[0])
+    longest = longest if axial else _SET.longest
     if scene.discs:
         discs, shortest = scene.discs, math.inf
         for inertias, springs in ((discs.inertias, discs.stiffnesses), (discs.masses, discs.axial_stiffnesses)):
@@ -136,6 +141,10 @@ def _chain_of_string(drilling, dt, elements, axial):
     counts = np.maximum(np.rint(elements * times / times.sum()), 1).astype(int)
     which = np.repeat(np.arange(len(segments)), counts)
     lengths = np.array([s.length for s in segments])[which] / counts[which]
+    joints = [x for x in drilling.joints if axial or x.turns]
+    last = [int(np.flatnonzero(which == x.segment)[-1]) for x in joints]
+    which, lengths = _parted(last, which), _parted(last, lengths, 0.5)
+    joints = [(end + 1 + k, int(x.turns and axial), x) for k, (end, x) in enumerate(zip(last, joints, strict=True))]
     depths = np.concatenate([[0.0], np.cumsum(lengths)])
     depths *= drilling.bit_depth / depths[-1]
 
@@ -146,16 +155,32 @@ def _chain_of_string(drilling, dt, elements, axial):
     rates = (0.0, 0.0) if drag is None else (drag.axial, drag.torsion)
     kinds = [("rhoA", "EA", rates[0])] * axial + [("rhoJ", "GJ", rates[1])]
     columns = []
-    for inertia, stiffness, rate in kinds:
-        mass, spring = of(inertia) * lengths, of(stiffness) / lengths
+    for d, (inertia, stiffness, rate) in enumerate(kinds):
+        own, at = lengths.copy(), [(end, x) for end, of_dof, x in joints if of_dof == d]
+        for end, _ in at:  # the element before reaches to the joint, which has no length
+            own[end - 1 : end + 1] = own[end - 1] + own[end], 1.0
+        mass, spring = of(inertia) * own, of(stiffness) / own
         courant = dt * np.sqrt(spring / mass)
         share = np.minimum(_SET.coupling[0] + courant**2 / 6, _SET.coupling[1])
         diagonal, damped, damper = np.zeros(len(depths)), np.zeros(len(depths)), damping_time * spring
+        for end, x in at:
+            mass[end], spring[end], damper[end] = 0.0, x.spring, x.damping
         for at_ends, ends in ((diagonal, (0.5 - share) * mass), (damped, damper)):
             at_ends[:-1] += ends
             at_ends[1:] += ends
         columns.append((diagonal, share * mass, rate * diagonal + damped, rate * share * mass - damper, spring))
-    return Chain(depths, *_stacked(columns), *_against_the_wall(drilling, depths))
+    hanging, hanging_top, wall = _against_the_wall(drilling, depths)
+    for end, d, _ in joints:  # the tension beside the joint, not that of its spring
+        if axial and d == 0:
+            wall.element[wall.element == end] -= 1
+    return Chain(depths, *_stacked(columns), hanging, hanging_top, wall, tuple(joints))
+
+
+def _parted(last, values, share=1):
+    """Values of elements, with those before joints, which are halved, twice, times a share."""
+    values = np.array(values)
+    values[last] = values[last] * share
+    return np.insert(values, [end + 1 for end in last], values[last])
 
 
 def _against_the_wall(drilling, depths):
@@ -188,6 +213,18 @@ def _against_the_wall(drilling, depths):
     wall = Wall(element.astype(np.int32), first, second, share, length, k, w * normal, w * b, tension, factor,
                 pieces.radius[of])  # fmt: skip
     return hanging, float(below[0]), wall
+
+
+def period_of_tools(scene) -> float:
+    """The shortest period (s) of tools that shake the string; infinite without any."""
+    return min((1 / joint.tool.frequency for joint in scene.joints if not joint.turns), default=math.inf)
+
+
+def fewest_in_period(scene, dt) -> None:
+    """Refuse a step (s) that is too long for a tool that shakes the string."""
+    most = period_of_tools(scene) / _SET.period[1]
+    if dt > most * (1 + 1e-9):
+        refuse("AxialTorsional", "dt", dt, f"at most {most:.3g} s: {_SET.period[1]:g} steps in a period of the tool")
 
 
 def time_of_impact(scene) -> float:

@@ -168,6 +168,8 @@ def _panels(history, rows):
     panels = [
         (SPEED, [line("drive_speed", "drive", DRIVE), line("bit_speed", lower, BIT)]),
         (TORQUE, [line("surface_torque", "at the surface", DRIVE), line("torque_on_bit", "on bit", BIT)]),
+        (Quantity("motor's own speed", unit="rad/s", shown="rpm"), [line("motor_speed", None, BIT)]),
+        (Quantity("pressure over motor", unit="Pa", shown="bar"), [line("pressure", None, DRIVE)]),
         (_FORCE, [line("hook_load", "hook load", DRIVE), line("weight_on_bit", "weight on bit", BIT)]),
         (Quantity("impulse", unit="N s"), [line("impulse_on_bit", "impacts on rigid rock, their sum", BIT)]),
         (Quantity(f"advance of the {lower}", unit="m", shown=shown, dimension="length"), [advance]),
@@ -180,7 +182,17 @@ def _panels(history, rows):
 
 
 #: Colours of the ledger; styles by the beginnings of its names.
-_COLOURS = ("tab:blue", "tab:orange", "tab:green", "tab:olive", "tab:cyan", "tab:red", "tab:brown", "tab:purple")
+_COLOURS = (
+    "tab:blue",
+    "tab:orange",
+    "tab:green",
+    "tab:olive",
+    "tab:cyan",
+    "tab:red",
+    "tab:brown",
+    "tab:purple",
+    "tab:gray",
+)
 _STYLES = {"work": "--", "lost": ":"}
 # A chart with more oscillations of the bit than this shows the bands between their extremes.
 _SWINGS = 80
@@ -204,6 +216,8 @@ def draw_over_time(history, between=None):
             else:
                 panel.plot(t, values / size, color=colour, label=label, linewidth=1.1)
         panel.set_ylabel(heading)
+        if quantity.label.startswith("motor") and history.stalled[rows].any():
+            _shade(panel, t, history.stalled[rows], "motor stalled", "tab:red", 0.25)
         if panel is axes[0] and turns(history) and not many:
             label = f"{lower_end(history)} at rest"
             _shade_rest(panel, t, history.bit_speed[rows], history.drive_speed[rows], label)
@@ -242,8 +256,12 @@ def _shade_rest(panel, t, bit, drive, label):
     level = AT_REST * max(float(np.abs(drive).mean()), 1e-3)
     at_rest = np.abs(bit) <= level
     if at_rest.any():
-        panel.fill_between(t, 0, 1, where=at_rest, transform=panel.get_xaxis_transform(), color="0.88", linewidth=0,
-                           zorder=0, label=label)  # fmt: skip
+        _shade(panel, t, at_rest, label, "0.88")
+
+
+def _shade(panel, t, where, label, colour, alpha=1.0):
+    panel.fill_between(t, 0, 1, where=where, transform=panel.get_xaxis_transform(), color=colour, linewidth=0,
+                       zorder=0, label=label, alpha=alpha)  # fmt: skip
 
 
 @_drawn

@@ -55,6 +55,7 @@ def _asks_for_axial(scene):
         found.append("the hook moves")
     if hook is not None and hook.autodriller is not None:
         found.append("an autodriller moves the block")
+    found += [f"{joint.tool.name} shakes the string" for joint in scene.joints if not joint.turns]
     return found + ([scene.bit.law.lifts] if scene.bit is not None and scene.bit.law.lifts else [])
 
 

@@ -137,6 +137,10 @@ static void loads(model *m, double h, const double *signal)
             m->b[d] += top->given + top->proportional * signal[d]
                        + top->integral * (top->error + h / 2 * signal[d]);
     }
+    for (int p = 0; p < m->pairs; p++) {
+        const int j = m->pair[p] * n + m->pair_dof[p];
+        m->b[j] -= signal[n + p], m->b[j + n] += signal[n + p];
+    }
     for (int d = 0; d < n; d++) m->b[last * n + d] -= m->bit.force[d + 2 - n];
     if (n == 2) m->b[2 * last] += m->bit.hanging; /* the tension at rest contains a part of the weight on bit */
 }

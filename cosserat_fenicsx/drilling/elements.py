@@ -8,13 +8,14 @@ that fail are halved. Energies and works balance to rounding and to the toleranc
 quadratic energies, and works are those of the step's own forces.
 """
 
+import itertools
 import math
 
 import numpy as np
 from scipy.optimize import brentq
 
 from cosserat_fenicsx.checks import number, positive, refuse
-from cosserat_fenicsx.drilling.chain import chain_of, unresolved, usual_step
+from cosserat_fenicsx.drilling.chain import chain_of, fewest_in_period, unresolved, usual_step
 from cosserat_fenicsx.drilling.laws import InC, check_bit
 from cosserat_fenicsx.drilling.linear_control import step_for
 from cosserat_fenicsx.drilling.protocol import StringModel
@@ -23,6 +24,7 @@ from cosserat_fenicsx.drilling.steady_start import (
     check_rock,
     check_steady,
     follows_the_bit,
+    steady_speed_of_bit,
     steady_state,
     steady_velocities,
 )
@@ -32,7 +34,7 @@ from cosserat_fenicsx.errors import SceneError
 
 _TRIALS = 30
 _ELEMENTS = 1_000_000
-_SUMS = ("drive", "hook", "bit", "wall", "mud")
+_SUMS = ("drive", "hook", "tools", "bit", "wall", "mud")
 _BIT = ("weight", "torque", "share", "impulse", "slowed", "slowing", "floor", "sinking", "face")
 
 
@@ -78,6 +80,8 @@ class AxialTorsional(StringModel):
             expected = f"a number of elements from 2 to {_ELEMENTS}"
             number("AxialTorsional", "elements", elements, expected, lambda x: 2 <= x <= _ELEMENTS and x == int(x))
         self.dt = dt or usual_step(scene, elements, self._axial)
+        if self._axial:
+            fewest_in_period(scene, self.dt)
         controls = [scene.drive.control, scene.hook and self._axial and scene.hook.autodriller]
         periods = [divided(x, self.dt, dt is not None) for x in controls if x]
         period = min((x for x in periods if x), default=None)
@@ -114,6 +118,7 @@ class AxialTorsional(StringModel):
         self._set_bit(scene.bit)
         self._signals = [self._set_hook(scene.hook or Hook())] if self._axial else []
         self._signals.append(self._set_drive(scene.drive))
+        self._set_joints()
         self._lib.limits(self._m)
         m, held = self._m, self._kept["held"]
         held[self._kept["limit"][:, 0] > 0] = 3 if self._axial else 2
@@ -149,7 +154,7 @@ class AxialTorsional(StringModel):
         if bit is None:
             return
         mass, m.weight = self._kept["mass"][-1], static_weight(self.scene)
-        mass[-1] += bit.inertia
+        mass[-1] += self.scene.bit_inertia
         if self._axial:
             mass[0] += bit.mass
             m.mass, m.hanging = mass[0] if self._m.at_end else bit.mass, m.weight
@@ -167,6 +172,18 @@ class AxialTorsional(StringModel):
             per_weight = bit.law.resistance(1.0) if closed else law
             self._laws.append(InC(self._ffi, per_weight, *(() if closed else bit.law.in_c(bit.most))))
             self._laws[1].put(*(self._ffi.addressof(m, name) for name in ("given", "curve")))
+
+    def _set_joints(self):
+        """Tools that part the string: the pairs of forces, whose signals follow those of the top."""
+        m, joints = self._m, self._chain.joints
+        if len(joints) > self._lib.MOST_PAIRS:
+            refuse("DrillString", "components", len(joints), f"at most {self._lib.MOST_PAIRS} tools that part it")
+        m.pairs = len(joints)
+        m.motor = next((p for p, (_, _, joint) in enumerate(joints) if joint.turns), -1)
+        for name, values in (("pair", [x[0] for x in joints]), ("pair_dof", [x[1] for x in joints])):
+            self._array(m, name, np.array(values, dtype=np.int32))
+        self._array(m, "pair_slope", np.array([joint.damping for *_, joint in joints], dtype=float))
+        self._signals += [joint.force for *_, joint in joints]
 
     def _set_hook(self, hook):
         top, elastic = self._m.top[0], math.isfinite(hook.stiffness)
@@ -198,7 +215,7 @@ class AxialTorsional(StringModel):
             check_steady(scene)
             if axial:
                 check_rock(scene)
-            motion[1 - axial :] = steady_velocities(scene)[1 - axial :]
+            motion[:] = axial * steady_velocities(scene)[0], steady_speed_of_bit(scene)
             self._set_steady(motion)
             self._set_end(motion)
 
@@ -229,7 +246,10 @@ class AxialTorsional(StringModel):
 
     def _set_steady(self, motion):
         """A steady start, see `steady_start`."""
-        m, kept, unknowns = self._m, self._kept, slice(2 - self._dofs, 2)
+        m, kept, unknowns, chain = self._m, self._kept, slice(2 - self._dofs, 2), self._chain
+        pairs = [(*at, joint.force(0.0)) for *at, joint in chain.joints]
+        turned = next((end + 1 for end, _, joint in chain.joints if joint.turns), None)
+        turning = float(steady_velocities(self.scene)[1])
 
         def limits(x):
             kept["x"][:] = x
@@ -238,19 +258,23 @@ class AxialTorsional(StringModel):
             return kept["limit"]
 
         def found(down):
-            motion[0] = down
             bit = self.scene.bit
+            motion[:] = down, steady_speed_of_bit(self.scene, down if self._axial else None)
+            velocities = np.full((m.nodes, 2), [down, turning])
+            if turned is not None:
+                velocities[turned:, 1] = motion[1]
             bears = np.zeros(2) if bit is None else bit.law.steady_forces(bit.resting or 0.0, motion)
             extra = (bears - [m.bit.hanging, 0.0])[unknowns]
-            return bears, *steady_state(motion[unknowns], self._chain, limits, (self._wall, m.of_rotation), extra)
+            friction = self._wall, m.of_rotation
+            return bears, velocities, *steady_state(velocities[:, unknowns], chain, limits, friction, extra, pairs)
 
         if self._axial and follows_the_bit(
             self.scene
         ):  # friction and drag of the string take a part of the weight on bit
             most = motion[0]
-            motion[0] = brentq(lambda down: found(down)[2][0], 1e-9 * most, most * (1 + 1e-9), xtol=1e-15 * most)
-        bears, x, above = found(motion[0])
-        kept["x"][:], kept["v"][:], kept["w"][:], kept["held"][:] = x, motion[unknowns], motion[unknowns], 0
+            motion[0] = brentq(lambda down: found(down)[3][0], 1e-9 * most, most * (1 + 1e-9), xtol=1e-15 * most)
+        bears, velocities, x, above = found(motion[0])
+        kept["x"][:], kept["v"][:], kept["w"][:], kept["held"][:] = x, *[velocities[:, unknowns]] * 2, 0
         m.bit.weight, m.bit.torque = m.bit.recorded = bears.tolist()
         for i, force in enumerate(above):
             top = m.top[i]
@@ -277,8 +301,14 @@ class AxialTorsional(StringModel):
     def _record(self, steps, rows):
         parts, start = intervals(self._signals, (self.steps, self.steps + steps), self.dt), self.steps
         if self._axial and "hook" not in self._samplers:
-            parts[:, [1, 3]] *= -1  # the hook's speed is positive upwards
+            parts[:, [1, 1 + len(self._signals)]] *= -1  # the hook's speed is positive upwards
         weights = self._weights(self.steps, steps)
+        for p, (*_, joint) in enumerate(self._chain.joints):  # of forces the means, which oscillate
+            if not joint.force.constant:
+                ends = start * self.dt + np.cumsum([0.0, *parts[:, 0]])
+                means = [joint.force.mean(*x) for x in itertools.pairwise(ends.tolist())]
+                for column in (1 + self._dofs + p, 1 + self._dofs + p + len(self._signals)):
+                    parts[:, column] = means
         for part in [parts] if self.end is None else parts[:, None]:
             if self.end is not None:
                 self._take(self.end.begin(self, part[0, 0]))
@@ -318,6 +348,8 @@ class AxialTorsional(StringModel):
         m, n, kept = self._m, self._dofs, self._kept
         x, v = kept["x"], kept["v" if m.at_end else "w"]
         forces = np.diff(x, axis=0) * kept["spring"]
+        for p, (end, d, joint) in enumerate(self._chain.joints):
+            forces[end, d] += joint.damping * (kept["w"][end + 1, d] - kept["w"][end, d]) - m.applied[p]
         at = np.concatenate([forces[:1], (forces[:-1] + forces[1:]) / 2, forces[-1:]])
         torque, nothing = -at[:, -1], np.full(m.nodes, np.nan)
         torque[[0, -1]] = m.top[n - 1].force, m.bit.recorded[1]

@@ -5,11 +5,11 @@ from typing import Any
 
 import numpy as np
 
-from cosserat_fenicsx.checks import File, number
+from cosserat_fenicsx.checks import File, number, positive, refuse
 from cosserat_fenicsx.drilling.protocol import LEDGER, PROFILE, SERIES
 from cosserat_fenicsx.drilling.scene import Drilling
 from cosserat_fenicsx.drilling.stick_slip import SPEED, TORQUE, StickSlip, alias, stick_slip_of
-from cosserat_fenicsx.errors import SceneError
+from cosserat_fenicsx.errors import SceneError, nearest
 from cosserat_fenicsx.quantities import Quantity, as_text
 from cosserat_fenicsx.results import screen
 from cosserat_fenicsx.results.result import Result, by_name
@@ -30,6 +30,9 @@ _QUANTITIES = by_name(
     Quantity("bit_advance", unit="m", axes=_TIME, digits=5),
     Quantity("weight_on_bit", unit="N", axes=_TIME, digits=5),
     Quantity("impulse_on_bit", "impulse of impacts on bit", "N s", axes=_TIME),
+    Quantity("motor_speed", "motor's own speed", "rad/s", axes=_TIME, shown="rpm", digits=5, short="motor",
+             getter=lambda x: x.motor_speed if x.scene.motor else np.full(len(x), np.nan)),
+    Quantity("pressure", "pressure over the motor", "Pa", axes=_TIME, shown="bar"),
     Quantity("kinetic", "kinetic energy", "J", axes=_TIME),
     Quantity("strain", "strain energy", "J", axes=_TIME),
     *(Quantity(name, unit="J", axes=_TIME) for name in LEDGER[2:]),
@@ -71,9 +74,11 @@ class DrillingHistory(Result):
 
     - ``drive_speed``, ``bit_speed``: rad/s; ``drive_angle``, ``bit_angle``: rad;
     - ``surface_torque``, ``torque_on_bit``: N m; ``hook_load``, ``weight_on_bit``: N;
+    - ``motor_speed``, ``pressure``, ``stalled``: speed of a `MudMotor`'s rotor against its housing, rad/s, the pressure
+      over it, Pa, and whether that speed is not above 0; 0, NaN and False without one;
     - ``bit_velocity``: m/s; ``bit_advance``: m;
-    - ``kinetic``, ``strain``: energies, J; ``work_of_drive``, ``work_of_hook``, ``work_of_weight``: done on the string
-      since the start, J; ``lost_at_bit``, ``lost_at_wall``, ``lost_in_mud``: J.
+    - ``kinetic``, ``strain``: energies, J; ``work_of_drive``, ``work_of_hook``, ``work_of_weight``, ``work_of_tools``:
+      done on the string since the start, J; ``lost_at_bit``, ``lost_at_wall``, ``lost_in_mud``: J.
 
     Arrays (k, m) over `profile_times` and `depths`: ``angle``, ``speed``, ``torque``, ``displacement``, ``velocity``,
     ``tension`` in the same units, and ``sticking``: True where wall or rock hold the string.
@@ -155,12 +160,47 @@ class DrillingHistory(Result):
         return self.times - (self.dt if over_two else self.dt / 2)
 
     @property
+    def pressure(self) -> np.ndarray:
+        """(n,) over the motor, Pa, at `mean_times`."""
+        motor = self.scene.motor
+        if motor is None:
+            return np.full(len(self), np.nan)
+        flow = [motor.flow_at(max(t, 0.0)) for t in self.mean_times] if callable(motor.flow) else motor.flow
+        return (np.asarray(flow) - motor.per_radian * self.motor_speed) / motor.leakage
+
+    @property
+    def stalled(self) -> np.ndarray:
+        """(n,) bool: the rotor of the motor stands, or is turned backwards."""
+        return (self.motor_speed <= 0) & (self.scene.motor is not None)
+
+    @property
     def balance(self) -> np.ndarray:
         """(n,) residual of the ledger, J: energies and losses less works, the negative loss of the scheme. Of a motion
         that starts in steady rotation, less its first value, the initial energy."""
         signs = {name: -1 if name.startswith("work") else 1 for name in LEDGER}
         missing = sum(sign * np.nan_to_num(getattr(self, name)) for name, sign in signs.items())
         return missing - missing[:1] if self.scene.start == "steady" else missing
+
+    def mean(self, name: str, periods: int, frequency: float) -> float:
+        """The mean of a quantity over time, over the last whole periods of a frequency.
+
+        Args:
+            name: such as "hook_load". periods: how many. frequency: Hz, such as that of an `OscillationTool`.
+
+        Raises:
+            SceneError: an unknown name, or a motion that is shorter.
+        """
+        if name not in SERIES and name != "pressure":
+            raise SceneError(f"mean.name = {name!r}: {nearest(str(name), [*SERIES, 'pressure'])}")
+        frequency = positive("mean", "frequency", frequency, "Hz")
+        periods = number("mean", "periods", periods, "a number from 1", lambda x: x >= 1 and x == int(x))
+        t, values = self.mean_times, getattr(self, name)
+        first = t[-1] - periods / frequency if len(t) else 0.0
+        if not len(t) or first < t[0]:
+            refuse("mean", "periods", periods, f"a motion that holds so many, {periods / frequency:g} s")
+        inside = t > first
+        t, values = np.append(first, t[inside]), np.append(np.interp(first, t, values), values[inside])
+        return float(np.diff(t) @ (values[1:] + values[:-1]) / 2 / (t[-1] - first))
 
     def stick_slip(self, since: float | None = None) -> StickSlip:
         """Period, peaks, and when the bit starts and stops.
@@ -197,14 +237,34 @@ class DrillingHistory(Result):
                 f"Estimated errors by the step: {first}peak {peak / turning:.2g} {rpm}, surface torque "
                 f"{max(torques) / size:.2g} {moment}."
             )
+        yield from self._on_motor(units)
         caution = alias(self)
         if caution:
             yield f"{caution[0].upper()}{caution[1:]}."
         yield from map(units.sentence, (*self.why[:1], *(x for x in self.why[1:] if x.startswith("APPROXIMATE"))))
 
+    def _on_motor(self, units):
+        """Sentences on the motor, and on when it stalls."""
+        motor = self.scene.motor
+        if motor is None or len(self) < 3:
+            return
+        late = self.times >= self.times[-1] / 2
+        shown = [units.on_screen(self.quantities[name]) for name in ("motor_speed", "pressure")]
+        mean = [f"{np.mean(getattr(self, name)[late]) / size:.4g} {unit}"
+                for name, (unit, size) in zip(("motor_speed", "pressure"), shown, strict=True)]  # fmt: skip
+        yield f"Motor in the second half: {mean[0]} faster than the string, {mean[1]} over it, in the mean."
+        if self.stalled.any():
+            first = self.mean_times[self.stalled.argmax()]
+            yield (f"THE MOTOR STALLS from t = {max(first, 0.0):.4g} s on, in {100 * self.stalled.mean():.3g} % of the "
+                   "time: the string turns its rotor backwards, by the law of a motor that runs; no motor bears that "
+                   "for long.")  # fmt: skip
+
     def _more(self, units):
         if len(self) > 5:
-            worked = {name: np.nan_to_num(getattr(self, f"work_of_{name}")[-1]) for name in ("drive", "hook", "weight")}
+            worked = {
+                name: np.nan_to_num(getattr(self, f"work_of_{name}")[-1])
+                for name in ("drive", "hook", "weight", "tools")
+            }
             unit, size = units.on_screen(Quantity("energy", unit="J", shown="kJ"))
             done = ", ".join(
                 f"of the {name} {as_text(x / size, 5)} {unit}" for name, x in worked.items() if x or name == "drive"

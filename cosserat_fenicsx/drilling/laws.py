@@ -354,4 +354,4 @@ def check_bit(scene) -> None:
     law = None if scene.bit is None else scene.bit.law.resistance(scene.bit.most)
     if law is not None and scene.discs is None:  # the last one of Discs has inertia
         impedance = scene.segments[-1].torsional_impedance
-        refuse_several_speeds(-law.steepest, impedance, scene.bit.inertia, " at slow rotation")
+        refuse_several_speeds(-law.steepest, impedance, scene.bit_inertia, " at slow rotation")

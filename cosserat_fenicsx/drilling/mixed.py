@@ -97,6 +97,9 @@ def mixed_scene(drilling: Drilling, depth: float | None = None) -> MixedScene:
     instance("mixed_scene", "drilling", drilling, Drilling, "a Drilling")
     if not hasattr(drilling.string, "components"):
         refuse("mixed_scene", "drilling.string", drilling.string, "a DrillString; discs are no rod")
+    for joint in drilling.joints:
+        refuse("mixed_scene", "drilling.string", joint.tool, "a string without MudMotor and OscillationTool, which "
+               "part it: a Collar in its place; drilling.simulate has them")  # fmt: skip
     top = _depth(drilling, depth)
     parts = list(zip(drilling.places, drilling.segments, strict=True))  # from the top down
     below = [

@@ -213,6 +213,8 @@ def check_step(scene, dt, duration, save_every=None):
     if duration / max(dt, save_every or 0.0) > MOST_ROWS:
         refuse(where, "save_every", save_every, f"at least {duration / MOST_ROWS:.3g} s: {MOST_ROWS:g} rows in "
                f"{duration:g} s")  # fmt: skip
+    if scene.motor is not None:
+        speed += scene.motor.speed(0.0) / _FASTER
     most, words = _largest_turn(scene)
     if words:
         what = f"{words} at that speed"

@@ -20,17 +20,18 @@ from cosserat_fenicsx.errors import NotConverged
 #: Recorded at the end of every step. drive_speed, bit_speed: rad/s; drive_angle, bit_angle: rad; surface_torque: M at
 #: the top, torque_on_bit: against the rotation of the bit, N m; hook_load, weight_on_bit: N; bit_velocity: m/s,
 #: bit_advance: m, downwards; impulse_on_bit: sum of all impacts on rigid rock since the start, N s, not contained in
-#: weight_on_bit.
+#: weight_on_bit; motor_speed: of a mud motor's rotor against its housing, rad/s, 0 without one.
 SERIES = (
     "drive_speed", "drive_angle", "surface_torque", "bit_speed", "bit_angle", "torque_on_bit", "hook_load",
-    "bit_velocity", "bit_advance", "weight_on_bit", "impulse_on_bit",
+    "bit_velocity", "bit_advance", "weight_on_bit", "impulse_on_bit", "motor_speed",
 )  # fmt: skip
 #: Energies and, since the start, works and losses, J, of the string above the rock with drive and bit. Up to the loss
-#: of the scheme: kinetic + strain = work_of_drive + work_of_hook + work_of_weight - lost_at_bit - lost_at_wall -
-#: lost_in_mud. work_of_drive is done by the torque that the control asks for; lost_in_mud is that of dampers, too.
+#: of the scheme: kinetic + strain = work_of_drive + work_of_hook + work_of_weight + work_of_tools -
+#: lost_at_bit - lost_at_wall - lost_in_mud. work_of_tools is done by motors (torque times speed) and oscillation tools;
+#: work_of_drive is done by the torque that the control asks for; lost_in_mud is that of dampers, too.
 LEDGER = (
-    "kinetic", "strain", "work_of_drive", "work_of_hook", "work_of_weight", "lost_at_bit", "lost_at_wall",
-    "lost_in_mud",
+    "kinetic", "strain", "work_of_drive", "work_of_hook", "work_of_weight", "work_of_tools", "lost_at_bit",
+    "lost_at_wall", "lost_in_mud",
 )  # fmt: skip
 #: Along the string, at `StringModel.depths`. angle: rad; speed: rad/s; torque: N m; displacement: m; velocity: m/s;
 #: tension: N; sticking: 1 where the wall holds the string, 0 where it slips or is free.

@@ -8,6 +8,7 @@ from typing import Literal
 from cosserat_fenicsx.checks import refuse
 from cosserat_fenicsx.drilling import bit_curves  # noqa: F401 its laws join their family
 from cosserat_fenicsx.drilling.bit_laws import BitOnRock, Stribeck
+from cosserat_fenicsx.drilling.joints import Joint, joints_of
 from cosserat_fenicsx.drilling.segments import Discs, Segment, segment_of
 from cosserat_fenicsx.drilling.top_drive import Hook, TopDrive
 from cosserat_fenicsx.drilling.wall_friction import FrictionLaw, ViscousDrag
@@ -65,6 +66,8 @@ class Drilling(InWords, Part):
         if self.depth is None and self.hole is None and self.string.components[-1].length is None:
             refuse(self.string.components[-1], "length", None, "a length (m), where there is neither hole nor depth")
         _ = self.segments
+        if self.motor is not None and self.bit is None:
+            refuse(self, "bit", None, f"a BitOnRock below {self.motor.name}, which turns it")
 
     @property
     def discs(self) -> Discs | None:
@@ -97,6 +100,27 @@ class Drilling(InWords, Part):
     def segments(self) -> tuple[Segment, ...]:
         """The uniform parts of the string, from the top down."""
         return tuple(segment_of(place, place.weight_in(self.fluids)) for place in self.places)
+
+    @cached_property
+    def joints(self) -> tuple[Joint, ...]:
+        """Where tools part the string, from the top down."""
+        return () if self.discs else joints_of(self.laid)
+
+    @cached_property
+    def motor(self):
+        """The `MudMotor` of the string, or None."""
+        return next((x.tool for x in self.joints if x.turns), None)
+
+    @cached_property
+    def turned(self) -> tuple[Segment, ...]:
+        """The parts below a motor, which turn with the bit; none without one."""
+        parted = [x.segment for x in self.joints if x.turns]
+        return self.segments[parted[0] + 1 :] if parted else ()
+
+    @property
+    def bit_inertia(self) -> float:
+        """At the lower end, beside that of the string's sections: of the bit, and of a motor's rotor, kg m^2."""
+        return (self.bit.inertia if self.bit else 0.0) + (self.motor.rotor_inertia if self.motor else 0.0)
 
     @property
     def damped(self) -> bool:
@@ -132,6 +156,8 @@ class Drilling(InWords, Part):
             asked = _over_time(drive.signal(), "rad/s", "angular velocity", units, duration)
         inertia = f", inertia {units.told(drive.inertia, 'kg m^2')}" if drive.inertia else ""
         yield f"Drive: {asked}, {drive.control.in_words(units)}{inertia}."
+        for joint in self.joints:
+            yield joint.tool.sentence(units)
         yield (
             "Bit: none, the lower end is free." if bit is None else f"Bit: {', '.join(_at_bit(bit, units, duration))}."
         )

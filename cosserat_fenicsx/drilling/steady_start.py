@@ -7,6 +7,7 @@ velocities twist and compress the string. The normal force at the wall depends o
 import numpy as np
 
 from cosserat_fenicsx.checks import refuse
+from cosserat_fenicsx.drilling.joints import speed_of_bit
 from cosserat_fenicsx.errors import NotConverged
 
 
@@ -53,22 +54,41 @@ def steady_velocities(scene) -> np.ndarray:
     """
     turning = scene.drive.signal()(0.0)
     if follows_the_bit(scene):
-        return np.array([scene.bit.law.rate(scene.bit.weight, turning), turning])
-    return np.array([0.0 if scene.hook is None else -scene.hook.signal()(0.0), turning])
+        return np.array([scene.bit.law.rate(scene.bit.weight, steady_speed_of_bit(scene)), turning])
+    return np.array([_of_hook(scene), turning])
+
+
+def steady_speed_of_bit(scene, down: float | None = None) -> float:
+    """rad/s, of steady motion: that of the drive, and of a motor.
+
+    Args:
+        down: velocity (m/s) of a bit that drills; None for that by its weight, or by the hook.
+
+    Raises:
+        SceneError: the motor stalls.
+    """
+    down = _of_hook(scene) if down is None and not follows_the_bit(scene) else down
+    return speed_of_bit(scene, scene.drive.signal()(0.0), down)
+
+
+def _of_hook(scene):
+    """m/s downwards."""
+    return 0.0 if scene.hook is None else -scene.hook.signal()(0.0)
 
 
 # Most iterations; relative change at which they end.
 _ROUNDS, _SAME = 200, 1e-13
 
 
-def steady_state(velocities, chain, limits, friction, bit):
+def steady_state(velocities, chain, limits, friction, bit, pairs=()):
     """Places of the nodes and forces on the top in steady motion.
 
     Args:
-        velocities: (dofs,) of all nodes. chain: the `Chain`.
+        velocities: (nodes, dofs). chain: the `Chain`.
         limits: (nodes, 3) of the places (nodes, dofs): largest friction at rest, in motion, contact radius.
         friction: the `Resistance` of the wall, and whether it is one over the rotation.
         bit: (dofs,) weight on bit less that at rest (N), torque on bit (N m).
+        pairs: (element, unknown, force) of forces that drive its nodes apart, N or N m.
 
     Returns:
         x (nodes, dofs); (dofs,) force along the string above the first node: compression (N), torque (N m).
@@ -76,27 +96,31 @@ def steady_state(velocities, chain, limits, friction, bit):
     Raises:
         NotConverged: friction and the tension that it causes increase each other without end.
     """
-    n = len(velocities)
-    x = np.zeros((len(chain.depths), n))
-    drag = chain.drag.copy()
-    drag[:-1] += chain.drag_off
-    drag[1:] += chain.drag_off
-    down, turning = velocities[0] if n == 2 else 0.0, velocities[-1]
+    n = velocities.shape[1]
+    x = np.zeros_like(velocities)
+    dragged = chain.drag * velocities
+    dragged[:-1] += chain.drag_off * velocities[1:]
+    dragged[1:] += chain.drag_off * velocities[:-1]
+    for i, d, force in pairs:
+        dragged[i, d] += force
+        dragged[i + 1, d] -= force
+    spring = np.where(chain.spring > 0, chain.spring, np.inf)
+    down, turning = velocities[:, 0] if n == 2 else 0.0, velocities[:, -1]
     for _ in range(_ROUNDS):
         still, _, radius = limits(x).T
         around = radius * turning
         slip = np.hypot(down, around)
         braked = still > 0
-        speed = np.full_like(slip, abs(turning)) if friction[1] else slip
+        speed = np.abs(turning) if friction[1] else slip
         size = np.zeros_like(slip)
         size[braked] = still[braked] / friction[0].still * friction[0](speed[braked]) / slip[braked]
-        resisting = drag * velocities
+        resisting = dragged.copy()
         resisting[:, -1] += size * around * radius
         if n == 2:
             resisting[:, 0] += size * down
         resisting[-1] += bit
         below = np.cumsum(resisting[::-1], axis=0)[::-1]
-        new = np.concatenate([np.zeros((1, n)), np.cumsum(-below[1:] / chain.spring, axis=0)])
+        new = np.concatenate([np.zeros((1, n)), np.cumsum(-below[1:] / spring, axis=0)])
         change, x = np.abs(new - x).max(), new
         if change <= _SAME * np.abs(x).max():
             return x, below[0]

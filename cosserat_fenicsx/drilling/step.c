@@ -204,6 +204,13 @@ static void commit(model *m, double h, const double *signal)
             sums->mud += h * lost * w[d];
         }
     }
+    for (int p = 0; p < m->pairs; p++) {
+        const int j = m->pair[p] * n + m->pair_dof[p];
+        const double rate = m->w[j + n] - m->w[j], lost = h * m->pair_slope[p] * rate * rate;
+        m->applied[p] = signal[n + p];
+        sums->tools += h * signal[n + p] * rate - lost;
+        sums->mud -= lost;
+    }
     const double *w = m->w + (size_t)last * n;
     const double before = n == 2 ? m->v[2 * last] : 0;
     const int stood = m->held[last] & AXIAL, slips = !(m->mask[last] & TURN);
@@ -257,9 +264,9 @@ static void rub_by_weight(lower *bit)
 
 static int step(model *m, double h, const double *from, const double *to)
 {
-    double signal[2];
+    double signal[2 + MOST_PAIRS];
     const size_t size = (size_t)m->nodes * m->dofs * sizeof(double);
-    for (int d = 0; d < m->dofs; d++) signal[d] = (from[d] + to[d]) / 2;
+    for (int d = 0; d < m->dofs + m->pairs; d++) signal[d] = (from[d] + to[d]) / 2;
     if (!build(m, h)) return 0;
     command_drive(m, h, signal[m->dofs - 1]);
     if (!m->fixed) limits(m);
@@ -298,12 +305,14 @@ static void write_record(const model *m, double *row)
         const double error = m->top[0].error;
         strain += m->top[0].integral * error * error / 2 - m->hanging_top * error;
     }
+    const double *parted = m->motor < 0 ? NULL : m->w + (size_t)m->pair[m->motor] * n + turn;
     const double drive = m->top[turn].force, hook = n == 2 ? m->hanging_top - m->top[0].force : NAN;
     const double weight_on_bit = n == 2 ? m->bit.recorded[0] : m->bit.over_time ? m->bit.weight : NAN;
     const double series[] = {w[turn], x[turn], drive, w[last * n + turn], x[last * n + turn], m->bit.recorded[1], hook,
                              n == 2 ? w[2 * last] : NAN, n == 2 ? x[2 * last] : NAN, weight_on_bit,
-                             n == 2 ? m->bit.impulse : NAN, kinetic, strain, m->sums.drive, m->sums.hook, weight,
-                             m->sums.bit, m->sums.wall, m->sums.mud};
+                             n == 2 ? m->bit.impulse : NAN, parted ? parted[n] - parted[0] : 0, kinetic, strain,
+                             m->sums.drive, m->sums.hook, weight, m->sums.tools, m->sums.bit, m->sums.wall,
+                             m->sums.mud};
     memcpy(row, series, sizeof series);
 }
 
@@ -311,16 +320,17 @@ static void write_record(const model *m, double *row)
    were done; of one that fails nothing, or its first parts, have been done, which nobody may use. */
 int advance_elements(model *m, int intervals, const double *interval, const double *weights, double *rows)
 {
-    const int n = m->dofs;
-    for (int i = 0; i < intervals; i++, interval += 2 + 2 * n) {
+    const int n = m->dofs, all = n + m->pairs;
+    for (int i = 0; i < intervals; i++, interval += 2 + 2 * all) {
         const double h = interval[0];
         if (weights) m->bit.weight = *weights;
-        double from[2], to[2];
+        double from[2 + MOST_PAIRS], to[2 + MOST_PAIRS];
+        memcpy(from, interval + 1, all * sizeof *from);
+        memcpy(to, interval + 1 + all, all * sizeof *to);
         for (int d = 0; d < n; d++) {
             const linear *c = &m->control;
             const int rigid = m->top[d].rigid, own = d == n - 1 && imposes(c);
-            double speed = from[d] = interval[1 + d];
-            to[d] = interval[1 + n + d];
+            double speed = from[d];
             if (own) speed += imposed(c, c->spent);
             if (own && rigid) from[d] = speed, to[d] += imposed(c, c->spent + h);
             if ((own || rigid) && m->v[d] != speed) {
@@ -331,8 +341,8 @@ int advance_elements(model *m, int intervals, const double *interval, const doub
         const double face = m->bit.face, sinks = m->bit.floor - face;
         double done = 0, size = 1;
         while (done < 1) {
-            double begin[2], end[2];
-            for (int d = 0; d < n; d++) {
+            double begin[2 + MOST_PAIRS], end[2 + MOST_PAIRS];
+            for (int d = 0; d < all; d++) {
                 begin[d] = from[d] + done * (to[d] - from[d]);
                 end[d] = from[d] + (done + size) * (to[d] - from[d]);
             }
@@ -348,11 +358,11 @@ int advance_elements(model *m, int intervals, const double *interval, const doub
                 if (size < 1.0 / (1 << HALVINGS)) return i;
             }
         }
-        if (interval[1 + 2 * n] != 0) {
+        if (interval[1 + 2 * all] != 0) {
             if (m->control.used) wait_on(&m->control);
             if (weights) weights++;
             write_record(m, rows + 1); /* after the time */
-            rows += 20;
+            rows += ROW;
         }
     }
     return intervals;

@@ -26,6 +26,9 @@ typedef struct {
     double scale, reach, load;      /* load: the weight on bit, N, for laws that are called */
 } friction;
 
+/* Numbers in a row of a motion: the time, SERIES and LEDGER of protocol.py. Most pairs of forces in a string. */
+enum { ROW = 22, MOST_PAIRS = 6 };
+
 #if 0
 extern "Python" double call_law(void *self, double slip, double load, double *slope);
 #endif
@@ -66,6 +69,10 @@ typedef struct {
     int stiff, bit;                          /* whether the drive imposes the speed; whether there is a bit */
     double drive_inertia, Kp, Ki, given;     /* torque of the drive: given + Kp (Om - om) + Ki integral */
     double bit_inertia;
+    double slope, dragged;                   /* of a motor above the bit: torque over speed, 0: none; drag below */
+    const double *stall;                     /* its stall torque in each of the steps asked for */
+    double bit_angle, turned, last_turned;   /* of the bit below a motor; its speed against the housing, see `speed` */
+    double tools;                            /* work of the motor since the start, J */
     double drive_speed, integral, bit_speed; /* at the end of the last step; without inertia, its mean */
     double last_on_bit;                      /* torque on bit of the step before */
     double work, at_bit, at_wall, in_mud;    /* since the start, J */
@@ -104,7 +111,7 @@ typedef struct {
 
 /* Sums since the start, J. */
 typedef struct {
-    double drive, hook, bit, wall, mud;
+    double drive, hook, tools, bit, wall, mud;
 } books;
 
 typedef struct {
@@ -126,6 +133,10 @@ typedef struct {
     curve curve;                    /* of that law, if it is a function in Python */
     int of_rotation, fixed;         /* which of these; whether the normal force is always that of the rest */
     double *limit;                  /* (nodes, 3) largest force at rest, in motion, and radius of contact */
+    int pairs, motor;               /* pairs of forces between nodes; which one is a motor's, or -1 */
+    const int *pair, *pair_dof;     /* (pairs,) elements, and their unknowns */
+    const double *pair_slope;       /* (pairs,) dampers, which count as tools; signals follow those of the top */
+    double applied[6];              /* forces of the last step */
     upper top[2];
     lower bit;
     books sums;

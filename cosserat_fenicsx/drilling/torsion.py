@@ -32,7 +32,7 @@ from cosserat_fenicsx.drilling.linear_control import step_for
 from cosserat_fenicsx.drilling.protocol import PROFILE, StringModel
 from cosserat_fenicsx.drilling.scene import Drilling
 from cosserat_fenicsx.drilling.signals import means
-from cosserat_fenicsx.drilling.steady_start import check_steady, steady_velocities
+from cosserat_fenicsx.drilling.steady_start import check_steady, steady_speed_of_bit, steady_velocities
 from cosserat_fenicsx.drilling.top_drive import Sample, divided
 from cosserat_fenicsx.drilling.wall_friction import law_of, wall_of
 from cosserat_fenicsx.well.components import DrillString
@@ -156,7 +156,21 @@ def _long_enough(parts, dt):
 
 
 # Numbers of C that change in a step.
-_NUMBERS = ("drive_speed", "integral", "bit_speed", "last_on_bit", "work", "at_bit", "at_wall", "in_mud", "iterations")
+_NUMBERS = (
+    "bit_angle",
+    "turned",
+    "last_turned",
+    "tools",
+    "drive_speed",
+    "integral",
+    "bit_speed",
+    "last_on_bit",
+    "work",
+    "at_bit",
+    "at_wall",
+    "in_mud",
+    "iterations",
+)
 
 
 class TorsionWaves(StringModel):
@@ -189,7 +203,8 @@ class TorsionWaves(StringModel):
         self._law = None if scene.bit is None else scene.bit.law.resistance(scene.bit.most)
         self._wall = law_of(scene.friction)[0]
         drag = 0.0 if scene.drag is None else scene.drag.torsion
-        time = math.fsum(x.length / x.torsional_speed for x in scene.segments)
+        self._parts = scene.segments[: len(scene.segments) - len(scene.turned)]
+        time = math.fsum(x.length / x.torsional_speed for x in self._parts)
         if dt is not None:
             dt = positive("TorsionWaves", "dt", dt, "s")
         if elements is not None:
@@ -214,17 +229,18 @@ class TorsionWaves(StringModel):
                            "speed of the bit is not determined")  # fmt: skip
                 refuse("Drilling", "friction", scene.friction, "a friction that decays more slowly with the "
                        f"speed: with {_SET.most:g} cells the speed at every place is not determined")  # fmt: skip
-            self.cells = cells = cells_of(scene.segments, dt, period)
+            self.cells = cells = cells_of(self._parts, dt, period)
             self._set_nodes(drag)
             factor, at_bit = self._steepness()
             dt = cells.dt * min(_SET.narrower / factor if factor else 1.0, _SET.narrower)
         self.dt, self.depths = cells.dt, cells.depths
         self._signal = scene.drive.signal()
+        self._stall = next((x.force for x in scene.joints if x.turns), None)
         self.why = tuple(self._reasons(asked))
         self._allocate()
         if scene.start == "steady":
             check_steady(scene)
-            self._set_steady(float(steady_velocities(scene)[1]))
+            self._set_steady(float(steady_velocities(scene)[1]), steady_speed_of_bit(scene))
         else:
             self._sample_torque(scene.drive, self.c)
 
@@ -247,10 +263,18 @@ class TorsionWaves(StringModel):
         if self._law is not None:
             slope[-1] = self._law.steepest
         impedance = self._above + self._below + self._drag
+        if self.scene.motor is not None:
+            c = self.scene.motor.slope
+            impedance[-1] *= c / (impedance[-1] + c)
         if self.scene.bit is not None:
-            impedance[-1] += 2 * self.scene.bit.inertia / self.cells.dt
+            impedance[-1] += 2 * self._bit_inertia / self.cells.dt
         steep = slope / impedance
         return steep.max(), self.scene.bit is not None and int(steep.argmax()) == len(steep) - 1
+
+    @property
+    def _bit_inertia(self):
+        """Of bit, rotor, and the parts below a motor, which turn as one body, kg m^2."""
+        return self.scene.bit_inertia + math.fsum(x.rhoJ * x.length for x in self.scene.turned)
 
     def _reasons(self, asked):
         cells, scene = self.cells, self.scene
@@ -270,6 +294,8 @@ class TorsionWaves(StringModel):
             )
         if cells.dt < asked / 2:
             yield f"dt is less than the {asked:.4g} s asked for, or the law of friction would have several answers"
+        if scene.motor is not None:
+            yield f"what is below {scene.motor.name} turns as one body of {self._bit_inertia:.4g} kg m^2, off the wall"
         if scene.start == "steady":
             yield "starts in steady rotation at the speed of the drive"
         if scene.hole is not None and self.normal_force is None:
@@ -300,7 +326,11 @@ class TorsionWaves(StringModel):
             if linear is not None:
                 c.stiff = linear.of_speed and drive.control.late > 0
                 self._set_linear(c.control, drive, linear)
-        c.bit_inertia = 0.0 if bit is None else bit.inertia
+        c.bit_inertia = self._bit_inertia
+        if scene.motor is not None:
+            c.slope = scene.motor.slope
+            rate = 0.0 if scene.drag is None else scene.drag.torsion
+            c.dragged = rate * math.fsum(x.rhoJ * x.length for x in scene.turned)
         self._laws = [InC(self._ffi, self._wall)]
         self._laws[0].fill(c.wall)
         if self._law is not None and self._law.function is not None:
@@ -310,13 +340,15 @@ class TorsionWaves(StringModel):
         elif self._law is not None and bit.varies:
             c.per_weight = [self._law.still / bit.most, self._law.slipping / bit.most]
 
-    def _set_steady(self, speed):
-        """A steady start at the drive's speed (rad/s), twisted by friction and drag."""
+    def _set_steady(self, speed, of_bit):
+        """A steady start at the speeds (rad/s) of drive and bit, twisted by friction and drag."""
         cells, now, c = self.cells, self._kept, self.c
         law = np.where(self._hold > 0, self._grip * self._wall(speed * self._reach), 0.0)
         if self._law is not None:
-            law[-1] = self.scene.bit.law.resistance(self.scene.bit.resting)(speed)
-        above = np.cumsum((law + self._drag * speed)[::-1])[::-1]  # handed down to the nodes
+            law[-1] = self.scene.bit.law.resistance(self.scene.bit.resting)(of_bit)
+        resisting = law + self._drag * speed
+        resisting[-1] += c.dragged * of_bit
+        above = np.cumsum(resisting[::-1])[::-1]  # handed down to the nodes
         torque, Z = above[1:], cells.impedance
         now["down"][:], now["up"][:] = torque + Z * speed, torque - Z * speed
         filtered = now["filtered"]
@@ -325,7 +357,8 @@ class TorsionWaves(StringModel):
         now["speed"][:] = now["last_speed"][:] = speed
         now["torque"][:], now["moment"][:], now["last_moment"][:] = law, above, above
         now["angle"][1:] = -np.cumsum(torque * cells.time / Z)
-        c.drive_speed = c.bit_speed = speed
+        c.drive_speed, c.bit_speed, c.bit_angle = speed, of_bit, now["angle"][-1]
+        c.turned = c.last_turned = of_bit - speed
         c.last_on_bit = law[-1]
         c.integral = above[0] / c.Ki if c.Ki else 0.0
         if c.control.used:
@@ -345,6 +378,9 @@ class TorsionWaves(StringModel):
         dt, buffer = self.dt, self._ffi.from_buffer
         signal = self._samplers["drive"] if self.scene.drive.control.sampled and self.c.stiff else self._signal
         speeds = means(signal, self.steps, steps, dt)
+        if self._stall is not None:
+            stall = means(self._stall, self.steps, steps, dt)
+            self.c.stall = buffer("double[]", stall)
         rows = buffer("double[]", rows, require_writable=True)
         self.steps += self._lib.advance_waves(
             self.c, steps, buffer("double[]", speeds), self._weights(self.steps, steps), rows
@@ -356,6 +392,8 @@ class TorsionWaves(StringModel):
         now = self._kept
         speed, torque = ((now[f"last_{name}"] + now[name]) / 2 for name in ("speed", "moment"))
         sticking = (self._hold > 0) & (now["last_speed"] == 0) & (now["speed"] == 0)
+        if self._stall is not None:
+            sticking[-1] = self.c.bit_speed == 0
         for name, values in (("angle", now["angle"]), ("speed", speed), ("torque", torque), ("sticking", sticking)):
             found[PROFILE.index(name)] = values
         return found

@@ -106,11 +106,34 @@ static __attribute__((noinline)) void energies(const waves *w, double *kinetic, 
     *strain = held / 2;
 }
 
-/* The bit, or the free end. */
-static void end(waves *w, double P)
+/* The bit below a motor, whose torque is R - c (om_bit - om): the housing om bears it, P - A om = T. So the bit meets
+   the wave (c P + A R)/(A + c) on the impedance c A/(A + c). */
+static double below_motor(waves *w, double P, double R)
+{
+    const int n = w->cells;
+    const double A = w->above[n] + w->drag[n], c = w->slope, S = c * A / (A + c), F = (c * P + A * R) / (A + c);
+    const double dt = w->dt, bit = turned(w, n, F, S + w->dragged, w->bit_inertia, &w->bit_speed), T = F - S * bit;
+    const double om = (P - T) / A;
+    w->last_turned = w->turned;
+    w->turned = bit - om;
+    w->bit_angle += dt * bit;
+    w->tools += dt * T * w->turned;
+    w->in_mud += dt * w->dragged * bit * bit;
+    w->at_bit += dt * w->torque[n] * w->turned; /* beyond what is booked at the speed of the housing */
+    return om;
+}
+
+/* The bit, or the free end; R: stall torque of a motor. */
+static void end(waves *w, double P, double R)
 {
     int n = w->cells;
     w->last_on_bit = w->torque[n];
+    if (w->slope > 0) {
+        const double om = below_motor(w, P, R);
+        book(w, n, om, P - w->above[n] * om);
+        w->up[n - 1] = P - 2 * w->above[n] * om;
+        return;
+    }
     double om = turned(w, n, P, w->above[n] + w->drag[n], w->bit_inertia, &w->bit_speed);
     book(w, n, om, P - w->above[n] * om);
     w->up[n - 1] = P - 2 * w->above[n] * om;
@@ -172,7 +195,7 @@ int advance_waves(waves *w, int steps, const double *speeds, const double *weigh
         if (weights) press(w, weights[k]);
         drive(w, speeds[k]);
         w->down[0] = w->up[0] + 2 * w->below[0] * w->speed[0];
-        end(w, between(w, P));
+        end(w, between(w, P), w->slope > 0 ? w->stall[k] : 0);
         for (int f = 0; f < w->filters; f++) {
             int c = w->filtered[f];
             double turn = w->turn[f], root = sqrt((1 - turn) * (1 + turn));
@@ -185,10 +208,12 @@ int advance_waves(waves *w, int steps, const double *speeds, const double *weigh
                                                                        : (w->last_speed[0] + w->speed[0]) / 2,
             w->angle[0],
             (w->last_moment[0] + w->moment[0]) / 2,
-            w->bit_inertia > 0 ? w->bit_speed : (w->last_speed[n] + w->speed[n]) / 2, w->angle[n],
-            w->bit ? (w->last_on_bit + w->torque[n]) / 2 : 0, NAN, NAN, NAN, weights ? weights[k] : NAN, NAN, kinetic,
-            strain, w->work, 0, 0, w->at_bit, w->at_wall, w->in_mud};
-        memcpy(rows + 20 * (size_t)k + 1, series, sizeof series);
+            w->bit_inertia > 0 ? w->bit_speed : (w->last_speed[n] + w->speed[n]) / 2,
+            w->slope > 0 ? w->bit_angle : w->angle[n],
+            w->bit ? (w->last_on_bit + w->torque[n]) / 2 : 0, NAN, NAN, NAN, weights ? weights[k] : NAN, NAN,
+            (w->last_turned + w->turned) / 2, kinetic, strain, w->work, 0, 0, w->tools, w->at_bit,
+            w->at_wall, w->in_mud};
+        memcpy(rows + ROW * (size_t)k + 1, series, sizeof series);
         if (!isfinite(kinetic + strain)) return k;
     }
     return steps;

@@ -113,7 +113,7 @@ def _plain(name):
 STEEL = Material(E=206.8e9, nu=0.3, density=7850.0)
 
 
-class StringPart(Part, family="component of a string"):
+class StringPart(Part, family="component of a string", homes=("cosserat_fenicsx.well.tools",)):
     """Base of the components of a string; a component of one's own is a frozen dataclass derived from it.
 
     Attributes:

@@ -6,6 +6,7 @@ import numpy as np
 
 from cosserat_fenicsx.checks import instance, number, refuse
 from cosserat_fenicsx.errors import InstallationError, NotConverged, SceneError
+from cosserat_fenicsx.units import rpm
 from cosserat_fenicsx.well.answer import TorqueAndDrag, scales_of, share
 from cosserat_fenicsx.well.buckled import LockUp, buckled_string
 from cosserat_fenicsx.well.components import DrillString
@@ -15,6 +16,7 @@ from cosserat_fenicsx.well.operations import Operation
 from cosserat_fenicsx.well.pieces import pieces_of, rings_of, sections_of
 from cosserat_fenicsx.well.rod.rod_answer import rod_in_contact
 from cosserat_fenicsx.well.softstring import chain_of, soft_string
+from cosserat_fenicsx.well.tools import MudMotor
 
 AUTO, SOFT, BUCKLED, ROD = "auto", "soft", "buckled", "rod"
 MODELS = (AUTO, SOFT, BUCKLED, ROD)
@@ -133,6 +135,7 @@ def _flexible(given, model, tol, torque_convention, pieces, laid):
     if strain > 0.01:
         why.append(f"BEYOND WHAT ANY PIPE CARRIES: the tension strains it by {100 * strain:.3g} %")
     beyond = [what for what, part in shares.items() if part > tol - error]
+    why += _on_motor(given[1], operation)
     whole = [*why, *(f"NOT ENOUGH for tol = {tol:g} in the {what}" for what in beyond)]
     if model == AUTO and beyond:
         exceeding = " and the ".join(beyond)
@@ -149,6 +152,20 @@ def _flexible(given, model, tol, torque_convention, pieces, laid):
         answer = replace(answer, why=(*answer.why, unknown), model_error=np.inf, left_out=(np.inf, np.inf))
         why.append(f"{bent} is bent: solving the rod in contact, which has the bend")
     return answer, why
+
+
+def _on_motor(string, operation):
+    """A sentence on a motor under the torque on bit.
+
+    Raises:
+        SceneError: it stalls.
+    """
+    for motor in (part for part in string.components if isinstance(part, MudMotor)):
+        speed = motor.running(type(operation).__name__, operation.torque)
+        yield (
+            f"{motor.name}: turns the bit by {speed / rpm:.4g} rpm beside the string's rotation, with "
+            f"{motor.pressure(operation.torque) / 1e5:.4g} bar over it"
+        )
 
 
 def _on_buckling(asked, soft, solved, sections):

@@ -74,6 +74,9 @@ FOLDERS = {
     "strings": {
         "stick_slip.png": "stick_slip/drilling.png",
         "autodriller.png": "autodriller/drilling.png",
+        "mud_motor.png": "mud_motor/drilling.png",
+        "motor_power_curve.png": "mud_motor/power_curve.png",
+        "oscillation_tool.png": "oscillation_tool/drilling.png",
         "off_bottom_map.png": "off_bottom/map.png",
         "stopped_block_map.png": "stopped_block/map.png",
         "stability_map.png": "stability_map.png",

@@ -23,6 +23,7 @@ from scipy.optimize import brentq
 
 from cosserat_fenicsx.checks import number, refuse
 from cosserat_fenicsx.drilling.bit_laws import Cutting
+from cosserat_fenicsx.drilling.joints import speed_of_bit
 from cosserat_fenicsx.drilling.laws import refuse_several_speeds
 from cosserat_fenicsx.drilling.linear.friction import WallDashpots
 from cosserat_fenicsx.drilling.linear.impedances import Guide, axial, torsional
@@ -284,11 +285,21 @@ class Steady:
         if self.law.needs_weight and weight is None:
             refuse(self.scene.bit, "weight", None, "the weight on bit (N), which the law needs")
         law = self.law.resistance(weight)
-        kappa = 0.0 if law is None else law.slope(speed)
+        turning = self.speed_of_bit(speed, weight)
+        kappa = 0.0 if law is None else law.slope(turning)
         if not self.scene.discs:
             at = f" at {speed:.4g} rad/s" + (f" under {weight / 1e3:.4g} kN" if weight is not None else "")
             refuse_several_speeds(kappa, self.guide.impedance, self.guide.inertia, at)
         return np.array([kappa, speed, rest])
+
+    def speed_of_bit(self, speed, weight):
+        """rad/s: a motor turns it faster than the string.
+
+        Raises:
+            SceneError: the motor stalls.
+        """
+        scene = self.scene if weight is None else self.scene.with_case(weight=weight)
+        return speed_of_bit(scene, speed, self._penetration(speed, None) if self.cuts and weight is None else None)
 
     def _penetration(self, speed, weight):
         """V from the weight on bit less the load of wear flats; or from the speed of the hook."""
@@ -299,7 +310,7 @@ class Steady:
                 refuse(self.scene.bit, "weight", None, "the weight on bit (N), or a Hook whose speed (m/s) is a "
                        "negative number: that of the block downwards")  # fmt: skip
             return rate
-        return self.law.rate(weight, speed)
+        return self.law.rate(weight, self.speed_of_bit(speed, weight))
 
     def equation(self, parameters):
         """The characteristic function of `parameters`."""
@@ -307,7 +318,8 @@ class Steady:
         guides = self.guides(speed, or_none(weight))
         if self.cuts:
             stiffnesses = self.law.axial_stiffness, self.law.torsional_stiffness
-            return Regenerative(*guides, *stiffnesses, self.law.blades, speed, first)
+            turning = self.speed_of_bit(speed, or_none(weight))
+            return Regenerative(*guides, *stiffnesses, self.law.blades, turning, first)
         if self.kind == "axial":
             bit = self.scene.bit
             return Alone(*guides, rock=0.0 if bit is None or or_none(weight) is None else bit.rock_stiffness)

@@ -9,6 +9,7 @@ from scipy.optimize import brentq
 
 from cosserat_fenicsx.checks import File, Numbers, number, positive, refuse
 from cosserat_fenicsx.drilling.bit_laws import Lobes
+from cosserat_fenicsx.drilling.joints import speed_of_bit
 from cosserat_fenicsx.drilling.linear.characteristic import Steady, speeds_and_weights
 from cosserat_fenicsx.drilling.linear.frequencies import natural_frequencies
 from cosserat_fenicsx.drilling.scene import Drilling
@@ -113,7 +114,8 @@ def campbell(
     Args:
         scene: a `Drilling`. fastest: highest speed of rotation, rad/s. up_to: highest frequency, Hz.
         torsion, axial: the lower end: "free" or "fixed". A bit on the rock turns freely and hardly moves axially.
-        excitations: {name: times a revolution}; None for once a revolution, and the blades or lobes of the bit.
+        excitations: {name: times a revolution}; None for once a revolution, and the blades or lobes of a bit
+            that turns with the string: a motor turns it faster.
 
     Raises:
         SceneError: numbers that are not positive, or an unknown end.
@@ -121,7 +123,7 @@ def campbell(
     fastest = positive("campbell", "fastest", fastest, "rad/s")
     up_to = positive("campbell", "up_to", up_to, "Hz")
     if excitations is None:
-        repeats = scene.bit.law.repeats if scene.bit else None
+        repeats = scene.bit.law.repeats if scene.bit and scene.motor is None else None
         excitations = {"1 x": 1.0} | ({f"{repeats[0]} x ({repeats[1]})": float(repeats[0])} if repeats else {})
     for name, times in excitations.items():
         number("campbell", f"excitations[{name!r}]", times, "a positive number", lambda x: 0 < x < math.inf)
@@ -222,13 +224,17 @@ def bit_bounce(scene: Drilling, speeds: Numbers) -> BitBounce:
     if scene.bit is None or not isinstance(scene.bit.law, Lobes):
         refuse("bit_bounce", "scene", scene.bit, "a bit with the law Lobes(count, amplitude)")
     speeds, _ = speeds_and_weights("bit_bounce", scene, speeds, None)
-    frequency = scene.bit.law.count * speeds / (2 * math.pi)
+    frequency = scene.bit.law.count * _of_bit(scene, speeds) / (2 * math.pi)
     return BitBounce(scene, speeds, frequency, _amplitude(scene, speeds))
+
+
+def _of_bit(scene, speeds):
+    return np.array([speed_of_bit(scene, float(speed)) for speed in speeds])
 
 
 def _amplitude(scene, speeds):
     bit, steady = scene.bit, Steady(scene, "axial")
-    s = 1j * bit.law.count * speeds
+    s = 1j * bit.law.count * _of_bit(scene, speeds)
     guides = [steady.guides(float(speed), bit.weight)[0] for speed in speeds]
     with np.errstate(divide="ignore"):
         impedance = np.array([guide.impedance_at_bit(x) for guide, x in zip(guides, s, strict=True)])

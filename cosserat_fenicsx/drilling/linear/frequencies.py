@@ -16,6 +16,7 @@ is that of the string alone, whether a `DrillString` or a whole `Drilling` is gi
 """
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -36,7 +37,7 @@ def natural_frequencies(scene: Drilling, count: int, bit: str = "free", kind: st
 
     The top drive stands still, whatever its control (`stability` takes the control into account), but for a `Motor`,
     which turns freely with its inertia; axially the top hangs in the stiffness of the hook. A rotation of the whole
-    string is not listed.
+    string is not listed. A mud motor, whose torque hardly depends on the motion, lets the string above it end free.
 
     Args:
         scene: a `Drilling`.
@@ -58,6 +59,10 @@ def natural_frequencies(scene: Drilling, count: int, bit: str = "free", kind: st
     if kind == "torsion" and scene.discs:
         return _of_discs(scene, bit)[:count]
     guide, top = (axial(scene), _hook(scene)) if kind == "axial" else (torsional(scene), _drive(scene))
+    if kind == "torsion" and scene.motor is not None:
+        if bit == "fixed":
+            refuse("natural_frequencies", "bit", bit, f"'free': {scene.motor.name} lets the string turn above its bit")
+        guide = replace(guide, parts=guide.parts[: len(guide.parts) - len(scene.turned) - 1], inertia=0.0)
     return _circular(guide, count, bit == "fixed", top) / (2 * math.pi)
 
 

@@ -17,6 +17,7 @@ from scipy.optimize import brentq
 from cosserat_fenicsx.checks import refuse
 from cosserat_fenicsx.drilling.linear.characteristic import Steady
 from cosserat_fenicsx.drilling.linear.excitation import Drawn
+from cosserat_fenicsx.drilling.linear.impedances import Disc
 from cosserat_fenicsx.drilling.linear.limits import critical_slopes
 from cosserat_fenicsx.drilling.scene import Drilling
 from cosserat_fenicsx.drilling.stick_slip import SPEED, TORQUE
@@ -36,8 +37,8 @@ class Hfto(Drawn):
     """Result of `Stability.hfto`: oscillations of one frequency each, by frequency.
 
     Attributes:
-        scene: the `Drilling` at the speed and weight. speed: rad/s. unbounded: how many more modes grow, which friction
-            at the wall feeds whatever the bit takes.
+        scene: the `Drilling` at the speed and weight. speed: of the bit, rad/s. unbounded: how many more modes grow,
+            which friction at the wall feeds whatever the bit takes.
         frequency: (n,) Hz. slope: (n,) N m s/rad, kappa_c, which the string's damping takes at the bit. growth: (n,)
             1/s, of the nearest mode while it is small. amplitude: (n,) of the bit's speed, rad/s; NaN where the law of
             the bit bounds none. torque, torque_depth: (n,) largest amplitude of the torque in the string, N m, and its
@@ -125,9 +126,9 @@ def oscillations(scene, up_to, frequencies, growth):
     law = scene.bit.law.resistance(scene.bit.weight) if scene.bit is not None else None
     if law is None:
         refuse("Stability", "hfto", scene.bit, "a bit whose torque follows from its speed, such as one with Stribeck")
-    speed = scene.drive.signal()(0.0)
-    guide = Steady(scene).guides(speed, scene.bit.weight)[0]
-    w, slopes = critical_slopes(scene, up_to, speed)
+    steady, turning = Steady(scene), scene.drive.signal()(0.0)
+    guide, speed = steady.guides(turning, scene.bit.weight)[0], steady.speed_of_bit(turning, scene.bit.weight)
+    w, slopes = critical_slopes(scene, up_to, turning)
     om, B, dom, dB = guide.bit(1j * w)
     # where a mode begins to grow as the slope falls; where friction at the wall feeds the string there are others
     kept = (w > 0) & (slopes > law.slope(speed)) & (((dB * om - B * dom) / om**2).real > 0)
@@ -173,10 +174,11 @@ def _largest_torque(guide, w):
     for k, part in enumerate(guide.parts):
         places = np.linspace(0.0, part.length, 2 + int(_PLACES * w * part.travel / (2 * math.pi)))
         here = part.through(s, state, places) if part.length else part.through(s, state)
-        sizes = np.abs(here.P / part.give(s)) if part.length or part.spring else np.zeros(1)
+        disc = isinstance(part, Disc)
+        sizes = np.abs(here.P / part.give(s)) if not disc or part.spring else np.zeros(1)
         worst = int(sizes.argmax())
         size = here.size if np.ndim(here.size) == 0 else np.broadcast_to(here.size, sizes.shape)[worst]
-        found.append((np.log(sizes[worst] or 1e-300) + size, top + places[worst] if part.length else float(k + 1)))
+        found.append((np.log(sizes[worst] or 1e-300) + size, float(k + 1) if disc else top + places[worst]))
         top += part.length
         state = part.down(s, state)
     logarithm, depth = max(found)

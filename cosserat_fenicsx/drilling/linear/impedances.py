@@ -170,6 +170,36 @@ class Disc(_Section):
 
 
 @dataclass(frozen=True)
+class Parted(_Section):
+    """A place where a tool parts the string: a dashpot c (`damping`) or a spring k between both sides, the other one 0:
+    w below = w above - P/c, or - s P/k.
+
+    Its impedance, for scaling, is c, or 1 N s/m times the rate k/(1 N s/m).
+    """
+
+    damping: float
+    spring: float
+    name: str
+
+    length = travel = inertia = drag = 0.0
+
+    @property
+    def impedance(self):
+        """For scaling."""
+        return self.damping or np.sqrt(self.spring)
+
+    def along(self, s, state, points, places):
+        return np.zeros(1), state.w, 0.0
+
+    def through(self, s, state):
+        """The state below."""
+        give, slope = (1 / self.damping, 0.0) if self.damping else (s / self.spring, 1 / self.spring)
+        return State(
+            state.w - give * state.P, state.P, state.dw - give * state.dP - slope * state.P, state.dP, state.size
+        )
+
+
+@dataclass(frozen=True)
 class Guide:
     """A string as a waveguide, with the condition at its top and the inertia at its lower end.
 
@@ -317,7 +347,7 @@ def _fed(drive, first, top):
 
 def torsional(scene, walls=None) -> Guide:
     """Torsional waveguide of a `Drilling` scene; `walls`: rates of friction at the wall, see `WallDashpots`."""
-    drive, string, bit = scene.drive, scene.discs, scene.bit.inertia if scene.bit else 0.0
+    drive, string, bit = scene.drive, scene.discs, scene.bit_inertia
     if string:
         lower = zip((*string.stiffnesses, None), (*string.dampings, 0.0), strict=True)
         parts = tuple(
@@ -354,4 +384,6 @@ def _uniform(scene, kind, walls):
             length = sum(piece[0] for piece in pieces)
             section = getattr(x, stiffness), getattr(x, inertia), rate + wall
             found.append(Uniform(length, *section, x.name, x.damping_time))
+        parted = [x for x in scene.joints if x.segment == k and x.turns == (kind == "torsion")]
+        found += [Parted(x.damping, x.spring, x.tool.name) for x in parted]
     return tuple(found)

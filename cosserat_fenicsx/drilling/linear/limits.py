@@ -122,6 +122,9 @@ def limit_weight(scene: Drilling, speed: float, *, up_to: float = 10.0) -> float
     law = scene.bit.law if scene.bit else None
     if law is None or law.drills or not law.needs_weight or law.resistance(1.0) is None:
         refuse("limit_weight", "scene", scene.bit, "a bit with a Stribeck law and a radius")
+    if scene.motor is not None:
+        refuse("limit_weight", "scene", scene.motor, "a string without a motor, the speed of whose bit depends on the "
+               "weight; stability takes any weights")  # fmt: skip
     per_newton, per_kilonewton = (law.resistance(weight).slope(speed) / weight for weight in (1.0, 1e3))
     if not math.isclose(per_newton, per_kilonewton, rel_tol=1e-4):
         refuse("limit_weight", "scene", scene.bit, "a bit whose torque is proportional to the weight on bit; stability "
@@ -174,7 +177,7 @@ def limit_speed(
         NotConverged: the roots that were found are fewer than those counted.
     """
     up_to = positive("limit_speed", "up_to", up_to, "Hz")
-    searched = _falls_at_wall(scene)
+    searched = _falls_at_wall(scene) or scene.motor is not None
     if scene.bit is None and not searched:
         refuse(scene, "bit", None, "a BitOnRock with a law, or a WallFriction that falls with the slip")
     if weight is not None:

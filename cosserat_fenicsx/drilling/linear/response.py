@@ -5,7 +5,7 @@ lower end has the inertia of the bit and the slope of its law; a bit that cuts c
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from rich.table import Table
@@ -19,6 +19,7 @@ from cosserat_fenicsx.drilling.linear.characteristic import (
     without_autodriller,
 )
 from cosserat_fenicsx.drilling.linear.excitation import Drawn
+from cosserat_fenicsx.drilling.linear.impedances import Parted, State
 from cosserat_fenicsx.drilling.linear.roots import all_roots
 from cosserat_fenicsx.drilling.linear.stability import ModeShape, shape_of, steady_of
 from cosserat_fenicsx.drilling.scene import Drilling
@@ -38,6 +39,8 @@ _SHOWN = {
     "torsion": (SPEED, Quantity("torque", unit="N m", shown="kN m")),
     "axial": (Quantity("velocity", unit="m/s"), WEIGHT),
 }
+# The source in the middle of a string.
+_TOOL = "tool force"
 # Frequencies without given ones: how many, and up to which one, Hz. Peaks that are listed. Growth over the spacing of
 # modes that is rounding.
 _MANY, _HIGHEST, _PEAKS, _NEUTRAL = 2000, 10.0, 12, 1e-9
@@ -83,7 +86,8 @@ class FrequencyResponse(Drawn):
         """(n,) complex ratio of what answers over what moves the string, at each frequency.
 
         In torsion the names are "drive speed", "surface torque", "bit speed" and "torque on bit"; axially "top
-        velocity" (downwards), "hook load", "bit velocity" (downwards) and "weight on bit".
+        velocity" (downwards), "hook load", "bit velocity" (downwards) and "weight on bit"; and, as a source, "tool
+        force", which drives both sides of an `OscillationTool` apart.
 
         Args:
             source: a torque or weight on bit is one beside that of the bit's law, with the drive in its place. Speed or
@@ -229,7 +233,12 @@ def frequency_response(
                          "weight at which `stability` finds no such mode, or unstable=True")  # fmt: skip
     guide = next(guide for guide in f.guides if guide.kind == kind)
     s = 2j * math.pi * frequency
-    impedance, drive, ratios = _ratios(guide, s, f.below(s)[f.guides.index(guide)], _ENDS[kind])
+    below = f.below(s)[f.guides.index(guide)]
+    impedance, drive, ratios = _ratios(guide, s, below, _ENDS[kind])
+    for k, tool in enumerate(x for x in guide.parts if isinstance(x, Parted) and x.spring):
+        ratios[_TOOL if not k else f"{_TOOL} {k + 1}"] = _from_tool(
+            guide, s, below, guide.parts.index(tool), _ENDS[kind]
+        )
     return FrequencyResponse(scene, kind, speed, frequency, impedance, drive, roots, f, ratios)
 
 
@@ -241,6 +250,28 @@ def _growing(roots, f):
     worst = growing[growing.real.argmax()]
     text = f"a mode of {worst.imag / 2 / math.pi:.4g} Hz grows by {worst.real:.3g} 1/s"
     return text + (f", and {len(growing) - 1} more grow" if len(growing) > 1 else "")
+
+
+def _from_tool(guide, s, below, place, names):
+    """{answer: ratio} to the force of a tool between both sides of a place in a guide, in the order of its parts."""
+    stands, parts = np.isinf(below), guide.parts
+    finite = np.where(stands, 1.0, below)
+    above = replace(guide, parts=parts[:place]).bottom(s)
+    spring, start, nothing = parts[place].spring, guide.start(s), np.zeros_like(s)
+
+    def at_bit(w, P):
+        end = State(w, P, nothing, nothing).scaled(parts[place - 1].impedance)
+        for part in parts[place + 1 :]:
+            end = part.down(s, end)
+        return np.array([end.w, end.P, np.where(stands, end.w, finite * end.w - end.P)]) * np.exp(end.size)
+
+    # both sides move by the wave from above, below also by the force: w below = w above - s/k (P - 1)
+    moved, driven = at_bit(above.w - s / spring * above.P, above.P), at_bit(s / spring, nothing)
+    share = -driven[2] / moved[2]
+    w, P, _ = share * moved + driven
+    per = share * np.exp(start.size - above.size)
+    load = np.where(stands, P, (finite - guide.inertia * s) * w)
+    return dict(zip(names, (per * start.w, -per * start.P, w, load), strict=True))
 
 
 def _ratios(guide, s, below, names):

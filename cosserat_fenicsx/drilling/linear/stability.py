@@ -18,6 +18,7 @@ from cosserat_fenicsx.drilling.linear.characteristic import (
 )
 from cosserat_fenicsx.drilling.linear.frequencies import SoftSpeed, SoftTorque, natural_frequencies, own_rule, with_rule
 from cosserat_fenicsx.drilling.linear.hfto import Hfto, oscillations
+from cosserat_fenicsx.drilling.linear.impedances import Disc
 from cosserat_fenicsx.drilling.linear.roots import all_roots, follow
 from cosserat_fenicsx.drilling.scene import Drilling
 from cosserat_fenicsx.drilling.stick_slip import SPEED, WEIGHT
@@ -112,7 +113,7 @@ def _along(guide, s, points):
         share = max(2, round(points * part.travel / guide.travel))
         x, here, twice = part.along(at, state, _POINTS + 2 * int(abs(s) * part.travel), share)
         energies.append((part.name, twice, state.size))
-        depth.append(top + x if part.length else np.array([k + 1.0]))
+        depth.append(np.array([k + 1.0]) if isinstance(part, Disc) else top + x)
         found.append((here, state.size))
         top += part.length
         state = part.down(at, state)
@@ -396,7 +397,8 @@ def stability(
 
     Friction at the wall acts by its slope at the slip of the case. Of a string that rotates it brakes axial motion, and
     drives torsion where it falls with the slip; the wall force is that of the soft string, in pieces. Components damp
-    by their `damping_time`, Kelvin and Voigt.
+    by their `damping_time`, Kelvin and Voigt. A mud motor is a dashpot between string and bit, which turns by its speed
+    under the torque on bit faster; speeds are those of the string.
 
     Args:
         scene: a `Drilling`; the speed of its drive and its weight on bit are replaced by those of the cases.
@@ -532,6 +534,8 @@ def undisturbed(scene, least, peak):
     speed = max(abs(least), abs(peak))
     if scene is None or scene.start != "steady" or not speed or peak - least >= _STILL * speed:
         return ""
+    if scene.motor is not None:
+        speed = abs(scene.drive.signal()(0.0))
     return _grows_undisturbed(scene, float(f"{speed:.9g}"))
 
 

@@ -1,0 +1,104 @@
+"""Tools that part the string, in torsion or along the axis: two nodes at one place, with a spring, a damper and a pair
+of forces between them.
+
+A `MudMotor` parts it in torsion: the stall torque acts on what is below and against the housing, and a dashpot of its
+slope between them. It is linear; below zero speed the rotor is turned backwards by the same law, and told.
+An `OscillationTool` parts axial motion, with its spring and its force.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import brentq
+
+from cosserat_fenicsx.checks import refuse
+from cosserat_fenicsx.drilling.signals import ScalarSignal
+from cosserat_fenicsx.errors import SceneError
+from cosserat_fenicsx.well.tools import MudMotor, OscillationTool
+
+# Speeds at which the torque of the bit is compared with the motor's.
+_TRIED = 400
+
+
+@dataclass(frozen=True)
+class Joint:
+    """A place where a string is parted.
+
+    Attributes:
+        tool: the component; the joint is at its lower end. segment: its index from the top down.
+        turns: whether it parts torsion, else axial motion.
+        spring, damping: N m/rad and N m s/rad, or N/m and N s/m. force: `ScalarSignal` of what drives both sides apart,
+            N m or N.
+    """
+
+    tool: MudMotor | OscillationTool
+    segment: int
+    turns: bool
+    spring: float
+    damping: float
+    force: ScalarSignal
+
+
+def joints_of(laid) -> tuple[Joint, ...]:
+    """The `Joint`s of components in their places, from the top down.
+
+    Raises:
+        SceneError: more than one motor.
+    """
+    found = []
+    for k, place in enumerate(reversed(laid)):
+        tool = place.component
+        if isinstance(tool, MudMotor):
+            found.append(Joint(tool, k, True, 0.0, tool.slope, _stall(tool)))
+        if isinstance(tool, OscillationTool):
+            if k == len(laid) - 1:
+                refuse("DrillString", "components", tool.name, f"a component below {tool.name}, which it shakes")
+            found.append(Joint(tool, k, False, tool.spring, 0.0, ScalarSignal(tool, "force", tool, "N")))
+    motors = [x.tool.name for x in found if x.turns]
+    if len(motors) > 1:
+        refuse("DrillString", "components", motors, "one MudMotor: two in a row are not computed")
+    return tuple(found)
+
+
+def _stall(motor):
+    """The stall torque over time."""
+    if not callable(motor.flow):
+        return ScalarSignal(motor, "flow", motor.stall_torque(), "N m")
+
+    def torque(t):
+        return motor.stall_torque(motor.flow_at(t))
+
+    torque.jumps = getattr(motor.flow, "jumps", ())
+    return ScalarSignal(motor, "flow", torque, "N m")
+
+
+def speed_of_bit(scene, turning, down=None):
+    """The speed of the bit in steady rotation of a string (rad/s): its own, or below a motor the largest one at which
+    the torque on bit is the motor's.
+
+    Args:
+        scene: a `Drilling`. turning: of the string, rad/s.
+        down: velocity of a bit that drills, m/s; None for that by its weight.
+
+    Raises:
+        SceneError: the motor stalls.
+    """
+    motor, bit = scene.motor, scene.bit
+    if motor is None:
+        return turning
+    rate = 0.0 if scene.drag is None else scene.drag.torsion
+    drag, stall = rate * sum(x.rhoJ * x.length for x in scene.turned), motor.stall_torque()
+
+    def excess(om):
+        velocity = bit.law.rate(bit.resting, om) if down is None and bit.law.drills else down or 0.0
+        torque = float(bit.law.steady_forces(bit.resting or 0.0, np.array([velocity, om]))[1])
+        return stall - motor.slope * (om - turning) - torque - drag * om
+
+    speeds = turning + np.linspace(stall / motor.slope, 0.0, _TRIED)[:-1]
+    values = np.array([excess(om) for om in speeds])
+    k = int(np.argmax(values >= 0))
+    if values[k] < 0:
+        raise SceneError(f"{motor.name}: it stalls: with {motor.flow_at(0.0):.4g} m^3/s it gives less than {stall:.5g} "
+                         "N m, and the bit takes more at every speed: expected less weight on bit, more flow or "
+                         "another motor; start='rest' computes how it stalls")  # fmt: skip
+    return float(speeds[0] if k == 0 else brentq(excess, speeds[k], speeds[k - 1], xtol=1e-14, rtol=1e-14))

@@ -1,0 +1,203 @@
+"""Tools in a string: a positive-displacement motor, and an oscillation tool.
+
+A motor with the displacement V a revolution, v = V/(2 pi), whose seals leak by `leak` times the pressure p over it,
+takes the flow Q at the speed om of its rotor against its housing, and hands the torque T down to the bit:
+
+    Q = v om + leak p,     T = v p - T_lost,     so     T = v Q/leak - T_lost - c om,     c = v^2/leak.
+
+The housing bears -T. For small motions about any speed the motor is a dashpot c between housing and bit. Where the bit
+takes more than the stall torque, T at om = 0, the string turns the rotor backwards; T_lost keeps its sign there.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Annotated, Any
+
+import numpy as np
+
+from cosserat_fenicsx.checks import call, number, refuse, store
+from cosserat_fenicsx.parts import (
+    ForceSize,
+    Frequency,
+    Inertia,
+    InTime,
+    Length,
+    Number,
+    Time,
+    Torque,
+    at_least,
+    positive,
+)
+from cosserat_fenicsx.quantities import Units
+from cosserat_fenicsx.well.components import Collar
+
+# Inner diameter of a housing over the outer one, where it is not given.
+_BORE = 0.6
+
+
+class _Tool(Collar):
+    """Base of tools: components like collars, by their diameters."""
+
+    _called = "tool"
+
+    def _refuse_size_as_length(self):
+        """There are no standard sizes: a text is a length."""
+
+    def validate(self):
+        """Refuse a size, and a tool that fills up to the surface; fill in the inner diameter."""
+        name = type(self).__name__
+        if self.size is not None:
+            refuse(self, "size", self.size, f"outer_diameter= and inner_diameter= (m): there are no standard {name}s")
+        if self.length is None:
+            refuse(self, "length", None, f"a length (m): a {name} does not fill up to the surface")
+        if self.inner_diameter is None and self.outer_diameter is not None:
+            store(self, inner_diameter=_BORE * self.outer_diameter)
+        super().validate()
+
+
+@dataclass(frozen=True, kw_only=True)
+class MudMotor(_Tool):
+    """A positive-displacement motor, which turns what is below it in the string against its housing.
+
+    What is below it (its drive shaft, a `Bit`) and its rotor turn with the bit, all above with the string. Along the
+    axis, and in torque and drag, it is a collar; `bend` is that of its housing.
+
+    Args:
+        length, outer_diameter, inner_diameter, mass, material, name, damping_time, bend, bend_at, tool_face: as of
+            `Collar`, but inner_diameter None for 0.6 of the outer one.
+        displacement: V, m^3 a revolution of the rotor against the housing.
+        leakage: flow past the seals per pressure over the motor, m^3/(s Pa).
+        lost_torque: T_lost, N m, of the torque that the pressure makes.
+        flow: Q, m^3/s: a number, or a function of time, such as a `Ramp` or a `Table`, for `drilling.simulate`.
+        rotor_inertia: kg m^2, of rotor and drive shaft; None for a steel cylinder of half the inner diameter.
+
+    Raises:
+        SceneError: as of `Collar`; numbers that are not positive; a flow whose stall torque is not above 0.
+    """
+
+    displacement: Annotated[float, Number("volume", positive("a displacement a revolution"))]
+    leakage: Annotated[float, Number(limits=positive("a leakage (m^3/(s Pa)), about 1e-8"))]
+    lost_torque: Annotated[Torque, at_least(0)] = 0.0
+    flow: InTime[Annotated[float, Number("flow", positive("a flow through the motor"))]]
+    rotor_inertia: Annotated[Inertia, positive()] | None = None
+
+    _called = "mud motor"
+
+    def validate(self):
+        """Refuse a motor that has no torque; fill in the inertia of the rotor."""
+        super().validate()
+        if self.rotor_inertia is None:
+            density, radius = self.material.density, self.inner_diameter / 4
+            store(self, rotor_inertia=density * math.pi / 2 * radius**4 * self.length)
+        self.flow_at(0.0)
+
+    @property
+    def per_radian(self) -> float:
+        """v, m^3/rad."""
+        return self.displacement / (2 * math.pi)
+
+    @property
+    def slope(self) -> float:
+        """c = v^2/leak, by which the torque falls with the speed, N m s/rad."""
+        return self.per_radian**2 / self.leakage
+
+    def flow_at(self, t: float) -> float:
+        """The flow at a time (s), m^3/s.
+
+        Raises:
+            SceneError: no number, or one whose stall torque is not above 0.
+        """
+        flow, where = self.flow, f"a flow (m^3/s) at t = {t:g} s"
+        if callable(flow):
+            flow = float(np.ravel(call(flow, t, "MudMotor.flow", f" at t = {t:g} s"))[0])
+        least = self.lost_torque * self.leakage / self.per_radian
+        expected = f"{where} above {least:.3g}, at which the motor stalls without load"
+        return number(self, "flow", flow, expected, lambda x: least < x < math.inf)
+
+    def sentence(self, units: Units) -> str:
+        """On its flow, speed and torque at the start, in some units."""
+        flow = units.told(self.flow_at(0.0), "m^3/s", form=".4g", shown="l/min")
+        speed = units.told(self.speed(0.0), "rad/s", form=".4g", shown="rpm")
+        torque = units.told(self.stall_torque(), "N m", form=".4g", shown="kN m")
+        return f"Tool, {self.name}: {flow} turn it at {speed} without load, it stalls at {torque}."
+
+    def _flow(self, flow):
+        return self.flow_at(0.0) if flow is None else number(self, "flow", flow, "a flow (m^3/s)", lambda x: x > 0)
+
+    def stall_torque(self, flow: float | None = None) -> float:
+        """The torque at which the motor stands, N m.
+
+        Args:
+            flow: m^3/s; None for its own, at the start.
+        """
+        return self.per_radian * self._flow(flow) / self.leakage - self.lost_torque
+
+    def speed(self, torque: Any, flow: float | None = None) -> Any:
+        """Speed of the rotor against the housing, rad/s, under torques on the bit (N m, a number or an array); below 0
+        beyond the stall torque. `flow` as of `stall_torque`."""
+        return (self.stall_torque(flow) - torque) / self.slope
+
+    def pressure(self, torque: Any, flow: float | None = None) -> Any:
+        """Pressure over the motor, Pa, see `speed`."""
+        return (self._flow(flow) - self.per_radian * self.speed(torque, flow)) / self.leakage
+
+    def running(self, owner: str, torque: float) -> float:
+        """The speed under a steady torque on bit (N m), rad/s.
+
+        Raises:
+            SceneError: the torque is above the stall torque.
+        """
+        stall = self.stall_torque()
+        if torque >= stall:
+            refuse(owner, "torque", torque, f"below the torque at which {self.name} stalls, {stall:.5g} N m at "
+                   f"{self.flow_at(0.0):.4g} m^3/s: less weight on bit, more flow or another motor")  # fmt: skip
+        return float(self.speed(torque))
+
+
+@dataclass(frozen=True, kw_only=True)
+class OscillationTool(_Tool):
+    """A tool that shakes the string along its axis, to reduce the friction at the wall: a spring, and a pair of forces
+    that drive its lower end down and what is above up, F sin(2 pi f (t - start)).
+
+    It shakes at its lower end; torsion passes through it. In torque and drag it is a collar.
+
+    Args:
+        length, outer_diameter, inner_diameter, mass, material, name, damping_time: as of `MudMotor`.
+        spring: k, N/m, of the spring that holds both sides together.
+        frequency: f, Hz. force: F, N, from the pressure pulses of a valve, say.
+        stroke: in place of the force, m: by how much it moves either way where nothing resists, F = k stroke.
+        start: s, from which time on it works.
+
+    Raises:
+        SceneError: as of `Collar`; numbers that are not positive, or force and stroke, or neither.
+    """
+
+    spring: Annotated[float, Number("stiffness", positive("the stiffness of its spring"))]
+    frequency: Annotated[Frequency, positive()]
+    force: Annotated[ForceSize, positive()] | None = None
+    stroke: Length | None = None
+    start: Annotated[Time, at_least(0)] = 0.0
+
+    _called = "oscillation tool"
+
+    def validate(self):
+        """Refuse force and stroke, or neither; the force from the stroke."""
+        super().validate()
+        if (self.force is None) == (self.stroke is None):
+            refuse(self, "force", self.force, "either a force (N) or a stroke (m)")
+        if self.force is None:
+            store(self, force=self.spring * self.stroke, stroke=None)
+
+    def sentence(self, units: Units) -> str:
+        """On its force and frequency, in some units."""
+        force, spring = (units.told(*x, form=".4g") for x in ((self.force, "N"), (self.spring, "N/m")))
+        return f"Tool, {self.name}: a force of {force} at {self.frequency:.4g} Hz beside a spring of {spring}."
+
+    @property
+    def jumps(self) -> tuple[float, ...]:
+        """Times (s) at which the force is not smooth."""
+        return (self.start,) if self.start else ()
+
+    def __call__(self, t: float) -> float:
+        """The force that drives both sides apart at a time (s), N."""
+        return self.force * math.sin(2 * math.pi * self.frequency * (t - self.start)) if t > self.start else 0.0

@@ -1,0 +1,254 @@
+"""Motors and oscillation tools in strings, against independent truths and closed forms."""
+
+import json
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import cosserat_fenicsx as cf
+from cosserat_fenicsx.drilling import (
+    BitLaw,
+    BitOnRock,
+    Cutting,
+    Drilling,
+    Hook,
+    Matched,
+    Stribeck,
+    TopDrive,
+    ViscousDrag,
+)
+from cosserat_fenicsx.drilling.linear.characteristic import Steady
+from cosserat_fenicsx.well import Bit, Collar, Component, DrillString, MudMotor, OscillationTool
+
+pytestmark = [pytest.mark.serial, pytest.mark.once]
+TRUTHS = json.loads((Path(__file__).parent / "reference" / "tools.json").read_text(encoding="utf-8"))
+STEEL = cf.Material(E=206e9, nu=0.3, density=7850.0)
+MOTOR, VISCOUS, PULLED = TRUTHS.values()
+GIVEN, KNOWN = MOTOR["input"], MOTOR["truth"]
+STEADY, STEPS, SLOPES = (next(KNOWN[x] for x in KNOWN if x.startswith(y)) for y in ("steady", "flow steps", "eigen"))
+
+
+@dataclass(frozen=True)
+class Rising(BitLaw):
+    """A torque that rises evenly with the speed."""
+
+    first: float
+    slope: float
+
+    def torque(self, speed, weight):
+        return self.first + self.slope * speed
+
+
+@dataclass(frozen=True, kw_only=True)
+class Lumped(MudMotor):
+    """A motor whose housing is the inertia of the truth, all but rigid."""
+
+    @property
+    def torsion(self):
+        return 3e10, GIVEN["J1"] / self.length
+
+
+@dataclass(frozen=True)
+class Switched:
+    """A flow that changes at once."""
+
+    first: float
+    second: float
+    at: float
+
+    @property
+    def jumps(self):
+        return (self.at,)
+
+    def __call__(self, t):
+        return self.first if t < self.at else self.second
+
+
+def motor(kind=MudMotor, **more):
+    given = {"displacement": GIVEN["V"], "leakage": GIVEN["leak"], "lost_torque": GIVEN["Tf"], "flow": GIVEN["Q"]}
+    return kind(**{"length": 1.0, "outer_diameter": "6 3/4 in", **given, **more})
+
+
+def pipe(length, EA=701023457.1261743, rhoA=26.71375795359451):
+    stiffness = cf.Stiffness(shear=(1e9, 1e9), axial=EA, bending=(1e6, 1e6), torsion=941162.1464157262, mass=rhoA,
+                             inertia=(0.05, 0.05, 0.09324815246769404))  # fmt: skip
+    return Component(length, stiffness, 200.0, 0.08)
+
+
+def above(*below, length=20.0, law=None, **more):
+    """A stiff drive that turns a pipe with what is below."""
+    law = law or Rising(GIVEN["T0"], GIVEN["b"])
+    return Drilling(
+        DrillString([*below, pipe(length)]), **{"drive": TopDrive(GIVEN["Om"]), "bit": BitOnRock(law), **more}
+    )
+
+
+def test_power_curve(truth):
+    tool = motor()
+    torque, speed, bit, pressure, power, efficiency = STEADY
+    truth("mud motor: no-load speed, stall torque, slope", [tool.speed(0.0), tool.stall_torque(), tool.slope],
+          [KNOWN["no-load speed (rad/s)"], KNOWN["stall torque (N m)"],
+           KNOWN["slope of torque over speed (N m s/rad)"]], 1e-12)  # fmt: skip
+    curve = cf.well.power_curve(tool, [0.02, GIVEN["Q"]])
+    at = [np.interp(torque, curve.torque[41:], x[41:]) for x in (curve.speed, curve.pressure)]
+    truth("mud motor: speed and pressure under torque", at, [speed, pressure], 1e-12)
+    assert GIVEN["Q"] * pressure == pytest.approx(power)
+    assert torque * speed / power == pytest.approx(efficiency)
+    assert (curve.speed[[40, -1]] == pytest.approx(0, abs=1e-12)) and "stalls at 11.89 kN m" in str(curve)
+
+
+@pytest.mark.parametrize(("model", "dt"), [("torsion", 2e-4), ("axial and torsional", 4e-4)])
+def test_flow_that_steps(model, dt, truth):
+    """Two bodies below a matched drive, from steady drilling at 10 s on; the books are balanced."""
+    scene = above(motor(Lumped, flow=Switched(GIVEN["Q"], GIVEN["Q2"], 10.0), rotor_inertia=GIVEN["J2"]),
+                  drive=TopDrive(GIVEN["Om"], control=Matched(torque=STEADY[0])))  # fmt: skip
+    found = cf.drilling.simulate(scene, 12.05, model=model, dt=dt, progress=False)
+    rows = np.array(STEPS)
+    when, mean = 10.0 + rows[:, 0], found.mean_times
+    bit = np.interp(when, found.times if model == "torsion" else mean, found.bit_speed)
+    speed, pressure = (np.interp(when, mean, x) for x in (found.motor_speed, found.pressure))
+    torque = pressure * scene.motor.per_radian - GIVEN["Tf"]
+    got = np.column_stack([bit - speed, bit, torque, pressure])
+    truth(f"mud motor, flow steps, {model}: speeds, torque, pressure", got, rows[:, 1:], 1e-3)
+    assert abs(found.balance[-1]) < 1e-6 * found.work_of_drive[-1] and not found.stalled[found.times > 0.1].any()
+
+
+@pytest.mark.parametrize(("model", "damped"), [("torsion", 0.0), ("torsion", 1e-5), ("axial and torsional", 0.0)])
+def test_steady_start(model, damped):
+    """Nothing changes, and the bit is faster by the motor's speed under its torque."""
+    scene = above(Bit(0.2), motor(damping_time=damped), start="steady", drag=ViscousDrag(torsion=0.5))
+    found = cf.drilling.simulate(scene, 0.5, model=model, progress=False)
+    assert np.ptp(found.bit_speed) < 1e-9 and np.ptp(found.surface_torque) < 1e-6
+    below = 0.5 * sum(x.rhoJ * x.length for x in scene.turned) * found.bit_speed[0]
+    assert found.motor_speed[0] == pytest.approx(scene.motor.speed(found.torque_on_bit[0] + below), rel=1e-9)
+    assert np.abs(np.diff(found.torque[-1][1:-1])).max() < 20.0  # by drag alone
+
+
+@pytest.mark.parametrize("model", ["torsion", "axial and torsional"])
+def test_a_motor_that_stalls(model):
+    """A bit that holds more than the motor: the string turns its rotor backwards, which is told."""
+    scene = above(Bit(0.2), motor(), law=Stribeck(30e3, 29e3), drag=ViscousDrag(torsion=2.0))
+    found = cf.drilling.simulate(scene, 3.0, model=model, progress=False)
+    assert (found.bit_speed == 0).all() and found.stalled[-1]
+    assert found.motor_speed[-1] == pytest.approx(-GIVEN["Om"], rel=1e-3)
+    assert "THE MOTOR STALLS from t = " in str(found)
+    with pytest.raises(cf.SceneError, match="mud motor: it stalls"):
+        cf.drilling.simulate(replace(scene, start="steady"), 1.0, model=model)
+
+
+def test_small_motions_see_a_dashpot(truth):
+    """The two bodies' own rates, below a matched drive; a bit that falls with the speed."""
+    scene = above(motor(Lumped, rotor_inertia=GIVEN["J2"]), drive=TopDrive(GIVEN["Om"], control=Matched()))
+    equation = Steady(scene)
+    f = equation.equation(equation.parameters(GIVEN["Om"], None))
+    s = np.array(SLOPES, dtype=complex)
+    for _ in range(20):
+        value, slope = f(s)
+        s = s - value / slope
+    truth("mud motor: rates of small motions", s.real, SLOPES, 1e-4)
+    falling = replace(scene, bit=BitOnRock(Stribeck(*GIVEN["stribeck"])))
+    bit, torque, decays = next(x for y, x in KNOWN.items() if y.startswith("with a Stribeck"))[0]
+    found = cf.drilling.stability(falling, [GIVEN["Om"]], up_to=1.0)
+    assert (not found.unstable(0)) == decays
+    truth("mud motor: speed of a Stribeck bit", equation.__class__(falling).speed_of_bit(GIVEN["Om"], None), bit, 1e-9)
+
+
+def test_a_bit_that_cuts_below_a_motor():
+    """It turns at the speed of string and motor: the steady state stays, and its delay follows that speed."""
+    cutting = BitOnRock(Cutting(0.108, 60e6, 0.6, 4), 60e3)
+    scene = above(Bit(0.2159), motor(), bit=cutting, start="steady")
+    found = cf.drilling.simulate(scene, 0.05, progress=False)
+    bit = GIVEN["Om"] + scene.motor.speed(found.torque_on_bit[0])
+    assert found.bit_speed[0] == pytest.approx(bit, rel=1e-9) and np.ptp(found.bit_speed) < 1e-6
+    steady = Steady(scene)
+    f = steady.equation(steady.parameters(GIVEN["Om"], 60e3))
+    assert f.delay == pytest.approx(2 * np.pi / 4 / bit) and f.penetration == pytest.approx(cutting.law.rate(60e3, bit))
+
+
+def shaken(f):
+    """The string of the truth with viscous drag, shaken at a frequency."""
+    given = VISCOUS["input"]
+    tool = OscillationTool(2.0, outer_diameter=0.127, inner_diameter=0.10861, material=STEEL, spring=given["k"],
+                           force=given["F"], frequency=f)  # fmt: skip
+    (length, *_), (short, *_), (low, EA, rhoA, rate) = *given["above"], *given["below"]
+    string = DrillString([pipe(low, EA, rhoA), pipe(short), tool, pipe(length - 2.0)])
+    return Drilling(string, TopDrive(0.0), drag=ViscousDrag(axial=rate))
+
+
+def test_tool_with_viscous_drag(truth):
+    """By exact waves, and one of the motions by elements: hook load, velocity of the lower end, power."""
+    rows, force = VISCOUS["truth"], VISCOUS["input"]["F"]
+    answer = cf.drilling.frequency_response(shaken(1.0), [row["f"] for row in rows], kind="axial", speed=0.0)
+    ends = [answer.transfer("tool force", x) for x in ("hook load", "bit velocity")]
+    known = [[row[f"{x} amplitude"] for row in rows] for x in ("hook load", "lower end velocity")]
+    truth("oscillation tool, viscous drag, by waves: hook load, lower end", np.abs(ends) * force, known, 1e-6)
+    (row, *_), f = rows, rows[0]["f"]
+    found = cf.drilling.simulate(shaken(f), 18.0, dt=1e-3, elements=320, progress=False)
+    late = found.mean_times > 16.0
+    waves = np.exp(2j * np.pi * f * found.mean_times[late])
+    waves = np.column_stack([np.ones_like(waves.real), waves.real, waves.imag])
+    got = [np.hypot(*np.linalg.lstsq(waves, x[late], rcond=None)[0][1:]) for x in (found.hook_load, found.bit_velocity)]
+    start = np.searchsorted(found.times, 16.0)
+    power = np.diff(found.work_of_tools[[start, -1]]) / np.diff(found.times[[start, -1]])
+    truth("oscillation tool, viscous drag, in motion at 5 Hz: hook load, lower end, power", [*got, *power],
+          [row[x] for x in ("hook load amplitude", "lower end velocity amplitude", "mean power fed in (W)")],
+          1e-3, most=2e-3)  # fmt: skip
+
+
+def test_tool_that_halves_the_pull(truth):
+    given = PULLED["input"]
+    path = cf.well.WellPath.from_survey([0, given["L"]], [90, 90], [0, 0], degrees=True)
+    hole = cf.well.Borehole(path, cf.well.HoleSection(given["L"], 0.2159, given["friction"]))
+    tool = OscillationTool(2.0, outer_diameter=0.127, inner_diameter=0.10861, material=STEEL, spring=given["k"],
+                           force=given["F"], frequency=given["f"], start=2.0)  # fmt: skip
+    string = DrillString([pipe(given["L"] - given["tool_at"]), tool, pipe(given["tool_at"] - 2.0)])
+    scene = Drilling(string, TopDrive(0.0), hole=hole, hook=Hook(speed=given["V"]), mud=cf.well.Mud(1850.0))
+    found = cf.drilling.simulate(scene, 16.0, elements=250, progress=False)
+    pull = found.mean("hook_load", periods=160, frequency=given["f"])
+    truth("oscillation tool, Coulomb friction: mean pull", pull, PULLED["truth"]["mean pull with the tool"], 1e-2)
+    with pytest.raises(cf.SceneError, match="mean.periods"):
+        found.mean("hook_load", 10000, 16.0)
+
+
+@pytest.mark.parametrize(("make", "words"), [
+    (lambda: motor(flow=0.0), "MudMotor.flow = 0.0: expected a flow through the motor"),
+    (lambda: motor(flow=1e-4), "MudMotor.flow = 0.0001: .*stalls without load"),
+    (lambda: motor(size="6 3/4 in"), "MudMotor.size"),
+    (lambda: motor(length=None), "MudMotor.length"),
+    (lambda: motor(leakage=0.0), "MudMotor.leakage"),
+    (lambda: above(motor(), bit=None), "Drilling.bit = None: expected a BitOnRock below mud motor"),
+    (lambda: above(motor(), motor()), "one MudMotor"),
+    (lambda: OscillationTool(2.0, outer_diameter=0.127, spring=1e6, frequency=16.0), "either a force"),
+    (lambda: above(OscillationTool(2.0, outer_diameter=0.127, spring=1e6, frequency=16.0, force=1e4)),
+     "component below"),
+    (lambda: cf.drilling.mixed_scene(above(Collar(9.0, "NC46-65"), motor()), 10.0), "without MudMotor"),
+    (lambda: cf.drilling.natural_frequencies(above(motor()), 2, "fixed"), "lets the string turn"),
+])  # fmt: skip
+def test_refused_by_name(make, words):
+    with pytest.raises(cf.SceneError, match=words):
+        make()
+
+
+def test_static_motor_is_told_and_refused():
+    path = cf.well.WellPath.from_survey([0, 20], [0, 0], [0, 0], degrees=True)
+    hole = cf.well.Borehole(path, cf.well.HoleSection(20.0, 0.2159, 0.2))
+    string = DrillString([motor(), pipe(19.0)])
+
+    def answer(torque):
+        operation = cf.well.Sliding(10e3, torque)
+        return cf.well.torque_and_drag(hole, string, operation, mud=cf.well.Mud(1200.0), model="soft")
+
+    assert "turns the bit by 64.73 rpm beside the string's rotation" in str(answer(STEADY[0]).why)
+    with pytest.raises(
+        cf.SceneError, match="Sliding.torque = 12000.0: expected below the torque at which mud motor stalls"
+    ):
+        answer(12e3)
+
+
+def test_scene_files():
+    for name in ("mud_motor", "oscillation_tool"):
+        scene = cf.read(Path(__file__).parent.parent / "demos" / "strings" / f"{name}.toml").scene
+        assert cf.drilling.choose.chosen(scene)[0] == ("torsion" if scene.motor else "axial and torsional")
+        assert scene.joints
