@@ -14,6 +14,7 @@ from cosserat_fenicsx.drilling import (
     Discs,
     Drilling,
     Hook,
+    Karnopp,
     Matched,
     RateLaw,
     Rational,
@@ -98,7 +99,7 @@ def found_by(name):
     """The motion of a stick-slip truth, above a matched impedance, from rest or steady as its code has it."""
     given = TRUTHS[name]["input"]
     law = {
-        "Coulomb": lambda: Stribeck(given["a"], given["b"]),
+        "Coulomb": lambda: Karnopp(given["a"], given["b"]),
         "Stribeck": lambda: Stribeck(given["a"], given["b"], given["c_law"]),
         "rational": lambda: Rational(given["a"], given["b"]),
     }[given["law"]]()
@@ -120,7 +121,7 @@ def test_stick_slip_of_one_disc(truth):
     known = TRUTHS["stick-slip of one disc, drop at once, exact cycle"]
     given, known = known["input"], known["truth"]
     discs = Discs((1.0, given["J"]), (given["k"],), drags=(0.0, given["c"]))
-    scene = Drilling(discs, TopDrive(given["Om"]), BitOnRock(Stribeck(given["Ts"], given["Td"])))
+    scene = Drilling(discs, TopDrive(given["Om"]), BitOnRock(Karnopp(given["Ts"], given["Td"])))
     found = cf.drilling.simulate(scene, 60.0, dt=1e-3, progress=False).stick_slip()
     cycle = [known["period"], known["largest speed of the disc"]]
     truth("stick-slip of one disc, period and peak", [found.period, found.peak], cycle, 1e-4)
