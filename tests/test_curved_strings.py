@@ -1,10 +1,14 @@
 """Rods of drill-strings in bent holes, in motion from their equilibria at rest, below pipe with friction at the wall."""
 
+import math
+
 import numpy as np
 import pytest
+from ended_motions import Stopped, stop_at
 from torsion_scenes import part
 
 import cosserat_fenicsx as cf
+from cosserat_fenicsx.drilling.pipe_friction import PipeFriction
 
 pytestmark = pytest.mark.serial
 MESH = {"elements": 20, "degree": 2}
@@ -49,3 +53,90 @@ def test_at_rest_in_a_bent_hole_nothing_moves(depth):
     assert history.kinetic.max() < 1e-9 * history.strain[0] and imbalance(history) < 1e-10
     pull = history.force(mixed.rod.start) @ mixed.above.down()
     assert pull == pytest.approx(mixed.above.tension, rel=1e-3)
+
+
+def test_torsion_in_a_bend_that_holds_the_string_on_its_axis_is_that_of_the_straight_string():
+    """Bit speed and surface torque with stick-slip of the bit, without friction at the wall: to 1e-3 of their peaks."""
+    parts = (part(30.0, 0.1651, 0.05715), part(120.0, 0.127, 0.10861))
+    string = drilling(
+        lambda t: 5.0 * (1 - math.cos(math.pi * min(t / 0.2, 1.0))),
+        friction=0.0, path=well(150.0), parts=parts, hole=0.1652, drag=1.0,
+        bit=cf.drilling.BitOnRock(cf.drilling.Stribeck(1500.0, 900.0, 3.0), inertia=20.0),
+    )  # fmt: skip
+    mixed = cf.drilling.mixed_scene(string, 90.0)
+    history = cf.simulate(mixed.scene, 0.6, dt=1e-3, elements=12, degree=2, start=mixed.rest(12, 2))
+    found, whole = mixed.as_drilling(history), cf.drilling.simulate(string, 0.6, dt=1e-4, model="torsion")
+    middles = found.times - found.dt / 2
+    for name, delay in (("bit_speed", 0.0), ("surface_torque", 1e-4)):
+        true = np.interp(middles, whole.times - delay, getattr(whole, name))
+        assert np.abs(getattr(found, name) - true).max() < 1e-3 * np.abs(true).max(), name
+    assert found.bit_speed.max() > 5 and imbalance(history) < 1e-5
+
+
+@pytest.mark.parametrize("depth", [150.0, 30.0])
+def test_the_torque_of_rotation_is_that_of_torque_and_drag(depth):
+    """The pipe by its waves, and nearly the whole string as a rod; drag makes the start short, and is taken off."""
+    path, rate, speed = well(200.0, turn=3.0), 8.0, 0.5
+    parts = (part(40.0, 0.1651, 0.05715, weight=1200.0), part(160.0, 0.127, 0.10861, weight=250.0))
+    string = drilling(lambda t: speed * min(2 * t, 1.0), path=path, parts=parts, drag=rate)
+    mixed = cf.drilling.mixed_scene(string, depth)
+    mesh = {"elements": round((200.0 - depth) / 5.0), "degree": 2}
+    history = cf.simulate(mixed.scene, 1.5, dt=2e-3, **mesh, start=mixed.rest(**mesh), save_every=0.05)
+    found = mixed.as_drilling(history)
+    of_mud = rate * speed * sum(x.rhoJ * x.length for x in string.segments)
+    assert imbalance(history) < 1e-4
+    torque = found.surface_torque[-8:].mean() - of_mud
+    for model in ("soft", "rod"):
+        rest = cf.well.torque_and_drag(string.hole, string.string, cf.well.RotateOffBottom(), mud=cf.well.Mud(0.0), model=model, tol=2e-3)
+        print(depth, model, torque, rest.surface_torque, torque / rest.surface_torque - 1, np.ptp(found.surface_torque[-8:]), rest.error, found.hook_load[-1], rest.hook_load, imbalance(history))
+
+
+def node(friction):
+    """The friction of one node of a pipe that lies in a horizontal hole: 90 m of 100 N/m."""
+    path = cf.well.WellPath.from_survey([0.0, 90.0], [90, 90], [0, 0], degrees=True)
+    string = drilling(0.0, path=path, parts=(part(90.0, 0.127, 0.10861),), friction=friction)
+    return PipeFriction(string, np.array([0.0, 45.0, 90.0])), 100.0 * 90.0
+
+
+def test_friction_at_a_node_is_a_vector_against_its_slip():
+    mu, r = 0.3, 0.127 / 2
+    law, load = node(mu)
+    A, B = np.array([7e3]), np.array([50.0])  # impedances, axial and torsional
+    turning = mu * load / math.hypot(1.0, mu)  # the wall bears the friction around the hole too
+    F, G = law.holding(np.array([0.0]), np.array([0.9 * turning * r]), A, B)  # it sticks
+    assert F[0] == 0 and G[0] == pytest.approx(0.9 * turning * r, rel=1e-12)
+    F, G = law.holding(np.array([0.0]), np.array([2.0 * turning * r]), A, B)
+    assert G[0] == pytest.approx(turning * r, rel=1e-12)
+    law, _ = node(mu)
+    F, _ = law.holding(np.array([5 * load]), np.array([0.0]), A, B)
+    assert F[0] == pytest.approx(mu * load, rel=1e-12)
+    for _ in range(30):  # the direction is that of the step before
+        F, G = law.holding(np.array([5 * load]), np.array([2 * load * r]), A, B)
+    V, W = (5 * load - F[0]) / A[0], (2 * load * r - G[0]) / B[0] * r
+    assert F[0] * W == pytest.approx(G[0] / r * V, rel=1e-9)
+    assert math.hypot(F[0], G[0] / r) == pytest.approx(mu * math.sqrt(load**2 - (G[0] / r) ** 2), rel=1e-9)
+
+
+def test_resume_below_a_pipe_that_rubs_gives_identical_digits(tmp_path, monkeypatch):
+    mixed = cf.drilling.mixed_scene(drilling(lambda t: min(4 * t, 2.0)), 200.0)
+    start = mixed.rest(**MESH)
+    whole = cf.simulate(mixed.scene, 0.12, dt=2e-3, **MESH, start=start)
+    stop_at(monkeypatch, 40, 0.0)
+    with pytest.raises(Stopped):
+        cf.simulate(mixed.scene, 0.12, dt=2e-3, folder=tmp_path / "run", **MESH, start=start)
+    history = cf.resume(tmp_path / "run", mixed.scene)
+    for name in ("times", "energy", "work", "dissipated"):
+        assert np.array_equal(getattr(history, name), getattr(whole, name))
+    assert np.array_equal(history.far_end(mixed.above), whole.far_end(mixed.above), equal_nan=True)
+
+
+def test_refusals():
+    free = cf.drilling.Drilling(cf.well.DrillString((part(200.0, 0.127, 0.10861),)), cf.drilling.TopDrive(0.0))
+    mixed = cf.drilling.mixed_scene(free, 100.0)
+    with pytest.raises(cf.SceneError, match="hole = None: expected a Borehole for `rest`.* start=1.0"):
+        mixed.rest(**MESH)
+    history = cf.simulate(mixed.scene, 0.002, dt=1e-3, elements=2, degree=2, start=1.0)
+    with pytest.raises(cf.SceneError, match="action = .*expected an action of the scene that depends on earlier motion"):
+        history.far_end(mixed.scene.loads[0])
+    with pytest.raises(cf.SceneError, match="history = .*expected a motion of the `scene`"):
+        cf.drilling.mixed_scene(free, 100.0).as_drilling(history)

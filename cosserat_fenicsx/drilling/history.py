@@ -85,7 +85,7 @@ class DrillingHistory(Result):
 
     Attributes:
         scene: the `Drilling`.
-        model: "torsion" or "axial and torsional". why: sentences on the choice of the model and its approximations.
+        model: "torsion", "axial and torsional", or "rod below pipe" of `MixedScene.as_drilling`. why: sentences on the choice of the model and its approximations.
         dt: step, s. counts: {name: number} of the solver, such as steps that were halved.
         times: (n,) s, each at the end of a step. mean_times: (n,) s, the middles of those over which means are taken.
         profile_times: (k,) s. depths: (m,) measured depths, m.
@@ -177,6 +177,8 @@ class DrillingHistory(Result):
     def balance(self) -> np.ndarray:
         """(n,) residual of the ledger, J: energies and losses less works, the negative loss of the scheme. Of a motion
         that starts in steady rotation, less its first value, the initial energy."""
+        if len(self) and np.isnan(self.kinetic).all():  # of a model without a ledger
+            return np.full(len(self), np.nan)
         signs = {name: -1 if name.startswith("work") else 1 for name in LEDGER}
         missing = sum(sign * np.nan_to_num(getattr(self, name)) for name, sign in signs.items())
         return missing - missing[:1] if self.scene.start == "steady" else missing
@@ -260,7 +262,7 @@ class DrillingHistory(Result):
                    "for long.")  # fmt: skip
 
     def _more(self, units):
-        if len(self) > 5:
+        if len(self) > 5 and not np.isnan(self.balance).all():
             worked = {
                 name: np.nan_to_num(getattr(self, f"work_of_{name}")[-1])
                 for name in ("drive", "hook", "weight", "tools")

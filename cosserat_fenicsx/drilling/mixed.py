@@ -9,10 +9,13 @@ from mpi4py import MPI
 from cosserat_fenicsx.actions.walls import HoleRing, HoleWall, TubeRing, TubeWall, value_at
 from cosserat_fenicsx.checks import instance, number, refuse, whole
 from cosserat_fenicsx.drilling.bit_laws import BitLaw
+from cosserat_fenicsx.drilling.history import COLUMNS, DrillingHistory
 from cosserat_fenicsx.drilling.pipe_above import PipeAbove
 from cosserat_fenicsx.drilling.scene import Drilling
 from cosserat_fenicsx.drilling.wall_friction import law_of, static_weight
+from cosserat_fenicsx.numerics import directors, small_rotations
 from cosserat_fenicsx.parts import ForceSize, Inertia, at_least
+from cosserat_fenicsx.results.history import History
 from cosserat_fenicsx.results.path import Path
 from cosserat_fenicsx.scene.action import PointAction
 from cosserat_fenicsx.scene.curves import Line
@@ -40,7 +43,7 @@ class MixedScene:
         scene: of the rod, its loads, the wall of the hole, and the pipe above. at_rest: the same rod with a wall
             without friction; `rest` finds its equilibrium.
         rod: from the top down. above: the `PipeAbove`. depth: measured depth of the rod's upper end, m.
-        why: sentences on approximations.
+        why: sentences on approximations. drilling: the `Drilling` that it was made of.
     """
 
     scene: Scene
@@ -49,7 +52,9 @@ class MixedScene:
     above: PipeAbove
     depth: float
     why: tuple
+    drilling: Drilling
     _string: StringScene | None = field(default=None, repr=False)
+    _hook_load: float = 0.0
 
     def rest(self, elements: int, degree: int, *, comm: MPI.Comm | None = None) -> Path:
         """The equilibrium at the wall without friction, to `start` a motion from: with the same mesh nothing moves.
@@ -72,6 +77,37 @@ class MixedScene:
         whole("rest", "elements", elements)
         return at_rest(self._string, elements, degree, comm)
 
+    def as_drilling(self, history: History) -> DrillingHistory:
+        """What happens at the surface and at the bit in a motion of `scene`, as of other models of strings: its charts,
+        tables, stick-slip, and files. Rows are the saved states but the first.
+
+        Speeds, torque and hook load of the surface are means over the last step before each; speeds of the bit are means
+        between states, in which it must turn by less than a whole turn. The torque on bit is that in the rod's end, with
+        the part that turns the bit's own inertia. There is no ledger of energy, which `history` has for the rod.
+
+        Raises:
+            SceneError: a motion of another scene, or with less than two states.
+        """
+        if self.rod not in history.scene.rods or len(history) < 2:
+            refuse("as_drilling", "history", history, "a motion of the `scene`, with two states or more")
+        rod, times, dt = self.rod, history.times, np.diff(history.times)
+        far, q = history.far_end(self.above)[1:], history.rotation(rod.end)
+        middle, change = (q[1:] + q[:-1]) / 2, np.diff(q, axis=0)
+        size, tangent = np.linalg.norm(middle, axis=1, keepdims=True), rod.curve.frame(rod.length)[:, 2]
+        # 4 tan(angle/4), about the mean axis of the bit
+        about = np.einsum("nij,nj,ni->n", small_rotations(middle), change, directors(middle / size) @ tangent)
+        turned, axis = 4 * np.arctan(about / 4), directors(q[1:]) @ tangent
+        moved = np.einsum("ni,ni->n", np.diff(history.position(rod.end), axis=0), axis)
+        rows = dict.fromkeys(COLUMNS, np.full(len(dt), np.nan)) | {
+            "times": times[1:], "drive_speed": far[:, 2], "drive_angle": np.cumsum(far[:, 2] * dt),
+            "surface_torque": far[:, 3], "bit_speed": turned / dt, "bit_angle": np.cumsum(turned),
+            "torque_on_bit": -np.einsum("ni,ni->n", history.moment(rod.end)[1:], axis),
+            "hook_load": self._hook_load - far[:, 1], "bit_velocity": moved / dt, "bit_advance": np.cumsum(moved),
+            "weight_on_bit": np.full(len(dt), static_weight(self.drilling)),
+        }  # fmt: skip
+        ends = np.array([0.0, self.depth, self.drilling.bit_depth])
+        return DrillingHistory(self.drilling, "rod below pipe", self.why, dt.mean(), ends, np.array([*rows.values()]).T)
+
 
 def mixed_scene(drilling: Drilling, depth: float | None = None) -> MixedScene:
     """A rod for a string's lower part in its hole, which may bend, and waves for the pipe above.
@@ -79,8 +115,9 @@ def mixed_scene(drilling: Drilling, depth: float | None = None) -> MixedScene:
     Components of the axes are north, east, down, as in a `WellPath`; without a hole the string is vertical below the
     origin. The rod is straight where it is free of stress. Its upper end is held on the axis of the hole, where it may
     turn and move along. With a hole, the rod's nodes touch the wall, and stabilisers and the bit touch it as rings,
-    with the friction of the hole; a string without a `Bit` is centred at its lower end. The bit's law acts there
-    (`BitTorque`), under a constant weight on bit; the pipe starts with the tension of the equilibrium without friction.
+    with the friction of the hole; a `BitOnRock` below a string without a `Bit` is centred in the hole. The bit's law
+    acts at the lower end (`BitTorque`), under a constant weight on bit. The pipe above rubs at the wall where its waves
+    meet (`PipeAbove.rubs`), and starts with the tension of the equilibrium without friction.
 
     Args:
         drilling: a `Drilling` with a `DrillString`.
@@ -118,9 +155,13 @@ def mixed_scene(drilling: Drilling, depth: float | None = None) -> MixedScene:
     weight = np.array([x.weight for _, _, _, x in below])
     weights = [(float(x), (0.0, 0.0, float(w))) for x, w in zip(ends, weight, strict=True)]
     on_bit = static_weight(drilling)
-    heights = np.diff([start[2], *(_axis(drilling, np.array([part[1] for part in below]))[0][:, 2])])
-    pipe = PipeAbove(rod.start, tuple(above), drilling.drive, drilling.hook, float(weight @ heights) - on_bit,
-                     drilling.drag)  # fmt: skip
+    whole = [np.array([0.0, *(place.bottom for place, _ in parts)]), np.array([top, *(part[1] for part in below)])]
+    heights = [np.diff(_axis(drilling, md)[0][:, 2]) for md in whole]
+    hanging = float(weight @ heights[1]) - on_bit
+    rubs = (
+        drilling if drilling.hole and (drilling.friction or any(x.friction for x in drilling.hole.sections)) else None
+    )
+    pipe = PipeAbove(rod.start, tuple(above), drilling.drive, drilling.hook, hanging, drilling.drag, rubs)
     loads = [LineForce(rod, AlongPieces(weights) if len(weights) > 1 else weights[0][1]), pipe]
     loads += [Force(rod.end, tuple(-on_bit * along))] if on_bit else []
     held = (rod.start,) if drilling.hole else (rod.start, rod.end)
@@ -135,7 +176,8 @@ def mixed_scene(drilling: Drilling, depth: float | None = None) -> MixedScene:
         wall, *rings = resting
         string = StringScene(drilling.hole.path, at_rest, rod, None, wall, tuple(rings), tuple(sections), ends, weight,
                              -on_bit * along, wall.clearance, 0.0, "at rest without friction", top)  # fmt: skip
-    return MixedScene(scene, at_rest, rod, pipe, top, tuple(_why(drilling, top)), string)
+    hook_load = float(np.array([x.weight for _, x in parts]) @ heights[0]) - on_bit
+    return MixedScene(scene, at_rest, rod, pipe, top, tuple(_why(drilling, top)), drilling, string, hook_load)
 
 
 def _section(part, segment):
@@ -200,15 +242,15 @@ def _walls(drilling, rod, top, radii):
             refuse("mixed_scene", "drilling.friction", drilling.friction, "a WallFriction, of which the rod's wall "
                    "takes the kinetic coefficient; other laws act in drilling.simulate")  # fmt: skip
         friction = [(to, law.kinetic * (x if of_hole else 1.0)) for to, x in friction]
-    rings = [(ring.s, ring.clearance, ring.radius, float(value_at(friction, [ring.s])[0]))
-             for ring in rings_of(drilling.laid, hole)[::-1] if ring.s > top + _NOTHING]  # fmt: skip
-    if not rings or rings[-1][0] < drilling.bit_depth - _NOTHING:
-        rings.append((drilling.bit_depth, 0.0, radii[-1][1], 0.0))
+    rings = [ring[:3] for ring in rings_of(drilling.laid, hole)[::-1] if ring.s > top + _NOTHING]
+    if drilling.bit is not None and (not rings or rings[-1][0] < drilling.bit_depth - _NOTHING):
+        rings.append((drilling.bit_depth, 0.0, radii[-1][1]))
     stations = [rod.end if s > drilling.bit_depth - _NOTHING else rod.at(s - top) for s, *_ in rings]
     walls = [kind(rod, hole.path, radius, radii, friction=friction, **given) for kind in (TubeWall, HoleWall)]
+    rubs = value_at(friction, [s for s, *_ in rings]).tolist()
     return tuple(
-        [wall, *(kind(at, hole.path, *ring[1:3], friction=ring[3], **given)
-                 for at, ring in zip(stations, rings, strict=True))]
+        [wall, *(kind(at, hole.path, *sizes, friction=mu, **given)
+                 for at, (_, *sizes), mu in zip(stations, rings, rubs, strict=True))]
         for wall, kind in zip(walls, (TubeRing, HoleRing), strict=True)
     )  # fmt: skip
 
@@ -216,7 +258,7 @@ def _walls(drilling, rod, top, radii):
 def _why(drilling, top):
     yield f"rod below {top:g} m, waves of torsion and stretch in the pipe above"
     if drilling.hole is not None:
-        yield "the pipe above turns and moves without friction at the wall"
+        yield "bending of the pipe above is left out: friction by the wall force of a soft string, with its tension"
         friction = drilling.friction
         if friction is not None and friction.decays:
             yield "friction at the rod's wall is the kinetic one, at rest too"

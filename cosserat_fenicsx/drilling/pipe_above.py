@@ -5,7 +5,7 @@ the speed om of its sections, M + Z om travels down and M - Z om up without chan
 downwards). So the wave at the lower end of a part is known from the one at its upper end one travel time before, and
 the force there is M = arriving - Z om: a dashpot and a known force.
 
-Parts meet at nodes, where M may drop by a drag; at the uppermost node a `TopEnd` reflects waves. Waves from the nodes
+Parts meet at nodes, where M may drop by a drag, and by friction at the wall of the hole (`PipeFriction`); at the uppermost node a `TopEnd` reflects waves. Waves from the nodes
 are stored as means over every time step, at the middle of the step, and read by Lagrange's interpolation with four of
 them, which amplifies no wave where steps are even (Laakso et al., IEEE Signal Process. Mag. 13 (1996) 30).
 """
@@ -18,6 +18,8 @@ import numpy as np
 import ufl
 
 from cosserat_fenicsx.checks import positive, refuse, store
+from cosserat_fenicsx.drilling.pipe_friction import PipeFriction
+from cosserat_fenicsx.drilling.scene import Drilling
 from cosserat_fenicsx.drilling.segments import Segment, segment_of
 from cosserat_fenicsx.drilling.top_drive import Hook, TopDrive
 from cosserat_fenicsx.drilling.wall_friction import ViscousDrag
@@ -26,8 +28,9 @@ from cosserat_fenicsx.scene.action import PointAction, scalar, vector
 from cosserat_fenicsx.scene.rod import Station, StationOrName, is_known
 from cosserat_fenicsx.well.components import Laid, StringPart
 
-# Drag acts at nodes, so many in the pipe at least: errors of 3e-4 at a rate of 0.3 per s in 3000 m.
-_BEADS = 64
+# Drag and friction act at nodes, so many in the pipe (errors of 3e-4 at a rate of 0.3 per s in 3000 m), or one in each
+# of these lengths (m) of a short one.
+_BEADS, _APART = 64, 15.0
 
 
 @dataclass(frozen=True)
@@ -50,8 +53,11 @@ class PipeAbove(PointAction):
         drive: a `TopDrive`. Its speed is about the axis that points from the pipe into the rod.
         hook: a `Hook`; None for a rigid one at rest.
         tension: with which the pipe pulls at the rod's end in the reference, N: the weight of what hangs there.
-        drag: a `ViscousDrag` of the pipe, as dashpots at 64 or more nodes; it shortens the
-            longest step; None for none.
+        drag: a `ViscousDrag` of the pipe, as dashpots at 64 or more nodes, or every 15 m of a short pipe; it shortens
+            the longest step; None for none.
+        rubs: a `Drilling` with a hole, of whose string the pipe is the upper part: it rubs at the wall of the hole, at
+            these nodes, with the friction of the `Drilling`, along and around the hole, see `pipe_friction`; None for
+            a pipe without a wall. Curvature of the hole does nothing else to its waves.
 
     Raises:
         SceneError: a part of the wrong kind, a station inside the rod, or a number out of range.
@@ -63,6 +69,7 @@ class PipeAbove(PointAction):
     hook: Hook | None = None
     tension: ForceSize = 0.0
     drag: ViscousDrag | None = None
+    rubs: Drilling | None = None
 
     scaled = False
 
@@ -139,13 +146,19 @@ class _InMotion:
 
     def __init__(self, pipe):
         self._pipe, self._down, drag = pipe, pipe.down(), pipe.drag or ViscousDrag()
-        parts = pipe.segments
+        parts, lengths = pipe.segments, np.array([x.length for x in pipe.segments])
+        rubs, whole, count = pipe.rubs, lengths.sum(), np.ones(len(parts), dtype=int)
+        if rubs or drag.axial or drag.torsion:
+            apart = whole / min(_BEADS, max(whole / _APART, 2.0))
+            count = np.ceil(lengths / apart - 1e-9).astype(int)
         axial = [(x.axial_impedance, x.length / x.axial_speed) for x in parts]
         torsional = [(x.torsional_impedance, x.length / x.torsional_speed) for x in parts]
         self._lines = (
-            _lines(axial, drag.axial, _hook_end(pipe.hook or Hook())),
-            _lines(torsional, drag.torsion, _drive_end(pipe.drive, parts[0].torsional_impedance)),
+            _lines(axial, count, drag.axial, _hook_end(pipe.hook or Hook())),
+            _lines(torsional, count, drag.torsion, _drive_end(pipe.drive, parts[0].torsional_impedance)),
         )
+        depths = np.append(0.0, np.cumsum(np.repeat(lengths / count, count)))
+        self._friction = PipeFriction(rubs, depths) if rubs else None
         self._damping = tuple(line.dashpot for line in self._lines)
         self.longest = min(line.longest for line in self._lines)
 
@@ -153,8 +166,11 @@ class _InMotion:
         # the pipe starts in the equilibrium of its springs, with the motion of its end
         k, c = self._pipe._springs
         axial, torsional = self._lines
-        axial.begin(motion.velocity @ self._down, -k * (motion.displacement @ self._down))
+        thrust = -k * (motion.displacement @ self._down)
+        axial.begin(motion.velocity @ self._down, thrust)
         torsional.begin(self._about(motion), -c * (motion.rotation @ self._down))
+        if self._friction:
+            self._friction.begin(thrust)
 
     def _about(self, motion):
         return motion.angular_velocity @ (motion.R @ self._down)
@@ -164,27 +180,38 @@ class _InMotion:
         return {"acting": ((thrust - self._pipe.tension, torque), self._damping)}
 
     def accept(self, t, h, motion):
-        for line, speed in zip(self._lines, (motion.velocity @ self._down, self._about(motion)), strict=True):
-            line.advance(t, h, speed)
+        held = (0.0, 0.0)
+        if self._friction:
+            (push, A), (torque, B) = (line.meeting(t, h) for line in self._lines)
+            held = self._friction.holding(push, torque, A, B)
+        speeds = motion.velocity @ self._down, self._about(motion)
+        for line, speed, force in zip(self._lines, speeds, held, strict=True):
+            line.advance(t, h, speed, force)
+        if self._friction:
+            self._friction.take(self._lines[0].inner)
+
+    def far_end(self):
+        return np.ravel([line.at_top for line in self._lines])
+
+    @property
+    def _parts(self):
+        named = {"axial": self._lines[0], "torsional": self._lines[1]}
+        return {**named, "friction": self._friction} if self._friction else named
 
     def undo(self):
-        for line in self._lines:
-            line.undo()
+        for part in self._parts.values():
+            part.undo()
 
     def memory(self):
-        return {name: line.memory() for name, line in zip(("axial", "torsional"), self._lines, strict=True)}
+        return {name: part.memory() for name, part in self._parts.items()}
 
     def recall(self, memory):
-        for line, name in zip(self._lines, ("axial", "torsional"), strict=True):
-            line.recall(memory[name])
+        for name, part in self._parts.items():
+            part.recall(memory[name])
 
 
-def _lines(parts, rate, end):
-    """The `DelayLines` of parts (impedance, travel time) with a drag of a rate (1/s)."""
-    pieces = np.ones(len(parts), dtype=int)
-    if rate:
-        times = np.array([time for _, time in parts])
-        pieces = np.ceil(_BEADS * times / times.sum()).astype(int)
+def _lines(parts, pieces, rate, end):
+    """The `DelayLines` of parts (impedance, travel time), cut into pieces, with a drag of a rate (1/s)."""
     impedance, time = (np.repeat(x, pieces) for x in np.transpose(parts))
     time = time / np.repeat(pieces, pieces)
     half = rate * impedance * time / 2  # of rate times the inertia of a piece
@@ -258,6 +285,8 @@ class DelayLines:
             nodes. top: a `TopEnd`.
     """
 
+    at_top = (math.nan, math.nan)
+
     def __init__(self, impedance, time, drag, top):
         self._Z, self._time, self._drag = (np.array(x, dtype=float) for x in (impedance, time, drag))
         self._top, self._parts = top, len(self._Z)
@@ -298,18 +327,29 @@ class DelayLines:
         read = (weights * self._values[at, np.arange(len(asked))]).sum(axis=0)
         return np.where(asked < times[0], self._first, read)
 
-    def advance(self, t, h, speed):
-        """Accept a step from t to t + h (s) with this mean speed of the lower end."""
+    def _arrived(self, t, h):
+        """(2, n) waves in the middle of a step from t to t + h (s): from above, from below."""
         if not self._count:  # before the start nothing changes; the spacing of the first step keeps impulses exact
             for k in range(-_SAMPLES, 0):
                 self._append(t + (k + 0.5) * h, self._first)
-        arrived = self._delayed(t + h / 2)
-        above, below = arrived[: self._parts], arrived[self._parts :]
+        return self._delayed(t + h / 2).reshape(2, -1)
+
+    def meeting(self, t, h):
+        """(2, n - 1) at the inner nodes in a step from t to t + h (s): the push of the waves, and the impedance."""
+        above, below = self._arrived(t, h)
+        return np.array([above[:-1] - below[1:], self._Z[:-1] + self._Z[1:] + self._drag[1:-1]])
+
+    def advance(self, t, h, speed, held=0.0):
+        """Accept a step from t to t + h (s) with this mean speed of the lower end; held: friction at inner nodes."""
+        above, below = self._arrived(t, h)
         Z, speeds = self._Z, np.empty(self._parts + 1)
         self._before = self._state
         speeds[0], self._state = self._top.step(self._state, t, t + h, Z[0] + self._drag[0], below[0])
-        speeds[1:-1] = (above[:-1] - below[1:]) / (Z[:-1] + Z[1:] + self._drag[1:-1])
+        speeds[1:-1] = (above[:-1] - below[1:] - held) / (Z[:-1] + Z[1:] + self._drag[1:-1])
         speeds[-1] = speed
+        #: speed and force of the upper end; forces at the inner nodes, means of both sides
+        self.at_top = speeds[0], below[0] + (Z[0] + self._drag[0]) * speeds[0]
+        self.inner = (above[:-1] + below[1:] + (Z[1:] - Z[:-1]) * speeds[1:-1]) / 2
         self._append(t + h / 2, np.concatenate([below + 2 * Z * speeds[:-1], above - 2 * Z * speeds[1:]]))
 
     def _append(self, t, values):

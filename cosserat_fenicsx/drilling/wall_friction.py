@@ -145,12 +145,13 @@ def scene_pieces(scene):
     return pieces_of(scene.hole, scene.string, rotating(static_weight(scene)), mud, scene.bit_depth)[0]
 
 
-def soft_string_force(pieces, weight, md):
-    """Wall force per length (N/m) at measured depths (m) of a soft string that rotates without axial motion.
+#: At measured depths of a soft string that rotates without axial motion: T, its tension by the weight in mud less the
+#: weight on bit, N; curvature k of the hole, 1/m; weight along its normal and binormal, N/m.
+Lateral = namedtuple("Lateral", "tension curvature normal binormal")
 
-    |T k n + w (e - (e.t) t)|, see `well.softstring`: friction acts across t alone, and T is the tension of the weight
-    in mud less the weight on bit (N).
-    """
+
+def lateral_load(pieces, weight, md):
+    """The `Lateral` of a string with a weight on bit (N) at measured depths (m)."""
     chain = chain_of(pieces)
     below = np.cumsum(np.append(-weight, chain.weight * chain.height(chain.length)))
     i = np.minimum(np.searchsorted(pieces.bottom, md), len(pieces.bottom) - 1)
@@ -158,18 +159,32 @@ def soft_string_force(pieces, weight, md):
     i = len(pieces.bottom) - 1 - i  # a chain runs from the bit up
     here = type(chain)(*(x[i] for x in chain))
     tension = below[i] + here.weight * here.height(u)
-    return np.hypot(here.curvature * tension + here.weight * here.down(u)[1], here.weight * here.b)
+    return Lateral(tension, here.curvature, here.weight * here.down(u)[1], here.weight * here.b)
+
+
+def soft_string_force(pieces, weight, md):
+    """Wall force per length (N/m) at measured depths (m) of a soft string that rotates without axial motion.
+
+    |T k n + w (e - (e.t) t)|, see `well.softstring` and `Lateral`: friction acts across t alone.
+    """
+    load = lateral_load(pieces, weight, md)
+    return np.hypot(load.curvature * load.tension + load.normal, load.binormal)
+
+
+def points_between(cuts):
+    """Gauss points (n, k) between cuts (n + 1,), and the lengths (n, k) for which they stand."""
+    half = np.diff(cuts)[:, None] / 2
+    return cuts[:-1, None] + half * (1 + _RULE.points), half * _RULE.weights
 
 
 def loads_between(scene, pieces, cuts, normal_force=None):
     """(middle (m), friction of a coefficient of 1 (N), contact radius (m)) between cuts, measured depths (m) among
     which are those of the pieces; `normal_force` as in `wall_of`."""
-    half = np.diff(cuts)[:, None] / 2
-    md = cuts[:-1, None] + half * (1 + _RULE.points)
+    md, lengths = points_between(cuts)
     force = soft_string_force(pieces, static_weight(scene), md) if normal_force is None else normal_force(md)
     middle = md.mean(axis=1)
     at = np.minimum(np.searchsorted(pieces.bottom, middle), len(pieces.bottom) - 1)
-    load = (force * _RULE.weights).sum(axis=1) * half[:, 0]
+    load = (force * lengths).sum(axis=1)
     if law_of(scene.friction)[2]:
         load = load * scene.hole.at(middle, "friction")
     return middle, load, pieces.radius[at]

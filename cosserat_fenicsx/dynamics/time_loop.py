@@ -185,7 +185,7 @@ class TimeLoop:
         else:
             ties = np.full((len(model.signature.connections.ties), 2, 6), np.nan)
             clamps = np.full((model.clamps.count, 6), np.nan)
-        held = {"tie_forces": ties, "clamp_forces": clamps}
+        held = {"tie_forces": ties, "clamp_forces": clamps, "far_ends": model.delays.far_ends(stepped)}
         if problem.contact:
             held["wall_forces"] = problem.contact.of_step() if stepped else np.full((problem.contact.count, 3), np.nan)
         self.history.append(Instant(problem.load_factor, nodal, gauss, 0, iterations, problem.multipliers(), time=t,

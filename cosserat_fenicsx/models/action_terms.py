@@ -426,6 +426,11 @@ class Delays:
         for delayed, _ in self._all:
             delayed.undo()
 
+    def far_ends(self, stepped):
+        """(actions, 4) numbers of their far ends in the last step; NaN where none was made."""
+        found = [delayed.far_end() if stepped else np.full(4, np.nan) for delayed, _ in self._all]
+        return np.reshape(found, (-1, 4))
+
     def memory(self):
         return {str(i): delayed.memory() for i, (delayed, _) in enumerate(self._all)}
 

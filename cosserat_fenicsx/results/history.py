@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from cosserat_fenicsx.checks import File
+from cosserat_fenicsx.checks import File, refuse
 from cosserat_fenicsx.numerics import directors
 from cosserat_fenicsx.quantities import Quantity
 from cosserat_fenicsx.results import screen
@@ -257,6 +257,23 @@ class History(RodResult):
             SceneError: something else.
         """
         return wall_forces(self, wall)
+
+    def far_end(self, action: Action) -> np.ndarray:
+        """(n, 4) velocity (m/s), force (N), angular velocity (rad/s) and torque (N m) at the far end of an action that
+        depends on earlier motion, such as the upper end of a `PipeAbove`: means over the step that led to every state;
+        NaN where no step did.
+
+        Args:
+            action: of the scene.
+
+        Raises:
+            SceneError: something else.
+        """
+        known = [x for x in self.scene.actions if x.delayed is not None]
+        found = next((k for k, x in enumerate(known) if x is action), None)
+        if found is None:
+            refuse("far_end", "action", action, "an action of the scene that depends on earlier motion: a PipeAbove")
+        return self._stacked("far_ends")[:, found]
 
     def orbit(self, station: StationOrName, wall: Action | None = None) -> Orbit:
         """The axis of a section in the cross-section of its hole, and the wall's normal force on it.
