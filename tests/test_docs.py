@@ -2,6 +2,7 @@
 
 import json
 import re
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -148,6 +149,7 @@ def test_programs_run(page, program, shown, tmp_path, monkeypatch):
 def test_scene_files_are_read(page, scene, tmp_path):
     file = tmp_path / "scene.toml"
     file.write_text(scene, encoding="utf-8")
+    shutil.copy(Path(__file__).parent / "reference" / "fit_readings.csv", tmp_path / "rig.csv")
     assert cf.read(file).title
 
 

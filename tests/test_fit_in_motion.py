@@ -103,3 +103,52 @@ def test_unknowns_that_are_refused(unknowns, words):
     readings = cf.drilling.Readings(t, {"drive_speed": 3 * t}, {"drive_speed": 0.05})
     with pytest.raises(cf.SceneError, match=words):
         cf.drilling.fit(scene(), readings, unknowns, dt=1e-2)
+
+
+FILE = """
+title = "The law of a bit"
+[discs]
+inertias = [1e-3, 350.0]
+stiffnesses = [470.0]
+drags = [0.0, 20.0]
+[drive]
+speed = "7 rad/s"
+inertia = 2900.0
+control = { type = "PI", Kp = 1500.0, Ki = 1200.0 }
+[bit]
+law = { type = "Stribeck", static = "5 kN m", dynamic = "4.2 kN m", speed = "3 rad/s" }
+[simulate]
+dt = 0.01
+[fit]
+readings = "rig.csv"
+noise = { drive_speed = 0.05, surface_torque = "100 N m" }
+[[fit.unknowns]]
+name = "bit.law.static"
+least = "6 kN m"
+largest = "7 kN m"
+"""
+
+
+def test_a_fit_in_a_scene_file(tmp_path):
+    """Table and picture as the command line writes them, with the number that Python finds."""
+    from cosserat_fenicsx.cli.main import main
+
+    (tmp_path / "rig.csv").write_text("".join(READ.read_text().splitlines(keepends=True)[:301]))
+    (tmp_path / "fit.toml").write_text(FILE)
+    asked = cf.read(tmp_path / "fit.toml")
+    assert "bit.law.static from 600 readings of drive_speed, surface_torque" in " ".join(str(asked).split())
+    assert main(["run", str(tmp_path / "fit.toml"), "-o", str(tmp_path / "out")]) == 0
+    readings = cf.drilling.Readings.from_csv(tmp_path / "rig.csv", NOISE)
+    found = cf.drilling.fit(asked.scene, readings, {"bit.law.static": (6e3, 7e3)}, dt=0.01)
+    names, row = (line.split(",") for line in (tmp_path / "out" / "fit.csv").read_text().splitlines()[:2])
+    assert float(row[names.index("value")]) == pytest.approx(found.values[0], rel=1e-9)
+    assert found.values == pytest.approx(TRUE[:1], rel=0.01) and (tmp_path / "out" / "fit.png").exists()
+    cf.write(asked, tmp_path / "again.toml")
+    assert cf.read(tmp_path / "again.toml").fit == asked.fit
+    for old, new, words in (
+        ('"rig.csv"', '"rag.csv"', "rag.csv: cannot be read"), ("bit.law.static", "bit.law.sta", "bit.law.sta"),
+        ('"7 kN m"', '"5 kN m"', "ascending"), ("0.05", "-1.0", "noise.*above 0"), ('"100 N m"', '"100 N"', "unit"),
+    ):  # fmt: skip
+        (tmp_path / "wrong.toml").write_text(FILE.replace(old, new))
+        with pytest.raises(cf.SceneError, match=f"line [0-9]+.*{words}"):
+            cf.read(tmp_path / "wrong.toml")

@@ -18,7 +18,7 @@ from cosserat_fenicsx.storage.store import Store, holds
 _TAKEN = ("duration", "dt", "elements", "model", "save_every")
 # Files that may be written.
 _NAMES = ("drilling.csv", "drilling.png", "energy.png", "phase.png", "map.png", "stability.csv", "stability.png",
-          "response.csv", "response.png")  # fmt: skip
+          "response.csv", "response.png", "fit.csv", "fit.png")  # fmt: skip
 
 
 def _scene(options, found):
@@ -36,11 +36,12 @@ def run(options, found, tables):
     if found.title:
         say(found.title, file=sys.stdout)
     _check_folder(options.folder, found.scene)
-    code, linear = DONE, {"stability": found.speeds and found.map, "response": found.response and found.respond}
-    if "duration" in found.settings or not any(linear.values()):
+    code, others = DONE, {"stability": found.speeds and found.map, "response": found.response and found.respond,
+                          "fit": found.fit and found.fitted}  # fmt: skip
+    if "duration" in found.settings or not any(others.values()):
         code = deliver_motion(lambda: found.run(folder=options.folder), options, tables)
     of_output = Namespace(output=options.output, scene=options.scene, units=options.units)
-    for name, computed in linear.items():
+    for name, computed in others.items():
         if code == DONE and computed:
 
             def files_of(answer, name=name):

@@ -165,7 +165,7 @@ def fit(
     instance("fit", "scene", scene, Drilling, "a Drilling")
     instance("fit", "readings", readings, Readings, "Readings")
     confidence = number("fit", "confidence", confidence, "a number between 0 and 1", lambda x: 0 < x < 1)
-    problem = _Problem(scene, readings, _ranges(scene, unknowns), clock, model, dt)
+    problem = _Problem(scene, readings, ranges_of(scene, unknowns), clock, model, dt)
     with StageProgress("fit", progress, world()) as at:
         found = []
         for k, start in enumerate(problem.starts(at)):
@@ -177,7 +177,7 @@ def fit(
     return problem.answer(best, confidence)
 
 
-def _ranges(scene, unknowns):
+def ranges_of(scene, unknowns):
     """{name: (least, largest)}, checked."""
     if not isinstance(unknowns, Mapping) or not unknowns:
         refuse("fit", "unknowns", unknowns, "{'bit.law.static': (least, largest)}")

@@ -24,23 +24,29 @@ duration = 60.0
 
 [stability]                      # optional: speeds, weights, and what else `stability` takes
 [response]                       # optional: frequencies, and what else `frequency_response` takes
+[fit]                            # optional: readings of a rig, their noise; [[fit.unknowns]]: name, least, largest
 
 Numbers are in SI, or text with a unit (`dimensions`).
 """
 
-from collections.abc import Sequence
+import os
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Annotated, Any, Literal
 
-from cosserat_fenicsx.checks import store
+import numpy as np
+
+from cosserat_fenicsx.checks import File, instance, refuse, store
 from cosserat_fenicsx.drilling.bit_laws import BitOnRock
 from cosserat_fenicsx.drilling.choose import chosen
+from cosserat_fenicsx.drilling.fitting import DrillingFit, fit, ranges_of
 from cosserat_fenicsx.drilling.history import DrillingHistory
 from cosserat_fenicsx.drilling.linear import frequencies
 from cosserat_fenicsx.drilling.linear.response import FrequencyResponse, frequency_response
 from cosserat_fenicsx.drilling.linear.stability import Stability, stability
 from cosserat_fenicsx.drilling.motion import check_arguments as check_simulation
 from cosserat_fenicsx.drilling.motion import simulate
+from cosserat_fenicsx.drilling.readings import Readings
 from cosserat_fenicsx.drilling.scene import Drilling
 from cosserat_fenicsx.drilling.segments import Discs
 from cosserat_fenicsx.drilling.top_drive import DriveControl, Hook, TopDrive
@@ -49,12 +55,15 @@ from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.parts import (
     AngularVelocity,
     Depth,
+    FileName,
     Frequency,
     Number,
     Part,
     Time,
     Values,
     at_least,
+    between,
+    concerning,
     misplaced,
     positive,
 )
@@ -129,6 +138,60 @@ class ResponseAt(Part):
 
 
 @dataclass(frozen=True)
+class FitUnknown(Part):
+    """A number of the string that is to be found.
+
+    Args:
+        name: of a number of a `Drilling`, such as "bit.law.static" or "hole.sections[0].friction".
+        least, largest: between which it is, in SI or text with a unit.
+    """
+
+    name: str
+    least: Any
+    largest: Any
+
+
+@dataclass(frozen=True)
+class FitToReadings(Part):
+    """Arguments of `fit` in a scene file; model and step are those of [simulate].
+
+    Args:
+        readings: the name of a .csv file, see `Readings.from_csv`, and columns there.
+        noise: {quantity: standard deviation}, in SI or text with a unit.
+        unknowns: the numbers that are to be found, each a `FitUnknown`.
+        clock: s that the readings' time 0 is after the start of the motion; or "unknown".
+        confidence, leave_out: as for `fit`.
+
+    Raises:
+        SceneError: no such file, or what `Readings` refuses; an unknown that is given twice.
+    """
+
+    readings: Annotated[File, FileName()]
+    noise: Any
+    unknowns: tuple[FitUnknown, ...]
+    columns: Any = None
+    clock: Time | Literal["unknown"] = 0.0
+    confidence: Annotated[float, between(0.01, 0.9999)] = 0.95
+    leave_out: bool = True
+
+    called = "fit"
+
+    def validate(self):
+        for name in ("noise", "columns"):
+            instance(self, name, getattr(self, name), Mapping if name == "noise" else (Mapping, type(None)),
+                     "a table by names of quantities, such as { surface_torque = ... }")  # fmt: skip
+        if len(self.ranges) < max(1, len(self.unknowns)):
+            refuse(self, "unknowns", [x.name for x in self.unknowns], "at least one, each with a name of its own")
+        store(self, readings=os.path.abspath(self.readings),
+              data=Readings.from_csv(self.readings, self.noise, self.columns))  # fmt: skip
+
+    @property
+    def ranges(self) -> dict[str, tuple]:
+        """{name: (least, largest)}, as given."""
+        return {x.name: (x.least, x.largest) for x in self.unknowns}
+
+
+@dataclass(frozen=True)
 class DrillingScene(InWords, Part):
     """A drill-string in motion and its computations, from `read`.
 
@@ -136,8 +199,8 @@ class DrillingScene(InWords, Part):
         drive: the `TopDrive`.
         string: the `DrillString`; or discs: `Discs`.
         bit, hook, mud, drag, depth, start: as for `Drilling`. well: its hole. wall_friction: its friction.
-        simulate: arguments of `simulate`. stability: a map of stability, or None. response: a frequency response, or
-            None.
+        simulate: arguments of `simulate`. stability: a map of stability, response: a frequency response, fit: numbers
+            that are to be found from readings; or None.
         title: for tables and charts.
 
     Attributes:
@@ -161,6 +224,7 @@ class DrillingScene(InWords, Part):
     simulate: SimulateDrilling | None = None
     stability: StabilityMap | None = None
     response: ResponseAt | None = None
+    fit: FitToReadings | None = None
     title: str = ""
 
     def validate(self):
@@ -181,6 +245,9 @@ class DrillingScene(InWords, Part):
         chosen(self.scene, model)
         if self.weights:
             self.scene.with_case(weight=self.weights[0])  # refused where there is no bit
+        if self.fit:
+            with concerning("fit", "unknowns"):
+                ranges_of(self.scene, self.fit.ranges)
 
     def sentences(self, units: Units):
         """On the `Drilling` and on what is asked for, in some units."""
@@ -195,6 +262,9 @@ class DrillingScene(InWords, Part):
             yield f"Asked for: stability at {len(self.speeds)} speeds{weights}."
         if self.response:
             yield f"Asked for: frequency response in {self.response.kind}."
+        if self.fit:
+            count = sum(np.isfinite(x).sum() for x in self.fit.data.values.values())
+            yield f"Asked for: {', '.join(self.fit.ranges)} from {count} readings of {', '.join(self.fit.data.values)}."
 
     @property
     def settings(self) -> dict[str, Any]:
@@ -242,3 +312,16 @@ class DrillingScene(InWords, Part):
             SceneError, NotConverged: see `frequency_response`.
         """
         return frequency_response(self.scene, **self.response.arguments()) if self.response else None
+
+    def fitted(self) -> DrillingFit | None:
+        """The numbers that fit the readings of the file, see `fit`; None where it asks for none.
+
+        Raises:
+            SceneError, NotConverged: see `fit`.
+        """
+        if self.fit is None:
+            return None
+        asked = {name: self.settings[name] for name in ("model", "dt") if name in self.settings}
+        asked |= {"confidence": self.fit.confidence, "leave_out": self.fit.leave_out}
+        clock = None if self.fit.clock == "unknown" else self.fit.clock
+        return fit(self.scene, self.fit.data, self.fit.ranges, clock=clock, **asked)

@@ -21,6 +21,8 @@ from cosserat_fenicsx.results.screen import InWords
 from cosserat_fenicsx.scene.rod import Rod
 from cosserat_fenicsx.scene.sections import Circle, Tube
 from cosserat_fenicsx.well.components import standard_size
+from cosserat_fenicsx.well.crooked import Tortuosity
+from cosserat_fenicsx.well.crooked import tortuosity as made_crooked
 from cosserat_fenicsx.well.path import WellPath
 
 
@@ -104,6 +106,7 @@ class Borehole(InWords, Part):
         length_unit: str | None = None,
         wall_stiffness: WallStiffness | None = None,
         sheet: str | None = None,
+        tortuosity: Tortuosity | None = None,
     ) -> "Borehole":
         """A hole from its survey, as in a scene file.
 
@@ -114,6 +117,8 @@ class Borehole(InWords, Part):
             columns: names of the columns of the file. degrees: see `WellPath.from_survey`.
             length_unit: of the measured depths of survey or stations, such as "ft".
             sheet: of an .xlsx file; None for the first one.
+            tortuosity: amplitude (degrees), period (m) and seed, where survey or stations are a plan, which is made as
+                crooked as drilled wells are: see `tortuosity`.
 
         Raises:
             SceneError: neither survey nor stations, or both; a sheet without an .xlsx file; see also `WellPath`.
@@ -143,6 +148,8 @@ class Borehole(InWords, Part):
                     raise
                 refuse("Borehole", "stations", stations, "rows of three numbers: md, inclination, azimuth")
             path = WellPath.from_survey(md, inc, azi, degrees)
+        if tortuosity is not None:
+            path = made_crooked(path, **tortuosity.arguments())
         return cls(path, sections, wall_stiffness)
 
     def __post_init__(self):

@@ -9,6 +9,7 @@ degrees = true                   # optional
 length_unit = "m"                # optional: of the measured depths of survey or stations, such as "ft"
 sheet = "as drilled"             # optional: of an .xlsx file, the first one if left out
 wall_stiffness = 1e9             # optional
+tortuosity = { amplitude = 0.5, period = "300 ft", seed = 1 }  # optional: makes a plan crooked
 sections = [
     { to = 2500.0, diameter = 0.2224, friction = 0.20, name = "casing" },
     { to = 3438.0, diameter = "8.5 in", friction = 0.30, name = "open hole" },

@@ -1,15 +1,29 @@
 """A smooth planned path made as crooked as drilled ones are."""
 
 import math
+from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from scipy.interpolate import CubicSpline
 
 from cosserat_fenicsx.checks import instance, number, refuse
+from cosserat_fenicsx.parts import Length, Number, Part, at_least, between
 from cosserat_fenicsx.well.path import WellPath
 
 # Stations a period, and nodes a period of random numbers; most stations.
 _STATIONS, _NODES, _MOST = 12, 2, 200_000
+
+
+@dataclass(frozen=True)
+class Tortuosity(Part):
+    """Arguments of `tortuosity` in a scene file: amplitude (degrees), period (m) and seed."""
+
+    amplitude: Annotated[float, between(0, 10, "an angle (degrees)")]
+    period: Length
+    seed: Annotated[int, Number(limits=at_least(0), whole=True)] | None = None
+
+    called = "tortuosity"
 
 
 def tortuosity(path: WellPath, amplitude: float | str, period: float | str, seed: int | None = None) -> WellPath:
