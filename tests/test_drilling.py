@@ -157,16 +157,17 @@ def test_a_small_torque_that_follows_from_the_weight_is_no_mistake_in_units():
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         assert chosen(inclined)[0] == TORSION
-    given = scene(
-        bit=cf.drilling.BitOnRock(cf.drilling.Stribeck(5.0, 5.0), weight=6e3), hole=hole(BENT), mud=MUD, depth=2000.0
-    )
     hardly = r"The torque of Stribeck\(...\) = 5 N m is hardly a torque on bit"
-    with pytest.warns(cf.SceneWarning, match=hardly) as said:
-        chosen(given)
+    with pytest.warns(cf.SceneWarning, match=hardly) as said:  # without a hole too
+        chosen(scene(bit=cf.drilling.BitOnRock(cf.drilling.Stribeck(5.0, 5.0))))
     assert len(said) == 1 and str(said[0].message).endswith("; coefficients of friction need radius= (m)")
     with pytest.warns(cf.SceneWarning, match="BitOnRock.weight = 60 N is hardly a weight on bit") as said:
         chosen(replace(inclined, bit=cf.drilling.BitOnRock(law, weight=60.0)))
     assert len(said) == 1
+    with pytest.warns(cf.SceneWarning, match="Motor.torque = 5 N m is hardly a torque of a drive"):
+        scene(drive=cf.drilling.TopDrive(control=cf.drilling.Motor(5.0)))
+    with pytest.warns(cf.SceneWarning, match="Hook.speed = -30 m/s is faster than blocks move.*'-30 m/h'"):
+        cf.drilling.Hook(speed=-30.0)
 
 
 rpm = cf.units.rpm

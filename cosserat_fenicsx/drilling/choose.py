@@ -8,7 +8,7 @@ from cosserat_fenicsx.drilling.torsion import TorsionWaves
 from cosserat_fenicsx.drilling.wall_friction import law_of, rotating, static_weight
 from cosserat_fenicsx.errors import NotConverged, SceneError, nearest
 from cosserat_fenicsx.well import criteria
-from cosserat_fenicsx.well.operations import TripIn, TripOut, doubt_on_bit
+from cosserat_fenicsx.well.operations import TripIn, TripOut
 from cosserat_fenicsx.well.solve import torque_and_drag
 
 TORSION, BOTH = "torsion", "axial and torsional"
@@ -108,11 +108,6 @@ def _operations(scene):
     bit, weight = scene.bit, static_weight(scene)
     law = None if bit is None else bit.law.resistance(bit.most)
     torque = law.kinetic if law else 0.0
-    if weight > 0:
-        doubt_on_bit("BitOnRock.weight", weight, "weight")
-        if not bit.law.needs_weight:  # a torque by the weight may be small without a mistake in units
-            called = f"The torque of {type(bit.law).__name__}(...)"
-            doubt_on_bit(called, torque, "torque", "; coefficients of friction need radius= (m)")
     yield rotating(weight, torque)
     if scene.hook is not None:
         signal = scene.hook.signal()

@@ -10,7 +10,7 @@ from cosserat_fenicsx.drilling import bit_curves  # noqa: F401 its laws join the
 from cosserat_fenicsx.drilling.bit_laws import BitOnRock, Stribeck
 from cosserat_fenicsx.drilling.joints import Joint, joints_of
 from cosserat_fenicsx.drilling.segments import Discs, Segment, segment_of
-from cosserat_fenicsx.drilling.top_drive import Hook, TopDrive
+from cosserat_fenicsx.drilling.top_drive import Hook, Motor, TopDrive
 from cosserat_fenicsx.drilling.wall_friction import FrictionLaw, ViscousDrag
 from cosserat_fenicsx.parts import Depth, Part
 from cosserat_fenicsx.quantities import Units
@@ -18,6 +18,7 @@ from cosserat_fenicsx.results.screen import InWords
 from cosserat_fenicsx.units import rpm
 from cosserat_fenicsx.well.components import DrillString, in_columns
 from cosserat_fenicsx.well.hole import Borehole, Mud
+from cosserat_fenicsx.well.operations import doubt_on_bit
 
 
 @dataclass(frozen=True)
@@ -68,6 +69,20 @@ class Drilling(InWords, Part):
         _ = self.segments
         if self.motor is not None and self.bit is None:
             refuse(self, "bit", None, f"a BitOnRock below {self.motor.name}, which turns it")
+        self._doubt_torques()
+
+    def _doubt_torques(self):
+        """Warn of weights and torques at bit and drive that are probably in other units."""
+        control, bit = self.drive.control, self.bit
+        if isinstance(control, Motor):
+            doubt_on_bit("Motor.torque", control.torque, "torque", of="drive")
+        if bit is None:
+            return
+        doubt_on_bit("BitOnRock.weight", bit.most or 0.0, "weight")
+        law = None if bit.law.needs_weight else bit.law.resistance(bit.most)  # one by the weight may be small
+        if law is not None:
+            called = f"The torque of {type(bit.law).__name__}(...)"
+            doubt_on_bit(called, max(law.still, law.kinetic), "torque", "; coefficients of friction need radius= (m)")
 
     @property
     def discs(self) -> Discs | None:

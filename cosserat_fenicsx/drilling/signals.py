@@ -11,6 +11,8 @@ from cosserat_fenicsx.checks import call, number, refuse, warn
 
 # Speeds (rad/s) above this are probably revolutions a minute: 300 rev/min are 31.4 rad/s.
 _FAST = 32.0
+# Speeds of the block (m/s) above this are probably in other units: strings are run at up to 2 m/s.
+_FASTEST_BLOCK = 5.0
 
 
 def doubt_speed(owner: object, field: str, speed: float) -> None:
@@ -21,6 +23,16 @@ def doubt_speed(owner: object, field: str, speed: float) -> None:
             f"{name}.{field} = {speed:g} rad/s are {speed / units.rpm:.0f} rev/min, faster than drives turn a string: "
             f"{speed:g} rev/min are {speed:g} * units.rpm = {speed * units.rpm:.4g} rad/s, '{speed:g} rpm' in a scene "
             "file"
+        )
+
+
+def doubt_block_speed(owner: object, field: str, speed: float) -> None:
+    """Warn of a speed of the block (m/s) that looks like metres an hour, or feet a minute."""
+    if abs(speed) > _FASTEST_BLOCK:
+        warn(
+            f"{type(owner).__name__}.{field} = {speed:g} m/s is faster than blocks move: {speed:g} m/h are "
+            f"{speed:g} / 3600 = {speed / 3600:.3g} m/s, '{speed:g} m/h' in a scene file; {speed:g} ft/min are "
+            f"{speed * units.foot / 60:.3g} m/s"
         )
 
 

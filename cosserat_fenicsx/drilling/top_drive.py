@@ -19,7 +19,7 @@ import numpy as np
 
 from cosserat_fenicsx.checks import call, finite_array, number, refuse
 from cosserat_fenicsx.checks import positive as positive_number
-from cosserat_fenicsx.drilling.signals import ScalarSignal, doubt_speed
+from cosserat_fenicsx.drilling.signals import ScalarSignal, doubt_block_speed, doubt_speed
 from cosserat_fenicsx.parts import (
     AngularVelocity,
     ForceSize,
@@ -442,6 +442,7 @@ class Autodriller(Part):
             refuse(self, "Kp", self.Kp, "Kp (m/(s N)), Ki (m/(s^2 N)) or both above 0, about 1e-8 and 1e-9")
         if len(self.limits) != 2 or not self.limits[0] < self.limits[1]:
             refuse(self, "limits", self.limits, "the least and the largest speed of the block downwards (m/s)")
+        doubt_block_speed(self, "limits", max(*self.limits, self.rate or 0.0, key=abs))
 
     def begin(self):
         """The integral, m/s."""
@@ -465,7 +466,8 @@ class Hook(Part):
 
     Args:
         stiffness: of lines and derrick, N/m; infinity for a rigid one.
-        speed: of the block, m/s, upwards positive: a number, from the start on, or a function of time.
+        speed: of the block, m/s, upwards positive: a number, from the start on, or a function of time. Above 5 m/s, at
+            the start or at a jump, it is taken with a warning.
         autodriller: an `Autodriller`, which moves the block in place of a speed.
 
     Raises:
@@ -477,8 +479,10 @@ class Hook(Part):
     autodriller: Autodriller | None = None
 
     def validate(self):
-        if not (self.signal().constant and self.signal()(0.0) == 0) and self.autodriller is not None:
+        signal = self.signal()
+        if not (signal.constant and signal(0.0) == 0) and self.autodriller is not None:
             refuse(self, "speed", self.speed, "0 beside an autodriller, which moves the block")
+        doubt_block_speed(self, "speed", max((signal(t) for t in (0.0, *signal.jumps)), key=abs))
 
     def signal(self) -> ScalarSignal:
         """The speed of the block at every time, m/s."""

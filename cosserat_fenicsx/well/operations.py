@@ -22,13 +22,14 @@ _DOUBTFUL = {"weight": (500.0, "N"), "torque": (50.0, "N m")}
 _SLOW = 20.0
 
 
-def doubt_on_bit(called, value, what, more=""):
-    """Warn of a "weight" or "torque" on bit (N, N m) that is probably in another unit; `called`: its name in the
-    warning, which ends with `more`."""
+def doubt_on_bit(called, value, what, more="", of="bit"):
+    """Warn of a "weight" or "torque" on bit (N, N m), or of the drive, that is probably in another unit; `called`: its
+    name in the warning, which ends with `more`."""
     least, unit = _DOUBTFUL[what]
     if 0 < abs(value) < least:
+        place = "on bit" if of == "bit" else f"of a {of}"
         warn(
-            f"{called} = {value:g} {unit} is hardly a {what} on bit: 25 kN are 25e3, 25 klbf 25 * units.kip; 5 kN m "
+            f"{called} = {value:g} {unit} is hardly a {what} {place}: 25 kN are 25e3, 25 klbf 25 * units.kip; 5 kN m "
             f"are 5e3, 4000 ft-lbf 4000 * units.ft_lbf{more}"
         )
 
