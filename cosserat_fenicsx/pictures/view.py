@@ -158,7 +158,7 @@ class Labels:
             box = _box(text, anchor + distance * way + half * np.clip(1.5 * way, -1, 1), size)
             if self._free(box) and (covered := self._covers(box)) < least:
                 line = anchor, anchor + (distance - _GAP) * way
-                costs = self._crosses(line, box) + covered[0], covered[1]
+                costs = self._crosses(line, box) + covered[0], covered[1] + self._along(line)
                 if costs < least:
                     best, least = (box, distance, line), costs
                 if costs == (0, 0):
@@ -222,6 +222,14 @@ class Labels:
         lines, boxes = np.reshape(self._leaders, (-1, 2, 2)), np.reshape(self._placed, (-1, 4))
         found = _crosses_boxes(lines, np.array(wide)) | _cross(np.array(line), lines)
         return int(found.sum() + _crosses_boxes(np.array(line), boxes).sum())
+
+    def _along(self, line):
+        """How many cells of lines that are no rods a line from a label to its point, (2, 2) pixels, crosses."""
+        start, end = line
+        cells = np.linspace(start, end, 2 + int(np.linalg.norm(end - start) / _CELL)) // _CELL
+        i, j = np.clip(cells.astype(int), 0, np.array(self._covered.shape) - 1).T
+        crossed = self._covered[i, j]
+        return int(((crossed > 0) & (crossed < _RODS)).sum())
 
     def _covers(self, box):
         """How much a rectangle covers: 1 where a rod is, else 0; and cells of lines, of rods `_RODS` times as many."""

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from cosserat_fenicsx.checks import positive
+from cosserat_fenicsx.checks import number, positive
 from cosserat_fenicsx.pictures.charts import unit_of
 from cosserat_fenicsx.pictures.drawing import colour_bar, load_pyvista, stage
 from cosserat_fenicsx.pictures.plot import deliver
@@ -20,19 +20,23 @@ from cosserat_fenicsx.well.charts import (
 _HEIGHT, _WIDTHS = 1000, (560, 1300)
 # Margins, pixels: left (numbers of depths), right (colour bar), top (title), bottom (names of axes).
 _MARGINS = (290, 280, 170, 180)
+# Bounds of a width that is asked for, pixels.
+_LEAST, _MOST = 300, 4000
 # Maximum intervals between the numbers of the longest axis.
 _INTERVALS = 6
 
 
-def draw_in_space(answer, file, enlarge, between, units):
+def draw_in_space(answer, file, enlarge, between, units, width=None):
     """See `TorqueAndDrag.plot_3d`."""
+    if width is not None:
+        width = number("plot_3d", "width", width, f"{_LEAST} to {_MOST} (pixels)", lambda x: _LEAST <= x <= _MOST)
     if enlarge is not None:
         positive("plot_3d", "enlarge", enlarge, "-")
     ends = depths_between("plot_3d", between, answer.depth)
-    deliver(world(), Path(file), lambda: _draw(answer, enlarge, *ends), units)
+    deliver(world(), Path(file), lambda: _draw(answer, enlarge, width, *ends), units)
 
 
-def _draw(answer, enlarge, top, bottom):
+def _draw(answer, enlarge, width, top, bottom):
     pyvista = load_pyvista()
     md = _places(answer.md, top, bottom)
     axis, radius = _picture(answer.hole.path.position(md)), answer.hole.at(md, "diameter") / 2
@@ -42,7 +46,7 @@ def _draw(answer, enlarge, top, bottom):
         shown = (0.015 if whole else 0.045) * size  # radius of the hole in the picture
         enlarge = max(1.0, float(f"{shown / radius.max():.1g}"))
     axes = axes_of(axis, enlarge * radius.max())
-    view = _view_of(axis, axes)
+    view, scale = _view_of(axis, axes, width)
     plotter = stage(pyvista, view.window, smooth=None)
     tubes = enlarge * radius.max() > view.pixel
     if not tubes:  # of lines, parts shorter than pixels would be drawn as dots
@@ -51,7 +55,7 @@ def _draw(answer, enlarge, top, bottom):
         md, axis, radius = md[some], axis[some], radius[some]
     line = axis + enlarge * _picture(_at(md, answer, answer.offset))
     thick = enlarge * (radius - _at(md, answer, answer.clearance))
-    _add_string(plotter, pyvista, answer, md, line, np.maximum(thick, 0.0), tubes)
+    _add_string(plotter, pyvista, answer, md, line, np.maximum(thick, 0.0), tubes, scale * _MARGINS[1])
     if tubes:
         _add_hole(plotter, pyvista, answer, md, axis, enlarge * radius)
     beside = enlarge * radius[:, None]
@@ -60,9 +64,8 @@ def _draw(answer, enlarge, top, bottom):
     outlines = _add_surroundings(plotter, pyvista, axes, axis, surface)
     labels = Labels(view, [axis, *beside])
     labels.keep_off(outlines)
-    labels.reserve(
-        (view.window[0] - 0.85 * _MARGINS[1], 0.15 * view.window[1]), (view.window[0], 0.85 * view.window[1])
-    )
+    wide, high = view.window
+    labels.reserve((wide - 0.85 * scale * _MARGINS[1], 0.15 * high), (wide, 0.85 * high))
     _add_title(plotter, answer, enlarge, title_of(answer, top, bottom), labels)
     draw_axes(plotter, pyvista, axes, view, labels, _font(view.window))
     _add_directions(axes, view, labels)
@@ -117,8 +120,9 @@ def _between(low, high, step):
     return step * np.arange(math.ceil(low / step - 1e-6), math.floor(high / step + 1e-6) + 1)
 
 
-def _view_of(points, axes):
-    """The `View` whose window is as large as the drawing of a box needs."""
+def _view_of(points, axes, wanted):
+    """The `View` whose window is as large as the drawing of a box needs, or as wide as wanted (pixels); and how many
+    times as large it is."""
     main = points[-1, :2] - points[0, :2]
     main = main if np.linalg.norm(main) > 1e-9 else np.array([1.0, 0.0])
     # across the main direction, whose end is at the right, turned and raised
@@ -137,11 +141,13 @@ def _view_of(points, axes):
     height = max(high / pixel, _WIDTHS[0])
     window = round(width + left + beside), round(height + over + below)
     focus = corners.mean(axis=0) + pixel * ((beside - left) / 2 * right + (over - below) / 2 * above)
-    return View(to_camera, right, above, up, focus, pixel * window[1] / 2, window)
+    scale = wanted / window[0] if wanted else 1.0
+    larger = tuple(round(scale * x) for x in window)
+    return View(to_camera, right, above, up, focus, pixel * window[1] / 2, larger), scale
 
 
-def _add_string(plotter, pyvista, answer, md, line, radius, tube):
-    """As a tube, or as a line where a tube were thinner than a pixel."""
+def _add_string(plotter, pyvista, answer, md, line, radius, tube, beside):
+    """As a tube, or as a line where a tube were thinner than a pixel; beside: pixels for the colour bar."""
     distributed = answer.distributed_force
     unit, size = unit_of(SIDE_FORCE)
     force, rows = _at(md, answer, distributed) / size, rows_between(answer.md, md[0], md[-1])
@@ -153,7 +159,7 @@ def _add_string(plotter, pyvista, answer, md, line, radius, tube):
     step = round_step(usual, room) if usual > 0 else 1.0
     most = math.ceil(usual / step - 1e-9) * step or step
     labels = round(most / step) + 1
-    width, beside = plotter.window_size[0], _MARGINS[1]
+    width = plotter.window_size[0]
     more = "\n(more: yellow)" if force.max(initial=0.0) > most else ""
     box = 1 - 0.75 * beside / width, 0.2, 0.4 * beside / width, 0.5
     bar = colour_bar(f"side force\n({unit}){more}", font, labels, step, box)
