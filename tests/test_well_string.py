@@ -59,9 +59,6 @@ def test_standard_sizes():
     assert pytest.approx(20.89 * cf.units.lb_per_ft) == PIPE.mass
     assert min(PIPE.stiffness.bending) == pytest.approx(1228200, rel=2e-4)
     assert cf.well.DrillPipe(size="5 19.5") == cf.well.DrillPipe(size='5" 19.50 lb/ft')
-    for size in standard_sizes()["Casing"].values():  # couplings and threads add a few percent
-        plain = 7850 * math.pi / 4 * (size["outer_diameter"] ** 2 - size["inner_diameter"] ** 2)
-        assert 0.99 * plain < size["mass"] < 1.06 * plain
     for name, kind in ((name, kind) for kind, known in standard_sizes().items() if kind != "Casing" for name in known):
         part = getattr(cf.well, kind)(100.0, name)
         plain = 7850 * math.pi / 4 * (part.outer_diameter**2 - part.inner_diameter**2)

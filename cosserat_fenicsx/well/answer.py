@@ -104,7 +104,8 @@ class TorqueAndDrag(Differentiated, Result):
         enough: whether both are within `tol`, as far as they are estimated, of hook load and surface torque alone;
             False warns that the model does not suffice for the accuracy asked for.
         torque_convention: "coulomb" or "johancsik", see `torque_and_drag`.
-        laid, pieces: the string in its place, and cut where anything jumps; solved: what was found on it.
+        laid, pieces: the string in its place, and cut where anything jumps; solved: what was found on it. by_rod: the
+            function that solves the rod in contact from an answer of a flexible string.
     """
 
     words = property(lambda self: f"{self.model} string", doc="What was solved, for titles.")
@@ -132,6 +133,7 @@ class TorqueAndDrag(Differentiated, Result):
     laid: Any
     pieces: Any
     solved: Any
+    by_rod: Any
 
     @property
     def quantities(self):
@@ -349,13 +351,17 @@ class TorqueAndDrag(Differentiated, Result):
     @cached_property
     def buckling_loads(self) -> np.ndarray:
         """(2, n) compression, N, above which it is a snake, and a helix, at `md`; NaN where that is not known."""
-        S, F = self._sections, -self.tension
+        return self.buckles_at(self._sections.EI)
+
+    def buckles_at(self, EI: np.ndarray) -> np.ndarray:
+        """`buckling_loads` with another bending stiffness (n,), N m^2, at `md`."""
+        F = -self.tension
         loose = np.where(self.clearance > 1e-9, self.clearance, np.nan)
         k, across, b = self._loads()
         plain = np.hypot(across - k * F, b)
         weight = self._of_piece(self.pieces.weight)
         with np.errstate(invalid="ignore"):
-            return np.array([load(S.EI, loose, weight, plain) for load in (criteria.snake_load, criteria.helix_load)])
+            return np.array([load(EI, loose, weight, plain) for load in (criteria.snake_load, criteria.helix_load)])
 
     @cached_property
     def helical(self) -> np.ndarray:
@@ -383,7 +389,7 @@ class TorqueAndDrag(Differentiated, Result):
         )
 
     def utilisation(
-        self, grade: str | float | Mapping[str, Any] = "E75", wear: float | Mapping[str, float] = 1.0
+        self, grade: str | float | Mapping[str, Any] = "E75", wear: float | str | Mapping[str, Any] = 1.0
     ) -> Utilisation:
         """Loads over what the body of the string bears: von Mises, tension, torsion, burst, collapse, fatigue.
 
@@ -391,7 +397,8 @@ class TorqueAndDrag(Differentiated, Result):
             grade: of the drill pipe: "E75", "X95", "G105", "S135" or a yield strength, Pa or text such as "135 ksi";
                 or a dict of these by names of components. Heavy-weight pipe (55 ksi), collars and stabilisers (110 ksi,
                 100 ksi above 6 7/8 in) have their usual yield strengths where they are not in it.
-            wear: share of the wall of the drill pipe that is left, 1 of new pipe, 0.8 of "premium"; or a dict.
+            wear: share of the wall of the drill pipe that is left, or a class of API RP 7G: "new" (1), "premium" (0.8),
+                "class 2" (0.7); or a dict.
 
         Raises:
             SceneError: an unknown grade or name, a component without diameters, no mud.
@@ -401,7 +408,7 @@ class TorqueAndDrag(Differentiated, Result):
         return Utilisation(self, strengths_of("utilisation", self.laid, grade, wear))
 
     def margin_of_overpull(
-        self, grade: str | float | Mapping[str, Any] = "E75", wear: float | Mapping[str, float] = 1.0, *,
+        self, grade: str | float | Mapping[str, Any] = "E75", wear: float | str | Mapping[str, Any] = 1.0, *,
         safety: float = 1.1,
     ) -> MarginOfOverpull:  # fmt: skip
         """How much more the surface may pull than the hook load of this answer, if the string is stuck.
@@ -415,8 +422,8 @@ class TorqueAndDrag(Differentiated, Result):
         return overpull_of(self, strengths_of("margin_of_overpull", self.laid, grade, wear), safety)
 
     def most_weight_on_bit(
-        self, grade: str | float | Mapping[str, Any] = "E75", wear: float | Mapping[str, float] = 1.0, *,
-        safety: float = 1.1, buckling: str = "helical", model: str = "buckled",
+        self, grade: str | float | Mapping[str, Any] = "E75", wear: float | str | Mapping[str, Any] = 1.0, *,
+        safety: float = 1.1, buckling: str = "helical", model: str = "buckled", progress: bool | None = None,
     ) -> MostWeightOnBit:  # fmt: skip
         """The largest weight on bit of this operation, with its torque on bit, and what limits it: buckling, lock-up,
         strength (von Mises), or the weight of the string, whose hook load is then 0.
@@ -424,12 +431,18 @@ class TorqueAndDrag(Differentiated, Result):
         Args:
             grade, wear: see `utilisation`. safety: factor on the von Mises stress.
             buckling: "helical" or "sinusoidal": which of them limits it.
-            model: "soft" or "buckled", whose helix also holds the string back; this answer may be of another model.
+            model: "soft"; "buckled", whose helix also holds the string back; or "rod", the exact rod in contact, of
+                which at most 14 equilibria are solved, each with its hook load to 1e-3 of the largest tension: with its
+                own tensions, bending moments and clearances; for "sinusoidal" it must not buckle by its second
+                variation either. A string of which no equilibrium is found beyond some weight is limited by that.
+                This answer may be of another model.
+            progress: of the rod; True or False; None shows it in runs of more than two seconds.
 
         Raises:
             SceneError: see `utilisation`; an operation without a weight on bit; a string that bears none.
+            NotConverged: of the rod: the limit was not found with 14 equilibria.
         """
-        return most_weight_of(self, grade, wear, safety, buckling, model)
+        return most_weight_of(self, grade, wear, safety, buckling, model, progress)
 
     def of_flexible(self, operation, model, solved):
         """The `TorqueAndDrag` of the same string with another operation and what was found for it, of a flexible string;
@@ -534,6 +547,7 @@ class TorqueAndDrag(Differentiated, Result):
         between: tuple[float, float] | None = None,
         *,
         units: Any = "SI",
+        width: int | None = None,
     ) -> None:
         """Draw the string in its hole in space, coloured by the side force.
 
@@ -542,13 +556,14 @@ class TorqueAndDrag(Differentiated, Result):
             enlarge: factor on radii and clearance, which the picture says; None for one that shows them.
             between: measured depths (m) from which to which it shows them.
             units: see `plot`.
+            width: of the picture, pixels, 300 to 4000; None for one that the shape of the hole decides.
 
         Raises:
             SceneError: pyvista is missing, or the name does not end in .png; depths that the string has not.
         """
         from cosserat_fenicsx.well.in_space import draw_in_space
 
-        draw_in_space(self, file, enlarge, between, units)
+        draw_in_space(self, file, enlarge, between, units, width)
 
     def __repr__(self):
         loads = f"hook load {self.hook_load:.6g} N, surface torque {self.surface_torque:.6g} N m"

@@ -24,7 +24,7 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 
 from cosserat_fenicsx import units
-from cosserat_fenicsx.checks import doubt_width, positive, refuse, store
+from cosserat_fenicsx.checks import doubt_width, positive, refuse, store, warn
 from cosserat_fenicsx.errors import SceneError, nearest
 from cosserat_fenicsx.parts import (
     DampingTime,
@@ -148,6 +148,8 @@ class StringPart(Part, family="component of a string", homes=("cosserat_fenicsx.
         return self.stiffness.torsion, self.stiffness.inertia[2]
 
 
+# Distances of tool joints (m) between which pipe of the ranges 1 to 3 has them, 18 to 45 ft, with some room.
+_JOINTS = 4.0, 16.0
 # The largest bend of a housing, degrees.
 _MOST_BENT = 5.0
 
@@ -320,6 +322,11 @@ class _Tubular(_Bendable):
             refuse(self, "tool_joint", self.tool_joint, f"at least the body's diameter, {self.outer_diameter:g} m")
         if self.joint_spacing is not None and not (self.tool_joint or 0) > self.outer_diameter:
             refuse(self, "joint_spacing", self.joint_spacing, "tool_joint as well, wider than the body")
+        if self.joint_spacing is not None and not _JOINTS[0] <= self.joint_spacing <= _JOINTS[1]:
+            warn(
+                f"{type(self).__name__}.joint_spacing = {self.joint_spacing:g} m is not that of drill pipe, 5.5 to 14 "
+                "m (ranges 1 to 3): 31 ft are '31 ft' or 9.45"
+            )
         if self.centralisers is not None and not self.centralisers.diameter > 2 * self.body_radius:
             expected = f"rings wider than the body, {2 * self.body_radius:g} m"
             refuse(self, "centralisers", self.centralisers, expected)

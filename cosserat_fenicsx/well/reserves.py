@@ -7,8 +7,10 @@ import numpy as np
 from scipy.optimize import brentq
 
 from cosserat_fenicsx.checks import number, refuse
-from cosserat_fenicsx.errors import SceneError
+from cosserat_fenicsx.errors import NotConverged, SceneError
+from cosserat_fenicsx.progress import StageProgress
 from cosserat_fenicsx.quantities import Quantity
+from cosserat_fenicsx.ranks import world
 from cosserat_fenicsx.results.result import Result, by_name
 from cosserat_fenicsx.well.buckled import LockUp, buckled_string
 from cosserat_fenicsx.well.pieces import sections_of
@@ -19,8 +21,13 @@ _PARTS, _LIMITS = ("component",), ("limit",)
 # Relative accuracy of weights on bit; a string that locks up under this much more weight than uses up its hook load is
 # said to lock up.
 _ACCURATE, _BEYOND = 3e-4, 1.05
+# Of the rod: relative accuracy of its hook load over the largest tension, and of the weight found, also where beyond it
+# no equilibrium is found; how many equilibria are solved at most; factor from one weight to the next until it is known
+# between which two the limit is.
+_ROD_TOL, _NEAR, _NEAR_UNSOLVED, _MOST_SOLVED, _AWAY = 1e-3, 4e-3, 0.04, 14, 1.15
 # Relative difference of two weights on bit below which the limits are reached together.
 _TOGETHER = 2 * _ACCURATE
+_UNSTABLE, _UNSOLVED = "loss of stability", "no equilibrium of the rod found"
 
 
 def _safety(owner, safety):
@@ -108,6 +115,8 @@ class MostWeightOnBit(Result):
         limits: names, such as "helical buckling". weights: (limits,) N; NaN where the string has not enough weight to
             reach the limit. md: where it is reached first, m. component: there.
         counts: (limits,) whether it counts: the kind of buckling that was not asked for does not.
+        model: "soft", "buckled", or "rod", of which the first limit alone is known, NaN elsewhere, with a weight within
+            it and at most 0.4 % below it, 4 % where beyond it no equilibrium was found.
     """
 
     limits: np.ndarray
@@ -117,6 +126,7 @@ class MostWeightOnBit(Result):
     counts: np.ndarray
     operation: str
     safety: float
+    model: str = "buckled"
 
     _rows_axis = "limit"
     _quantities = by_name(
@@ -144,7 +154,8 @@ class MostWeightOnBit(Result):
         return len(self.limits)
 
     def _about(self):
-        return {"kind": "MostWeightOnBit", "operation": self.operation, "safety": self.safety}
+        names = "operation", "safety", "model"
+        return {"kind": "MostWeightOnBit"} | {name: getattr(self, name) for name in names}
 
     def _answer(self, units):
         i = self._first
@@ -155,24 +166,30 @@ class MostWeightOnBit(Result):
             f"{self.operation}: at most {self._told('weight', units, form='.4g')} on bit, limited by "
             f"{self.limit}{where}; strength with a safety factor of {self.safety:g}."
         )
-        yield "'-': the hook load is 0 before this limit is reached."
+        if self.model == "rod":
+            yield "By the exact rod in contact. '-': not reached up to this weight, and not looked for beyond it."
+        else:
+            yield "'-': the hook load is 0 before this limit is reached."
 
     def __repr__(self):
         return f"MostWeightOnBit({self.weight:.6g} N, {self.limit})"
 
 
-def most_weight_of(answer, grade, wear, safety, buckling, model):
+def most_weight_of(answer, grade, wear, safety, buckling, model, progress=None):
     """The `MostWeightOnBit` of an answer's string and operation, see `TorqueAndDrag.most_weight_on_bit`."""
     who = "most_weight_on_bit"
     safety = _safety(who, safety)
     if buckling not in ("helical", "sinusoidal"):
         refuse(who, "buckling", buckling, "'helical' or 'sinusoidal'")
-    if model not in ("soft", "buckled"):
-        refuse(who, "model", model, "'soft' or 'buckled'")
+    if model not in ("soft", "buckled", "rod"):
+        refuse(who, "model", model, "'soft', 'buckled' or 'rod'")
     if "weight" not in {field.name for field in fields(answer.operation)}:
         refuse(who, "operation", answer.operation.name, "one with a weight on bit, such as Sliding(weight)")
     if answer.operation.direction(1.0)[0] > 0:
         refuse(who, "operation", answer.operation.name, "one that goes down or rotates, such as Sliding(weight)")
+    if model == "rod":
+        start = most_weight_of(answer, grade, wear, safety, buckling, "buckled")
+        return _by_rod(answer, start.weight, strengths_of(who, answer.laid, grade, wear), safety, buckling, progress)
     strengths = strengths_of(who, answer.laid, grade, wear)
     soft, solved = (cache(partial(_solved, answer, x)) for x in ("soft", model))
     high, least = float(answer.pieces.weight @ (answer.pieces.bottom - answer.pieces.top)), soft(0.0)
@@ -215,6 +232,79 @@ def most_weight_of(answer, grade, wear, safety, buckling, model):
     place = np.searchsorted(least.md, md).clip(max=len(least.md) - 1)
     part = np.where(np.isnan(md), "", least.value("component_name")[place])
     return MostWeightOnBit(limits, weights, md, part, counts, answer.operation.name, safety)
+
+
+def _by_rod(answer, start, strengths, safety, buckling, progress):
+    """The `MostWeightOnBit` of the rod in contact, looked for from a weight (N) on.
+
+    Raises:
+        NotConverged: the limit was not found to its accuracy with as many equilibria as are allowed.
+    """
+    whole = float(answer.pieces.weight @ (answer.pieces.bottom - answer.pieces.top))
+    low, high, weight = (0.0, None), (np.inf, None), min(start, whole)
+    with StageProgress("most weight on bit", progress, world()) as bar:
+        for k in range(_MOST_SOLVED):
+            bar.at(f"rod in contact {k + 1} of at most {_MOST_SOLVED}, {weight / 1e3:.4g} kN on bit")
+            limits = _limits_of_rod(answer, weight, strengths, safety, buckling)
+            name = min(limits, key=lambda x: limits[x][0])
+            inside = limits[name][0] > 0
+            low, high = ((weight, limits), high) if inside else (low, (weight, limits))
+            if high[1] is None or low[1] is None:
+                weight = min(weight * _AWAY, whole) if inside else weight / _AWAY
+            elif high[0] - low[0] <= (_NEAR_UNSOLVED if _UNSOLVED in high[1] else _NEAR) * high[0]:
+                break
+            else:
+                weight = _between(low, high, inside)
+        else:
+            raise NotConverged(
+                f"most_weight_on_bit: {_MOST_SOLVED} equilibria of the rod in contact leave it between {low[0]:.4g} "
+                f"and {high[0]:.4g} N: expected a model='buckled', or a string that bears more"
+            )
+    names = list(dict.fromkeys((*limits, *low[1], *high[1])))
+    first = min(high[1], key=lambda x: high[1][x][0])
+    of_first = [x == first for x in names]
+    md = high[1][first][1]
+    reached = np.where(of_first, md, np.nan)
+    part = answer.value("component_name")[min(np.searchsorted(answer.md, np.nan_to_num(md)), len(answer.md) - 1)]
+    return MostWeightOnBit(np.array(names), np.where(of_first, low[0], np.nan), reached,
+                           np.where(of_first & ~np.isnan(reached), part, ""), np.full(len(names), True),
+                           answer.operation.name, safety, "rod")  # fmt: skip
+
+
+def _between(low, high, above):
+    """The weight that is tried next, between one within all limits and one beyond: where the margin vanishes on a line,
+    and a little beyond that on the other side of the last one; in the middle where margins are no line."""
+    name = min(high[1], key=lambda x: high[1][x][0])
+    left, right = (found.get(name, (np.nan, 0))[0] for _, found in (low, high))
+    middle, width = (low[0] + high[0]) / 2, high[0] - low[0]
+    if not np.isfinite(left - right) or name == _UNSTABLE:
+        return middle
+    zero = low[0] + width * left / (left - right)
+    zero += (1 if above else -1) * _NEAR * zero / 3
+    return float(np.clip(zero, low[0] + width / 20, high[0] - width / 20))
+
+
+def _limits_of_rod(answer, weight, strengths, safety, buckling):
+    """{limit: (what is left of it, a share, below 0 beyond it; measured depth, m)} of the rod with a weight on bit."""
+    start = _solved(answer, "soft", weight)
+    most = float(np.abs(start.tension).max())
+    # the rod's tolerance is relative to the hook load, which may be small
+    tol = min(0.5, _ROD_TOL * most / max(abs(start.hook_load), 1e-3 * most))
+    try:
+        rod = answer.by_rod(replace(start, tol=tol), (), False, helix=buckling == "helical")
+    except NotConverged:
+        return {_UNSOLVED: (-np.inf, np.nan)}
+    found = {"weight of the string": (rod.hook_load / most, 0.0)}
+    shares = {"helical buckling": _to_load(rod, 1), "strength": 1 - safety * Utilisation(rod, strengths).von_mises}
+    if buckling == "sinusoidal":
+        stable = rod.solved.negative_modes == 0
+        found[_UNSTABLE] = 1.0 if stable else -1.0, float(rod.md[np.argmin(rod.tension)])
+        shares["sinusoidal buckling"] = _to_load(rod, 0)  # beyond it the rod may be a snake, which is stable
+    for name, share in shares.items():
+        if np.isfinite(share).any():
+            at = int(np.nanargmin(share))
+            found[name] = float(share[at]), float(rod.md[at])
+    return found
 
 
 def _solved(answer, model, weight):

@@ -143,7 +143,8 @@ def _flexible(given, model, tol, torque_convention, pieces, laid):
     ends = [(x.tension[-1, -1], x.torque[-1, -1]) for x in (solved, soft)]
     differences = {SOFT: tuple(float(a - b) for a, b in zip(*ends, strict=True))} if buckled else {}
     answer = TorqueAndDrag(*given, used, tol, torque_convention, tuple(whole), error, max(shares.values()),
-                           tuple(parts.total for parts in left_out), differences, laid, pieces, solved)  # fmt: skip
+                           tuple(parts.total for parts in left_out), differences, laid, pieces, solved,
+                           rod_in_contact)  # fmt: skip
     if bent := given[1].bent:
         unknown = (
             f"THE BEND of {bent} IS NOT IN IT: a string on the axis of the hole has none, and what it "

@@ -8,13 +8,14 @@
   allowed bending stress is that of API RP 7G, of grade E, and of S-135 from its yield strength on, which is known for
   these two alone: X95 and G105 have that of grade E.
 
-Wear: the share of the wall that is left, worn off the outside: 0.8 of the class "premium". All is of the body: tool
-joints and their connections are left out, and so is damage by corrosion.
+Wear: the share of the wall that is left, worn off the outside: 0.8 of the class "premium", 0.7 of "class 2". All is of the
+body: tool joints and their connections are left out, and so is damage by corrosion.
 """
 
 import re
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -31,6 +32,8 @@ from cosserat_fenicsx.well.pieces import areas, sections_of, true_tension, von_m
 
 #: Least yield strengths of the grades of drill pipe, API Spec 5DP, Pa.
 GRADES = {"E75": 75 * ksi, "X95": 95 * ksi, "G105": 105 * ksi, "S135": 135 * ksi}
+#: Share of the wall that is left of the classes of used drill pipe, API RP 7G.
+CLASSES = {"new": 1.0, "premium": 0.8, "class 2": 0.7}
 # Of the tubes of heavy-weight pipe (Drilco), of collars up to 6 7/8 in and wider ones (API Spec 7-1).
 _HEAVY, _COLLAR, _WIDE_COLLAR, _WIDE = 55 * ksi, 110 * ksi, 100 * ksi, 6.875 * inch
 _SHEAR, _NEW_WALL = 0.577, 0.875
@@ -56,6 +59,21 @@ def yield_of(owner, grade):
                   lambda x: 1e7 <= x <= 1e10)  # fmt: skip
 
 
+def wear_of(owner, wear):
+    """Share of the wall that is left, of a class by its name or as a number.
+
+    Raises:
+        SceneError: an unknown name, with the nearest one; a number that is no share.
+    """
+    expected = f"the share of the wall that is left, from 0.1 to 1, or {', '.join(map(repr, CLASSES))}"
+    if isinstance(wear, str):
+        plain = " ".join(wear.lower().replace("-", " ").replace("_", " ").split())
+        if plain not in CLASSES:
+            refuse(owner, "wear", wear, f"{expected}: 0.8 of premium pipe, 0.7 of class 2")
+        return CLASSES[plain]
+    return number(owner, "wear", wear, expected, lambda x: 0.1 <= x <= 1)
+
+
 def usual_yield(part):
     """Yield strength (Pa) of a component that no grade is given for; None where none is usual."""
     if isinstance(part, HeavyWeight):
@@ -72,7 +90,8 @@ class PipeStrength(InWords, Part):
     Args:
         pipe: a component with diameters.
         grade: "E75", "X95", "G105" or "S135"; or a yield strength, Pa or text, such as "135 ksi".
-        wear: share of the wall that is left, 0.1 to 1: 1 of new pipe, 0.8 of the class "premium".
+        wear: share of the wall that is left, 0.1 to 1, or a class of API RP 7G: "new" (1), "premium" (0.8), "class 2"
+            (0.7).
 
     Attributes:
         yield_strength: Pa. outer_diameter: of the worn body, m. area: of its section, m^2.
@@ -84,13 +103,13 @@ class PipeStrength(InWords, Part):
 
     pipe: StringPart
     grade: object = "E75"
-    wear: float = 1.0
+    wear: Any = 1.0
 
     def validate(self):
         """Find the worn section and the yield strength."""
         if not self.pipe.outer_diameter or not self.pipe.inner_diameter:
             refuse(self, "pipe", self.pipe.name, "a component with an outer and an inner diameter, such as DrillPipe")
-        number(self, "wear", self.wear, "the share of the wall that is left, from 0.1 to 1", lambda x: 0.1 <= x <= 1)
+        store(self, wear=wear_of(self, self.wear))
         new, bore = self.pipe.outer_diameter, self.pipe.inner_diameter
         store(self, yield_strength=yield_of("PipeStrength", self.grade),
               outer_diameter=bore + self.wear * (new - bore))  # fmt: skip

@@ -12,7 +12,6 @@ from cosserat_fenicsx.errors import SceneError, nearest
 from cosserat_fenicsx.quantities import Quantity, Units
 from cosserat_fenicsx.results import screen
 from cosserat_fenicsx.results.result import Result, by_name
-from cosserat_fenicsx.well import criteria
 from cosserat_fenicsx.well.between_joints import MODES, UNKNOWN, bent, span_of
 from cosserat_fenicsx.well.components import DrillPipe
 from cosserat_fenicsx.well.contacts import stretches
@@ -137,14 +136,19 @@ class Utilisation(Result):
 
     @cached_property
     def curvature(self) -> np.ndarray:
-        """Largest curvature of the pipe, rad/m: of the hole times `joint_factor`, or of the hole and of a helix with the
-        string's clearance where it is buckled (r F/2 EI); of the rod in contact its own where that is larger."""
-        answer, EI = self.answer, self.answer._sections.EI
+        """Largest curvature of the pipe, rad/m, with the bending stiffness EI of its worn body throughout: of the hole
+        times `joint_factor`, or of the hole and of a helix with the string's clearance where the compression F is above
+        the worn pipe's load of buckling (r F/2 EI); of the rod in contact its moment over EI where that is larger,
+        which is too much where the hole imposes the curvature on a worn pipe. Tensions, and moments of the rod, are
+        those of the answer, whose pipe is as it was given."""
+        answer, EI = self.answer, self._of(lambda strength, here: strength.bending)
         along = answer.dogleg_severity * self.joint_factor
         if answer.model == "rod":
             return np.maximum(along, answer.bending_moment / EI)
-        buckled = np.where(answer.buckling > criteria.STRAIGHT, answer.clearance * -answer.tension / (2 * EI), 0.0)
-        return np.where(buckled > 0, np.maximum(along, answer.dogleg_severity + buckled), along)
+        with np.errstate(invalid="ignore"):
+            buckled = answer.buckles_at(EI)[0] < -answer.tension
+        helix = answer.dogleg_severity + answer.clearance * -answer.tension / (2 * EI)
+        return np.where(buckled, np.maximum(along, helix), along)
 
     @cached_property
     def bending_stress(self) -> np.ndarray:

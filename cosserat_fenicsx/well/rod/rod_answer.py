@@ -189,12 +189,12 @@ def _found(flexible, solved, differences):
         )
 
 
-def rod_in_contact(flexible, decided, progress=None, exact=True):
+def rod_in_contact(flexible, decided, progress=None, exact=True, helix=True):
     """The `RodInContact` of the same string in the same hole as a soft one.
 
     Args:
         decided: sentences on why the soft string is not enough. exact: False for an answer that may be less accurate
-            than asked, and says so.
+            than asked, and says so. helix: whether to begin again as a helix where the equilibrium would buckle.
 
     Raises:
         SceneError: a component without stiffness, or as wide as the hole; a weight in mud that is not positive;
@@ -237,17 +237,17 @@ def rod_in_contact(flexible, decided, progress=None, exact=True):
             return short.answer, short
 
     solved, short = solve(helix=False)
-    if solved.negative_modes:
+    if solved.negative_modes and helix:
         with contextlib.suppress(NotConverged):
-            helix, shorter = solve(helix=True)
-            if helix.negative_modes == 0:
+            turned, shorter = solve(helix=True)
+            if turned.negative_modes == 0:
                 decided = (
                     *decided,
                     "begun as a helix: from the axis an equilibrium was found that would buckle, "
                     f"{solved.negative_modes} negative eigenvalues of the second variation",
-                    *_of_hand(helix),
+                    *_of_hand(turned),
                 )
-                solved, short = helix, shorter
+                solved, short = turned, shorter
     if short is not None:
         decided = (*decided, f"NOT ENOUGH for tol = {flexible.tol:g}: {short}")
     return RodInContact._of(flexible, solved, decided)
