@@ -10,6 +10,7 @@ from cosserat_fenicsx.ranks import are_apart
 _PATIENCE = 2.0  # s before a bar appears
 _LINE_EVERY = 10.0  # s between plain lines
 _REDRAWN = 0.5  # s between texts of `_Clocked` in a terminal
+_PLANNED = 1.0  # s before a plan is told, and so before a bar
 
 
 def _shown(wanted, comm):
@@ -79,6 +80,31 @@ class Progress:
     def __exit__(self, *exception):
         if self._bar is not None:
             self._bar.stop()
+
+
+class Plan:
+    """Context manager that prints on rank 0 what is about to be done, and how long it may take: at once, or, where
+    progress is not asked for (`wanted`, see `Progress`), in runs that have not ended after a second."""
+
+    def __init__(self, text, wanted, comm):
+        patience = 0.0 if wanted is True else _PLANNED
+        self._text, self._timer = text, None
+        if _shown(wanted, comm):
+            self._timer = threading.Timer(patience, self._tell)
+            self._timer.daemon = True
+
+    def _tell(self):
+        print(self._text, file=sys.stderr, flush=True)
+
+    def __enter__(self):
+        if self._timer:
+            self._timer.start()
+        return self
+
+    def __exit__(self, *exception):
+        if self._timer:
+            self._timer.cancel()
+            self._timer.join()
 
 
 class _Clocked:

@@ -42,7 +42,8 @@ def a_million(found):
 
 def covered(found):
     """The errors are within their estimates."""
-    (((_, _, row),), sweeps) = found
+    ((_, _, row),), sweeps, operations = found
+    assert len(operations) == 3 and {model for _, model in operations} == {"rod"}
     within = all(row["covered"]) and max(row["errors"]) < 1e-5 and max(row["estimates"]) <= 1e-4
     return within and len(sweeps) == 1 and sweeps[0][-1] <= 1e-4
 
@@ -55,7 +56,8 @@ QUICK = {
     "first_runs": ({"runs": 1, "kinds": ["a column in a plane"]}, lambda found: all(
         files in (4, 5) and first[0] > following[0] > 0 for first, following, files in found.values()), ()),
     "wall_in_motion": ({"runs": 1, "duration": 0.02, "length": 250.0, "elements": 40}, lies_and_falls, ()),
-    "rods_in_wells": ({"quick": True}, covered, ("| P | trip in | ",)),
+    "rods_in_wells": ({"quick": True}, covered, (
+        "| P | trip in | ", "the models that answered: 3 rod.", "| largest | ")),
     "accuracy": ({"quick": True}, bool, ("| mixed | P3 | 4.9e-07", "EA = GA = infinity", "eta = 0 to 9")),
     "choice": ({"runs": 1, "scenes": 1, "counts": (2, 4, 8)}, chosen_well, ()),
     "many_rods": ({"sizes": (0,)}, lambda found: all(

@@ -12,7 +12,8 @@ import pytest
 from reference_wells import in_build_section, well
 
 import cosserat_fenicsx as cf
-from cosserat_fenicsx.well.rod import rod_in_hole
+from cosserat_fenicsx import progress
+from cosserat_fenicsx.well.rod import rod_answer, rod_in_hole
 from cosserat_fenicsx.well.rod.rod_answer import _found
 
 KNOWN = json.loads((Path(__file__).parent / "reference" / "rod_in_hole.json").read_text(encoding="utf-8"))
@@ -49,6 +50,32 @@ def test_auto_goes_on_to_the_rod_and_says_why(out):
         not soft.enough
         and cf.well.torque_and_drag(hole(build()), STRING, cf.well.TripOut(-50e3), tol=0.05).model == "soft"
     )
+
+
+@pytest.mark.parametrize("model, told", [("auto", "error in the hook load exceeds tol = 0.0001: "), ("rod", "")])
+def test_what_is_about_to_be_done_is_said_before_a_long_run(model, told, monkeypatch, capsys):
+    asked = hole(build()), STRING, cf.well.TripOut(weight=-50e3)
+    cf.well.torque_and_drag(*asked, model="soft")
+    cf.well.torque_and_drag(*asked, model=model, progress=False)
+    assert capsys.readouterr().err == ""
+    monkeypatch.setattr(progress, "_PLANNED", 0.01)
+    for wanted in (None, True):
+        cf.well.torque_and_drag(*asked, model=model, progress=wanted)
+        first, *_ = capsys.readouterr().err.splitlines()
+        assert first.startswith("torque_and_drag, trip out: ") and f"{told}solving the rod in contact" in first
+        assert "ends after about 10" in first
+
+
+def test_a_search_ends_after_so_much_work_and_says_what_to_do(monkeypatch):
+    """Coiled tubing with weight on bit in a horizontal hole: a helix, and with more weight on bit lock-up."""
+    path = cf.well.WellPath.from_survey([0, 300, 600, 900], [0, 0, 90, 90], [0, 0, 0, 0])
+    tubing = cf.well.DrillPipe(outer_diameter=0.0508, inner_diameter=0.0429, tool_joint=0.0508, mass=5.5)
+    asked = cf.well.Borehole(path, cf.well.HoleSection(900, 0.1556, 0.3)), cf.well.DrillString([tubing])
+    monkeypatch.setattr(rod_answer, "_LONGEST", 0.3)
+    for weight, told in ((6e3, "model=.buckled., the flexible string, with the wall force of a helix, has a hook"),
+                         (20e3, "WITH THE WALL FORCE OF A HELIX IT LOCKS UP: .* locks up at md = ")):  # fmt: skip
+        with pytest.raises(cf.NotConverged, match=rf"the search has ended after about 0 s .*{told}"):
+            cf.well.torque_and_drag(*asked, cf.well.Sliding(weight), mud=MUD, model="rod")
 
 
 def test_what_the_answer_of_the_rod_tells(out):
@@ -294,7 +321,9 @@ def test_what_cannot_be_a_rod(monkeypatch):
     monkeypatch.setattr(rod_in_hole, "solve_in_hole", fails)
     instead = cf.well.torque_and_drag(hole(path), STRING, cf.well.TripOut())
     assert not instead.enough and "not solved: the contact alternates" in str(instead)
-    with pytest.raises(cf.NotConverged, match="alternates$"):
+    with pytest.raises(
+        cf.NotConverged, match="alternates; model='soft', the flexible string, has a hook load of 1.2112e.05 N"
+    ):
         cf.well.torque_and_drag(hole(path), STRING, cf.well.TripOut(), model="rod")
     flat = cf.well.WellPath.from_survey([0, 20000], [90, 90], [0, 0])
     with pytest.raises(cf.NotConverged, match=r"alternates; WITH THE WALL FORCE OF A HELIX IT LOCKS UP: .* md = "):

@@ -287,20 +287,23 @@ class Step:
 class LimitedNewton:
     """Newton steps of limited length, from the state of a `Problem`, for states far from the solution, such as a rod
     pressed against a wall; longest, widest: displacement of a node in a step, in the model's unit of length, and its
-    rotation, rad.
+    rotation, rad; before_step: called before every `step`.
 
     The contact force that is carried at the Gauss points takes the same share of its step as the motion. A tangent that
     is singular to rounding is used nevertheless, because pivots of a slender rod beside a stiff wall are as small; the
     caller must check the result by its balance.
     """
 
-    def __init__(self, problem, longest, widest):
+    def __init__(self, problem, longest, widest, before_step=None):
         self._problem, self._longest, self._widest, self.iterations = problem, longest, widest, 0
+        self._before_step = before_step
         self._change = problem.numbering.vector()
         self._carried = [function.x.array for function in problem.model.carried]
 
     def step(self, share=1.0):
         """Take one step, or a share of it; None where the tangent is singular or the residual is not a number."""
+        if self._before_step:
+            self._before_step()
         self._residual()
         self._factor()
         return self.take(share) if self._direction() else None

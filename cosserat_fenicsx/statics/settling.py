@@ -60,7 +60,7 @@ def stages_from(spring, way="fast"):
     return (*to_axis, *fading, (wall, 0.0, False), *stiffer, *DECADES)
 
 
-def settle(problem, walls, clearance, rounding, stages, careful=(), on_stage=None, hold=0.0):
+def settle(problem, walls, clearance, rounding, stages, careful=(), on_stage=None, hold=0.0, before_step=None):
     """Bring a problem to equilibrium at its walls, from its state; returns the number of Newton steps. Raises
     NotConverged where a stage was not solved, or the result is no equilibrium.
 
@@ -68,9 +68,10 @@ def settle(problem, walls, clearance, rounding, stages, careful=(), on_stage=Non
     which the rod touches, in the model's unit of length; rounding: residual force of a node that rounding may leave, in
     the model's unit; careful: indices of the stages to solve more precisely; on_stage: called with the index of each;
     hold: for a rod that is free, or almost free, to turn as a whole, such as a helix in a straight tube: stiffness,
-    over the wall's own, of springs to the last position, which keep the tangent regular and vanish at rest.
+    over the wall's own, of springs to the last position, which keep the tangent regular and vanish at rest;
+    before_step: called before every Newton step.
     """
-    newton = LimitedNewton(problem, max(_LONGEST * clearance, _OF_LENGTH), _WIDEST)
+    newton = LimitedNewton(problem, max(_LONGEST * clearance, _OF_LENGTH), _WIDEST, before_step)
     for k, (stiffness, spring, viscous) in enumerate(stages):
         for wall in walls:
             wall.wall, wall.spring, wall.anchor = stiffness, spring, None

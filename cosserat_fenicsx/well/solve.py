@@ -6,6 +6,8 @@ import numpy as np
 
 from cosserat_fenicsx.checks import instance, number, refuse
 from cosserat_fenicsx.errors import InstallationError, NotConverged, SceneError
+from cosserat_fenicsx.progress import Plan
+from cosserat_fenicsx.ranks import world
 from cosserat_fenicsx.units import rpm
 from cosserat_fenicsx.well.answer import TorqueAndDrag, scales_of, share
 from cosserat_fenicsx.well.buckled import LockUp, buckled_string
@@ -14,7 +16,7 @@ from cosserat_fenicsx.well.hole import Borehole, Mud
 from cosserat_fenicsx.well.model_error import model_errors
 from cosserat_fenicsx.well.operations import Operation
 from cosserat_fenicsx.well.pieces import pieces_of, rings_of, sections_of
-from cosserat_fenicsx.well.rod.rod_answer import rod_in_contact
+from cosserat_fenicsx.well.rod.rod_answer import longest, rod_in_contact
 from cosserat_fenicsx.well.softstring import chain_of, soft_string
 from cosserat_fenicsx.well.tools import MudMotor
 
@@ -23,6 +25,7 @@ MODELS = (AUTO, SOFT, BUCKLED, ROD)
 CONVENTIONS = ("coulomb", "johancsik")
 _QUANTITIES = {"hook load": "N", "surface torque": "N m"}
 _LOCKS_UP = "WITH THE WALL FORCE OF A HELIX IT LOCKS UP"
+_HOW_LONG = "solving the rod in contact mostly takes a second, and ends after about"
 _NO_ROD = (
     "the exact rod in contact is not tried: beyond helical buckling there are many equilibria, and it may return "
     "another one than the string's; use model='rod' to force it"
@@ -58,7 +61,8 @@ def torque_and_drag(
             q/sqrt(1 + e^2 mu^2) with e the share of the slip that is around it: part of the load is carried by
             friction, as on the rod in contact; "johancsik", q itself, the convention of most programs, which gives a
             torque 2 to 4 % higher at a friction of 0.2 to 0.3.
-        progress: of the rod; True or False; None shows it in runs of more than two seconds.
+        progress: of the rod; True or False; None shows it in runs of more than two seconds, and says after the first
+            one which model is solved, and for how long at most.
 
     Returns:
         a `TorqueAndDrag`. Its `enough` is False where the accuracy asked for is beyond the model, or where `model` is
@@ -85,15 +89,30 @@ def torque_and_drag(
         return flexible
     if model == AUTO and flexible.model == BUCKLED:
         return replace(flexible, why=(*flexible.why, _NO_ROD))
+    told = "" if model == ROD else f"{why[-1].rpartition(': ')[0] or why[-1]}: "
     try:
-        return rod_in_contact(flexible, why, progress, exact=model == ROD)
+        with Plan(f"torque_and_drag, {operation.name}: {told}{_HOW_LONG} {longest(tol):.0f}", progress, world()):
+            return rod_in_contact(flexible, why, progress, exact=model == ROD)
     except (SceneError, NotConverged, InstallationError) as problem:
         if model == ROD:
             if isinstance(problem, NotConverged):
-                problem.args = ("; ".join([str(problem), *(line for line in why if line.startswith(_LOCKS_UP))]),)
+                problem.args = ("; ".join([str(problem), *_instead(flexible, why)]),)
             raise
         failed = f"the exact rod in contact was tried, and not solved: {problem}"
         return replace(flexible, why=(*flexible.why, failed))
+
+
+def _instead(flexible, why):
+    """Sentences on what the flexible string says where the rod was not solved."""
+    locked = [line for line in why if line.startswith(_LOCKS_UP)]
+    yield from locked
+    if not locked:
+        helix = ", with the wall force of a helix" if flexible.model == BUCKLED else ""
+        off = f"may be off by {flexible.left_out[0]:.2g} N" if np.isfinite(flexible.left_out[0]) else "may lock up"
+        yield (
+            f"model='{flexible.model}', the flexible string{helix}, has a hook load of {flexible.hook_load:.5g} N and "
+            f"{off}"
+        )
 
 
 def check_settings(model=AUTO, tol=1e-4, torque_convention=CONVENTIONS[0]):

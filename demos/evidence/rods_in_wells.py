@@ -1,7 +1,7 @@
 """The exact rod in three wells: Newton steps, processor time, and estimated errors beside true ones.
 
     python demos/evidence/rods_in_wells.py           every operation; medians of 5 runs; writes out/rods_in_wells.md
-    python demos/evidence/rods_in_wells.py --quick   one operation in one well, one run
+    python demos/evidence/rods_in_wells.py --quick   one operation in one well and in a random one, one run
 
 A uniform string in well P (turn and horizontal), Volve 15/9-F-12 and ISCWSA standard well 2, coefficient of friction
 0.25, in every operation; drilling and sliding once more with the bit centred in the hole. Each is solved at the default
@@ -9,20 +9,27 @@ settings, on elements of 2 m, and on elements of about half a metre in a wall of
 torque count as true. A broomstick is 40 depths of the bit by `depth_sweep`. Times are processor times on one thread,
 forms compiled. The ratio, which depends less on the machine, is the time on elements of 2 m over that of as many
 solutions with banded matrices of the same sizes (LAPACK's gbsv) as there were Newton steps.
+
+Three operations each in 40 random wells of tests/random_wells.py with assemblies of a bit and stabilisers are timed
+as `torque_and_drag` chooses the model; and small pipe that slides in a horizontal hole beyond its helical buckling
+load, by model="rod", until it has an answer or says that it finds none.
 """
 
 import json
 import statistics
+import sys
+import warnings
 from pathlib import Path
 
 import numpy as np
-from harness import command, in_words, table, timed, write
+from harness import HEADS, command, in_words, judged, table, timed, write
 from scipy.linalg import solve_banded
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.well.rod.rod_in_hole import solve_in_hole
 
-SURVEYS = Path(__file__).resolve().parents[2] / "tests" / "reference" / "wells.json"
+TESTS = Path(__file__).resolve().parents[2] / "tests"
+SURVEYS = TESTS / "reference" / "wells.json"
 WELLS = ("P", "F-12", "ISCWSA 2")
 WEIGHT, RADIUS, CLEARANCE, FRICTION, BIT = 241.13, 0.0635, 0.04445, 0.25, 0.1  # N/m, m
 STIFFNESS = cf.Stiffness((1.35359e8, 1.35359e8), 7.03868e8, (1228200.0, 1228200.0), 9.4e5)
@@ -45,6 +52,16 @@ BEFORE = 4  # elements over those of the mesh before, where their number is aske
 DEPTHS, SHALLOWEST = 40, 0.2  # of a broomstick; over the deepest
 #: At most: Newton steps; s at default settings and on elements of 2 m; s of a broomstick; error of the hook load.
 STEPS, DEFAULT, AT_2M, BROOM, ERROR = 55, 0.3, 1.0, 20.0, 1e-5
+#: Random wells with assemblies; at most, s: median and largest of their operations, and of a string that slides.
+MANY, MEDIAN, LONGEST, ENDS = 40, 1.0, 3.0, 10.0
+#: Pipe (outer and inner diameter, tool joint, m; mass, kg/m), diameter of the hole, m, and length of its horizontal, m.
+SMALL = {
+    "coiled tubing 2 in": ((0.0508, 0.0429, 0.0508, 5.5), 0.1556, 500),
+    "coiled tubing 2 3/8 in": ((0.0603, 0.0507, 0.0603, 7.0), 0.1556, 1500),
+    "drill pipe 2 7/8 in": ((0.0730, 0.0546, 0.1016, 16.2), 0.1556, 1500),
+    "drill pipe 5 in": ((0.1270, 0.1086, 0.1651, 31.1), 0.2159, 3000),
+}
+WEIGHTS = (10e3, 30e3, 80e3)  # N, on bit
 FORMS = {"elements": "d", "steps": "d", "seconds": ".2f", "errors": ".0e", "estimates": ".0e"}
 UNKNOWNS, BAND = 7, 27  # of a node; on each side of the diagonal, P3
 
@@ -111,7 +128,46 @@ def broomstick(hole, operation, depths):
     return seconds, float(sweep.values["error"].max())
 
 
-def lines(rows, sweeps, runs, depths):
+def spent(*asked, **settings):
+    """Processor time, s, of a `torque_and_drag`, and its model, or "none" where it raises."""
+
+    def task():
+        try:
+            return cf.well.torque_and_drag(*asked, progress=False, **settings).model
+        except (cf.SceneError, cf.NotConverged):
+            return "none"
+
+    return timed(task)[::-1]
+
+
+def random_operations(count):
+    """`spent` of each operation in so many random wells with assemblies."""
+    sys.path.append(str(TESTS))
+    import random_wells
+
+    found, seed = [], 0
+    with warnings.catch_warnings(action="ignore", category=cf.SceneWarning):
+        while count:
+            drawn, seed = random_wells.draw(seed), seed + 3  # of these every third has a bit
+            if any(isinstance(part, cf.well.Stabiliser) for part in drawn.string.components):
+                given, count = {"mud": drawn.mud, "depth": drawn.depth}, count - 1
+                found += [spent(drawn.hole, drawn.string, operation, **given) for operation in drawn.operations]
+    return found
+
+
+def slides(names):
+    """[(name, weight on bit, *`spent`)] of small pipe in a horizontal hole."""
+    for name in names:
+        (outer, inner, joint, mass), diameter, length = SMALL[name]
+        path = cf.well.WellPath.from_survey([0, 1000, 1900, 1900 + length], [0, 0, 90, 90], [0] * 4)
+        pipe = cf.well.DrillPipe(outer_diameter=outer, inner_diameter=inner, tool_joint=joint, mass=mass)
+        hole = cf.well.Borehole(path, cf.well.HoleSection(path.length, diameter, FRICTION))
+        for weight in WEIGHTS:
+            asked = hole, cf.well.DrillString([pipe]), cf.well.Sliding(weight)
+            yield name, weight, *spent(*asked, mud=cf.well.Mud(1200.0), model="rod")
+
+
+def lines(rows, sweeps, operations, slid, runs, depths):
     """The tables as Markdown."""
     yield (
         f"{in_words()}. Medians of {runs} run(s); in each cell first at the default settings, then on elements "
@@ -132,6 +188,20 @@ def lines(rows, sweeps, runs, depths):
     yield ""
     cells = [(name, what, f"{seconds:.1f}", f"{error:.0e}") for name, what, seconds, error in sweeps]
     yield from table("well | operation | s | largest estimated error", cells)
+    yield ""
+    seconds, models = zip(*operations, strict=True)
+    told = ", ".join(f"{models.count(x)} {x}" for x in dict.fromkeys(models))
+    yield f"{len(seconds)} operations in random wells with assemblies; the models that answered: {told}."
+    yield ""
+    cells = [("median", judged(statistics.median(seconds), MEDIAN, ".2f"))]
+    cells += [("largest", judged(max(seconds), LONGEST, ".2f"))]
+    yield from table(f"processor time | s | {HEADS}", cells)
+    if slid:
+        yield ""
+        yield "Sliding in a horizontal hole, by model='rod':"
+        yield ""
+        cells = [(name, f"{w / 1e3:g}", model, judged(s, ENDS, ".1f")) for name, w, s, model in slid]
+        yield from table(f"pipe | weight on bit (kN) | answer | s | {HEADS}", cells)
 
 
 def missed(found):
@@ -150,7 +220,8 @@ def main(quick=False, out="out"):
     """Print the tables and write them to out/rods_in_wells.md.
 
     Returns:
-        [(well, operation, what `measure` found)], and [(well, operation, s, largest estimated error)].
+        [(well, operation, what `measure` found)], [(well, operation, s, largest estimated error)], and [(s, model)] of
+        the operations in random wells.
     """
     runs, fine, depths = (1, 1024, 1) if quick else (5, FINE, DEPTHS)
     rows, sweeps = [], []
@@ -161,8 +232,9 @@ def main(quick=False, out="out"):
             rows.append((name, what, measure(hole, operation, centred, runs, fine)))
         for operation, _ in CASES[:1] if quick else CASES[:3]:
             sweeps.append((name, operation.name, *broomstick(hole, operation, depths)))
-    print(write("rods_in_wells", lines(rows, sweeps, runs, depths), out))
-    return rows, sweeps
+    operations, slid = random_operations(1 if quick else MANY), [*slides(() if quick else SMALL)]
+    print(write("rods_in_wells", lines(rows, sweeps, operations, slid, runs, depths), out))
+    return rows, sweeps, operations
 
 
 if __name__ == "__main__":

@@ -24,6 +24,9 @@ from cosserat_fenicsx.well.pieces import bend_of, rings_of
 from cosserat_fenicsx.well.rod.resultants import MOSTLY
 from cosserat_fenicsx.well.rod.string_scene import energy_of_helix, turns_of_helix
 
+# Longest search for an equilibrium, s of processor time, at the usual tolerance and looser ones.
+_LONGEST, _USUAL = 10.0, 1e-4
+
 
 def _of_rod(name, doc=""):
     """The attribute of the `InHole` with the same name; its description is that in `TorqueAndDrag` unless given."""
@@ -189,6 +192,11 @@ def _found(flexible, solved, differences):
         )
 
 
+def longest(tol):
+    """About how long the search for an equilibrium may take, s of processor time."""
+    return _LONGEST * max(1.0, (_USUAL / tol) ** 0.25)
+
+
 def rod_in_contact(flexible, decided, progress=None, exact=True, helix=True):
     """The `RodInContact` of the same string in the same hole as a soft one.
 
@@ -202,13 +210,15 @@ def rod_in_contact(flexible, decided, progress=None, exact=True, helix=True):
         NotConverged: no equilibrium was found, or not as accurately as asked.
     """
     # imported here, since it needs dolfinx, which the soft string does not
-    from cosserat_fenicsx.well.rod.rod_in_hole import NotAccurate, solve_in_hole
+    from cosserat_fenicsx.well.rod.rod_in_hole import NotAccurate, Work, solve_in_hole
 
     laid = in_columns(flexible.laid, flexible.mud)[::-1]  # from the top down
     hole, operation = flexible.hole, flexible.operation
     check_rod(hole, laid, operation, flexible.mud, flexible.torque_convention)
     above = [0.0, *(section.to for section in hole.sections)]
     reached = [section for section, top in zip(hole.sections, above, strict=False) if top < flexible.depth]
+
+    work = Work(longest(flexible.tol))  # of both starts
 
     def solve(helix):
         """The `InHole`, and the `NotAccurate` if it is less accurate than asked, else None."""
@@ -230,6 +240,7 @@ def rod_in_contact(flexible, decided, progress=None, exact=True, helix=True):
                 helix=helix,
                 tol=flexible.tol,
                 progress=progress,
+                work=work,
             ), None
         except NotAccurate as short:
             if exact:

@@ -3,6 +3,7 @@
 import contextlib
 import math
 from dataclasses import dataclass
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -57,10 +58,12 @@ _MESHES, _WALLS = _Meshes(), _Walls()
 _STARTS, _FROM_HELIX = ("fast", "gentle", "relaxed"), ("helix",)
 # Stands for an unknown number of negative modes in comparisons, instead of -1 where the second variation is singular.
 _SINGULAR = 1 << 30
+# Elements times Newton steps in a second.
+_STEPS = 6e4
 
 
 def solve_in_hole(path, lengths, stiffness, weight, contact_radius, *, wall_stiffness=None, helix=False, tol=1e-4,
-                  elements=None, degree=_MESHES.degree, progress=None, comm=None, **given):  # fmt: skip
+                  elements=None, degree=_MESHES.degree, progress=None, comm=None, work=None, **given):  # fmt: skip
     """The equilibrium of a string in a hole, as an exact rod in contact with the hole's wall.
 
     The string hangs from a clamp at the start of the path, on its axis, and ends at the sum of its lengths. Its weight
@@ -81,6 +84,7 @@ def solve_in_hole(path, lengths, stiffness, weight, contact_radius, *, wall_stif
         elements: their number, which fixes the mesh; the error estimate then comes from a mesh with a quarter of them.
         degree: of the elements, 2 to 4.
         progress, comm: as `solve` takes them.
+        work: the `Work` that it may do; None for any.
 
     Returns:
         `InHole`.
@@ -89,12 +93,13 @@ def solve_in_hole(path, lengths, stiffness, weight, contact_radius, *, wall_stif
         SceneError: numbers outside their range, or of another count.
         NotConverged: no equilibrium was found, or, as a `NotAccurate`, not as accurately as asked.
     """
+    work = work or Work(math.inf)
     first = _WALLS.first if wall_stiffness is None else wall_stiffness
     string = string_in(path, lengths, stiffness, weight, contact_radius, first, **given)
     tol = tolerance("solve_in_hole", tol)
     comm, counts = communicator(comm), _counts(elements, len(Layout.of(string.scene, 1).breaks[0]) - 1)
     with Progress([float(len(stages_from(string.spring)))], progress, comm, "stage") as bar:
-        job = _Job(degree, bool(helix), tol, _WALLS.stiffest if wall_stiffness is None else 1.0, bar, comm)
+        job = _Job(degree, bool(helix), tol, _WALLS.stiffest if wall_stiffness is None else 1.0, bar, work, comm)
         answer = None
         for count in counts:
             try:
@@ -110,8 +115,35 @@ def solve_in_hole(path, lengths, stiffness, weight, contact_radius, *, wall_stif
                 break
     string.leave(answer.factor)
     if elements is None and answer.error > tol:
-        raise NotAccurate(answer, tol)
+        raise NotAccurate(answer, tol, work)
     return answer
+
+
+class Work:
+    """What a search for an equilibrium may cost: `left`, elements times Newton steps, of which a second takes about
+    60 000. So where it ends does not depend on the machine.
+
+    Args:
+        seconds: about how long it may take.
+    """
+
+    def __init__(self, seconds):
+        self._seconds, self.left = seconds, _STEPS * seconds
+
+    def spend(self, elements):
+        """Count a Newton step on so many elements.
+
+        Raises:
+            NotConverged: it is one too many.
+        """
+        self.left -= elements
+        if self.left < 0:
+            raise NotConverged(self.words)
+
+    @property
+    def words(self):
+        """Why a search has ended, "" where it has not."""
+        return f"the search has ended after about {self._seconds:.0f} s of processor time" if self.left < 0 else ""
 
 
 class NotAccurate(NotConverged):
@@ -121,10 +153,11 @@ class NotAccurate(NotConverged):
         answer: the `InHole`.
     """
 
-    def __init__(self, answer, tol):
+    def __init__(self, answer, tol, work):
+        ended = f"{work.words}: " if work.words else ""
         super().__init__(
-            f"the estimated error of the rod in contact is {answer.error:.1e} on {answer.path.elements[0]} elements, "
-            f"of which the wall's softness makes {answer.of_stiffness:.1e}: expected a tol above it, not {tol:g}, or a "
+            f"{ended}the estimated error of the rod in contact is {answer.error:.1e} on {answer.path.elements[0]} "
+            f"elements, of which the wall's softness makes {answer.of_stiffness:.1e}: expected a tol above it, not {tol:g}, or a "
             "stiffer wall"
         )
         self.answer = answer
@@ -145,13 +178,14 @@ def _counts(elements, pieces):
 
 class _Job(NamedTuple):
     """Settings that all meshes share: the degree of the elements, whether the start is a helix, the tolerance, the
-    stiffest wall that it may need (over the first one), the progress, and the ranks."""
+    stiffest wall that it may need (over the first one), the progress, the work that is left, and the ranks."""
 
     degree: int
     helix: bool
     tol: float
     stiffest: float
     bar: Progress
+    work: Work
     comm: MPI.Comm
 
 
@@ -215,6 +249,7 @@ def _divided(string, layout, wanted, count):
 def _on_mesh(string, layout, stages, factor, start, before, job):
     """The `InHole` on one mesh, in a wall stiffer by a factor or more, from that on another mesh, a helix or the axis,
     with errors by that on the mesh before."""
+    job.work.spend(0)
     with solvers_of(string.scene, layout, degree=job.degree, comm=job.comm) as (problem, _, stability):
         problem.set_load_factor(1.0)
         _begin(problem, string, layout, start, job.helix)
@@ -249,7 +284,8 @@ def _in_walls(string, problem, stability, stages, factor, steps, job):
             records[factor * stages[k][0]] = record_of(problem, 1.0, 0, 0, 0)
 
     scaled = [(factor * wall, factor * spring, viscous) for wall, spring, viscous in stages]
-    steps += _settled(string, problem, scaled, factor, careful, on_stage, _WALLS.hold if job.helix else 0.0)
+    hold, spend = _WALLS.hold if job.helix else 0.0, partial(job.work.spend, len(model.layout.breaks[0]) - 1)
+    steps += _settled(string, problem, scaled, factor, careful, on_stage, hold, spend)
     records[factor] = record_of(problem, 1.0, _negative_modes(string, problem, stability), steps, steps)
     answers = []
     for stiffness, record in records.items():
@@ -263,14 +299,14 @@ def _in_walls(string, problem, stability, stages, factor, steps, job):
     return answers
 
 
-def _settled(string, problem, stages, factor=1.0, careful=(), on_stage=None, hold=0.0):
+def _settled(string, problem, stages, factor=1.0, careful=(), on_stage=None, hold=0.0, spend=None):
     """`settle` of a string in a wall stiffer by a factor."""
     model = problem.model
     of_wall = string.wall.stiffness * float(model.layout.sizes(model.scene).max())
     stiffest = factor * max([of_wall, *(ring.stiffness for ring in string.rings)])
     rounding = _WALLS.rounding * np.finfo(float).eps * stiffest * model.scales.length / model.scales.force
     return settle(problem, string.stages, string.clearance / model.scales.length, rounding, stages, careful, on_stage,
-                  hold)  # fmt: skip
+                  hold, spend)  # fmt: skip
 
 
 def at_rest(string, elements, degree, comm=None):
