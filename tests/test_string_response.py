@@ -289,6 +289,8 @@ def test_results_are_told_drawn_and_stored(tmp_path):
     text = str(r)
     assert "surface torque" in text and max(map(len, text.splitlines())) <= 100 and len(text.splitlines()) <= 30
     assert r.mode_of(8.0).rotation is not None and abs(r.mode_of(8.0).root.imag / 2 / math.pi - 8.0) < 0.3
+    with pytest.raises(cf.SceneError, match="mode_of.frequency = 10.1: expected at most 10 Hz"):
+        r.mode_of(10.1)
     table = r.to_dataframe("field")
     assert table["surface torque per torque on bit"][9] == pytest.approx(
         abs(r.transfer("torque on bit", "surface torque")[9])

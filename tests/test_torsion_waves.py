@@ -513,6 +513,7 @@ def test_critical_speeds_of_a_pipe(tmp_path):
     w = (np.arange(40) + 0.5) * math.pi * part.torsional_speed / part.length
     assert found["torsion", "1 x"] == pytest.approx(w[w <= 20.0], rel=1e-12)
     assert set(answer.excitations) == {"1 x", "3 x (lobes)"} and "kind" in answer.to_dataframe()
+    assert "of torsion (bit free) and" in str(answer) and "of axial (bit fixed)" in str(answer)
     answer.plot(tmp_path / "campbell.png")
     assert (tmp_path / "campbell.png").stat().st_size > 20_000
 

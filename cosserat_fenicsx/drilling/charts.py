@@ -434,7 +434,7 @@ def draw_campbell(answer):
     fastest = answer.fastest / size
     for n, (kind, frequencies) in enumerate(answer.frequencies.items()):
         for i, frequency in enumerate(frequencies):
-            label = f"{kind} (natural)" if i == 0 else None
+            label = f"{kind}, bit {answer.ends[kind]} (natural)" if i == 0 else None
             panel.plot([0, fastest], [frequency] * 2, color=COLOURS[n], linewidth=0.9, label=label)
     for n, (name, times) in enumerate(answer.excitations.items()):
         highest = times * answer.fastest / (2 * math.pi)

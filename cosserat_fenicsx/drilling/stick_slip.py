@@ -28,7 +28,7 @@ class StickSlip:
         period: mean time between two starts of the bit from rest, s; NaN where it starts fewer than twice.
         periods: (n,) those times, s. starts, stops: when the bit starts and stops, s. A bit that swings back stops
             where it ceases to turn with the drive, and starts where it does so again.
-        stuck: share of the time that the bit is at rest, over whole periods where there are some.
+        stuck: share of the time that the bit is at rest, over whole periods where there are some; 1 where it never turns.
         severity: half the range of the bit's speed over the mean speed of the drive: 0 for a steady rotation, 1 and
             more where the bit comes to rest.
         torque: (smallest, largest) surface torque, N m. bit_torque: the same at the bit.
@@ -53,8 +53,8 @@ class StickSlip:
 
     @property
     def sticks(self) -> bool:
-        """Whether the bit comes to rest in this time, or swings back."""
-        return len(self.starts) > 1 or self.stuck > 0.01
+        """Whether the bit turns and comes to rest in this time, or swings back."""
+        return len(self.starts) > 1 or 0.01 < self.stuck < 1
 
     def __str__(self):
         return self.summary()
@@ -70,7 +70,13 @@ class StickSlip:
             return f"From {self.since:g} to {self.until:g} s neither drive nor bit turns."
         least, peak, mean = (x / turning for x in (self.least, self.peak, self.mean))
         speed = f"bit speed {least:.4g} to {peak:.4g} {rpm}, mean {mean:.4g} {rpm}"
-        if not self.sticks:
+        if self.stuck == 1:
+            what = (
+                "the bit never turned. Where the surface torque still grows, simulate a longer time; where it does not, "
+                "the drive's torque does not free the bit and the string: expected less static torque on bit or "
+                "friction, or a stronger drive"
+            )
+        elif not self.sticks:
             what = f"no stick-slip: {speed}, severity {self.severity:.3g}"
         else:
             again = "" if np.isnan(self.period) else f"period {self.period:.5g} s, "

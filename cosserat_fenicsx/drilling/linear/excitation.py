@@ -49,12 +49,14 @@ class Campbell(Drawn):
     Attributes:
         fastest: highest speed of rotation, rad/s. frequencies: {"torsion": (n,), "axial": (m,)} Hz, without what
             lies above `up_to`; they do not depend on the speed. excitations: {name: times a revolution}. up_to: Hz.
+        ends: {"torsion": "free", "axial": "fixed"}, how the lower end was held.
     """
 
     fastest: float
     frequencies: dict[str, np.ndarray]
     excitations: dict[str, float]
     up_to: float
+    ends: dict[str, str]
 
     def critical_speeds(self) -> dict[tuple[str, str], np.ndarray]:
         """{(kind, excitation): speeds in rad/s up to the highest one where it meets a natural frequency}."""
@@ -95,7 +97,8 @@ class Campbell(Drawn):
 
     def _answer(self, units):
         rpm, turning = units.on_screen(SPEED)
-        found = " and ".join(f"{len(x)} of {kind}" for kind, x in self.frequencies.items())
+        kinds = self.frequencies.items()
+        found = " and ".join(f"{len(x)} of {kind} (bit {self.ends[kind]})" for kind, x in kinds)
         yield f"{len(self)} critical speeds up to {self.fastest / turning:.4g} {rpm}."
         yield f"Natural frequencies up to {self.up_to:.4g} Hz: {found}; excitations: {', '.join(self.excitations)}."
 
@@ -113,7 +116,8 @@ def campbell(
 
     Args:
         scene: a `Drilling`. fastest: highest speed of rotation, rad/s. up_to: highest frequency, Hz.
-        torsion, axial: the lower end: "free" or "fixed". A bit on the rock turns freely and hardly moves axially.
+        torsion, axial: the lower end: "free" or "fixed". A bit on the rock turns freely and hardly moves axially, so
+            the defaults differ; `natural_frequencies` takes the end as free in both unless asked.
         excitations: {name: times a revolution}; None for once a revolution, and the blades or lobes of a bit
             that turns with the string: a motor turns it faster.
 
@@ -132,7 +136,7 @@ def campbell(
         if end not in ("free", "fixed"):
             refuse("campbell", kind, end, "'free' or 'fixed'")
     frequencies = {kind: _up_to(scene, kind, end, up_to) for kind, end in kinds.items()}
-    return Campbell(fastest, frequencies, dict(excitations), up_to)
+    return Campbell(fastest, frequencies, dict(excitations), up_to, kinds)
 
 
 def _up_to(scene, kind, end, up_to):

@@ -42,7 +42,8 @@ def natural_frequencies(scene: Drilling, count: int, bit: str = "free", kind: st
     Args:
         scene: a `Drilling`.
         count: how many.
-        bit: "free", with the inertia or mass of the scene's bit, or "fixed".
+        bit: "free", with the inertia or mass of the scene's bit, or "fixed". The default is the same in torsion and
+            axially; `campbell` holds the bit axially unless asked, as on rock.
         kind: "torsion" or "axial".
 
     Returns:

@@ -108,9 +108,13 @@ class FrequencyResponse(Drawn):
         """The `ModeShape` of the mode whose frequency (Hz) is nearest.
 
         Raises:
-            SceneError: there is no mode up to the highest frequency, or a frequency that is not positive.
+            SceneError: there is no mode up to the highest frequency, or a frequency that is not positive, or above the
+                highest one, up to which modes were looked for.
         """
         frequency = Number("frequency", positive()).check("mode_of", "frequency", frequency)
+        if frequency > self.frequency.max():
+            refuse("mode_of", "frequency", frequency, f"at most {self._highest} Hz, the highest of the response: modes "
+                   "were looked for up to it. Ask frequency_response for higher frequencies")  # fmt: skip
         if not len(self.roots):
             raise SceneError(f"mode_of: expected a response that has modes, this one has none up to {self._highest} Hz")
         return shape_of(self.equation, self.roots[np.abs(self.roots.imag - 2 * math.pi * frequency).argmin()])
