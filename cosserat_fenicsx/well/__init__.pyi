@@ -30,8 +30,8 @@ from cosserat_fenicsx.well.operations import Static as Static
 from cosserat_fenicsx.well.operations import TripIn as TripIn
 from cosserat_fenicsx.well.operations import TripOut as TripOut
 from cosserat_fenicsx.well.path import WellPath as WellPath
-from cosserat_fenicsx.well.power_curve import PowerCurve as PowerCurve
-from cosserat_fenicsx.well.power_curve import power_curve as power_curve
+from cosserat_fenicsx.well.motor_curves import PowerCurve as PowerCurve
+from cosserat_fenicsx.well.motor_curves import power_curve as power_curve
 from cosserat_fenicsx.well.reserves import MarginOfOverpull as MarginOfOverpull
 from cosserat_fenicsx.well.reserves import MostWeightOnBit as MostWeightOnBit
 from cosserat_fenicsx.well.scenefile import WellScene as WellScene
