@@ -465,7 +465,11 @@ def test_tables_take_the_numbers_of_a_data_frame():
     """Of mixed columns a frame gives objects; a function along a rod is smooth, and a name that is none is refused."""
     rows = np.ones((2, 3), dtype=object)
     assert cf.signals.AlongTable(np.array([0, 1], dtype=object), rows)(np.array([0.5])).tolist() == [[1.0, 1.0, 1.0]]
-    assert cf.signals.Table((0, 1), rows)(0.5) == (1.0, 1.0, 1.0) and cf.signals.Along(lambda s: (s, 0, 0)).breaks == ()
+    assert cf.signals.Table((0, 1), rows)(0.5) == (1.0, 1.0, 1.0)
+    assert (
+        cf.signals.Table((0, 1), np.array([2.0, 4.0]))(0.5) == (3.0,)
+        and cf.signals.Along(lambda s: (s, 0, 0)).breaks == ()
+    )
     rod = cf.Rod(cf.Line((0, 0, 0), (1, 0, 0)), cf.Circle(0.01), cf.Material(E=210e9), name="rod")
     with pytest.raises(cf.SceneError, match="no rod is named"):
         cf.Scene([rod], [cf.Clamp(rod.start)]).rod([])

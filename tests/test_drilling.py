@@ -214,15 +214,6 @@ def test_stick_slip(history):
         history.stick_slip(70.0)
 
 
-def test_a_bit_that_never_turned_is_no_stick_slip():
-    """A torque of the drive below that which holds the bit."""
-    weak = replace(scene(), drive=cf.drilling.TopDrive(control=cf.drilling.Motor(500.0, 100.0), inertia=2000.0))
-    found = cf.drilling.simulate(weak, 20.0)
-    cycle = found.stick_slip()
-    assert (found.bit_speed == 0).all() and cycle.stuck == 1 and not cycle.sticks
-    assert "the bit never turned. Where the surface torque still grows" in str(cycle) and "stick-slip" not in str(cycle)
-
-
 def test_starts_and_stops_are_interpolated():
     from cosserat_fenicsx.drilling.stick_slip import crossings
 

@@ -500,6 +500,16 @@ def test_gains_of_tuned_drives():
         cf.drilling.SoftSpeed(public_discs(cf.drilling.Stiff(), 1e4), 2900.0)
 
 
+def test_a_bit_that_never_turned_is_no_stick_slip():
+    """A torque of the drive below that which holds the bit."""
+    weak = cf.drilling.TopDrive(None, 374.0, cf.drilling.Motor(500.0, 100.0))
+    held = cf.drilling.BitOnRock(cf.drilling.Stribeck(6e3, 3e3))
+    found = cf.drilling.simulate(cf.drilling.Drilling(cf.drilling.Discs((374.0, 374.0), (473.0,)), weak, held), 20.0)
+    cycle = found.stick_slip()
+    assert (found.bit_speed == 0).all() and cycle.stuck == 1 and not cycle.sticks
+    assert "the bit never turned. Where the surface torque still grows" in str(cycle) and "stick-slip" not in str(cycle)
+
+
 def test_critical_speeds_of_a_pipe(tmp_path):
     """A free end in torsion, (k + 1/2)/2 c/L; a fixed one in axial motion, k c/(2 L)."""
     bit = cf.drilling.BitOnRock(cf.drilling.Lobes(3, 0.002), weight=8e4)

@@ -216,7 +216,9 @@ class Table(FunctionOfTime):
     @cached_property
     def _numbers(self):
         """(times, columns) as arrays, converted once, since long tables are evaluated often."""
-        return np.array(self.times, dtype=float), np.array(np.transpose(self.values), dtype=float, order="C")
+        return np.array(self.times, dtype=float), np.array(
+            np.atleast_2d(np.transpose(self.values)), dtype=float, order="C"
+        )
 
 
 def _as_text(rows):
