@@ -102,3 +102,21 @@ def test_fast_rods_do_not_pass_through_each_other():
                           for rod, d in zip(history.scene.rods, (0.05, 0.0), strict=True)))  # fmt: skip
     assert above.min() > 0 and closest(history) > 1.5 * RADIUS
     assert drift(history.linear_momentum) < 1e-10
+
+
+def test_it_goes_on_from_its_folder(tmp_path):
+    """A motion that is continued while rods touch has the same digits; forces of contacts are read from its states."""
+    settings = {"dt": 5e-5, "elements": 1, "degree": 2}
+    whole = cf.simulate(bars((0.1, 0.3)), 1e-3, **settings)
+    cf.simulate(bars((0.1, 0.3)), 6e-4, folder=tmp_path / "bars", **settings)
+    stored = cf.resume(tmp_path / "bars", duration=1e-3)
+    for rod, same in zip(whole.scene.rods, stored.scene.rods, strict=True):
+        assert np.array_equal(whole.position(rod.end), stored.position(same.end))
+    found, again = (motion[-1].contacts(motion.scene.loads[0]) for motion in (whole, stored))
+    depth, (first, _) = -found.gap[0], whole.scene.rods
+    assert found.force == pytest.approx(4 / 3 * 1e7 * math.sqrt(4 * RADIUS) * depth**1.5) == pytest.approx(again.force)
+    np.testing.assert_allclose((found.s[0], found.other_s[0]), (0.4, 0.75), atol=1e-3)
+    assert not found.line.any() and "b" in str(found)
+    forces = whole.quantities["rod_force"].of(whole, first)
+    np.testing.assert_allclose(forces[-1].sum(axis=0), -found.force[0] * found.normal[0], rtol=1e-9)
+    assert not forces[0].any()

@@ -13,6 +13,7 @@ from cosserat_fenicsx.results import screen
 from cosserat_fenicsx.results.contacts import contacts_in_words
 from cosserat_fenicsx.results.recovery import viscous_contact
 from cosserat_fenicsx.results.result import by_name
+from cosserat_fenicsx.results.rod_contacts import ROD_FORCE, RodContacts, rod_contacts_of
 from cosserat_fenicsx.results.rods import RodResult
 from cosserat_fenicsx.results.whirl import Orbit, WallForces, Whirl, orbit_of, wall_forces, whirl
 from cosserat_fenicsx.scene.action import Action
@@ -142,6 +143,25 @@ class History(RodResult):
     def times(self) -> np.ndarray:
         """(n,), see the class."""
         return self._array("time")
+
+    @property
+    def quantities(self) -> dict[str, Quantity]:
+        """{name: `Quantity`}, with forces of rods that touch."""
+        return super().quantities | by_name(*([ROD_FORCE] if self.scene.rod_contact else []))
+
+    def contacts(self, touch: Action) -> RodContacts:
+        """Where rods touch each other in the last state, with the forces there; `print` shows them. `motion[k]` has
+        those of state k.
+
+        Args:
+            touch: the `RodContact` of the scene.
+
+        Raises:
+            SceneError: something else.
+        """
+        if touch is not self.scene.rod_contact or touch is None:
+            refuse("contacts", "touch", touch, "the RodContact of the scene")
+        return rod_contacts_of(self, len(self) - 1)
 
     kinetic = _of_ledger("kinetic")
     strain = _of_ledger("strain")

@@ -17,7 +17,7 @@ from cosserat_fenicsx.results.modes import ModesAlong
 from cosserat_fenicsx.results.records import Event, Records
 from cosserat_fenicsx.results.recovery import element_contact
 from cosserat_fenicsx.results.result import by_name
-from cosserat_fenicsx.results.rod_contacts import RodContacts, nodal_forces, rod_contacts_of
+from cosserat_fenicsx.results.rod_contacts import ROD_FORCE, RodContacts, rod_contacts_of
 from cosserat_fenicsx.results.rods import RodResult
 from cosserat_fenicsx.results.sensitivity import Sensitivity, Uncertainty
 from cosserat_fenicsx.results.threads import Threads
@@ -60,11 +60,6 @@ _QUANTITIES = by_name(
     Quantity("event_mode", "mode", "1", "xyz", "inertial", ("event", "s"),
              lambda path, rod: np.array([path.mode(x, rod) for x in path.events]) if path.events else None),
 )  # fmt: skip
-
-
-_ROD_FORCE = Quantity(
-    "rod_force", "force of other rods at a node", "N", "xyz", "inertial", ("point", "s"), nodal_forces
-)
 
 
 class Path(RodResult):
@@ -111,7 +106,7 @@ class Path(RodResult):
     def quantities(self) -> dict[str, Quantity]:
         """{name: `Quantity`}, with the errors of further criteria that `tol` bounds, and forces of rods that touch."""
         further = ((x.name, f"estimated error of {words_of(x.name)}", f"errors.{x.name}") for x in self.criteria)
-        touches = [_ROD_FORCE] if self.scene.rod_contact else []
+        touches = [ROD_FORCE] if self.scene.rod_contact else []
         return super().quantities | by_name(
             *(Quantity(f"error_{name}", label, getter=getter, digits=2) for name, label, getter in further), *touches
         )

@@ -63,24 +63,47 @@ _COLUMNS = (
 )
 
 
-def rod_contacts_of(path, k):
-    """See `Path.rod_contacts`."""
-    length, record = path.scales.length, path._records[k]
-    strands = Strands.of(path.scene, path.layout, path.rule, length)
+def _strands(path):
+    return Strands.of(path.scene, path.layout, path.rule, path.scales.length)
+
+
+def _pressed(path, k, strands):
+    """The `Touches` of state k that press, with their forces (m,), and the positions (N, 3) there; dimensionless."""
+    record, elastic = path._records[k], path.scene.rod_contact.stiffness is not None
     counts = [n * path.degree + 1 for n in path.layout.counts]
-    x = record.rq[:, :3] + np.repeat(path.scene.origins / length, counts, axis=0)
-    found, _ = strands.near(x, _TOUCHES * strands.radii.max())
-    nodes = strands.nodes_of(found)
-    matrix, total = np.zeros((len(x), 3, len(found))), np.zeros(x.shape)
-    gradients = strands.gradients(found)
+    x = record.rq[:, :3] + np.repeat(path.scene.origins / path.scales.length, counts, axis=0)
+    found, _ = strands.near(x, 0.0 if elastic else _TOUCHES * strands.radii.max())
+    forces = (_by_law if elastic else _by_balance)(path, record, strands, found)
+    held = forces > _NOTHING * np.abs(forces).max(initial=0.0)
+    return found.of(held), forces[held], x
+
+
+def _by_law(history, record, strands, found):
+    """The forces of elastic surfaces in a motion."""
+    surface = history.scene.rod_contact.surface(strands, history.rule.lobatto, history.scales, history.time_unit)
+    speeds = record.rates[strands.nodes_of(found), :3]
+    approach = -np.einsum("mni,mni->m", strands.gradients(found), speeds)
+    force, _ = surface.force(surface.law(found), -found.gap)
+    return force * np.maximum(1 + surface.damping * approach, 0.0)
+
+
+def _by_balance(path, record, strands, found):
+    """Those of hard surfaces, whose sum at every node is known."""
+    if not len(found):
+        return np.zeros(0)
+    nodes, gradients = strands.nodes_of(found), strands.gradients(found)
+    matrix, total = np.zeros((len(record.rq), 3, len(found))), np.zeros((len(record.rq), 3))
     for i in range(len(found)):
         np.add.at(matrix[..., i], nodes[i], gradients[i])
     np.add.at(total, strands.cells, record.rod_forces)
-    forces = (
-        np.linalg.lstsq(matrix.reshape(-1, len(found)), total.ravel(), rcond=None)[0] if len(found) else np.zeros(0)
-    )
-    held = forces > _NOTHING * np.abs(forces).max(initial=0.0)
-    found, forces = found.of(held), forces[held] * path.scales.force
+    return np.linalg.lstsq(matrix.reshape(-1, len(found)), total.ravel(), rcond=None)[0]
+
+
+def rod_contacts_of(path, k):
+    """See `Path.contacts`."""
+    length, strands = path.scales.length, _strands(path)
+    found, forces, x = _pressed(path, k, strands)
+    forces = forces * path.scales.force
     names = np.array([rod.name for rod in path.scene.rods])
     (rod, s, place), (other, other_s, _) = (
         (names[strands.rods[e]], strands.s(e, a) * length, strands.at(x, e, a) * length)
@@ -97,13 +120,30 @@ def rod_contacts_of(path, k):
 
 
 def nodal_forces(path, rod):
-    """(points, nodes, 3) forces of other rods at the nodes of a rod, N, inertial."""
+    """(states, nodes, 3) forces of other rods at the nodes of a rod, N, inertial."""
     nodes, cells = path._rows(rod)[1], path._cells(path.scene.number(rod))
+    if path.scene.rod_contact.stiffness is not None:
+        strands = _strands(path)
+        return np.array([_at_nodes(path, k, strands)[nodes] for k in range(len(path))])
     forces = path._stacked("rod_forces")[:, cells] * path.scales.force
     found = np.zeros((len(path), nodes.stop - nodes.start, 3))
     for j in range(path.degree + 1):
         found[:, j : j + path.degree * (forces.shape[1] - 1) + 1 : path.degree] += forces[:, :, j]
     return found
+
+
+#: What results of scenes with a `RodContact` have.
+ROD_FORCE = Quantity(
+    "rod_force", "force of other rods at a node", "N", "xyz", "inertial", ("point", "s"), nodal_forces
+)
+
+
+def _at_nodes(history, k, strands):
+    """(N, 3) the sums of the forces of elastic surfaces at nodes, N."""
+    found, forces, x = _pressed(history, k, strands)
+    total = np.zeros_like(x)
+    np.add.at(total, strands.nodes_of(found), strands.gradients(found) * forces[:, None, None])
+    return total * history.scales.force
 
 
 def check_apart(path, whole=None):
