@@ -279,7 +279,7 @@ class Strands:
         ends = np.cumsum(self.sizes) - self.sizes
         begin, end = (ends[t.element] + self.sizes[t.element] * t.place for t in (first, second))
         at = begin + share[:, None] * (end - begin)
-        lowest, highest = (np.sort([first.element, second.element], axis=0))
+        lowest, highest = np.sort([first.element, second.element], axis=0)
         element = np.clip(np.searchsorted(ends, at, side="right") - 1, lowest, highest)
         return element, (at - ends[element]) / self.sizes[element]
 

@@ -89,6 +89,8 @@ def test_a_rod_that_folds_its_own_surface():
 
 def test_what_rods_that_touch_have_not():
     scene = crossing()
+    with pytest.raises(cf.SceneError, match="rods that touch each other have hard surfaces in equilibria"):
+        cf.solve(crossing(stiffness=1e8))
     with pytest.raises(cf.SceneError, match="buckling: RodContact acts in `solve` and `simulate` alone"):
         cf.buckling(scene)
     with pytest.raises(cf.SceneError, match="modes: RodContact acts in `solve` and `simulate` alone"):

@@ -13,16 +13,18 @@ import cosserat_fenicsx as cf
 pytestmark = pytest.mark.serial
 #: masses, kg; lengths, m; radius, m; distance of the surfaces at the start, m
 MASSES, LENGTHS, RADIUS, APART = (0.5, 0.8), (0.6, 0.9), 0.005, 2e-4
+#: N/m^2, and that of a point over the depth^1.5
+STIFFNESS = 1e8
+POINT = 4 / 3 * STIFFNESS * math.sqrt(4 * RADIUS)
 
 
-def bars(d=(0.0, 0.0), speed=1.0, stiffness=1e7, bending=1e6, slope=0.0, **contact):
+def bars(d=(0.0, 0.0), speed=1.0, stiffness=STIFFNESS, bending=1e6, **contact):
     """Two bars that cross at a right angle; the upper one falls at a speed on the lower one, at distances d from both
-    middles; slope: the angle of the upper one with the horizontal."""
+    middles."""
     rods = []
-    for name, m, L, e, direction in zip("ab", MASSES, LENGTHS, d, ((1, 0, slope), (0, 1, 0)), strict=True):
-        section = cf.Stiffness((1e9, 1e9), 1e9, (bending,) * 2, bending, mass=m / L, inertia=(1e-12, 1e-12, 2e-12))
-        along = np.array(direction) / np.linalg.norm(direction)
-        middle = np.array((0, 0, (2 * RADIUS + APART) / math.cos(slope))) * (name == "a") - e * along
+    for name, m, L, e, along in zip("ab", MASSES, LENGTHS, d, np.eye(3)[:2], strict=True):
+        section = cf.Stiffness((1e8, 1e8), 1e8, (bending,) * 2, bending, mass=m / L, inertia=(1e-12, 1e-12, 2e-12))
+        middle = np.array((0, 0, 2 * RADIUS + APART)) * (name == "a") - e * along
         curve = cf.Line(tuple(middle - L / 2 * along), tuple(middle + L / 2 * along))
         rods.append(cf.Rod(curve, section, name=name))
     touch = cf.RodContact(radius=RADIUS, stiffness=stiffness, **contact)
@@ -37,7 +39,7 @@ def middles(history, quantity):
 def test_bars_that_cross(scheme, truth):
     """Bars of motions in the truths, after an impact off their middles: 0.2835820895522388 and 0.44776119402985076 m/s,
     2.388059701492537 and 1.9900497512437811 rad/s. They turn while they touch, and the contact slides."""
-    history = cf.simulate(bars((0.1, 0.3)), 8e-3, dt=8e-5, scheme=scheme, elements=1, degree=2)
+    history = cf.simulate(bars((0.1, 0.3)), 3e-3, dt=3e-5, scheme=scheme, elements=1, degree=2)
     assert np.ptp(history.linear_momentum, axis=0).max() < 1e-10 * MASSES[0]
     assert np.ptp(history.angular_momentum, axis=0).max() < 1e-10
     assert np.abs(history.balance).max() < 1e-8 * history.kinetic[0]
@@ -50,10 +52,8 @@ def test_bars_that_cross(scheme, truth):
 
 def test_an_impact_takes_as_long_as_that_of_balls():
     """Hertz: with the force K p^1.5 masses m1, m2 touch for 2.943 p/v, p = (5 m v^2/(4 K))^(2/5), 1/m = 1/m1 + 1/m2."""
-    stiffness = 1e7
-    history = cf.simulate(bars(stiffness=stiffness), 8e-3, dt=2e-5, elements=1, degree=2)
-    K, m = 4 / 3 * stiffness * math.sqrt(4 * RADIUS), MASSES[0] * MASSES[1] / sum(MASSES)
-    deepest = (5 * m / (4 * K)) ** 0.4
+    history = cf.simulate(bars(), 3e-3, dt=2e-5, elements=1, degree=2)
+    deepest = (5 * MASSES[0] * MASSES[1] / sum(MASSES) / (4 * POINT)) ** 0.4
     gap = np.subtract(*(history.position(rod.at(rod.length / 2))[:, 2] for rod in history.scene.rods)) - 2 * RADIUS
     assert -gap.min() == pytest.approx(deepest, rel=2e-3)
     assert history.times[gap < 0][[0, -1]] @ (-1, 1) == pytest.approx(2.9433 * deepest, rel=1e-2)
@@ -62,7 +62,7 @@ def test_an_impact_takes_as_long_as_that_of_balls():
 def test_damping_takes_what_hunt_and_crossley_say():
     """Restitution 1 - (2/3) damping v for small ones, whatever the power of the law; the loss is booked."""
     damping = 0.03
-    history = cf.simulate(bars(damping=damping), 8e-3, dt=4e-5, elements=1, degree=2)
+    history = cf.simulate(bars(damping=damping), 3e-3, dt=3e-5, elements=1, degree=2)
     a, b = middles(history, "velocity")
     assert 1 - (a - b)[2] == pytest.approx(2 / 3 * damping, rel=0.03)
     assert history.dissipated[-1] == pytest.approx(history.kinetic[0] - history.kinetic[-1], rel=1e-4)
@@ -72,8 +72,6 @@ def test_damping_takes_what_hunt_and_crossley_say():
 def test_what_motions_need():
     with pytest.raises(cf.SceneError, match=r"expected one process, and a RodContact.stiffness \(N/m\^2\)"):
         cf.simulate(bars(stiffness=None), 1.0)
-    with pytest.raises(cf.SceneError, match="rods that touch each other have hard surfaces in equilibria"):
-        cf.solve(bars(), [1.0])
     with pytest.raises(cf.SceneError, match="0 without a stiffness"):
         cf.RodContact(damping=0.1)
     with pytest.raises(cf.SceneError, match="triple-jump"):
@@ -81,7 +79,9 @@ def test_what_motions_need():
 
 
 def test_a_surface_that_is_too_soft():
-    with pytest.raises(cf.NotConverged, match=r"rod 'a' at s = .* enters rod 'b' .*its stiffness is too small") as found:
+    with pytest.raises(
+        cf.NotConverged, match=r"rod 'a' at s = .* enters rod 'b' .*its stiffness is too small"
+    ) as found:
         cf.simulate(bars(stiffness=1e4), 0.1, dt=1e-3, elements=1, degree=2)
     assert len(found.value.path)
 
@@ -114,7 +114,7 @@ def test_it_goes_on_from_its_folder(tmp_path):
         assert np.array_equal(whole.position(rod.end), stored.position(same.end))
     found, again = (motion[-1].contacts(motion.scene.loads[0]) for motion in (whole, stored))
     depth, (first, _) = -found.gap[0], whole.scene.rods
-    assert found.force == pytest.approx(4 / 3 * 1e7 * math.sqrt(4 * RADIUS) * depth**1.5) == pytest.approx(again.force)
+    assert found.force == pytest.approx(POINT * depth**1.5) == pytest.approx(again.force)
     np.testing.assert_allclose((found.s[0], found.other_s[0]), (0.4, 0.75), atol=1e-3)
     assert not found.line.any() and "b" in str(found)
     forces = whole.quantities["rod_force"].of(whole, first)

@@ -133,9 +133,7 @@ def nodal_forces(path, rod):
 
 
 #: What results of scenes with a `RodContact` have.
-ROD_FORCE = Quantity(
-    "rod_force", "force of other rods at a node", "N", "xyz", "inertial", ("point", "s"), nodal_forces
-)
+ROD_FORCE = Quantity("rod_force", "force of other rods at a node", "N", "xyz", "inertial", ("point", "s"), nodal_forces)
 
 
 def _at_nodes(history, k, strands):
