@@ -87,6 +87,7 @@ def test_shapes_and_continuity(name):
 
 @pytest.mark.parametrize("angle", [0.3, -2.0, 2 * math.pi, 9.0])
 def test_arc(angle):
+    """Also a metre of a circle with R = 1e6 m, whose rise s^2/(2 R) of 5e-7 m has nine correct digits."""
     centre, start, axis = np.array([1.0, 2, 3]), np.array([4.0, 2.5, 1]), np.array([1.0, 2, 2]) / 3
     arc = cf.Arc(centre, start, angle, axis=3 * axis)
     radius = np.linalg.norm(np.cross(axis, start - centre))
@@ -98,19 +99,9 @@ def test_arc(angle):
     np.testing.assert_allclose(arc.frame(s)[:, :, 0], np.tile(axis, (7, 1)), **NEAR)
     u = curvature(arc, inside(arc, 0.01 * arc.length))
     np.testing.assert_allclose(u, np.tile([np.sign(angle) / radius, 0, 0], (len(u), 1)), atol=1e-10)
-
-
-def test_a_ring_closes():
-    ring = cf.Arc((0, 0, 5), (2, 0, 0), 2 * math.pi, d1=(1, 0, 1))
-    np.testing.assert_allclose(ring.position(ring.length), (2, 0, 0), **NEAR)
-    np.testing.assert_allclose(ring.frame(ring.length), ring.frame(0.0), **NEAR)
-    np.testing.assert_allclose(ring.frame(0.0)[:, 0], (HALF, 0, HALF), **NEAR)
-
-
-def test_a_flat_arc_keeps_its_digits():
-    """A metre of a circle with R = 1e6 m: its rise s^2/(2 R) of 5e-7 m has nine correct digits."""
-    arc = cf.Arc((0, 1e6, 0), (0, 0, 0), 1e-6)
-    np.testing.assert_allclose(arc.position(1.0), (1.0, 5e-7, 0), rtol=1e-9)
+    np.testing.assert_allclose(cf.Arc((0, 1e6, 0), (0, 0, 0), 1e-6).position(1.0), (1.0, 5e-7, 0), rtol=1e-9)
+    given = cf.Arc((0, 0, 5), (2, 0, 0), angle, d1=(1, 0, 1))
+    np.testing.assert_allclose(given.frame(0.0)[:, 0], (HALF, 0, HALF), **NEAR)
 
 
 @pytest.mark.parametrize("turns", [2.5, -2.5])
@@ -258,6 +249,11 @@ def test_a_rigid_motion_of_the_input_moves_the_curve():
         (cf.Spline(BEND, d1), cf.Spline(moved(*BEND), Q @ d1)),
         (cf.Spline(RING, d1, closed=True), cf.Spline(moved(*RING), Q @ d1, closed=True)),
     ]  # fmt: skip
+    points = np.round(np.array(BEND) * 1024) / 1024  # where a spline stands costs no digits: the sums below are exact
+    near, far = cf.Spline(points), cf.Spline(points + [2.0**22, -(2.0**23), 0])
+    np.testing.assert_array_equal(
+        near.frame(np.linspace(0, near.length, 50)), far.frame(np.linspace(0, far.length, 50))
+    )
     for curve, turned in pairs:
         s = np.linspace(0, curve.length, 41)
         assert turned.length == pytest.approx(curve.length, rel=1e-14)
@@ -265,19 +261,10 @@ def test_a_rigid_motion_of_the_input_moves_the_curve():
         np.testing.assert_allclose(turned.frame(s), Q @ curve.frame(s), atol=1e-13)
 
 
-def test_where_a_spline_stands_costs_no_digits():
-    points = np.round(np.array(BEND) * 1024) / 1024  # the sums below are exact
-    near, far = cf.Spline(points), cf.Spline(points + [2.0**22, -(2.0**23), 0])
-    assert near.length == far.length
-    s = np.linspace(0, near.length, 50)
-    np.testing.assert_array_equal(near.frame(s), far.frame(s))
-
-
 def test_thousands_of_points():
     x = np.linspace(0, 300, 3000)
     spline = cf.Spline(np.column_stack([x, np.cos(x), np.sin(x)]))
-    s = np.linspace(0, spline.length, 5000)
-    R = spline.frame(s)
+    R = spline.frame(np.linspace(0, spline.length, 5000))
     np.testing.assert_allclose(R.transpose(0, 2, 1) @ R, np.broadcast_to(np.eye(3), R.shape), **NEAR)
     assert spline.length == pytest.approx(300 * math.sqrt(2), rel=1e-5)
 
