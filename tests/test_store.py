@@ -126,14 +126,17 @@ def test_another_one_is_refused(user, kept, tmp_path):
         assert written(folder) == before and str(folder) in str(refusal.value)
 
 
-@pytest.mark.parametrize("name", ["stored.json", "motion.json", "drilling.json", "study.json", "start.npz",
-                                  "checkpoint.npz", "rows.0.jsonl", "instants.npy", "series.npy"])  # fmt: skip
-@pytest.mark.parametrize("text", ["", "mine", '{"speed": 3}'])
+HEADS = [f"{name}.json" for name in ("stored", "motion", "drilling", "study")]
+OWN = [(name, text) for name in HEADS for text in ("", "mine", '{"speed": 3}')]
+OWN += [(name, "mine") for name in ("start.npz", "checkpoint.npz", "rows.0.jsonl", "instants.npy", "series.npy")]
+
+
+@pytest.mark.parametrize(("name", "text"), OWN)
 def test_files_of_the_users_own_stay_as_they_are(name, text, user, kept, tmp_path):
     (tmp_path / name).write_text(text)
     tables = {"simulate": ["instants.npy"], "drilling.simulate": ["series.npy"]}.get(user.call, [])
     ours = [*tables, *(["start.npz", "checkpoint.npz"] if tables else []), "rows.0.jsonl"]
-    if name.endswith(".json") or name in ours:
+    if name in HEADS or name in ours:
         with pytest.raises(cf.SceneError, match=name):
             user.begin(tmp_path)
         assert written(tmp_path) == {name: text.encode()}
@@ -280,21 +283,18 @@ def numbers_held(thing, before=""):
 def test_a_stored_history_answers_as_one_in_memory(tmp_path):
     rod, scene = everything()
     stored = cf.simulate(scene, 0.2, dt=0.01, folder=tmp_path / "motion", **SMALL)
-    kept = cf.simulate(scene, 0.2, dt=0.01, **SMALL)
-    again = cf.read_history(tmp_path / "motion")
+    kept, again = cf.simulate(scene, 0.2, dt=0.01, **SMALL), cf.read_history(tmp_path / "motion")
     twin = next(x for x in again.scene.rods if x.name == rod.name)
-    assert repr(stored) == repr(kept) == repr(again)
-    for name in ("times", "steps", "iterations", "kinetic", "strain", "energy", "work", "dissipated", "balance",
-                 "linear_momentum", "angular_momentum", "along_axis"):  # fmt: skip
-        for history in (stored, again):
+    for history, same in ((stored, rod), (again, twin)):
+        assert repr(history) == repr(kept)
+        for name in ("times", "steps", "iterations", "kinetic", "strain", "energy", "work", "dissipated", "balance",
+                     "linear_momentum", "angular_momentum", "along_axis"):  # fmt: skip
             assert (getattr(history, name) == getattr(kept, name)).all(), name
-    for name in ("position", "displacement", "rotation", "rotation_angle", "force", "moment", "velocity",
-                 "angular_velocity"):  # fmt: skip
-        expected = getattr(kept, name)(rod.at(0.7))
-        assert (getattr(stored, name)(rod.at(0.7)) == expected).all(), name
-        assert (getattr(again, name)(twin.at(0.7)) == expected).all(), name
-    for name, values in kept.fields(7, rod).items():
-        assert (stored.fields(7, rod)[name] == values).all() and (again.fields(7, twin)[name] == values).all(), name
+        for name in ("position", "displacement", "rotation", "rotation_angle", "force", "moment", "velocity",
+                     "angular_velocity"):  # fmt: skip
+            assert (getattr(history, name)(same.at(0.7)) == getattr(kept, name)(rod.at(0.7))).all(), name
+        for name, values in kept.fields(7, rod).items():
+            assert (history.fields(7, same)[name] == values).all(), name
     assert (stored.largest_displacement() == kept.largest_displacement()).all()
     assert (stored.at_points([3, 5]).position(rod.end) == kept.position(rod.end)[[3, 5]]).all()
     for history, name in ((kept, "kept"), (again, "again")):
@@ -302,14 +302,6 @@ def test_a_stored_history_answers_as_one_in_memory(tmp_path):
     assert (tmp_path / "kept.xdmf").read_text().replace("kept", "again") == (tmp_path / "again.xdmf").read_text()
     again.plot_energy(tmp_path / "energy.png")
     assert (tmp_path / "energy.png").stat().st_size > 10000
-
-
-def test_neither_tol_nor_dt(tmp_path):
-    """The default tolerance; a folder may be prolonged."""
-    _, scene = flying_in_space()
-    history = cf.simulate(scene, 0.02, folder=tmp_path / "flight", elements=1, degree=2)
-    assert (cf.read_history(tmp_path / "flight").times == history.times).all()
-    assert cf.resume(tmp_path / "flight", duration=0.04).times[-1] == 0.04
 
 
 def test_none_of_its_states_stays_in_memory(tmp_path):
@@ -347,18 +339,20 @@ def test_a_checkpoint_that_cannot_be_written_leaves_the_one_before(tmp_path, mon
 
 
 def test_a_complete_motion_stays_as_it_is_and_may_be_prolonged(tmp_path, monkeypatch, never_ended):
-    """Steps of 0.05 s: the extended motion equals one of that duration from the start."""
+    """Steps of 0.05 s: the extended motion equals one of that duration from the start. By the default tolerance too."""
     scene = flying_in_space()[1]
     short = cf.simulate(scene, 2, dt=0.05, folder=tmp_path / "short", **SMALL)
     stamps = {file.name: file.stat().st_mtime_ns for file in (tmp_path / "short").iterdir()}
     again = cf.resume(tmp_path / "short")
     assert repr(again) == repr(short) and (again.energy == short.energy).all()
     assert {file.name: file.stat().st_mtime_ns for file in (tmp_path / "short").iterdir()} == stamps
+    free = cf.simulate(scene, 0.02, folder=tmp_path / "free", elements=1, degree=2)
+    assert (cf.read_history(tmp_path / "free").times == free.times).all()
+    assert cf.resume(tmp_path / "free", duration=0.04).times[-1] == 0.04
     stop_at(monkeypatch, 20, 0.0)
     with pytest.raises(Stopped):
         cf.resume(tmp_path / "short", duration=5)
-    longer = cf.resume(tmp_path / "short")
-    whole = cf.read_history(never_ended("fixed"))
+    longer, whole = cf.resume(tmp_path / "short"), cf.read_history(never_ended("fixed"))
     np.testing.assert_allclose(longer.times, whole.times, rtol=1e-14)
     np.testing.assert_allclose(longer._all_rq, whole._all_rq, atol=1e-11)
     with pytest.raises(cf.SceneError, match="at least 5 s"):
@@ -377,93 +371,75 @@ def test_a_lost_motion_keeps_what_is_done(tmp_path):
 
 
 def test_damaged_files(tmp_path, monkeypatch, never_ended):
-    """A truncated file of states or a missing checkpoint only costs time; the message says what was lost."""
+    """A truncated file of states or a missing checkpoint only costs time; the message says what was lost. Objects in a
+    file of states would be pointers of another process, which crash this one."""
     folder = tmp_path / "part"
     part_of("fixed", folder, monkeypatch, apart=1e9)
-    states = folder / "instants.npy"
-    whole = states.read_bytes()
-    states.write_bytes(whole[: -rows(folder).dtype.itemsize * 3 // 2])
-    seen = cf.read_history(folder)
-    assert 0 < len(seen) < 30
-    cf.resume(folder)
-    assert_same(folder, never_ended("fixed"))
-    for damage in (b"", b"nonsense", (folder / "checkpoint.npz").read_bytes()[:-100]):
-        states.write_bytes(whole)
-        (folder / "checkpoint.npz").write_bytes(damage)
+    states, point = folder / "instants.npy", folder / "checkpoint.npz"
+    whole, kept = states.read_bytes(), point.read_bytes()
+    lost = whole[: -rows(folder).dtype.itemsize * 3 // 2]
+    for left, checkpoint in ((lost, kept), (whole, b""), (whole, b"nonsense"), (whole, kept[:-100]), (None, kept)):
+        states.unlink() if left is None else states.write_bytes(left)
+        point.write_bytes(checkpoint)
+        assert left != lost or 0 < len(cf.read_history(folder)) < 30
         cf.resume(folder)
         assert_same(folder, never_ended("fixed"))
-    states.write_bytes(b"nonsense" + whole[8:])
-    with pytest.raises(cf.SceneError, match=r"instants.npy is damaged .* expected saved states"):
-        cf.read_history(folder)
-    states.unlink()
-    cf.resume(folder)
-    assert_same(folder, never_ended("fixed"))
-    for name in ("checkpoint.npz", "start.npz"):
+    whole = states.read_bytes()
+    for damaged in (
+        b"nonsense" + whole[8:],
+        *(whole.replace(b"'<f8'", kind.ljust(5), 1) for kind in (b"'|O'", b"'<U2'", b"'>f8'")),
+    ):
+        states.write_bytes(damaged)
+        with pytest.raises(cf.SceneError, match="other columns than those of saved states|instants.npy is damaged"):
+            cf.read_history(folder)
+    for name in ("instants.npy", "checkpoint.npz", "start.npz"):
         (folder / name).unlink()
     with pytest.raises(cf.SceneError, match="no checkpoint can be read"):
         cf.resume(folder, flying_in_space()[1])
 
 
-def test_no_objects_are_read_from_a_file_of_states(tmp_path):
-    """They would be pointers of another process, which crash this one."""
-    folder = tmp_path / "motion"
-    run("plane", folder)
-    scene, states = flying_in_a_plane()[1], folder / "instants.npy"
-    whole = states.read_bytes()
-    for kind in (b"'|O'", b"'<U2'", b"'>f8'"):
-        states.write_bytes(whole.replace(b"'<f8'", kind.ljust(5), 1))
-        with pytest.raises(cf.SceneError, match="other columns than those of saved states|is damaged"):
-            cf.read_history(folder, scene)
-
-
 def test_another_scene_is_told_from_the_one_of_the_motion(tmp_path, monkeypatch):
-    folder = tmp_path / "motion"
     rod, scene = flying_in_space()
-    part_of("fixed", folder, monkeypatch)
-    longer = cf.Rod(cf.Line((6, 0, 0), (0, 8, 1)), rod.section, name=rod.name)
-    softer = cf.Rod(
-        rod.curve, cf.Stiffness((1e4, 1e4), 1e4, (500, 400), 500, mass=1.0, inertia=(10, 10, 20)), name=rod.name
-    )
-    damped = cf.Rod(rod.curve, rod.section, name=rod.name, damping=cf.Damping(drag=1.0))
-    others = {
+    part_of("fixed", tmp_path / "motion", monkeypatch)
+
+    def changed(curve=rod.curve, section=rod.section, **more):
+        return cf.Scene([cf.Rod(curve, section, name=rod.name, **more)])
+
+    def pushed(station, *size):
+        return cf.Scene([rod], loads=[cf.Force(station, cf.signals.Triangle(size, 0, 2.5, 5)), scene.loads[1]])
+
+    soft = cf.Stiffness((1e4, 1e4), 1e4, (500, 400), 500, mass=1.0, inertia=(10, 10, 20))
+    for words, other in {
         "rods is '2 items'": cf.Scene([rod, cf.Rod(cf.Line((0, 0, 0), (1, 0, 0)), rod.section)], loads=scene.loads),
-        "rods[0].curve.end is [0.0, 8.0, 1.0]": cf.Scene([longer]),
-        "rods[0].section.bending is [500.0, 400.0]": cf.Scene([softer]),
-        "rods[0].damping is": cf.Scene([damped]),
+        "rods[0].curve.end is [0.0, 8.0, 1.0]": changed(cf.Line((6, 0, 0), (0, 8, 1))),
+        "rods[0].section.bending is [500.0, 400.0]": changed(section=soft),
+        "rods[0].damping is": changed(damping=cf.Damping(drag=1.0)),
         "loads is '1 items'": cf.Scene([rod], loads=scene.loads[:1]),
-        "loads[0].force.value is": cf.Scene(
-            [rod], loads=[cf.Force(rod.start, cf.signals.Triangle((10, 0, 0), 0, 2.5, 5)), scene.loads[1]]
-        ),
-        "loads[0].station.s is 10.0": cf.Scene(
-            [rod], loads=[cf.Force(rod.end, cf.signals.Triangle((20, 0, 0), 0, 2.5, 5)), scene.loads[1]]
-        ),
+        "loads[0].force.value is": pushed(rod.start, 10, 0, 0),
+        "loads[0].station.s is 10.0": pushed(rod.end, 20, 0, 0),
         "supports is '1 items'": cf.Scene([rod], [cf.Pin(rod.start)], scene.loads),
-    }
-    for words, other in others.items():
+    }.items():
         with pytest.raises(cf.SceneError, match="the scene is not the one of the motion") as refusal:
-            cf.resume(folder, other)
+            cf.resume(tmp_path / "motion", other)
         assert words in str(refusal.value)
 
 
 def test_what_cannot_be_done_is_said(tmp_path, monkeypatch):
     folder, scene = tmp_path / "motion", flying_in_a_plane()[1]
-    with pytest.raises(cf.SceneError, match=r"no motion was found there .*: expected a folder that simulate"):
-        cf.resume(folder)
+
+    def refused(words, call, *given, **more):
+        with pytest.raises(cf.SceneError, match=words):
+            call(*given, **more)
+
+    refused("no motion was found there .*: expected a folder that simulate", cf.resume, folder)
     part_of("plane", folder, monkeypatch)
-    with pytest.raises(
-        cf.SceneError, match=r"resume.scene = None: expected the scene of .* a function written in Python cannot be"
-    ):
-        cf.resume(folder)
-    with pytest.raises(cf.SceneError, match=r"resume.scene = 3: expected a Scene"):
-        cf.resume(folder, 3)
-    with pytest.raises(cf.SceneError, match=r"resume.duration = 1: expected None or at least 3 s"):
-        cf.resume(folder, scene, duration=1)
-    with pytest.raises(cf.SceneError, match=r"simulate.folder = .*: it holds a motion already"):
-        run("plane", folder)
+    refused("resume.scene = None: expected the scene of .* a function written in Python cannot be", cf.resume, folder)
+    refused("resume.scene = 3: expected a Scene", cf.resume, folder, 3)
+    refused("resume.duration = 1: expected None or at least 3 s", cf.resume, folder, scene, duration=1)
+    refused("simulate.folder = .*: it holds a motion already", run, "plane", folder)
     head = {**files.unsealed((folder / "stored.json").read_bytes()), "ranks": 2}
     (folder / "stored.json").write_bytes(files.sealed(head))
-    with pytest.raises(cf.SceneError, match=r"computed by 2 rank\(s\), and here are 1"):
-        cf.resume(folder, scene)
+    refused(r"computed by 2 rank\(s\), and here are 1", cf.resume, folder, scene)
 
 
 SECTION = cf.Stiffness((5e3, 5e3), 1e4, (50, 50), 40, mass=1.0, inertia=(0.01, 0.01, 0.02))
@@ -508,10 +484,6 @@ def test_what_differs_is_told_where_it_differs_most(tmp_path):
     assert len(cf.resume(folder, pushed(lambda t: (0, 5 * math.sin(4 * math.pi * t * (1 + 1e-12)), 0)))) == 21
 
 
-def contents(folder):
-    return {file.name: file.read_bytes() for file in folder.iterdir()}
-
-
 LATE = {
     "load": pushed(lambda t: (0, 1.0, 0 if t < 2 else 5.0)),
     "motion": cf.Scene([ROD], [cf.Prescribed(ROD.start, lambda t: (0, 0.01 * t**2, max(0, t - 2) ** 3), (0, 0, 0))]),
@@ -523,13 +495,13 @@ LATE = {
 def test_what_leaves_its_plane_later_is_refused_before_anything_is_written(tmp_path, case):
     folder = tmp_path / "motion"
     assert cf.simulate(LATE[case], 1.0, folder=folder, **BEGUN).model == "planar"
-    before = contents(folder)
+    before = written(folder)
     with pytest.raises(
         cf.SceneError, match=r"resume.duration = 3: .* was computed in the x-y plane, and until then"
     ) as refusal:
         cf.resume(folder, LATE[case], duration=3.0)
     assert "a motion in space, by another simulate" in str(refusal.value) and "velocities" not in str(refusal.value)
-    assert contents(folder) == before
+    assert written(folder) == before
     assert cf.resume(folder, LATE[case], duration=1.5).times[-1] == 1.5
 
 
@@ -552,10 +524,10 @@ def test_functions_of_time_are_compared_by_their_values(tmp_path, monkeypatch):
         return scene(drive=cf.drilling.TopDrive(lambda t: factor * min(t, 5.0)))
 
     cf.drilling.simulate(moving(1.0), 2.0, folder=tmp_path / "one")
-    with pytest.raises(cf.SceneError, match=r"expected the scene of .* a function written in Python cannot be stored"):
-        cf.resume(tmp_path / "one")
-    with pytest.raises(cf.SceneError, match=r"drive.speed at t = .* s is .*, where the motion has"):
-        cf.resume(tmp_path / "one", moving(1.001))
+    for given, words in (((), "expected the scene of .* a function written in Python cannot be stored"),
+                         ((moving(1.001),), r"drive.speed at t = .* s is .*, where the motion has")):  # fmt: skip
+        with pytest.raises(cf.SceneError, match=words):
+            cf.resume(tmp_path / "one", *given)
     assert len(cf.resume(tmp_path / "one", moving(1.0), duration=3.0)) == 300
 
 

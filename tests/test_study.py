@@ -1,6 +1,5 @@
 """Studies: every case alone on its rank, kept as they come, gone on with after a break."""
 
-import io
 import os
 import sys
 import time
@@ -11,6 +10,7 @@ import numpy as np
 import pytest
 from conftest import COMM, column
 from mpi4py import MPI
+from test_requests import Terminal
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx import progress as module
@@ -72,33 +72,22 @@ def test_all_ranks_compute_and_longer_cases_do_not_hold_up_the_others():
     assert COMM.size == 1 or found.results.count(found.results[0]) == 1
 
 
-@pytest.mark.ranks
-def test_equal_results_on_any_number_of_ranks():
-    cases = [{"eta": eta, "elements": n} for n in (2, 4) for eta in (0.3, 0.9, 1.2)]
-    cases.append({"eta": 1.0, "elements": 0})
-    together, alone = cf.study(tip, cases), cf.study(tip, cases, comm=MPI.COMM_SELF)
-    assert all(map(equal, together.results, alone.results)) and together.results[0]["place"].shape == (3,)
-    assert together.failures == alone.failures
-    assert "elements = 0: expected a whole number above zero" in together.failures[0].why
-    rod, scene = column()
-    assert cf.solve(scene, [0.5], elements=2).comm == MPI.COMM_WORLD  # as before
+COLUMNS = [*({"eta": eta, "elements": n} for n in (2, 4) for eta in (0.3, 0.9, 1.2)), {"eta": 1.0, "elements": 0}]
+SOFT = [{"depth": depth, "friction": mu, "model": "soft"} for depth in (900.0, 2500.0) for mu in (0.1, 0.3)]
+EXACT = {"depth": [620.0, 650.0], "friction": [0.2], "model": ["rod"]}
 
 
 @pytest.mark.ranks
-def test_torque_and_drag():
-    cases = [{"depth": depth, "friction": mu, "model": "soft"} for depth in (900.0, 2500.0) for mu in (0.1, 0.3)]
-    together, alone = cf.study(hook_load, cases), cf.study(hook_load, cases, comm=MPI.COMM_SELF)
-    assert not together.failures and all(map(equal, together.results, alone.results))
-
-
-@pytest.mark.ranks
-@pytest.mark.slow
-def test_the_rod_in_contact():
-    """It has a communicator of its own."""
-    cases = {"depth": [620.0, 650.0], "friction": [0.2], "model": ["rod"]}
-    together, alone = cf.study(hook_load, cases), cf.study(hook_load, cases, comm=MPI.COMM_SELF)
-    assert not together.failures and all(map(equal, together.results, alone.results))
-    assert together.results[0]["model"] == "rod"
+@pytest.mark.parametrize(("task", "cases"), [
+    (tip, COLUMNS), (hook_load, SOFT), pytest.param(hook_load, EXACT, marks=pytest.mark.slow),
+], ids=["column", "soft string", "rod in contact"])  # fmt: skip
+def test_equal_results_on_any_number_of_ranks(task, cases):
+    """The rod in contact has a communicator of its own; afterwards all ranks work together as before."""
+    together, alone = cf.study(task, cases), cf.study(task, cases, comm=MPI.COMM_SELF)
+    assert all(map(equal, together.results, alone.results)) and together.failures == alone.failures
+    whys = [why for _, why in together.failures]
+    assert len(whys) == (cases is COLUMNS) and all("elements = 0: expected a whole number above" in x for x in whys)
+    assert cf.solve(column()[1], [0.5], elements=2).comm == MPI.COMM_WORLD
 
 
 @pytest.mark.ranks
@@ -155,8 +144,15 @@ def test_values_to_the_last_digit(value, tmp_path_all):
     "value", [object(), [[1], [1, 2]], {"a": {"b": 1}}, {1: 2}, [object()], np.ma.array([1], mask=[1])]
 )
 def test_results_that_cannot_be_kept_are_failures(value):
+    """But what is not installed is no failure of a case."""
     ((_, why),) = cf.study(lambda i: value, [{"i": 0}]).failures
     assert why.startswith("SceneError: study.task") and "expected" in why
+
+    def needs(i):
+        raise cf.InstallationError("no compiler")
+
+    with pytest.raises(cf.InstallationError, match="no compiler"):
+        cf.study(needs, [{"i": 0}])
 
 
 @pytest.mark.parametrize(("task", "cases", "words"), [
@@ -194,10 +190,6 @@ def test_the_study_alone_shows_progress(capsys):
 
 @pytest.mark.ranks
 def test_a_bar_in_a_terminal(monkeypatch):
-    class Terminal(io.StringIO):
-        def isatty(self):
-            return True
-
     screen = Terminal()
     monkeypatch.setattr(module.sys, "stderr", screen)
     monkeypatch.setattr(module, "_PATIENCE", 0.0)
@@ -238,16 +230,6 @@ def test_a_full_disk_ends_all_ranks(tmp_path_all, monkeypatch):
     with pytest.raises(cf.NotStored, match="No space left on device") as stop:
         cf.study(lambda i: i, {"i": range(400)}, folder=tmp_path_all)
     assert stop.value.path.done[:3].all()
-
-
-def test_what_is_not_installed_is_no_failure_of_a_case():
-    def needs(i):
-        if i == 2:
-            raise cf.InstallationError("no compiler")
-        return i
-
-    with pytest.raises(cf.InstallationError, match="no compiler"):
-        cf.study(needs, {"i": range(5)})
 
 
 ROOT = Path(__file__).parent.parent
@@ -334,24 +316,43 @@ def heaviness():
     return 9.81 * MUD.density
 
 
+def weight(mud, operation):
+    return mud.density
+
+
 @pytest.mark.ranks
 def test_another_study_is_refused(tmp_path_all, monkeypatch):
-    cf.study(third, CASES, folder=tmp_path_all)
+    """By its cases, parts of scenes among them, by its task, and by what this uses."""
+    muds = {"mud": [cf.well.Mud(1200.0), cf.well.Mud(1300.0)], "operation": [cf.well.TripIn()]}
+    given = {third: CASES, pressure: {"depth": [1.0]}, weight: muds}
+    if COMM.rank == 0:
+        (tmp_path_all / "file").write_text("")
+    for task, cases in given.items():
+        cf.study(task, cases, folder=tmp_path_all / task.__name__)
     COMM.barrier()
+    with pytest.raises(cf.SceneError, match="expected a folder that can be written to"):
+        cf.study(third, CASES, folder=tmp_path_all / "file")
 
-    def refused(task, cases, words):
+    def refused(task, cases, words, folder="third"):
         with pytest.raises(cf.SceneError, match=rf"it holds another study, expected the same call, .*: {words}"):
-            cf.study(task, cases, folder=tmp_path_all)
+            cf.study(task, cases, folder=tmp_path_all / folder)
 
     refused(fourth, CASES, "task: function is '.*fourth', where the study has '.*third'")
     refused(third, {"i": range(13)}, "cases: number is 13, where the study has 12")
     refused(third, {"i": [*range(11), 0.5]}, r"cases\[11\]\['i'\] is 0.5, where the study has 11")
-    with monkeypatch.context() as changed:
-        changed.setattr(sys.modules[__name__], "LIMIT", 5)
-        refused(third, CASES, "the code of task, or something that it uses, was changed")
-        changed.setattr(fourth, "__qualname__", "third")
-        refused(fourth, CASES, "the code of task, or .* changed")
-    assert len(cf.study(third, CASES, folder=tmp_path_all)) == 12
+    others = [cf.well.Mud(1200.0), cf.well.Mud(1400.0)]
+    refused(weight, {**muds, "mud": others}, r"cases\[1\]\['mud'\].density is 1400", "weight")
+    here = sys.modules[__name__]
+    for task, name, other in ((third, "LIMIT", 5), (pressure, "MUD", cf.well.Mud(1300.0)),
+                              (pressure, "heaviness", lambda: 9.80665 * MUD.density)):  # fmt: skip
+        with monkeypatch.context() as changed:
+            changed.setattr(here, name, other)
+            words = "the code of task, or something that it uses, was changed"
+            refused(task, given[task], words, task.__name__)
+            changed.setattr(fourth, "__qualname__", "third")
+            refused(fourth, CASES, "the code of task, or .* changed")
+    assert len(cf.study(third, CASES, folder=tmp_path_all / "third")) == 12
+    assert cf.study(pressure, given[pressure], folder=tmp_path_all / "pressure").results == [9.81 * 1200.0]
 
 
 @pytest.mark.ranks
@@ -372,18 +373,6 @@ def counted(i):
 
 
 @pytest.mark.ranks
-def test_what_a_task_uses_is_compared(tmp_path_all, monkeypatch):
-    cf.study(pressure, {"depth": [1.0]}, folder=tmp_path_all)
-    COMM.barrier()
-    here = sys.modules[__name__]
-    for name, other in (("MUD", cf.well.Mud(1300.0)), ("heaviness", lambda: 9.80665 * MUD.density)):
-        with monkeypatch.context() as changed, pytest.raises(cf.SceneError, match="or something that it uses"):
-            changed.setattr(here, name, other)
-            cf.study(pressure, {"depth": [1.0]}, folder=tmp_path_all)
-    assert cf.study(pressure, {"depth": [1.0]}, folder=tmp_path_all).results == [9.81 * 1200.0]
-
-
-@pytest.mark.ranks
 def test_what_cannot_be_compared_is_refused_with_a_folder_alone(tmp_path_all):
     for task, cases in ((lambda x: 1, [{"x": object()}]), (Call(), [{"x": 1}])):
         assert cf.study(task, cases).results == [1]
@@ -394,24 +383,3 @@ def test_what_cannot_be_compared_is_refused_with_a_folder_alone(tmp_path_all):
 class Call:
     def __call__(self, x):
         return 1
-
-
-@pytest.mark.ranks
-def test_parts_of_scenes_are_compared(tmp_path_all):
-    def weight(mud, operation):
-        return mud.density
-
-    cases = {"mud": [cf.well.Mud(1200.0), cf.well.Mud(1300.0)], "operation": [cf.well.TripIn()]}
-    assert cf.study(weight, cases, folder=tmp_path_all).results == [1200.0, 1300.0]
-    COMM.barrier()
-    with pytest.raises(cf.SceneError, match=r"cases\[1\]\['mud'\].density is 1400"):
-        cf.study(weight, {**cases, "mud": [cf.well.Mud(1200.0), cf.well.Mud(1400.0)]}, folder=tmp_path_all)
-
-
-@pytest.mark.ranks
-def test_places_that_cannot_be_written_to(tmp_path_all):
-    if COMM.rank == 0:
-        (tmp_path_all / "file").write_text("")
-    COMM.barrier()
-    with pytest.raises(cf.SceneError, match="expected a folder that can be written to"):
-        cf.study(third, CASES, folder=tmp_path_all / "file")
