@@ -61,8 +61,11 @@ def test_new_processes_give_the_same(here, tmp_path):
     assert processes(again) == processes(found)
 
 
-def test_threads_give_the_same(here):
-    with ThreadPoolExecutor(2) as executor:
+@pytest.mark.parametrize("pool", [
+    lambda: ThreadPoolExecutor(2), lambda: ProcessPoolExecutor(1, mp_context=get_context("spawn")),
+], ids=["threads", "spawned processes"])  # fmt: skip
+def test_pools_of_the_caller_give_the_same(pool, here):
+    with pool() as executor:
         same(cf.study(tip, CASES, executor=executor), here)
 
 
@@ -100,19 +103,17 @@ def test_a_killed_worker_ends_the_study_and_keeps_what_is_done(tmp_path):
         cf.study(killed, {"eta": [0.3, 0.6], "elements": [4]}, workers=1, folder=tmp_path / "kept")
 
 
-@pytest.mark.parametrize(("given", "words"), [
-    ({"workers": 0}, "study.workers = 0: expected"),
-    ({"executor": 3}, "expected a concurrent.futures.Executor or a dask Client"),
-    ({"executor": 3, "workers": 2}, "expected none with an executor"),
+@pytest.mark.parametrize(("task", "cases", "given", "words"), [
+    (tip, CASES, {"workers": 0}, "study.workers = 0: expected"),
+    (tip, CASES, {"executor": 3}, "expected a concurrent.futures.Executor or a dask Client"),
+    (tip, CASES, {"executor": 3, "workers": 2}, "expected none with an executor"),
+    (tip, {"eta": [lambda: 0.3], "elements": [4]}, {"workers": 1}, r"study.cases\[0\]: the executor cannot send it"),
+    (lambda eta, elements: eta, CASES, {"workers": 2},
+     "expected a function of a module, or an executor that takes others"),
 ])  # fmt: skip
-def test_refusals(given, words):
+def test_refusals(task, cases, given, words):
     with pytest.raises(cf.SceneError, match=words):
-        cf.study(tip, CASES, **given)
-
-
-def test_arguments_that_cannot_be_sent_are_refused():
-    with pytest.raises(cf.SceneError, match=r"study.cases\[0\]: the executor cannot send it"):
-        cf.study(tip, {"eta": [lambda: 0.3], "elements": [4]}, workers=1)
+        cf.study(task, cases, **given)
 
 
 def test_threads_of_a_case_compute_alone():
@@ -125,11 +126,6 @@ def test_threads_of_a_case_compute_alone():
     assert cf.study(of_thread, {"k": [1]}).results == [1.0] and not are_apart()
 
 
-def test_a_function_of_a_function_is_refused_for_new_processes():
-    with pytest.raises(cf.SceneError, match="expected a function of a module, or an executor that takes others"):
-        cf.study(lambda eta, elements: eta, CASES, workers=2)
-
-
 def test_cases_are_handed_out_while_others_run(monkeypatch):
     """Of many cases only some are given to the executor ahead."""
     from cosserat_fenicsx.studies import executors
@@ -140,8 +136,3 @@ def test_cases_are_handed_out_while_others_run(monkeypatch):
         monkeypatch.setattr(executor, "submit", lambda *x, submit=executor.submit: given.append(x) or submit(*x))
         found = cf.study(lambda k: float(len(given) - k), {"k": list(range(20))}, executor=executor)
     assert len(given) == 20 and max(found.results) <= 4
-
-
-def test_spawned_pools_of_the_caller_serve(here):
-    with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as executor:
-        same(cf.study(tip, CASES, executor=executor), here)
