@@ -146,18 +146,14 @@ def processor_time(act):
     return time.process_time() - begun
 
 
-def test_a_frame_of_a_thousand_rods_is_built_in_no_time():
+@pytest.mark.parametrize(("size", "rods", "most"), [
+    ((18,), 1008, 0.5), pytest.param((57, 58), 10_033, 5.0, marks=pytest.mark.slow),
+])  # fmt: skip
+def test_frames_of_thousands_of_rods_are_built_in_no_time(size, rods, most):
     """1008 rods take 0.02 s; a dense decomposition took 27 s for 208 rods, and grows with the cube."""
-    parts = grid_shell(18)
-    assert len(parts[0]) == 1008
-    assert processor_time(lambda: check_no_mechanism(cf.Scene(*parts))) < 0.5
-
-
-@pytest.mark.slow
-def test_a_frame_of_ten_thousand_rods_is_built_in_seconds():
-    parts = grid_shell(57, m=58)
-    assert len(parts[0]) == 10_033
-    assert processor_time(lambda: check_no_mechanism(cf.Scene(*parts))) < 5.0
+    parts = grid_shell(size[0], m=size[-1])
+    assert len(parts[0]) == rods
+    assert processor_time(lambda: check_no_mechanism(cf.Scene(*parts))) < most
 
 
 def test_the_free_motion_of_one_rod_among_a_thousand_is_named():
@@ -258,18 +254,17 @@ def leaves(kind):
     """The column with something that leaves its plane."""
     rod, scene = column()
     P = cf.euler_load(rod)
-    extra, supports = [], list(scene.supports)
-    if kind == "force":
-        extra = [cf.Force(rod.at(10.0), (0, 1e-6 * P, 0))]
-    elif kind == "moment":
-        extra = [cf.Moment(rod.at(10.0), (0, 0, 1e-3 * P))]
-    elif kind == "support":
-        supports.append(cf.Roller(rod.end, (1, 1, 0)))
-    elif kind == "section":
+    loads, supports = [], []
+    if kind == "section":
         rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, 20.0), d1=(1, 1, 0)), cf.Rectangle(0.2, 0.3), STEEL, name="column")
-        supports = [cf.Clamp(rod.start)]
-        return rod, cf.Scene([rod], supports, [cf.Force(rod.end, (P, 0, -P))])
-    return rod, cf.Scene([rod], supports, [*scene.loads, *extra])
+        return cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Force(rod.end, (P, 0, -P))])
+    if kind == "support":
+        supports = [cf.Roller(rod.end, (1, 1, 0))]
+    else:
+        loads = [
+            cf.Force(rod.at(10.0), (0, 1e-6 * P, 0)) if kind == "force" else cf.Moment(rod.at(10.0), (0, 0, 1e-3 * P))
+        ]
+    return cf.Scene([rod], [*scene.supports, *supports], [*scene.loads, *loads])
 
 
 @pytest.mark.parametrize("kind, words", [
@@ -279,7 +274,7 @@ def leaves(kind):
     ("section", "a section of rod 'column' has its principal axes (EI) oblique to the plane"),
 ])  # fmt: skip
 def test_what_leaves_the_plane_is_named(kind, words):
-    _, scene = leaves(kind)
+    scene = leaves(kind)
     path = cf.solve(scene, [0.1], elements=2)
     assert path.model == ("spatial" if kind == "support" else "determinate") and words in " ".join(path.why)
     with pytest.raises(cf.SceneError) as refusal:

@@ -45,16 +45,12 @@ ALONE = "of 2 alone ended with"
 def run(program, folder, size=2):
     """(what `mpirun` returned, s)."""
     clean = {name: value for name, value in os.environ.items() if not name.startswith(("OMPI_COMM", "PMIX", "ORTE"))}
-    began = time.monotonic()
-    done = subprocess.run(
+    words, began = (
         ["mpirun", "--oversubscribe", "-n", str(size), sys.executable, "-c", BEGIN + program],
-        check=False,
-        capture_output=True,
-        encoding="utf-8",
-        cwd=folder,
-        timeout=60,
-        env={**clean, "PYTHONPATH": str(ROOT)},
+        time.monotonic(),
     )
+    done = subprocess.run(words, check=False, capture_output=True, encoding="utf-8", cwd=folder, timeout=60,
+                          env={**clean, "PYTHONPATH": str(ROOT)})  # fmt: skip
     return done, time.monotonic() - began
 
 
@@ -89,24 +85,15 @@ def test_one_process_is_not_watched():
     code = "import sys, cosserat_fenicsx; print(sys.excepthook is sys.__excepthook__, 'mpi4py' in sys.modules)"
     clean = {name: value for name, value in os.environ.items() if name not in ranks.SIZES}
     for more, said in [({}, "True False"), *(({name: "2"}, "False False") for name in ranks.SIZES)]:
-        done = subprocess.run(
-            [sys.executable, "-c", code],
-            check=True,
-            capture_output=True,
-            encoding="utf-8",
-            cwd=ROOT,
-            env={**clean, **more},
-        )
+        done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, encoding="utf-8", cwd=ROOT,
+                              env={**clean, **more})  # fmt: skip
         assert done.stdout.strip() == said, more
 
 
 def test_what_exit_raises_is_what_python_raises():
     for status, code, arguments in (
-        (None, None, ()),
-        (3, 3, (3,)),
-        ("words", "words", ("words",)),
-        ((1, 2), (1, 2), (1, 2)),
-    ):
+        (None, None, ()), (3, 3, (3,)), ("words", "words", ("words",)), ((1, 2), (1, 2), (1, 2)),
+    ):  # fmt: skip
         with pytest.raises(SystemExit) as stop:
             ranks._exit(status)
         try:
