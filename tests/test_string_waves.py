@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from axial_scenes import IMPEDANCE, MU, SPEED, WEIGHT, column, hanging, in_a_well, string, unbalanced
 from scipy.linalg import eigvalsh
-from torsion_scenes import LAW, PIPE, SOFT, lying, off_bottom, stick_slip
+from torsion_scenes import LAW, PIPE, SOFT, Turn, lying, off_bottom, stick_slip
 from torsion_scenes import part as part_of
 
 import cosserat_fenicsx as cf
@@ -87,12 +87,8 @@ def test_discs_at_the_speed_where_their_steady_motion_becomes_unstable():
     bit = cf.drilling.BitOnRock(cf.drilling.Stribeck(0.8, 0.5, 1 / 0.9, radius=R), W)
     for speed in (2.7652598516 * 0.995, 2.7652598516 * 1.005):
         on_bit = W * R * (0.5 + 0.3 * np.exp(-0.9 * speed))
-        model = AxialTorsional(
-            cf.drilling.Drilling(
-                discs, cf.drilling.TopDrive(control=cf.drilling.Motor(on_bit + 475 * speed, 425.0)), bit
-            ),
-            0.01,
-        )
+        drive = cf.drilling.TopDrive(control=cf.drilling.Motor(on_bit + 475 * speed, 425.0))
+        model = AxialTorsional(cf.drilling.Drilling(discs, drive, bit), 0.01)
         x, v = model._kept["x"], model._kept["v"]
         moments = on_bit + 50 * speed
         x[1:, 0] = -np.cumsum(moments / np.array([698.063, 1080.0, 907.48]))
@@ -136,15 +132,11 @@ class Swallow:
 
 
 def test_other_laws_of_the_bit_plug_in_as_end_conditions():
-    scene = cf.drilling.Drilling(
-        string(PIPE),
-        cf.drilling.TopDrive(1.0),
-        cf.drilling.BitOnRock(cf.drilling.Cutting(0.1, 60e6, 0.6, 4)),
-        hook=cf.drilling.Hook(speed=-0.1),
-    )
-    lobes = cf.drilling.Drilling(
-        scene.string, scene.drive, cf.drilling.BitOnRock(cf.drilling.Lobes(3, 0.002, LAW), 80e3, inertia=50.0)
-    )
+    cutting = cf.drilling.BitOnRock(cf.drilling.Cutting(0.1, 60e6, 0.6, 4))
+    lobed = cf.drilling.BitOnRock(cf.drilling.Lobes(3, 0.002, LAW), 80e3, inertia=50.0)
+    laid, drive = string(PIPE), cf.drilling.TopDrive(1.0)
+    scene = cf.drilling.Drilling(laid, drive, cutting, hook=cf.drilling.Hook(speed=-0.1))
+    lobes = cf.drilling.Drilling(laid, drive, lobed)
     assert column(AxialTorsional(lobes, 0.01, 50, axial=False).advance(100), "torque_on_bit").max() > 0
     Z = IMPEDANCE[0], 296.3752962822167
     end = Swallow(*Z)
@@ -165,13 +157,8 @@ def test_other_laws_of_the_bit_plug_in_as_end_conditions():
 
 def test_the_same_digits_after_recall():
     bit = cf.drilling.BitOnRock(cf.drilling.Stribeck(0.6, 0.3, 3.0, radius=0.1), 80e3, inertia=50.0, mass=300.0)
-    scene = hanging(
-        cf.drilling.Hook(5e6, -0.001),
-        cf.drilling.TopDrive(6.0, **SOFT),
-        bit,
-        300.0,
-        drag=cf.drilling.ViscousDrag(0.2, 0.1),
-    )
+    hook, drive = cf.drilling.Hook(5e6, -0.001), cf.drilling.TopDrive(6.0, **SOFT)
+    scene = hanging(hook, drive, bit, 300.0, drag=cf.drilling.ViscousDrag(0.2, 0.1))
     first, second = (AxialTorsional(scene, 0.01, 100) for _ in range(2))
     rows, profiles = first.advance(3000), first.profile()
     second.advance(1234)
@@ -197,16 +184,16 @@ def test_a_step_that_fails_returns_what_was_done():
 
 
 def test_what_is_refused():
-    steep = cf.drilling.Drilling(
-        string(PIPE), cf.drilling.TopDrive(1.0), cf.drilling.BitOnRock(cf.drilling.Stribeck(6000.0, 4000.0, 3.0))
+    steep, hard = (
+        cf.drilling.Drilling(
+            string(PIPE),
+            cf.drilling.TopDrive(1.0),
+            cf.drilling.BitOnRock(cf.drilling.Stribeck(6e3, 4e3, decay), **more),
+        )
+        for decay, more in ((3.0, {}), (0.1, {"inertia": 20.0}))
     )
     with pytest.raises(cf.SceneError, match="law.*666.667 N m per rad/s.*impedance.*296.375"):
         AxialTorsional(steep)
-    hard = cf.drilling.Drilling(
-        string(PIPE),
-        cf.drilling.TopDrive(1.0),
-        cf.drilling.BitOnRock(cf.drilling.Stribeck(6000.0, 4000.0, 0.1), inertia=20.0),
-    )
     with pytest.raises(cf.SceneError, match=r"dt = 0.01 s: expected at most about 0.00\d+ s"):
         AxialTorsional(hard, 0.01, 50)
     assert AxialTorsional(hard, elements=50).dt < 0.005
@@ -250,19 +237,14 @@ def test_pulled_and_turned_at_once(speed, load):
 def test_one_way_of_slip_alone():
     """Without a slip across it, friction does not calm what still swings: drag does, and adds what is known."""
     hanging_load, rate, rho_a, rho_j = 166501.15325538238, 0.5, 26.713757953594364, 0.0932481524676923
-    rows = steady(
-        AxialTorsional(
-            in_a_well(*STRAIGHT, cf.drilling.Hook(speed=0.3), drag=cf.drilling.ViscousDrag(axial=rate)), 0.0025, 100
-        ),
-        60,
-    )
+    scene = in_a_well(*STRAIGHT, cf.drilling.Hook(speed=0.3), drag=cf.drilling.ViscousDrag(axial=rate))
+    rows = steady(AxialTorsional(scene, 0.0025, 100), 60)
     told = hanging_load + MU * ACROSS * 1500 + rate * rho_a * 0.3 * 1500
     load = column(rows, "hook_load")
     assert load.mean() == pytest.approx(told, rel=1e-6) and np.abs(load - told).max() < 1e-4 * told
     assert np.all(column(rows, "surface_torque") == 0)
-    rows = steady(
-        AxialTorsional(in_a_well(*STRAIGHT, turns=2 * np.pi, drag=cf.drilling.ViscousDrag(rate)), 0.0025, 100), 60
-    )
+    scene = in_a_well(*STRAIGHT, turns=2 * np.pi, drag=cf.drilling.ViscousDrag(rate))
+    rows = steady(AxialTorsional(scene, 0.0025, 100), 60)
     told = MU * ACROSS * 0.0635 * 1500 + rate * rho_j * 2 * np.pi * 1500
     assert column(rows, "surface_torque").mean() == pytest.approx(told, rel=1e-6)
     assert column(rows, "hook_load") == pytest.approx(hanging_load, rel=1e-9)
@@ -317,21 +299,10 @@ def test_a_lying_pipe_until_its_end_moves():
     assert om.max() == pytest.approx(12.565, rel=2e-3) and unbalanced(rows) < 1e-11
 
 
-class Slowly:
-    """A turn forward within a time, and a quarter of a turn back within the same time."""
-
-    def __init__(self, within):
-        self.within, self.jumps = within, (within, 2 * within)
-
-    def __call__(self, t):
-        angle = 2 * np.pi if t < self.within else -np.pi / 2 if t < 2 * self.within else 0.0
-        return angle / self.within * (1 - np.cos(2 * np.pi * t / self.within))
-
-
 def test_a_pipe_turned_slowly_and_back():
     """M = sqrt(2 GJ m phi); back by dphi to l2 = sqrt(GJ dphi/m), and M = m l1 - 2 m l2."""
     m = 3.52427441057226
-    model = AxialTorsional(lying(cf.drilling.TopDrive(Slowly(120.0))), 0.01, 250, axial=False)
+    model = AxialTorsional(lying(cf.drilling.TopDrive(Turn(2 * np.pi, np.pi / 2, 120.0))), 0.01, 250, axial=False)
     rows = model.advance(12000)
     x, angle = model.depths, model.profile()[0]
     slope, end = np.polyfit(x[x < 1700], np.sqrt(angle[x < 1700]), 1)
@@ -413,19 +384,17 @@ def test_falling_friction_of_a_long_string_needs_no_half_steps():
     """Where nothing moves along the axis, and where all does."""
     path = cf.well.WellPath.from_survey([0, 1000, 1500, 5000], [0, 0, 60, 60], np.zeros(4), degrees=True)
     parts = part_of(4800.0, 0.127, 0.10861, weight=220.0), part_of(200.0, 0.1651, 0.05715, weight=1200.0)
-    pipe, hole = (
+    pipe, drive = (
         cf.well.DrillString(parts, order="top down"),
-        cf.well.Borehole(path, cf.well.HoleSection(5000, 0.2159, 0.3)),
+        cf.drilling.TopDrive(8.0, 2900.0, cf.drilling.PI(1e4, 1e4)),
     )
+    given = {
+        "hole": cf.well.Borehole(path, cf.well.HoleSection(5000, 0.2159, 0.3)),
+        "drag": cf.drilling.ViscousDrag(0.1, 0.1),
+        "friction": cf.drilling.WallFriction(1.0, 0.7, 1.0, of_rotation=True, of_hole=True),
+    }  # fmt: skip
     for hook in (None, cf.drilling.Hook(5e6, 0.3)):
-        scene = cf.drilling.Drilling(
-            pipe,
-            cf.drilling.TopDrive(8.0, 2900.0, cf.drilling.PI(1e4, 1e4)),
-            hook=hook,
-            hole=hole,
-            friction=cf.drilling.WallFriction(1.0, 0.7, 1.0, of_rotation=True, of_hole=True),
-            drag=cf.drilling.ViscousDrag(0.1, 0.1),
-        )
+        scene = cf.drilling.Drilling(pipe, drive, hook=hook, **given)
         model = AxialTorsional(scene, 0.01, 250)
         rows = model.advance(3000)
         assert model.counts["halved"] == 0 and model.counts["iterations"] < 4 * 3000 and unbalanced(rows) < 1e-11
@@ -451,12 +420,8 @@ def drilling(drive=None, start="steady", **more):
     lambda x: AxialTorsional(x, 0.01, 100, axial=False),
 ])  # fmt: skip
 def test_nothing_changes(model, drive):
-    scene = drilling(
-        drive,
-        bit=cf.drilling.BitOnRock(ROCK, weight=50e3, inertia=50.0),
-        drag=cf.drilling.ViscousDrag(0.3, 0.3),
-        friction=cf.drilling.WallFriction(0.25, 0.2, 0.5),
-    )
+    drag, friction = cf.drilling.ViscousDrag(0.3, 0.3), cf.drilling.WallFriction(0.25, 0.2, 0.5)
+    scene = drilling(drive, bit=cf.drilling.BitOnRock(ROCK, 50e3, inertia=50.0), drag=drag, friction=friction)
     rows = model(scene).advance(300)
     for name in ("bit_speed", "drive_speed", "surface_torque", "torque_on_bit"):
         assert np.abs(column(rows, name) / column(rows, name)[0] - 1).max() < 1e-8, name
@@ -476,15 +441,8 @@ def test_the_books_begin_with_the_energy_of_the_start(model):
 @pytest.mark.parametrize("model", [lambda x: TorsionWaves(x, 0.002), lambda x: AxialTorsional(x, 0.002, 600)])
 def test_surface_torque_is_that_of_torque_and_drag(model):
     scene = drilling()
-    soft = cf.well.torque_and_drag(
-        scene.hole,
-        scene.string,
-        cf.well.RotateOffBottom(),
-        mud=scene.mud,
-        model="soft",
-        tol=1e-8,
-        torque_convention="johancsik",
-    )
+    asked = {"mud": scene.mud, "model": "soft", "tol": 1e-8, "torque_convention": "johancsik"}
+    soft = cf.well.torque_and_drag(scene.hole, scene.string, cf.well.RotateOffBottom(), **asked)
     assert column(model(scene).advance(1), "surface_torque")[0] == pytest.approx(soft.surface_torque, rel=2e-3)
 
 

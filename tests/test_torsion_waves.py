@@ -16,20 +16,16 @@ from torsion_scenes import (
     PIPE,
     SOFT,
     SPEED,
+    Turn,
     imbalance,
     lying,
     off_bottom,
     part,
     run,
+    starts_of,
     stick_slip,
-    string,
-)
-from torsion_scenes import (
-    SPEED as TORSION_SPEED,
-)
-from torsion_scenes import (
-    string as string_of,
-)
+)  # fmt: skip
+from torsion_scenes import string as string_of
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx import drilling, well
@@ -55,11 +51,8 @@ REFERENCE_ANGLES = np.array([
 @pytest.mark.parametrize(("speed", "dt"), [(np.pi, 20 / SPEED), (2 * np.pi, 7.3 / SPEED)])
 def test_the_staircase_of_a_torque_that_drops_at_once(speed, dt):
     """Bit without inertia, stiff drive: each 2L/c the wave 2 Z Om is added, and a bit that slips takes all but T_d."""
-    scene = cf.drilling.Drilling(
-        string_of((2000.0, *PIPE[1:])),
-        cf.drilling.TopDrive(speed),
-        cf.drilling.BitOnRock(cf.drilling.Stribeck(8000.0, 5000.0)),
-    )
+    bit = cf.drilling.BitOnRock(cf.drilling.Stribeck(8000.0, 5000.0))
+    scene = cf.drilling.Drilling(string_of((2000.0, *PIPE[1:])), cf.drilling.TopDrive(speed), bit)
     model = TorsionWaves(scene, dt)
     travel, Z = 2000 / SPEED, PIPE_IMPEDANCE
     t, rows = run(model, 40 * travel)
@@ -141,18 +134,6 @@ def test_a_front_in_a_lying_pipe():
     assert imbalance(rows) < 1e-11
 
 
-class Turn:
-    """Slowly to an angle within a time, and then back by another angle within the same time."""
-
-    def __init__(self, there, back, within):
-        self.there, self.back, self.within = there, back, within
-        self.jumps = (within, 2 * within)
-
-    def __call__(self, t):
-        angle = self.there if t < self.within else -self.back if t < 2 * self.within else 0.0
-        return angle / self.within * (1 - np.cos(2 * np.pi * t / self.within))
-
-
 def test_a_pipe_turned_slowly_and_back():
     """The parabola of a string on its wall: l = sqrt(2 GJ phi/m), M = m l; back by dphi to sqrt(GJ dphi/m)."""
     m, GJ = 3.52427441057226, 941984.5211067691
@@ -175,27 +156,9 @@ def test_starts_off_bottom():
     model = TorsionWaves(scene, 10.0001 / 2787.5976461718205, normal_force=wall_force)
     assert model._hold.sum() == pytest.approx(18077.89943213615, rel=1e-6)
     t, rows = run(model, 24)
-    om, resting, starts = rows[:, COLUMN["bit_speed"]], True, []
-    for k in range(len(t)):
-        if om[k] <= 0:
-            resting = True
-        elif resting and om[k] > 20 * cf.units.rpm:
-            resting = False
-            starts.append(t[k])
+    starts = starts_of(t, rows[:, COLUMN["bit_speed"]])
     assert starts == pytest.approx([5.408, 10.78, 16.61, 22.49], rel=3e-3)
     assert imbalance(rows) < 1e-11
-
-
-def starts_of(t, speed, half=20 * cf.units.rpm):
-    """Times where the lower end turns with half the speed of the drive after it has been at rest."""
-    found, resting = [], True
-    for k in range(len(t)):
-        if speed[k] <= 0:
-            resting = True
-        elif resting and speed[k] > half:
-            resting = False
-            found.append(t[k])
-    return np.array(found)
 
 
 def test_how_often_a_string_starts_off_bottom():
@@ -231,26 +194,16 @@ def test_a_wave_goes_through_parts_of_any_length():
     """Parts of the same impedance whose travel times fit no step, between a drive without reflection and a free end:
     the end turns as the drive was asked to turn a travel time before."""
     lengths, speeds = np.array([700.3, 0.2, 1001.7, 13.1, 303.13]), np.array([3100.0, 2000.0, 2900.0, 3300.0, 3000.0])
-    parts = [
-        cf.well.Component(
-            length, cf.Stiffness((1e9, 1e9), 1e9, (1e6, 1e6), 300 * c, 20.0, inertia=(0.1, 0.1, 300 / c)), 1, 0.1
-        )
-        for length, c in zip(lengths, speeds, strict=True)
-    ]
+    stiff = [cf.Stiffness((1e9,) * 2, 1e9, (1e6,) * 2, 300 * c, 20.0, inertia=(0.1, 0.1, 300 / c)) for c in speeds]
+    parts = [cf.well.Component(length, each, 1, 0.1) for length, each in zip(lengths, stiff, strict=True)]
     travel = (lengths / speeds).sum()
 
     def asked(t):
         return 1 - np.cos(4 * t)
 
-    errors = []
+    errors, drive = [], cf.drilling.TopDrive(asked, control=cf.drilling.Matched(300.0))
     for dt in (0.02, 0.01):
-        model = TorsionWaves(
-            cf.drilling.Drilling(
-                cf.well.DrillString(parts, order="top down"),
-                cf.drilling.TopDrive(asked, control=cf.drilling.Matched(300.0)),
-            ),
-            dt,
-        )
+        model = TorsionWaves(cf.drilling.Drilling(cf.well.DrillString(parts, order="top down"), drive), dt)
         t, rows = run(model, 5)
         s = np.maximum(t - travel, 0)
         errors.append(np.abs(rows[:, COLUMN["bit_angle"]] - (s - np.sin(4 * s) / 4)).max())
@@ -268,21 +221,16 @@ def test_cells_keep_travel_time_inertia_and_compliance():
     assert (found.time / found.impedance).sum() == pytest.approx(sum(x.length / x.GJ for x in segments), rel=1e-12)
     times = found.time / found.dt
     assert np.all((np.abs(times - 1) < 1e-9) | ((times >= 1.5 - 1e-9) & (times < 2.5)))
-    whole = cells_of(
-        cf.drilling.Drilling(string_of(PIPE, (200.0, 0.1651, 0.05715)), cf.drilling.TopDrive(1.0)).segments,
-        10.5 / SPEED,
-    )
+    scene = cf.drilling.Drilling(string_of(PIPE, (200.0, 0.1651, 0.05715)), cf.drilling.TopDrive(1.0))
+    whole = cells_of(scene.segments, 10.5 / SPEED)
     assert len(whole.time) == 320 and whole.unfit < 1e-9
 
 
 def test_drag_is_of_the_second_order():
     angles = []
+    drive = cf.drilling.TopDrive(lambda t: 1 - np.cos(3 * t), 2900.0, cf.drilling.PI(2e3, 5e3))
+    scene = cf.drilling.Drilling(string_of(PIPE), drive, drag=cf.drilling.ViscousDrag(1.0))
     for cells in (40, 80, 160):
-        scene = cf.drilling.Drilling(
-            string_of(PIPE),
-            cf.drilling.TopDrive(lambda t: 1 - np.cos(3 * t), 2900.0, cf.drilling.PI(2e3, 5e3)),
-            drag=cf.drilling.ViscousDrag(1.0),
-        )
         angles.append(run(TorsionWaves(scene, elements=cells), 160 * 3000 / SPEED / 40)[1][-1, COLUMN["bit_angle"]])
     assert 3.7 < (angles[0] - angles[1]) / (angles[1] - angles[2]) < 4.3
 
@@ -290,11 +238,8 @@ def test_drag_is_of_the_second_order():
 def test_a_motor_and_a_wave_of_the_drag():
     """The steady speed of a given torque: over the drags of its bearings and of the mud."""
     drag = 5.0 * DENSITY * 1.1878745537285865e-05 * 3000
-    scene = cf.drilling.Drilling(
-        string_of(PIPE),
-        cf.drilling.TopDrive(inertia=1000.0, control=cf.drilling.Motor(3000.0, 100.0)),
-        drag=cf.drilling.ViscousDrag(5.0),
-    )
+    drive = cf.drilling.TopDrive(inertia=1000.0, control=cf.drilling.Motor(3000.0, 100.0))
+    scene = cf.drilling.Drilling(string_of(PIPE), drive, drag=cf.drilling.ViscousDrag(5.0))
     _, rows = run(TorsionWaves(scene), 200)
     for name in ("drive_speed", "bit_speed"):
         assert rows[-1, COLUMN[name]] == pytest.approx(3000 / (100 + drag), rel=1e-6)
@@ -344,13 +289,9 @@ def test_what_is_told_and_refused():
     light = cf.drilling.BitOnRock(cf.drilling.Stribeck(6000.0, 2000.0, 1e-3), inertia=0.01)
     with pytest.raises(cf.SceneError, match="BitOnRock.law = .*a larger inertia of the bit than 0.01"):
         TorsionWaves(replace(stick_slip(), bit=light))
-    law = cf.drilling.Stribeck(6000.0, 2000.0, 1.0)
+    bit, laid = cf.drilling.BitOnRock(cf.drilling.Stribeck(6000.0, 2000.0, 1.0)), (PIPE, (200.0, 0.1651, 0.05715))
     with pytest.raises(cf.SceneError, match="impedance of the string at the bit is 1793.82"):
-        TorsionWaves(
-            cf.drilling.Drilling(
-                string_of(PIPE, (200.0, 0.1651, 0.05715)), cf.drilling.TopDrive(1.0), cf.drilling.BitOnRock(law)
-            )
-        )
+        TorsionWaves(cf.drilling.Drilling(string_of(*laid), cf.drilling.TopDrive(1.0), bit))
     with pytest.raises(cf.SceneError, match="expected a DrillString; discs have no waves"):
         TorsionWaves(cf.drilling.Drilling(cf.drilling.Discs((1.0, 1.0), (1.0,)), cf.drilling.TopDrive(1.0)))
     with pytest.raises(cf.SceneError, match="TorsionWaves.scene.bit.law = .*knows no depth of cut"):
@@ -427,12 +368,8 @@ def test_no_frequency_is_missed(drive, kind, bit):
 
 def test_discs_and_what_turns_as_a_whole():
     held, free = public_discs(cf.drilling.Stiff(), 1e4), public_discs(cf.drilling.Motor(1.0), 1e4)
-    assert [len(cf.drilling.natural_frequencies(x, 9, bit)) for x in (held, free) for bit in ("free", "fixed")] == [
-        3,
-        2,
-        3,
-        3,
-    ]
+    counts = [len(cf.drilling.natural_frequencies(x, 9, bit)) for x in (held, free) for bit in ("free", "fixed")]
+    assert counts == [3, 2, 3, 3]
     undamped = replace(held, string=cf.drilling.Discs(held.string.inertias, held.string.stiffnesses))
     guide = torsional(undamped)
     roots, _ = all_roots(lambda s: guide.bit(s)[1::2], Box(-1, 1, 1e-3, 9.0), 1.0)
@@ -544,7 +481,7 @@ def other(model, factor):
 
 
 def test_a_rotation_to_the_left_is_the_mirror_image():
-    models = [TorsionWaves(stick_slip(sign * 2 * np.pi), 20 / TORSION_SPEED) for sign in (1, -1)]
+    models = [TorsionWaves(stick_slip(sign * 2 * np.pi), 20 / SPEED) for sign in (1, -1)]
     (right, ours), (left, theirs) = (
         (cycle_of(rows, 30), step_errors(m.dt, partial(other, m), rows, 30)) for m in models for rows in run(m, 60)[1:]
     )
@@ -569,12 +506,12 @@ def test_a_mesh_that_cannot_be_coarser_is_compared_with_a_finer_one():
 
 def test_a_matched_drive_has_the_impedance_of_the_uppermost_component_however_short_it_is():
     """A short thin sub above a stub and pipe: within a cell with them it must not change the drive."""
-    laid = string((5.0, 0.08, 0.03), (0.7, 0.25, 0.05), (2000.0, *PIPE[1:]))
+    laid = string_of((5.0, 0.08, 0.03), (0.7, 0.25, 0.05), (2000.0, *PIPE[1:]))
     scene = cf.drilling.Drilling(laid, cf.drilling.TopDrive(6.0, control=cf.drilling.Matched()))
     Z = scene.segments[0].torsional_impedance
     told = replace(scene, drive=cf.drilling.TopDrive(6.0, control=cf.drilling.Matched(Z)))
     assert Z < 100
-    rows, given = (run(TorsionWaves(x, 20 / TORSION_SPEED), 10)[1] for x in (scene, told))
+    rows, given = (run(TorsionWaves(x, 20 / SPEED), 10)[1] for x in (scene, told))
     assert np.array_equal(rows, given, equal_nan=True)
 
 
@@ -595,7 +532,7 @@ CUTTING = cf.drilling.Cutting(a=0.108, epsilon=60e6, zeta=0.6, blades=4)
 def test_a_bit_below_a_motor_that_turns_too_far_in_a_step_is_refused(law, torque, most):
     """A motor has no speed asked for: the rotation in a step is known afterwards alone."""
     scene = cf.drilling.Drilling(
-        string(PIPE),
+        string_of(PIPE),
         cf.drilling.TopDrive(inertia=100.0, control=cf.drilling.Motor(torque)),
         cf.drilling.BitOnRock(law, inertia=50.0),
         hook=cf.drilling.Hook(speed=0.0),

@@ -74,3 +74,27 @@ def imbalance(rows):
         for names in (["kinetic", "strain"], ["work_of_drive"], ["lost_at_bit", "lost_at_wall", "lost_in_mud"])
     )
     return np.abs(kept - work + lost[0]).max() / np.abs(work).max()
+
+
+class Turn:
+    """Slowly to an angle within a time, and then back by another angle within the same time."""
+
+    def __init__(self, there, back, within):
+        self.there, self.back, self.within = there, back, within
+        self.jumps = (within, 2 * within)
+
+    def __call__(self, t):
+        angle = self.there if t < self.within else -self.back if t < 2 * self.within else 0.0
+        return angle / self.within * (1 - np.cos(2 * np.pi * t / self.within))
+
+
+def starts_of(t, speed, half=20 * cf.units.rpm):
+    """Times where the lower end turns with half the speed of the drive after it has been at rest."""
+    found, resting = [], True
+    for now, rate in zip(t, speed, strict=True):
+        if rate <= 0:
+            resting = True
+        elif resting and rate > half:
+            resting = False
+            found.append(now)
+    return np.array(found)
