@@ -55,9 +55,8 @@ def test_a_string_without_losses():
     """Any falling torque makes it grow; none leaves it as it is."""
     scene = pipe_and_collars(drag=0.0)
     assert math.isinf(cf.drilling.limit_speed(scene)) and cf.drilling.limit_weight(scene, 6.0) == 0.0
-    assert cf.drilling.limit_speed(scene, up_to=0.05) == 0.0 and math.isinf(
-        cf.drilling.limit_weight(scene, 6.0, up_to=0.05)
-    )  # no mode
+    assert cf.drilling.limit_speed(scene, up_to=0.05) == 0.0  # no mode
+    assert math.isinf(cf.drilling.limit_weight(scene, 6.0, up_to=0.05))
     assert cf.drilling.stability(scene, [6.0], [1e3], modes=6).unstable_modes.tolist() == [[6]]
     free = cf.drilling.stability(replace(scene, bit=None), [6.0], modes=6)
     assert free.unstable_modes.tolist() == [[0]] and (free.growth == 0).all()
@@ -103,19 +102,17 @@ def test_a_tuned_drive_is_one_drive_whoever_tells_of_it():
     drive chosen by hand is compared with the one that its string would have."""
     string, case = tubes(*GIVEN["sections"]), ([60 * RPM], [8e4])
 
-    def told(control, **given):
-        return cf.drilling.stability(
-            pipe_and_collars(drive=cf.drilling.TopDrive(1.0, 2900.0, control), inertia=50.0), *case, up_to=BAND
-        )
+    def told(control):
+        drive = cf.drilling.TopDrive(1.0, 2900.0, control)
+        return cf.drilling.stability(pipe_and_collars(drive=drive, inertia=50.0), *case, up_to=BAND)
 
     soft, torque = (choose(string, 2900.0) for choose in (cf.drilling.SoftSpeed, cf.drilling.SoftTorque))
     assert (soft.rule, torque.rule) == ("SoftSpeed", "SoftTorque") and cf.drilling.PI(soft.Kp, soft.Ki) == soft
     own = told(soft)
     assert cf.drilling.SoftSpeed(own.scene, 2900.0) == soft
     heard = cf.drilling.SoftSpeed(string, 2900.0, bit_inertia=50.0)
-    assert heard.Ki == pytest.approx(
-        2900.0 * (2 * math.pi * cf.drilling.natural_frequencies(own.scene, 1)[0]) ** 2, rel=1e-12
-    )
+    omega = 2 * math.pi * cf.drilling.natural_frequencies(own.scene, 1)[0]
+    assert heard.Ki == pytest.approx(2900.0 * omega**2, rel=1e-12)
     columns, k = own.with_drives(0), own.unstable(0)[0]
     assert (columns["SoftSpeed"] == own.growth[0, 0]).all()
     text = own.details()
