@@ -31,7 +31,7 @@ def circle(diameter):
 
 
 @pytest.mark.parametrize("outside, inside", [TWO, THREE])
-def test_true_tension_is_the_weight_of_the_steel_and_the_pressures_on_ends_and_shoulders(outside, inside):
+def test_true_tension_is_the_weight_of_the_steel_and_the_pressures_on_ends_and_shoulders(outside, inside, truth):
     """Neither buoyancy nor effective tension is in the closed form."""
     hole = hole_of([0, 1000, 1500, 3000], [0, 0, 60, 60])
     string, mud = W.DrillString([COLLAR, PIPE]), W.Mud(outside, inside=inside)
@@ -40,11 +40,12 @@ def test_true_tension_is_the_weight_of_the_steel_and_the_pressures_on_ends_and_s
     below, above = ((circle(x.outer_diameter), circle(x.inner_diameter)) for x in (COLLAR, PIPE))
     at_bit, at_shoulder = ([pressure(x, path, md) for x in (outside, inside)] for md in (bit, shoulder))
     tension = at_bit[1] * below[1] - at_bit[0] * below[0]  # a closed lower end
-    assert answer.true_tension[-1] == pytest.approx(tension, rel=1e-10)
+    truth("fluids in columns: true tension at the bit, of the pressures there", answer.true_tension[-1], tension, 1e-10)
     tension += COLLAR.mass * G * (path.position(bit)[2] - path.position(shoulder)[2])
     tension += at_shoulder[0] * (below[0] - above[0]) - at_shoulder[1] * (below[1] - above[1])
     tension += PIPE.mass * G * path.position(shoulder)[2]
-    assert answer.hook_load == pytest.approx(tension, rel=1e-10)  # no pressure acts at the surface
+    # no pressure acts at the surface
+    truth("fluids in columns: hook load, of steel and pressures on its ends", answer.hook_load, tension, 1e-10)
     assert answer.true_tension[0] == answer.hook_load
     # effective tension does not jump where a fluid or a section does; pressures of burst and collapse
     jump = np.diff(answer.tension)[np.diff(answer.md) == 0]

@@ -86,7 +86,7 @@ def test_the_tables_of_api(grade, wear):
     assert found == pytest.approx(API[grade, wear], abs=0.7)
 
 
-#: Casing by API Bulletin 5C2 (21st edition, 1999; collapse and internal yield of plain ends, psi, rounded to 10) and API
+#: Casing by API Bulletin 5C2 (21st edition, 1999: collapse and internal yield, psi, rounded to 10) and API
 #: Spec 5CT (drift, in), at a yield strength (psi). Written from memory of these tables, not compared with a copy.
 CASINGS = {
     "4 1/2 in 11.60": (80e3, 6350, 7780, 3.875), "5 1/2 in 17.00": (80e3, 6290, 7740, 4.767),
@@ -296,6 +296,7 @@ def test_strength_limits_the_weight_on_bit_of_a_weak_string(well):
     assert use.largest == pytest.approx(1 / 1.1, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_the_most_weight_on_bit_of_the_rod():
     """A pipe above its bit in a straight hole without friction: it buckles at Dawson and Paslay's load; or yields where
     it bends from the bit down to the wall, which a soft string does not know."""

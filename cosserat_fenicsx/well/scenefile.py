@@ -38,7 +38,7 @@ depth = 3438.0
 depths = { from = "300 m", to = 3438.0, count = 20 }
 friction = [0.1, 0.2, 0.3]
 
-[strength]                       # optional: grade, wear (numbers, or tables by names of components), safety, buckling
+[strength]                       # optional: grade, wear (or tables by names of components), safety, buckling, model
 grade = { "drill pipe" = "S135" }
 wear = 0.8
 
@@ -125,13 +125,14 @@ class StrengthSettings(Part):
     Args:
         grade, wear: of the drill pipe, or tables by names of components, see `TorqueAndDrag.utilisation`.
         safety: factor in the margin of overpull and the most weight on bit.
-        buckling: "helical" or "sinusoidal": which limits the weight on bit.
+        buckling: "helical" or "sinusoidal": which limits the weight on bit. model: by which it is found.
     """
 
     grade: Any = "E75"
     wear: Any = 1.0
     safety: float = 1.1
     buckling: Literal["helical", "sinusoidal"] = "helical"
+    model: Literal["soft", "buckled", "rod"] = "buckled"
 
     called = "strength"
 
@@ -141,7 +142,7 @@ class StrengthSettings(Part):
         found["overpull"] = answer.margin_of_overpull(self.grade, self.wear, safety=self.safety)
         if answer.operation.weight > 0:
             found["weight_on_bit"] = answer.most_weight_on_bit(
-                self.grade, self.wear, safety=self.safety, buckling=self.buckling
+                self.grade, self.wear, safety=self.safety, buckling=self.buckling, model=self.model
             )
         return found
 
