@@ -30,15 +30,12 @@ HOLE = cf.well.Borehole(
     PATH, [cf.well.HoleSection(1500, 0.2224, 0.2, "casing"), cf.well.HoleSection(2500, 0.2159, 0.3, "open hole")]
 )
 PIPE = cf.well.DrillPipe(size="5 in 19.50 lb/ft")
-STRING = cf.well.DrillString(
-    [
-        cf.well.Bit(0.2159),
-        cf.well.Collar(90, "NC46-65"),
-        cf.well.Stabiliser(1.5, 0.2127, 0.165, 0.07),
-        cf.well.HeavyWeight(120, "5 in"),
-        PIPE,
-    ]
-)
+ASSEMBLY = [
+    cf.well.Collar(90, "NC46-65"),
+    cf.well.Stabiliser(1.5, 0.2127, 0.165, 0.07),
+    cf.well.HeavyWeight(120, "5 in"),
+]
+STRING = cf.well.DrillString([cf.well.Bit(0.2159), *ASSEMBLY, PIPE])
 MUD = cf.well.Mud(1200.0)
 #: A string by numbers, with the stiffness of a 5 in drill pipe.
 STIFF = cf.Stiffness((1e9, 1e9), 7e8, (1228200.0, 1228200.0), 9.4e5)
@@ -113,10 +110,11 @@ def test_the_state_along_the_string():
     EI = 206.8e9 * math.pi / 64 * (PIPE.outer_diameter**4 - PIPE.inner_diameter**4)
     assert out.bending_moment[in_build] == pytest.approx(EI * math.radians(50) / 600)
     assert (out.component[0], out.component[-1]) == (4, 0) and out.clearance[-1] == 0
+    alike = drag(cf.well.TripOut(), hole=HOLE.with_friction(0.3))  # contacts add up to the friction
+    assert sum(force for _, _, force, _ in alike.contacts) == pytest.approx(alike.drag / 0.3, rel=1e-9)
     slide = drag(cf.well.Sliding(60e3))
-    assert slide.tension[-1] == -60e3 and np.interp(slide.neutral_point, slide.md, slide.tension) == pytest.approx(
-        0, abs=10
-    )
+    assert slide.tension[-1] == -60e3
+    assert np.interp(slide.neutral_point, slide.md, slide.tension) == pytest.approx(0, abs=10)
     text = str(slide)
     assert "sliding, bit at 2500 m" in text and "heavy-weight" in text and "NOT ENOUGH" in text
     shallow = drag(cf.well.TripOut(), depth=800.0)
@@ -188,6 +186,10 @@ def test_the_soft_string_says_what_it_leaves_out():
     (lambda: drag(cf.well.TripOut), "expected an operation, such as TripOut"),
     (lambda: drag(cf.well.TripOut(), tol=0), "tol = 0"),
     (lambda: drag(cf.well.TripOut()).critical_load("Euler"), "He-Kyllingstad or Lubinski"),
+    (lambda: in_si("x", "-12 KN/m", "force per length"), "did you mean 'kN/m'"),
+    (lambda: in_si("x", "1 minute", "time"), "did you mean 'min'"),
+    (lambda: in_si("x", "5 Nmm", "moment"), "expected a known unit"),  # 'Nm' is a thousand times as large
+    (lambda: in_si("x", "2 mile", "length"), "expected a known unit"),
 ])  # fmt: skip
 def test_what_is_refused(do, words):
     with pytest.raises(cf.SceneError, match=words):
@@ -230,11 +232,6 @@ def test_dimensions_in_other_units_are_warned_of():
     hollow = cf.well.DrillString([cf.well.Component(None, weight=-20.0, contact_radius=0.06)])
     with pytest.warns(cf.SceneWarning, match="floats: it weighs -20 N/m"):
         cf.well.torque_and_drag(HOLE, hollow, cf.well.TripIn(), model="soft")
-
-
-def test_contacts_add_up_to_the_friction():
-    out = drag(cf.well.TripOut(), hole=HOLE.with_friction(0.3))
-    assert sum(force for _, _, force, _ in out.contacts) == pytest.approx(out.drag / 0.3, rel=1e-9)
 
 
 DEMOS = Path(__file__).parent.parent / "demos"
@@ -297,17 +294,6 @@ def test_what_a_file_says():
 ])  # fmt: skip
 def test_field_units(text, dimension, value):
     assert in_si("x", text, dimension) == pytest.approx(value, rel=1e-7)
-
-
-@pytest.mark.parametrize(("text", "dimension", "words"), [
-    ("-12 KN/m", "force per length", "did you mean 'kN/m'"),
-    ("1 minute", "time", "did you mean 'min'"),
-    ("5 Nmm", "moment", "expected a known unit"),  # 'Nm' is a thousand times as large
-    ("2 mile", "length", "expected a known unit"),
-])  # fmt: skip
-def test_only_units_of_the_same_size_are_suggested(text, dimension, words):
-    with pytest.raises(cf.SceneError, match=words):
-        in_si("x", text, dimension)
 
 
 @pytest.mark.parametrize(("old", "new", "words"), [
@@ -430,13 +416,11 @@ def test_the_reference_has_every_key_unit_and_size():
     classes = [cls for family in (StringPart, Operation) for cls in members(family).values()]
     classes = [cls for cls in classes if cls.__module__.startswith("cosserat_fenicsx.")]
     assert {cls.__name__ for cls in classes} <= told
-    arguments = {
-        name for cls in (*classes, cf.well.Mud, cf.well.HoleSection) for name in inspect.signature(cls).parameters
-    }
+    parts = (*classes, cf.well.Mud, cf.well.HoleSection)
+    arguments = {name for cls in parts for name in inspect.signature(cls).parameters}
     holes = {key for make in cf.well.Borehole.constructors() for key in arguments_of(make)} - {"path"}
-    keys = holes | {
-        key for cls in (DepthSweepSettings, StrengthSettings, TorqueAndDragSettings) for key in arguments_of(cls)
-    }
+    settings = (DepthSweepSettings, StrengthSettings, TorqueAndDragSettings)
+    keys = holes | {key for cls in settings for key in arguments_of(cls)}
     keys |= {f"[{key}]" for key in arguments_of(WellScene)} - {"[title]", "[operations]"}
     names = ("length", "force", "moment", "density", "mass per length", "force per length", "speed", "rotation")
     units = {unit for name in (*names, "pressure") for unit in DIMENSIONS[name].units}
@@ -477,6 +461,10 @@ def test_a_build_section_through_the_public_face(case):
     assert [x[2] for x in points] == pytest.approx([case[f"point_force_{k}"] for k in (3, 2, 1)], rel=1e-3)
     assert [x[3] for x in points] == ["high", "high", "low"] and is_balanced(found)
     assert not found.solved.rough and "ROUGH" not in str(found)
+    for point, k in zip(points, (3, 2, 1), strict=True):
+        assert abs(point.force - case[f"point_force_{k}"]) < point.error < 5e-3 * point.force
+    assert all(np.isnan(x.error) for x in found.contacts if not x.at_point)
+    assert pickle.loads(pickle.dumps(point)).error == point.error and len(point) == 4
     # what is left is smooth: the pressure of an arc and of a straight hole, without a trace of the peaks
     assert found.side_force.max() > 6 * found.distributed_force.max()
     lying = given["w"] * math.sin(math.radians(alpha))
@@ -492,10 +480,8 @@ def test_an_assembly_through_the_public_face(case):
     stiff = cf.Stiffness((1e12,) * 2, 1e12, (case["EI"],) * 2, case["EI"])
     bit = cf.well.Bit(wide, length=1e-3, body_diameter=2 * r, mass=case["w"] / 9.81)
     string = cf.well.DrillString([bit, cf.well.Component(None, stiff, case["w"], r)])
-    found = cf.well.torque_and_drag(
-        cf.well.Borehole(path, cf.well.HoleSection(length + 20, wide, 0.0)), string, cf.well.Static(weight=case["WOB"]),
-        mud=cf.well.Mud(1e-3), depth=length, model="rod",
-    )  # fmt: skip
+    hole, given = cf.well.Borehole(path, cf.well.HoleSection(length + 20, wide, 0.0)), {"depth": length, "model": "rod"}
+    found = cf.well.torque_and_drag(hole, string, cf.well.Static(weight=case["WOB"]), mud=cf.well.Mud(1e-3), **given)
     *_, tangency, at_bit = points_of(found)
     assert length - tangency[0] == pytest.approx(exact["arc_length_to_tangency"], abs=1e-3)
     assert tangency[2] == pytest.approx(exact["reaction_at_tangency"], rel=1e-4)
@@ -510,14 +496,10 @@ SLICK = (1.7e7, 2050.0, 0.0508, 17.919140838675947, 1639.0117496314479)
 @pytest.mark.parametrize("tol", [1e-4, 1e-6])
 def test_a_force_behind_which_the_string_rises(tol):
     """In a stiff wall the contact splits behind it: the force is not that of the first part alone, 8 % more."""
-    EI, weight, clearance, at, force = SLICK
-    length, path = 120.0, cf.well.WellPath.from_survey([0, 140], np.radians([3.0, 3.0]), [0, 0], degrees=False)
-    solved = solve_in_hole(
-        path, [length], cf.Stiffness((1e12,) * 2, 1e12, (EI, EI), EI), weight, 0.1, radius=0.1 + clearance,
-        bottom_tension=-250e3, rings=[(length, 0.0, 0.1)], tol=tol,
-    )  # fmt: skip
+    *_, at, force = SLICK
+    solved = pressed(3.0, tol=tol)
     *_, tangency, at_bit = (x for x in solved.contacts if x.start == x.end)
-    assert length - tangency.start == pytest.approx(at, abs=2e-3)
+    assert 120.0 - tangency.start == pytest.approx(at, abs=2e-3)
     assert abs(tangency.force - force) < min(tangency.error, 5e-4 * force) and tangency.error < 5e-3 * force
     assert at_bit.force == pytest.approx(283.51, rel=5e-3) and not solved.rough
 
@@ -529,12 +511,8 @@ STABILISED = ((29.0, 0.003), (11.0, 0.003), (2.0, 0.0016)), (3536.43, 4185.51)
 
 def test_forces_of_rings_next_to_each_other():
     """No wall is between them whose softness would count: the next wall is 18 m away."""
-    (rings, forces), (EI, weight, clearance, *_) = STABILISED, SLICK
-    length, path = 120.0, cf.well.WellPath.from_survey([0, 140], [88.0, 88.0], [0, 0])
-    solved = solve_in_hole(
-        path, [length], cf.Stiffness((1e12,) * 2, 1e12, (EI, EI), EI), weight, 0.1, radius=0.1 + clearance,
-        bottom_tension=-250e3, rings=[*((length - d, room, 0.1) for d, room in rings), (length, 0.0, 0.1)],
-    )  # fmt: skip
+    rings, forces = STABILISED
+    solved = pressed(88.0, rings)
     *_, stabiliser, at_bit = (x for x in solved.contacts if x.start == x.end)
     for found, force in zip((stabiliser, at_bit), forces, strict=True):
         assert abs(found.force - force) < found.error < 5e-3 * force and found not in solved.rough
@@ -557,25 +535,20 @@ def test_a_smaller_tol_makes_forces_at_points_more_accurate(case):
         assert abs(point.force - exact) < min(2e-4 * exact, 3 * point.error) and point.error < 2e-2 * exact
 
 
-def test_errors_of_forces_at_points_are_with_the_contacts():
-    case = KNOWN["stiff build"][0]
-    found = in_build_section(case)
-    for point, k in zip(points_of(found), (3, 2, 1), strict=True):
-        assert abs(point.force - case[f"point_force_{k}"]) < point.error < 5e-3 * point.force
-    assert all(np.isnan(x.error) for x in found.contacts if not x.at_point)
-    assert pickle.loads(pickle.dumps(point)).error == point.error and len(point) == 4
-
-
 def test_a_force_near_the_end_of_its_contact_says_so():
     """The part that is left behind it is shorter than what its peak and the rise behind it need."""
-    EI, weight, clearance, _, force = SLICK
-    length, path = 60.0, cf.well.WellPath.from_survey([0, 140], np.radians([3.0, 3.0]), [0, 0], degrees=False)
-    solved = solve_in_hole(
-        path, [length], cf.Stiffness((1e12,) * 2, 1e12, (EI, EI), EI), weight, 0.1, radius=0.1 + clearance,
-        bottom_tension=-250e3, rings=[(length, 0.0, 0.1)],
-    )  # fmt: skip
+    solved, force = pressed(3.0, length=60.0), SLICK[-1]
     tangency = [x for x in solved.contacts if x.start == x.end][-2]
     assert tangency in solved.rough and abs(tangency.force - force) < tangency.error < force
+
+
+def pressed(inclination, rings=(), length=120.0, **more):
+    """An assembly by numbers in a straight hole, with 250 kN and rings (distance from the bit, clearance)."""
+    EI, weight, clearance, *_ = SLICK
+    path = cf.well.WellPath.from_survey([0, 140], np.radians([inclination] * 2), [0, 0], degrees=False)
+    rings = [*((length - d, room, 0.1) for d, room in rings), (length, 0.0, 0.1)]
+    stiff, given = cf.Stiffness((1e12,) * 2, 1e12, (EI, EI), EI), {"bottom_tension": -250e3, "rings": rings}
+    return solve_in_hole(path, [length], stiff, weight, 0.1, radius=0.1 + clearance, **given, **more)
 
 
 def wall(pressure, start=20.0, end=60.0, h=0.3):
