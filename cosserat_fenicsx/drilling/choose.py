@@ -65,7 +65,18 @@ def _left_out(scene, name):
     found = [f"APPROXIMATE: the bend of {bent} is left out: the string lies on the axis"] if bent else []
     if scene.bit is not None and scene.bit.varies and scene.hole is not None:
         found.append("APPROXIMATE: friction at the wall is that under the weight on bit at the start")
-    return found + _pushed(scene) + (_buckled(scene, name) if scene.hole is not None else [])
+    return found + _stalls(scene) + _pushed(scene) + (_buckled(scene, name) if scene.hole is not None else [])
+
+
+def _stalls(scene):
+    """A sentence where a bit at rest holds more than a motor gives."""
+    law = scene.motor and scene.bit.law.resistance(scene.bit.most)
+    if not law or law.still < (stall := scene.motor.stall_torque()):
+        return []
+    return [
+        f"{scene.motor.name} gives at most {stall:.5g} N m at the start, and the bit at rest holds {law.still:.5g} N m: "
+        "where it sticks the motor stalls"
+    ]
 
 
 def _pushed(scene):

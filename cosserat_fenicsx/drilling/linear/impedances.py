@@ -12,7 +12,7 @@ which are entire functions of s, but for s = -1/tau. States are scaled by positi
 such that nothing overflows however large s L is.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import groupby
 from operator import itemgetter
 
@@ -270,8 +270,12 @@ class Guide:
         In the lowest part, of the impedance Z and the travel time T, the power p = -Re(w* P) handed down and the energy
         e = mu |w|^2 + |P|^2/K grow as p' >= (x - D) e and e' <= (4/c^2) (x + d/2) p, with the drive D and the largest
         drag d. So 2 p/(c e) is at least the theta below, and p at least Z tanh(y) |w|^2 with tanh(2 y) = theta: without
-        drag Z tanh(x T), whatever is above. Damping of Kelvin and Voigt adds to it.
+        drag Z tanh(x T), whatever is above. Damping of Kelvin and Voigt adds to it. A motor's dashpot c below a string
+        of Re Z >= y leaves c y/(c + y) at least.
         """
+        if isinstance(self.parts[-1], Parted):
+            y, c = replace(self, parts=self.parts[:-1]).least(x), self.parts[-1].damping
+            return c * y / (c + y)
         lowest, travel, drag = self.parts[-1], 0.0, 0.0
         for part in reversed(self.parts):
             if not part.length or not np.isclose(part.impedance, lowest.impedance, rtol=1e-9):
