@@ -130,12 +130,23 @@ def test_steady_start(model, damped):
 def test_a_motor_that_stalls(model):
     """A bit that holds more than the motor: the string turns its rotor backwards, which is told."""
     scene = above(Bit(0.2), motor(), law=Stribeck(30e3, 29e3), drag=ViscousDrag(torsion=2.0))
-    found = cf.drilling.simulate(scene, 3.0, model=model, progress=False)
+    found = cf.drilling.simulate(scene, 3.0, model=model, dt=3e-4, progress=False)
     assert (found.bit_speed == 0).all() and found.stalled[-1]
     assert found.motor_speed[-1] == pytest.approx(-GIVEN["Om"], rel=1e-3)
-    assert "THE MOTOR STALLS from t = " in str(found)
+    assert "THE MOTOR STALLS from t = " in str(found) and "where it sticks the motor stalls" in " ".join(found.why)
     with pytest.raises(cf.SceneError, match="mud motor: it stalls"):
         cf.drilling.simulate(replace(scene, start="steady"), 1.0, model=model)
+
+
+@pytest.mark.parametrize("model", ["torsion", "axial and torsional"])
+def test_resumed_to_the_same_digits(model, tmp_path):
+    flow = cf.signals.Table((0.0, 0.1, 0.2), (0.04, 0.04, 0.03))
+    shaker = OscillationTool(2.0, outer_diameter=0.127, spring=5e6, frequency=16.0, stroke=5e-3, start=0.05)
+    scene = above(Bit(0.2), motor(flow=flow), Collar(2.0, "NC46-65"), shaker)
+    whole = cf.drilling.simulate(scene, 0.3, model=model, dt=2e-4, progress=False)
+    cf.drilling.simulate(scene, 0.15, model=model, dt=2e-4, folder=tmp_path / "run", progress=False)
+    np.testing.assert_array_equal(cf.resume(tmp_path / "run", duration=0.3).rows, whole.rows)
+    assert (whole.hook_load.std() > 1e3) == (model != "torsion") and abs(whole.balance[-1]) < 1e-6 * whole.kinetic.max()
 
 
 def test_small_motions_see_a_dashpot(truth):
@@ -205,8 +216,8 @@ def test_tool_that_halves_the_pull(truth):
                            force=given["F"], frequency=given["f"], start=2.0)  # fmt: skip
     string = DrillString([pipe(given["L"] - given["tool_at"]), tool, pipe(given["tool_at"] - 2.0)])
     scene = Drilling(string, TopDrive(0.0), hole=hole, hook=Hook(speed=given["V"]), mud=cf.well.Mud(1850.0))
-    found = cf.drilling.simulate(scene, 16.0, elements=250, progress=False)
-    pull = found.mean("hook_load", periods=160, frequency=given["f"])
+    found = cf.drilling.simulate(scene, 13.0, elements=250, progress=False)
+    pull = found.mean("hook_load", periods=128, frequency=given["f"])
     truth("oscillation tool, Coulomb friction: mean pull", pull, PULLED["truth"]["mean pull with the tool"], 1e-2)
     with pytest.raises(cf.SceneError, match="mean.periods"):
         found.mean("hook_load", 10000, 16.0)
@@ -229,6 +240,20 @@ def test_tool_that_halves_the_pull(truth):
 def test_refused_by_name(make, words):
     with pytest.raises(cf.SceneError, match=words):
         make()
+
+
+def test_friction_below_a_motor_is_told():
+    """What torsion alone leaves out is the difference of both models."""
+    path = cf.well.WellPath.from_survey([0, 31], [90, 90], [0, 0], degrees=True)
+    hole = cf.well.Borehole(path, cf.well.HoleSection(31.0, 0.2159, 0.3))
+    scene = above(Collar(10.0, "NC46-65"), motor(), hole=hole, mud=cf.well.Mud(1200.0), start="steady")
+    torsion, both = (
+        cf.drilling.simulate(scene, 0.01, model=x, progress=False) for x in ("torsion", "axial and torsional")
+    )
+    told = next(x for x in torsion.why if "below mud motor, about" in x)
+    torque = float(told.split("about ")[1].split()[0])
+    left_out = (torsion.motor_speed[-1] - both.motor_speed[-1]) * scene.motor.slope
+    assert left_out + GIVEN["b"] * (torsion.bit_speed[-1] - both.bit_speed[-1]) == pytest.approx(torque, rel=0.1)
 
 
 def test_static_motor_is_told_and_refused():

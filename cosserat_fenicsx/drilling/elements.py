@@ -8,7 +8,6 @@ that fail are halved. Energies and works balance to rounding and to the toleranc
 quadratic energies, and works are those of the step's own forces.
 """
 
-import itertools
 import math
 
 import numpy as np
@@ -303,12 +302,12 @@ class AxialTorsional(StringModel):
         if self._axial and "hook" not in self._samplers:
             parts[:, [1, 1 + len(self._signals)]] *= -1  # the hook's speed is positive upwards
         weights = self._weights(self.steps, steps)
-        for p, (*_, joint) in enumerate(self._chain.joints):  # of forces the means, which oscillate
-            if not joint.force.constant:
-                ends = start * self.dt + np.cumsum([0.0, *parts[:, 0]])
-                means = [joint.force.mean(*x) for x in itertools.pairwise(ends.tolist())]
-                for column in (1 + self._dofs + p, 1 + self._dofs + p + len(self._signals)):
-                    parts[:, column] = means
+        varying = [(p, joint.force) for p, (*_, joint) in enumerate(self._chain.joints) if not joint.force.constant]
+        begin = [] if not varying else self._begin(parts)
+        for p, force in varying:  # of forces the means, as they oscillate
+            means = [force.mean(t, t + length) for t, length in zip(begin, parts[:, 0], strict=True)]
+            for column in (1 + self._dofs + p, 1 + self._dofs + p + len(self._signals)):
+                parts[:, column] = means
         for part in [parts] if self.end is None else parts[:, None]:
             if self.end is not None:
                 self._take(self.end.begin(self, part[0, 0]))
@@ -321,6 +320,14 @@ class AxialTorsional(StringModel):
                 return
             if self.end is not None:
                 self.end.commit(self, part[0, 0])
+
+    def _begin(self, parts):
+        """Times at which the parts of steps begin, the same in whichever chunk they are done."""
+        ends = parts[:-1, -1] == 1
+        begin = (self.steps + np.cumsum([0, *ends])) * self.dt
+        for k in np.flatnonzero(~ends):
+            begin[k + 1] = begin[k] + parts[k, 0]
+        return begin
 
     def _take(self, given):
         """The `EndForce` of the coming step."""

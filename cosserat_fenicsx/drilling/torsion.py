@@ -34,7 +34,7 @@ from cosserat_fenicsx.drilling.scene import Drilling
 from cosserat_fenicsx.drilling.signals import means
 from cosserat_fenicsx.drilling.steady_start import check_steady, steady_speed_of_bit, steady_velocities
 from cosserat_fenicsx.drilling.top_drive import Sample, divided
-from cosserat_fenicsx.drilling.wall_friction import law_of, wall_of
+from cosserat_fenicsx.drilling.wall_friction import law_of, loads_between, scene_pieces, wall_of
 from cosserat_fenicsx.well.components import DrillString
 
 
@@ -295,13 +295,28 @@ class TorsionWaves(StringModel):
         if cells.dt < asked / 2:
             yield f"dt is less than the {asked:.4g} s asked for, or the law of friction would have several answers"
         if scene.motor is not None:
-            yield f"what is below {scene.motor.name} turns as one body of {self._bit_inertia:.4g} kg m^2, off the wall"
+            yield f"what is below {scene.motor.name} turns as one body of {self._bit_inertia:.4g} kg m^2"
+            yield from self._off_the_wall()
         if scene.start == "steady":
             yield "starts in steady rotation at the speed of the drive"
         if scene.hole is not None and self.normal_force is None:
             yield "wall force of the soft string without axial motion: tension by the weight alone"
         if scene.hook is not None and (scene.hook.speed != 0 or math.isfinite(scene.hook.stiffness)):
             yield "the hook is left out: torsion alone knows no axial motion"
+
+    def _off_the_wall(self):
+        """A sentence on the friction of the wall on what is below a motor, which is left out."""
+        scene, top = self.scene, self.depths[-1]
+        if scene.hole is None or not scene.turned:
+            return
+        pieces = scene_pieces(scene)
+        cuts = np.append(top, pieces.bottom[pieces.bottom > top * (1 + 1e-9)])
+        _, load, radius = loads_between(scene, pieces, cuts, self.normal_force)
+        if (torque := self._wall.kinetic * float(load @ radius)) > 0:
+            yield (
+                f"APPROXIMATE: the friction of the wall on what is below {scene.motor.name}, about {torque:.3g} N m, "
+                "is left out; the axial and torsional model has it"
+            )
 
     def _allocate(self):
         cells, scene, n = self.cells, self.scene, len(self.cells.time)
