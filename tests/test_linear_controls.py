@@ -185,6 +185,12 @@ def test_in_a_scene_file(tmp_path):
     (lambda: ZTorque(delay=-0.01), "ZTorque.delay = -0.01"),
     (lambda: simulate(Drilling(PIPE, TopDrive(OM, control=ZTorque(delay=0.01))), 1.0, dt=0.008),
      "ZTorque.delay = 0.01: expected at least two steps"),
+    (lambda: stability(Drilling(PIPE, TopDrive(OM, control=ZTorque(Z / 2, 0.0, 0.1))), [OM]),
+     "ZTorque.delay = 0.1: expected 0 .s., or a filter"),
+    (lambda: simulate(Drilling(PIPE, TopDrive(OM, control=ZTorque(Z, 0.0, 0.1))), 1.0, model="axial and torsional"),
+     "ZTorque.delay = 0.1: expected 0 .s., or a filter"),
+    (lambda: simulate(Drilling(Discs((9.0, 9.0), (5.0,)), TopDrive(OM, control=ZTorque(9.0, delay=0.1))), 1.0),
+     "ZTorque.delay = 0.1: expected 0 .s., or a filter of the second order"),
     (lambda: simulate(Drilling(Discs((9.0, 9.0), (5.0,)), TopDrive(OM, control=ZTorque())), 1.0),
      "ZTorque.impedance = None: expected an impedance"),
 ])  # fmt: skip

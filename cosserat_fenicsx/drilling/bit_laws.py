@@ -307,7 +307,7 @@ class BitOnRock(Part):
     """
 
     law: BitLaw
-    weight: InTime[Annotated[ForceSize, positive()]] | None = None
+    weight: InTime[Annotated[ForceSize, at_least(0, "a weight on bit")]] | None = None
     inertia: Inertia = 0.0
     mass: Mass = 0.0
     rock_stiffness: Stiffness = math.inf
@@ -325,6 +325,8 @@ class BitOnRock(Part):
             if not self.signal()(0.0) >= 0:
                 refuse(self, "weight", self.signal()(0.0), "a weight on bit that is not negative (N), at t = 0")
         elif self.weight is not None:
+            if self.weight == 0:
+                refuse(self, "weight", 0.0, "a weight on bit above 0 (N), or None for a bit off the rock")
             pressed = self.weight / self.rock_stiffness
             if pressed > _DEEP:
                 warn(

@@ -201,7 +201,7 @@ class AxialTorsional(StringModel):
             top.rigid, top.given, top.proportional, top.integral, self._space = gains
             if self._space is not None:
                 top.rigid = self._space.of_speed and drive.control.late > 0
-                self._set_linear(self._m.control, drive, self._space)
+                self._set_linear(self._m.control, drive, self._space, None)
         return drive.signal()
 
     # -- the start -----------------------------------------------------------------------------------------------------

@@ -161,6 +161,31 @@ def steady_control(control: DriveControl, space: StateSpace, torque: float):
     return level, x, y
 
 
+def check_late(control: DriveControl, space: StateSpace | None, impedance: float | None, discs: bool = False) -> None:
+    """Refuse a control that acts late and answers to fast torques so much that motions of all frequencies grow, the
+    faster the shorter they are: a speed times the impedance (N m s/rad) of the string, a torque over that of a body.
+
+    Args:
+        impedance: None where the drive turns a body, an element or a disc. discs: whether it is a disc.
+
+    Raises:
+        SceneError: so it is.
+    """
+    if space is None or not control.late:
+        return
+    _, B, C, D = arrays_of(space)
+    if not space.of_speed:
+        grows = discs and abs(D[1]) > 1
+    elif impedance is None:
+        grows = D[1] != 0 or (discs and C @ B[:, 1] != 0)
+    else:
+        grows = abs(D[1]) * impedance > 1 + _STEADY
+    if grows:
+        order = " of the second order" if discs and space.of_speed else ""
+        refuse(control, "delay", control.late, f"0 (s), or a filter{order}: {type(control).__name__} answers late to "
+               "fast torques by as much as they are or more, and motions of all frequencies grow")  # fmt: skip
+
+
 def check_step(control: DriveControl, answer: float, dt: float) -> None:
     """Refuse a step dt (s) in which a control answers to the mean torque by a factor `answer` of 1 or more.
 

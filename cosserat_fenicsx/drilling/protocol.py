@@ -12,7 +12,7 @@ import numpy as np
 from cosserat_fenicsx.algebra.building import Pointers
 from cosserat_fenicsx.checks import refuse
 from cosserat_fenicsx.drilling.laws import SOURCES
-from cosserat_fenicsx.drilling.linear_control import arrays_of, check_step, steady_control
+from cosserat_fenicsx.drilling.linear_control import arrays_of, check_late, check_step, steady_control
 from cosserat_fenicsx.drilling.signals import means
 from cosserat_fenicsx.drilling.top_drive import Sample, Sampler
 from cosserat_fenicsx.errors import NotConverged
@@ -75,8 +75,10 @@ class StringModel(Pointers):
             self._samplers["drive"] = Sampler(control, name, self.dt, drive.signal(), first)
             self._given()
 
-    def _set_linear(self, record, drive, space):
-        """Fill C's record of a linear control, a `StateSpace`, for steps of `dt`, at rest."""
+    def _set_linear(self, record, drive, space, impedance):
+        """Fill C's record of a linear control, a `StateSpace`, for steps of `dt`, at rest; impedance (N m s/rad): of
+        the waves below the drive, None above a body."""
+        check_late(drive.control, space, impedance, self.scene.discs is not None)
         A, B, C, D = arrays_of(space)
         n, late = len(A), round(drive.control.late / self.dt)
         record.used, record.size, record.late = 1, n, late

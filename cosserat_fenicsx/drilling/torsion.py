@@ -340,7 +340,7 @@ class TorsionWaves(StringModel):
             c.stiff, c.given, c.Kp, c.Ki, linear = self._gains
             if linear is not None:
                 c.stiff = linear.of_speed and drive.control.late > 0
-                self._set_linear(c.control, drive, linear)
+                self._set_linear(c.control, drive, linear, scene.segments[0].torsional_impedance)
         c.bit_inertia = self._bit_inertia
         if scene.motor is not None:
             c.slope = scene.motor.slope

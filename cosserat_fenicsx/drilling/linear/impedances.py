@@ -19,7 +19,7 @@ from operator import itemgetter
 import numpy as np
 
 from cosserat_fenicsx.checks import refuse
-from cosserat_fenicsx.drilling.linear_control import polynomials_of
+from cosserat_fenicsx.drilling.linear_control import check_late, polynomials_of
 from cosserat_fenicsx.drilling.steady_start import follows_the_bit
 from cosserat_fenicsx.drilling.top_drive import Hook
 
@@ -299,6 +299,7 @@ def _drive_top(drive, impedance):
     """The condition of the drive: (om, M) at the top and their derivatives, free of poles. It acts late by
     exp(-s late), where it is called once a sample by half of that and its delay."""
     gains, inertia, late = drive.control.gains(impedance), drive.inertia, drive.control.late
+    check_late(drive.control, gains.linear, impedance, impedance is None)
     if gains.rigid:
         return _held
     rest, *answers = map(np.poly1d, polynomials_of(gains))
