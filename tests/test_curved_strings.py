@@ -56,7 +56,7 @@ def test_at_rest_in_a_bent_hole_nothing_moves(depth):
 
 
 def test_torsion_in_a_bend_that_holds_the_string_on_its_axis_is_that_of_the_straight_string():
-    """Bit speed and surface torque with stick-slip of the bit, without friction at the wall: to 1e-3 of their peaks."""
+    """Bit speed and surface torque while the bit sticks and slips, without friction at the wall: to 1e-3 of their peaks."""
     parts = (part(30.0, 0.1651, 0.05715), part(120.0, 0.127, 0.10861))
     string = drilling(
         lambda t: 5.0 * (1 - math.cos(math.pi * min(t / 0.2, 1.0))),
@@ -64,31 +64,40 @@ def test_torsion_in_a_bend_that_holds_the_string_on_its_axis_is_that_of_the_stra
         bit=cf.drilling.BitOnRock(cf.drilling.Stribeck(1500.0, 900.0, 3.0), inertia=20.0),
     )  # fmt: skip
     mixed = cf.drilling.mixed_scene(string, 90.0)
-    history = cf.simulate(mixed.scene, 0.6, dt=1e-3, elements=12, degree=2, start=mixed.rest(12, 2))
-    found, whole = mixed.as_drilling(history), cf.drilling.simulate(string, 0.6, dt=1e-4, model="torsion")
+    history = cf.simulate(mixed.scene, 0.3, dt=1e-3, elements=8, degree=2, start=mixed.rest(8, 2))
+    found, whole = mixed.as_drilling(history), cf.drilling.simulate(string, 0.3, dt=1e-4, model="torsion")
     middles = found.times - found.dt / 2
     for name, delay in (("bit_speed", 0.0), ("surface_torque", 1e-4)):
         true = np.interp(middles, whole.times - delay, getattr(whole, name))
         assert np.abs(getattr(found, name) - true).max() < 1e-3 * np.abs(true).max(), name
-    assert found.bit_speed.max() > 5 and imbalance(history) < 1e-5
+    assert found.bit_speed.max() > 5 and imbalance(history) < 5e-5
 
 
-@pytest.mark.parametrize("depth", [150.0, 30.0])
-def test_the_torque_of_rotation_is_that_of_torque_and_drag(depth):
-    """The pipe by its waves, and nearly the whole string as a rod; drag makes the start short, and is taken off."""
-    path, rate, speed = well(200.0, turn=3.0), 8.0, 0.5
+@pytest.mark.slow
+def test_the_torque_of_rotation_of_a_whole_string_is_that_of_the_rod_at_rest():
+    """Of a steady speed, less the known drag, which makes the start short: to 2e-3; and the hook load."""
     parts = (part(40.0, 0.1651, 0.05715, weight=1200.0), part(160.0, 0.127, 0.10861, weight=250.0))
-    string = drilling(lambda t: speed * min(2 * t, 1.0), path=path, parts=parts, drag=rate)
-    mixed = cf.drilling.mixed_scene(string, depth)
-    mesh = {"elements": round((200.0 - depth) / 5.0), "degree": 2}
+    rate, speed, mesh = 8.0, 0.5, {"elements": 34, "degree": 2}
+    string = drilling(lambda t: speed * min(2 * t, 1.0), path=well(200.0, turn=3.0), parts=parts, drag=rate)
+    mixed = cf.drilling.mixed_scene(string, 30.0)
     history = cf.simulate(mixed.scene, 1.5, dt=2e-3, **mesh, start=mixed.rest(**mesh), save_every=0.05)
     found = mixed.as_drilling(history)
-    of_mud = rate * speed * sum(x.rhoJ * x.length for x in string.segments)
-    assert imbalance(history) < 1e-4
-    torque = found.surface_torque[-8:].mean() - of_mud
-    for model in ("soft", "rod"):
-        rest = cf.well.torque_and_drag(string.hole, string.string, cf.well.RotateOffBottom(), mud=cf.well.Mud(0.0), model=model, tol=2e-3)
-        print(depth, model, torque, rest.surface_torque, torque / rest.surface_torque - 1, np.ptp(found.surface_torque[-8:]), rest.error, found.hook_load[-1], rest.hook_load, imbalance(history))
+    torque = found.surface_torque[-8:].mean() - rate * speed * sum(x.rhoJ * x.length for x in string.segments)
+    rest = cf.well.torque_and_drag(string.hole, string.string, cf.well.RotateOffBottom(), mud=cf.well.Mud(0.0),
+                                   model="rod", tol=2e-3)  # fmt: skip
+    assert torque == pytest.approx(rest.surface_torque, rel=2e-3)
+    assert found.hook_load[-1] == pytest.approx(rest.hook_load, rel=1e-3)
+    assert imbalance(history) < 5e-5
+
+
+def test_the_friction_of_a_turning_pipe_is_that_of_the_soft_string():
+    string = drilling(0.0, path=well(200.0, turn=3.0), parts=(part(200.0, 0.127, 0.10861, weight=250.0),))
+    law, impedances = PipeFriction(string, np.linspace(0.0, 200.0, 41)), (np.full(39, 7e3), np.full(39, 300.0))
+    for _ in range(2):  # the second time the tension is known
+        _, torques = law.holding(np.zeros(39), np.full(39, 1e4), *impedances)
+    rest = cf.well.torque_and_drag(string.hole, string.string, cf.well.RotateOffBottom(), mud=cf.well.Mud(0.0),
+                                   model="soft")  # fmt: skip
+    assert torques.sum() == pytest.approx(rest.surface_torque, rel=1e-3)
 
 
 def node(friction):
@@ -136,7 +145,9 @@ def test_refusals():
     with pytest.raises(cf.SceneError, match="hole = None: expected a Borehole for `rest`.* start=1.0"):
         mixed.rest(**MESH)
     history = cf.simulate(mixed.scene, 0.002, dt=1e-3, elements=2, degree=2, start=1.0)
-    with pytest.raises(cf.SceneError, match="action = .*expected an action of the scene that depends on earlier motion"):
+    with pytest.raises(
+        cf.SceneError, match="action = .*expected an action of the scene that depends on earlier motion"
+    ):
         history.far_end(mixed.scene.loads[0])
     with pytest.raises(cf.SceneError, match="history = .*expected a motion of the `scene`"):
         cf.drilling.mixed_scene(free, 100.0).as_drilling(history)

@@ -32,6 +32,8 @@ from cosserat_fenicsx.well.rod.string_scene import StringScene
 _NOTHING = 1e-9
 # Default stiffness of the wall, N/m^2, and of rings, N/m.
 _WALL = 1e8
+# Damping of the wall in motions, s/m: without it a bit in gauge chatters from step to step.
+_DAMPING = 10.0
 _DOWN = np.array([0.0, 0.0, 1.0])
 
 
@@ -128,8 +130,8 @@ def mixed_scene(drilling: Drilling, depth: float | None = None) -> MixedScene:
         MixedScene.
 
     Raises:
-        SceneError: discs, a depth outside the string, a bit that cuts, a bent housing below the depth, or drags of
-            torsion and of axial motion that differ.
+        SceneError: discs, a depth outside the string, a bit that cuts, a bent housing below the depth, drags of torsion
+            and of axial motion that differ, or a start in steady rotation.
     """
     instance("mixed_scene", "drilling", drilling, Drilling, "a Drilling")
     if not hasattr(drilling.string, "components"):
@@ -137,6 +139,8 @@ def mixed_scene(drilling: Drilling, depth: float | None = None) -> MixedScene:
     for joint in drilling.joints:
         refuse("mixed_scene", "drilling.string", joint.tool, "a string without MudMotor and OscillationTool, which "
                "part it: a Collar in its place; drilling.simulate has them")  # fmt: skip
+    if drilling.start != "rest":
+        refuse("mixed_scene", "drilling.start", drilling.start, "'rest', from which the rod starts")
     top = _depth(drilling, depth)
     parts = list(zip(drilling.places, drilling.segments, strict=True))  # from the top down
     below = [
@@ -146,7 +150,7 @@ def mixed_scene(drilling: Drilling, depth: float | None = None) -> MixedScene:
         if part.bend:
             refuse(part, "bend", part.bend, "None in mixed_scene, whose rod is straight where it is free of stress")
     above = [replace(x, length=min(place.bottom, top) - place.top) for place, x in parts if place.top < top - _NOTHING]
-    (start, end), (t, along) = _axis(drilling, np.array([top, drilling.bit_depth]))
+    (start, _), (t, along) = _axis(drilling, np.array([top, drilling.bit_depth]))
     ends = np.array([bottom - top for _, bottom, _, _ in below])
     sections = [_section(part, x) for _, _, part, x in below]
     rod = Rod(Line(tuple(start), tuple(start + ends[-1] * t)),
@@ -158,17 +162,15 @@ def mixed_scene(drilling: Drilling, depth: float | None = None) -> MixedScene:
     whole = [np.array([0.0, *(place.bottom for place, _ in parts)]), np.array([top, *(part[1] for part in below)])]
     heights = [np.diff(_axis(drilling, md)[0][:, 2]) for md in whole]
     hanging = float(weight @ heights[1]) - on_bit
-    rubs = (
-        drilling if drilling.hole and (drilling.friction or any(x.friction for x in drilling.hole.sections)) else None
-    )
-    pipe = PipeAbove(rod.start, tuple(above), drilling.drive, drilling.hook, hanging, drilling.drag, rubs)
+    rough = drilling.hole and (drilling.friction or any(x.friction for x in drilling.hole.sections))
+    pipe = PipeAbove(rod.start, tuple(above), drilling.drive, drilling.hook, hanging, drilling.drag,
+                     drilling if rough else None)  # fmt: skip
     loads = [LineForce(rod, AlongPieces(weights) if len(weights) > 1 else weights[0][1]), pipe]
     loads += [Force(rod.end, tuple(-on_bit * along))] if on_bit else []
     held = (rod.start,) if drilling.hole else (rod.start, rod.end)
     supports = [Roller(x, tuple(across)) for x in held for across in np.linalg.svd(t[None])[2][1:]]
-    resting, moving = _walls(
-        drilling, rod, top, [(float(x), p[2].body_radius) for x, p in zip(ends, below, strict=True)]
-    )
+    radii = [(float(x), part.body_radius) for x, (_, _, part, _) in zip(ends, below, strict=True)]
+    resting, moving = _walls(drilling, rod, top, radii)
     at_rest = Scene([rod], supports, [*loads, *resting])
     scene = Scene([rod], supports, [*loads, *_bit(drilling, rod), *moving])
     string = None
@@ -246,12 +248,12 @@ def _walls(drilling, rod, top, radii):
     if drilling.bit is not None and (not rings or rings[-1][0] < drilling.bit_depth - _NOTHING):
         rings.append((drilling.bit_depth, 0.0, radii[-1][1]))
     stations = [rod.end if s > drilling.bit_depth - _NOTHING else rod.at(s - top) for s, *_ in rings]
-    walls = [kind(rod, hole.path, radius, radii, friction=friction, **given) for kind in (TubeWall, HoleWall)]
     rubs = value_at(friction, [s for s, *_ in rings]).tolist()
     return tuple(
-        [wall, *(kind(at, hole.path, *sizes, friction=mu, **given)
-                 for at, (_, *sizes), mu in zip(stations, rings, rubs, strict=True))]
-        for wall, kind in zip(walls, (TubeRing, HoleRing), strict=True)
+        [along(rod, hole.path, radius, radii, friction=friction, **given, **more),
+         *(at(station, hole.path, *sizes, friction=mu, **given, **more)
+           for station, (_, *sizes), mu in zip(stations, rings, rubs, strict=True))]
+        for along, at, more in ((TubeWall, TubeRing, {}), (HoleWall, HoleRing, {"damping": _DAMPING}))
     )  # fmt: skip
 
 
@@ -264,6 +266,7 @@ def _why(drilling, top):
             yield "friction at the rod's wall is the kinetic one, at rest too"
         if drilling.hole.wall_stiffness is None:
             yield f"the wall has a stiffness of {_WALL:g} N/m^2"
+        yield f"the wall has a damping of {_DAMPING:g} s/m"
     yield "mud adds no mass to sideways motions of the rod"
     if drilling.bit is not None and drilling.bit.weight is not None:
         yield "the weight on bit is constant: the bit does not leave the rock"

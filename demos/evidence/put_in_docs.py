@@ -82,6 +82,7 @@ FOLDERS = {
         "stability_map.png": "stability_map.png",
     },
     "whirl": {"whirl.png": "whirl.png"},
+    "curved_string": {"curved_string.png": "curved_string.png"},
     "column": {"eccentric_cantilever_delta.png": "figure.png"},
     "recipes": RECIPES,
     "frames": {f"{name}.png": f"{name}.png" for name in ("gridshell", "lattice", "net")},
