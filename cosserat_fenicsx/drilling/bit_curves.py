@@ -85,7 +85,7 @@ class TableLaw(BitLaw):
         return Surface(loads, *splines, np.array([values[0], rise[0]]))
 
     def torque(self, speed, weight):
-        if self.weights and weight > self.weights[-1]:
+        if self.weights and weight > self.weights[-1] * (1 + 1e-9):  # more than rounding
             refuse(self, "weights", self.weights, f"weights up to {weight:.6g} N at least, which the bit bears")
         return self._surface(speed, weight)
 

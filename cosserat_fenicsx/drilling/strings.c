@@ -21,6 +21,9 @@ static int interval_of(const double *ends, int count, double x)
     return low;
 }
 
+/* Whether a load is above those of a table, by more than rounding. */
+static inline int beyond(const curve *law, double load) { return load > law->loads[law->rows - 1] * (1 + 1e-9); }
+
 /* Hermite's shares of value and slope by the load of a row, and of the next one. */
 static void shares(const curve *law, int row, double load, double *share)
 {
@@ -34,7 +37,7 @@ static double rests(const friction *f)
 {
     const curve *law = f->other;
     double slope, share[4];
-    if (law->rows < 2 || f->load > law->loads[law->rows - 1]) return call_law(law->self, 0, f->load, &slope);
+    if (law->rows < 2 || beyond(law, f->load)) return call_law(law->self, 0, f->load, &slope);
     const int row = interval_of(law->loads, law->rows - 1, f->load);
     const double *R = law->still + row, *rise = R + law->rows;
     shares(law, row, f->load, share);
@@ -46,7 +49,7 @@ static __attribute__((noinline, cold)) double resistance_of_other(const friction
 {
     const curve *law = f->other;
     double R;
-    if (!law->rows || (law->self && f->load > law->loads[law->rows - 1]))
+    if (!law->rows || (law->self && beyond(law, f->load)))
         R = call_law(law->self, f->reach * s, f->load, slope);
     else {
         const double x = law->logarithmic ? log(f->reach * s) : f->reach * s, last = law->knots[law->count];
