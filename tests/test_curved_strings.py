@@ -1,4 +1,4 @@
-"""Rods of drill-strings in bent holes, in motion from their equilibria at rest, below pipe with friction at the wall."""
+"""Rods of drill-strings in bent holes, in motion from their equilibria, below pipe with friction at the wall."""
 
 import math
 
@@ -56,7 +56,8 @@ def test_at_rest_in_a_bent_hole_nothing_moves(depth):
 
 
 def test_torsion_in_a_bend_that_holds_the_string_on_its_axis_is_that_of_the_straight_string():
-    """Bit speed and surface torque while the bit sticks and slips, without friction at the wall: to 1e-3 of their peaks."""
+    """Bit speed and surface torque while the bit sticks and slips, without friction at the wall: to 1e-3 of their
+    peaks."""
     parts = (part(30.0, 0.1651, 0.05715), part(120.0, 0.127, 0.10861))
     string = drilling(
         lambda t: 5.0 * (1 - math.cos(math.pi * min(t / 0.2, 1.0))),

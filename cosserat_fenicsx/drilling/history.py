@@ -85,7 +85,8 @@ class DrillingHistory(Result):
 
     Attributes:
         scene: the `Drilling`.
-        model: "torsion", "axial and torsional", or "rod below pipe" of `MixedScene.as_drilling`. why: sentences on the choice of the model and its approximations.
+        model: "torsion", "axial and torsional", or "rod below pipe" (`MixedScene`). why: sentences on the choice of
+            the model and its approximations.
         dt: step, s. counts: {name: number} of the solver, such as steps that were halved.
         times: (n,) s, each at the end of a step. mean_times: (n,) s, the middles of those over which means are taken.
         profile_times: (k,) s. depths: (m,) measured depths, m.

@@ -5,7 +5,8 @@ the speed om of its sections, M + Z om travels down and M - Z om up without chan
 downwards). So the wave at the lower end of a part is known from the one at its upper end one travel time before, and
 the force there is M = arriving - Z om: a dashpot and a known force.
 
-Parts meet at nodes, where M may drop by a drag, and by friction at the wall of the hole (`PipeFriction`); at the uppermost node a `TopEnd` reflects waves. Waves from the nodes
+Parts meet at nodes, where M may drop by a drag, and by friction at the wall of the hole (`PipeFriction`); at the
+uppermost node a `TopEnd` reflects waves. Waves from the nodes
 are stored as means over every time step, at the middle of the step, and read by Lagrange's interpolation with four of
 them, which amplifies no wave where steps are even (Laakso et al., IEEE Signal Process. Mag. 13 (1996) 30).
 """

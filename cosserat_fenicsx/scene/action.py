@@ -100,7 +100,8 @@ class Action(Part, family="load or action", homes=("cosserat_fenicsx.scene.loads
             `at` (t) -> {attribute: value}, of the action at a time in the next step, `accept` (t, h, motion) after a
             step from t (s) to t + h, `undo` (), which takes back the last step, `memory` and `recall` as of
             `dynamics.stepper.Stepper`, and `far_end` () -> four numbers on the last step that results keep: velocity
-            (m/s), force (N), angular velocity (rad/s) and torque (N m) where it ends. `motion` is a `models.action_terms.StationMotion`.
+            (m/s), force (N), angular velocity (rad/s) and torque (N m) where it ends. `motion` is a
+            `models.action_terms.StationMotion`.
         resists: None; or a method (speed, rad/s, from 0 on) -> torque (N m) about the axis d3 against the rotation of
             its `station` in motions, and its derivative: at 0 the largest torque that holds, then a convex function.
         touches: whether it is a wall that nodes of rods touch in motions (dynamics/contact.py), in place of a virtual
