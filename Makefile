@@ -18,7 +18,7 @@ export VTK_DEFAULT_OPENGL_WINDOW = vtkEGLRenderWindow
 # A numpy in the user's own site directory would hide the distribution's.
 export PYTHONNOUSERSITE = 1
 
-.PHONY: help setup packages demo animation motion gallery well string whirl recipes test docs tutorials tables figure3 work-precision benchmarks cosseratbench failures rods-in-wells folders tangles truths random random-wells imperfect mutants sanitizers release clean
+.PHONY: help setup packages demo animation motion gallery well string whirl recipes test docs tutorials tables figure3 work-precision benchmarks cosseratbench failures rods-in-wells folders tangles truths random random-wells random-strings imperfect mutants sanitizers release clean
 
 help:
 	@echo "Times are those of two cores and an empty cache of compiled forms, after \`make setup\`."
@@ -39,10 +39,11 @@ help:
 	@echo "make benchmarks  published problems, each solved, drawn and compared with its printed numbers; writes out/benchmarks.md (a few minutes)"
 	@echo "make cosseratbench  the scenarios of a public suite, cosseratbench, beside the results of other solvers (git gets it; half a minute)"
 	@echo "make failures where methods fail: a map of methods against trials; writes out/ (at most a quarter of an hour)"
-	@echo "make rods-in-wells  the exact rod in three wells: Newton steps, processor time, errors (about 5 minutes)"
+	@echo "make rods-in-wells  the exact rod in three wells, 40 random ones, and beyond buckling: steps, processor time, errors (about 8 minutes)"
 	@echo "make truths  errors against closed forms and numbers of other programs, beside what was asked for (a few minutes)"
 	@echo "make random  200 random scenes against the strong form, at three tolerances (about 5 minutes)"
 	@echo "make random-wells  100 random wells, strings and operations against finer meshes in a stiffer wall (about half an hour)"
+	@echo "make random-strings  200 random drill-strings in motion: energy, torque, small motions, steps, models (half an hour)"
 	@echo "make imperfect  60 symmetric structures with small imperfections against paths in small steps (about 20 minutes)"
 	@echo "make mutants  120 small errors put into the code: how many do the tests find? (two hours)"
 	@echo "make sanitizers  the tests on C that checks its bounds and what it leaves undefined (half an hour)"
@@ -141,6 +142,9 @@ random: setup
 
 random-wells: setup
 	$(PYTHON) tests/random_wells.py 100
+
+random-strings: setup
+	$(PYTHON) demos/evidence/random_strings.py
 
 imperfect: setup
 	$(PYTHON) tests/imperfect_structures.py 60

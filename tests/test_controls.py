@@ -140,6 +140,15 @@ def test_autodriller(truth):
     truth("autodriller on waves, weight over that asked for", told, rows[:, 1], 1e-3, of=given["Ws"])
 
 
+def test_a_steady_start_below_an_autodriller_has_no_weight_on_bit():
+    """The block stands still at the start: a bit that drills by its weight would give way at once."""
+    scene = Drilling(pipe(500.0), TopDrive(6.0), BitOnRock(RateLaw(18e6, 2e3)),
+                     hook=Hook(autodriller=Autodriller(1e4, 2e-7)), start="steady")  # fmt: skip
+    assert np.ptp(cf.drilling.simulate(scene, 0.1, progress=False).bit_speed) < 1e-9
+    with pytest.raises(cf.SceneError, match="start = 'steady': expected a bit without a weight, BitOnRock"):
+        cf.drilling.simulate(replace(scene, bit=replace(scene.bit, weight=1e4)), 0.1, progress=False)
+
+
 def test_small_motions_leave_an_autodriller_out():
     hook = Hook(autodriller=Autodriller(100e3, 2e-8))
     scene = Drilling(pipe(1000.0), TopDrive(12.0), BitOnRock(Stribeck(5e3, 3e3, 3.0), 100e3), hook=hook)

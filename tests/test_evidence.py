@@ -272,6 +272,16 @@ def test_strings_beside_other_methods(tmp_path):
     assert (tmp_path / "work_precision_string_quick.png").stat().st_size > 20000
 
 
+def test_random_strings_quick(tmp_path):
+    """A string of 1.9 km with a PI control: every check is made, with both models, and nothing is off."""
+    import random_strings
+
+    rows, refused = random_strings.main(quick=True, out=tmp_path)
+    assert {what for _, what, _ in rows} >= {"models differ", "resumed differs", "response at low frequency"}
+    assert all(ratio <= 1 for _, _, ratio in rows) and len(rows) >= 11 and not refused
+    assert "| resumed differs | 2 | 0 | 0 |" in (tmp_path / "random_strings.md").read_text(encoding="utf-8")
+
+
 #: Verdicts other than "right" that are allowed, by trial and method. One large step may end anywhere, with a warning.
 _SAID = {cells.SAID, cells.STOPPED}
 _JUMPS = {(trial, method.key): _SAID for trial in ("jump_1.1", "jump_1.5", "jump_4") for method in own.OWN[1:]}

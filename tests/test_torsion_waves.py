@@ -494,14 +494,15 @@ def test_a_rotation_to_the_left_is_the_mirror_image():
 def test_where_friction_allows_no_longer_step_a_shorter_one_is_compared(model):
     scene = replace(off_bottom()[0], friction=cf.drilling.WallFriction(0.3, 0.195, 0.05, of_rotation=True))
     errors = cf.drilling.simulate(scene, 9, model=model, check=True, progress=False).errors
-    assert 0 < errors.peak < 5 and 0 < errors.largest_torque < 1000
+    assert 0 < errors.peak < 5 and 0 < errors.largest_torque == errors.least_torque < 1000
 
 
 def test_a_mesh_that_cannot_be_coarser_is_compared_with_a_finer_one():
     found = cf.drilling.simulate(stick_slip(), 60, model="axial and torsional", elements=2, check=True, progress=False)
     assert len(found.depths) == 4
     finer = cycle_of(run(AxialTorsional(stick_slip(), found.dt / 2, 6), 60)[1], 30)
-    assert found.errors == pytest.approx(2 * np.abs(np.subtract(cycle_of(found.rows, 30), finer)), rel=1e-6)
+    told = 2 * np.abs(np.subtract(cycle_of(found.rows, 30), finer))
+    assert found.errors == pytest.approx([*told[:2], told[2:].max(), told[2:].max()], rel=1e-6)
 
 
 def test_a_matched_drive_has_the_impedance_of_the_uppermost_component_however_short_it_is():

@@ -32,9 +32,15 @@ def check_rock(scene) -> None:
     """Refuse a hook that moves a string with axial motion whose bit stands on rock without drilling.
 
     Raises:
-        SceneError: the hook moves, and the bit stands on such rock.
+        SceneError: the hook moves, and the bit stands on such rock; or an autodriller is to put a weight on a bit that
+            drills and has one already.
     """
     bit, (down, _) = scene.bit, steady_velocities(scene)
+    driller = scene.hook is not None and scene.hook.autodriller is not None
+    if driller and bit is not None and bit.law.drills and bit.weight is not None:
+        refuse("Drilling", "start", "steady", "a bit without a weight, BitOnRock(weight=None), which the autodriller "
+               "puts on it; or 'rest': the block of an autodriller stands still at the start, and the bit drills by "
+               "its weight")  # fmt: skip
     if down and bit is not None and bit.weight is not None and not bit.law.drills:
         refuse("Drilling", "start", "steady", f"'rest' with a hook that moves at {-down:g} m/s: the rock below a bit "
                "with a weight is not drilled and does not give way, unless its law is Cutting(...)")  # fmt: skip

@@ -43,5 +43,5 @@ from cosserat_fenicsx.well.sweep import DepthSweep as DepthSweep
 from cosserat_fenicsx.well.sweep import depth_sweep as depth_sweep
 from cosserat_fenicsx.well.tools import MudMotor as MudMotor
 from cosserat_fenicsx.well.tools import OscillationTool as OscillationTool
-from cosserat_fenicsx.well.tortuosity import tortuosity as tortuosity
+from cosserat_fenicsx.well.crooked import tortuosity as tortuosity
 from cosserat_fenicsx.well.utilisation import Utilisation as Utilisation
