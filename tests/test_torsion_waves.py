@@ -32,8 +32,8 @@ from cosserat_fenicsx import drilling, well
 from cosserat_fenicsx.drilling.elements import AxialTorsional
 from cosserat_fenicsx.drilling.linear.impedances import axial, torsional
 from cosserat_fenicsx.drilling.linear.roots import Box, all_roots
-from cosserat_fenicsx.drilling.protocol import PROFILE
-from cosserat_fenicsx.drilling.stick_slip import cycle_of, step_errors
+from cosserat_fenicsx.drilling.protocol import LEDGER, PROFILE, SERIES
+from cosserat_fenicsx.drilling.stick_slip import Cycle, cycle_of, step_errors
 from cosserat_fenicsx.drilling.torsion import TorsionWaves, cells_of
 
 pytestmark = [pytest.mark.serial, pytest.mark.once]
@@ -445,6 +445,18 @@ def test_a_bit_that_never_turned_is_no_stick_slip():
     cycle = found.stick_slip()
     assert (found.bit_speed == 0).all() and cycle.stuck == 1 and not cycle.sticks
     assert "the bit never turned. Where the surface torque still grows" in str(cycle) and "stick-slip" not in str(cycle)
+
+
+@pytest.mark.parametrize(("second", "told"), [(1.5, False), (1.0, True)])
+def test_a_motion_that_is_not_periodic_says_that_its_errors_are_not_known(second, told):
+    """The bit turns for 0.4 s at 0 and at 1.5 or 1 s of every 3 s."""
+    rows = np.zeros((3000, 1 + len(SERIES) + len(LEDGER)))
+    t = rows[:, 0] = 0.01 * np.arange(3000)
+    rows[:, 1 + SERIES.index("drive_speed")] = 3.0
+    rows[:, 1 + SERIES.index("bit_speed")] = 9.0 * ((t % 3 < 0.4) | ((t - second) % 3 < 0.4))
+    history = cf.drilling.DrillingHistory(pipe_and_collars(), "torsion", (), 0.01, np.arange(2.0), rows)
+    history.errors = Cycle(0.001, 0.01, 5.0, 5.0)
+    assert history.stick_slip().irregular == told == ("The motion is not periodic" in " ".join(str(history).split()))
 
 
 def test_critical_speeds_of_a_pipe(tmp_path):

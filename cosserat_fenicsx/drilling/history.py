@@ -230,8 +230,9 @@ class DrillingHistory(Result):
         return {"kind": "DrillingHistory", "model": self.model, "why": self.why, "dt": self.dt}
 
     def _answer(self, units):
-        if len(self) > 5:
-            yield self.stick_slip().summary(units)
+        cycle = self.stick_slip() if len(self) > 5 else None
+        if cycle:
+            yield cycle.summary(units)
         if self.errors is not None:
             period, peak, *torques = self.errors
             (rpm, turning), (moment, size) = (units.on_screen(x) for x in (SPEED, TORQUE))
@@ -240,6 +241,8 @@ class DrillingHistory(Result):
                 f"Estimated errors by the step: {first}peak {peak / turning:.2g} {rpm}, surface torque "
                 f"{max(torques) / size:.2g} {moment}."
             )
+            if cycle and cycle.irregular:
+                yield "The motion is not periodic: its numbers depend on any step, and may differ by more than that."
         yield from self._on_motor(units)
         caution = alias(self)
         if caution:

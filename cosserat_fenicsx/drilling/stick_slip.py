@@ -15,6 +15,8 @@ WEIGHT = Quantity("weight on bit", unit="N", shown="kN")
 AT_REST = 1e-6
 # A bit that has started reaches this share.
 _FAST = 0.5
+# Periods that differ by less, over their mean, are those of a periodic motion.
+_REGULAR = 0.2
 
 
 @dataclass(frozen=True)
@@ -56,6 +58,11 @@ class StickSlip:
     def sticks(self) -> bool:
         """Whether the bit turns and comes to rest in this time, or swings back."""
         return len(self.starts) > 1 or 0.01 < self.stuck < 1
+
+    @property
+    def irregular(self) -> bool:
+        """Whether the times between starts differ by more than a fifth: peaks of such a motion depend on any step."""
+        return len(self.periods) > 2 and bool(np.ptp(self.periods) > _REGULAR * self.period)
 
     def __str__(self):
         return self.summary()
