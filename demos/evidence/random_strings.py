@@ -147,7 +147,7 @@ def off_in_small_motions(scene, speed):
     growth = D.stability(scene, [speed]).growth[0, 0]
     others, largest = np.sort([-9.0, *growth[np.isfinite(growth)]])[-2:]
     until = 2 + 8 / max(abs(largest), 0.1)
-    if (largest - others) * until > 10:
+    if (largest - others) * until > 10 and abs(largest) < 1:
         bump = cf.signals.Table([0, 1, 1.25, 1.5], speed * np.array([1, 1, 1 + 1e-6, 1]))
         motion = moved(replace(steady, drive=replace(scene.drive, speed=bump)), until)
         parts, size = np.linspace(until / 2, until, 5), np.abs(motion.bit_speed - speed)
