@@ -511,7 +511,9 @@ def test_where_friction_allows_no_longer_step_a_shorter_one_is_compared(model):
 
 def test_a_mesh_that_cannot_be_coarser_is_compared_with_a_finer_one():
     found = cf.drilling.simulate(stick_slip(), 60, model="axial and torsional", elements=2, check=True, progress=False)
-    assert len(found.depths) == 4
+    assert len(found.depths) == 4 and any("sends a jump down the string" in x for x in found.why)
+    smooth = AxialTorsional(replace(stick_slip(), drive=drilling.TopDrive(cf.signals.Ramp(6.0))), found.dt, 4)
+    assert not any("sends a jump" in x for x in smooth.why)
     finer = cycle_of(run(AxialTorsional(stick_slip(), found.dt / 2, 6), 60)[1], 30)
     told = 2 * np.abs(np.subtract(cycle_of(found.rows, 30), finer))
     assert found.errors == pytest.approx([*told[:2], told[2:].max(), told[2:].max()], rel=1e-6)

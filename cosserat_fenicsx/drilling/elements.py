@@ -397,6 +397,11 @@ class AxialTorsional(StringModel):
         """Sentences on mesh, step, start and approximations."""
         scene, bit, wall = self.scene, self.scene.bit, self._m.pieces > 0
         yield f"{len(self.depths) - 1} elements, steps of {self.dt:.3g} s"
+        drive = scene.drive
+        if scene.start == "rest" and not scene.discs and drive.imposes_speed and drive.signal()(0.0) != 0:
+            yield ("APPROXIMATE: a drive that has its speed at once sends a jump down the string, which oscillates "
+                   "over some elements: peaks of torque may be a fifth too large, beyond `errors`; a Ramp of the "
+                   "speed or an inertia of the drive avoids it")  # fmt: skip
         if not self._axial:
             if wall:
                 yield "friction at the wall by the tension at rest"
