@@ -6,6 +6,7 @@ from itertools import combinations
 
 import numpy as np
 import pytest
+from ended_motions import Stopped, stop_at
 from moving_scenes import drift
 
 import cosserat_fenicsx as cf
@@ -45,9 +46,9 @@ def test_bars_that_cross(scheme, truth):
     assert np.abs(history.balance).max() < 1e-8 * history.kinetic[0]
     assert abs(history.work[-1]) < 1e-7 * history.kinetic[0] < 0.01 * abs(history.work.min())
     truth(f"bars that cross, speeds, {scheme}", [-v[2] for v in middles(history, "velocity")],
-          [0.2835820895522388, 0.44776119402985076], 1e-3, most=1e-4)  # fmt: skip
+          [0.2835820895522388, 0.44776119402985076], 1e-3, most=5e-4)  # fmt: skip
     a, b = middles(history, "angular_velocity")
-    truth(f"bars that cross, spins, {scheme}", [-a[1], -b[0]], [2.388059701492537, 1.9900497512437811], 1e-3, most=1e-4)
+    truth(f"bars that cross, spins, {scheme}", [-a[1], -b[0]], [2.388059701492537, 1.9900497512437811], 1e-3, most=5e-4)
 
 
 def test_an_impact_takes_as_long_as_that_of_balls():
@@ -56,7 +57,7 @@ def test_an_impact_takes_as_long_as_that_of_balls():
     deepest = (5 * MASSES[0] * MASSES[1] / sum(MASSES) / (4 * POINT)) ** 0.4
     gap = np.subtract(*(history.position(rod.at(rod.length / 2))[:, 2] for rod in history.scene.rods)) - 2 * RADIUS
     assert -gap.min() == pytest.approx(deepest, rel=2e-3)
-    assert history.times[gap < 0][[0, -1]] @ (-1, 1) == pytest.approx(2.9433 * deepest, rel=1e-2)
+    assert history.times[gap < 0][[0, -1]] @ (-1, 1) == pytest.approx(2.9433 * deepest, rel=2e-2)
 
 
 def test_damping_takes_what_hunt_and_crossley_say():
@@ -104,12 +105,14 @@ def test_fast_rods_do_not_pass_through_each_other():
     assert drift(history.linear_momentum) < 1e-10
 
 
-def test_it_goes_on_from_its_folder(tmp_path):
+def test_it_goes_on_from_its_folder(monkeypatch, tmp_path):
     """A motion that is continued while rods touch has the same digits; forces of contacts are read from its states."""
     settings = {"dt": 5e-5, "elements": 1, "degree": 2}
     whole = cf.simulate(bars((0.1, 0.3)), 1e-3, **settings)
-    cf.simulate(bars((0.1, 0.3)), 6e-4, folder=tmp_path / "bars", **settings)
-    stored = cf.resume(tmp_path / "bars", duration=1e-3)
+    stop_at(monkeypatch, 12, 0)
+    with pytest.raises(Stopped):
+        cf.simulate(bars((0.1, 0.3)), 1e-3, folder=tmp_path / "bars", **settings)
+    stored = cf.resume(tmp_path / "bars")
     for rod, same in zip(whole.scene.rods, stored.scene.rods, strict=True):
         assert np.array_equal(whole.position(rod.end), stored.position(same.end))
     found, again = (motion[-1].contacts(motion.scene.loads[0]) for motion in (whole, stored))

@@ -99,7 +99,7 @@ class _Pairs:
         self.direction = mean / (now.distance + before.distance)[:, None]
 
     def pulls(self, rows):
-        """(nodes' rows (m, n), (m, n)) of the unknowns, -1 where clamped, and what unit forces are there; rows: (N, 3)."""
+        """Rows (m, n) of the unknowns, -1 where clamped, and (m, n) what unit forces are there; rows: (N, 3)."""
         strands, shape = self._strands, (len(self.now), -1)
         pulls = strands.pulls(self.element, self.place, self.direction)
         return rows[strands.movers(self.element)].reshape(shape), pulls.reshape(shape)
