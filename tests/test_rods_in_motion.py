@@ -70,6 +70,22 @@ def test_damping_takes_what_hunt_and_crossley_say():
     assert np.abs(history.balance).max() < 1e-8 * history.kinetic[0]
 
 
+def test_rods_side_by_side_hit_each_other_along_a_line():
+    """They keep momenta and energy, and the first one all but stops."""
+    section = cf.Stiffness((1e7,) * 2, 1e7, (1e3,) * 2, 1e3, mass=1.0, inertia=(1e-6, 1e-6, 2e-6))
+    upper = cf.Rod(cf.Line((-0.17, 0, 2 * RADIUS + 1e-4), (0.23, 0, 2 * RADIUS + 1e-4)), section, name="upper")
+    lower = cf.Rod(cf.Line((-0.2, 0, 0), (0.2, 0, 0)), section, name="lower")
+    touch, falls = cf.RodContact(radius=RADIUS, stiffness=1e7), cf.InitialVelocity(upper, linear=(0, 0, -0.5))
+    history = cf.simulate(
+        cf.Scene([upper, lower], [], [touch], velocities=[falls]), 3e-3, dt=5e-5, elements=4, degree=2
+    )
+    assert np.ptp(history.linear_momentum, axis=0).max() < 2e-11
+    assert np.ptp(history.angular_momentum, axis=0).max() < 1e-11
+    assert np.abs(history.balance).max() < 1e-8 * history.kinetic[0] < 0.1 * abs(history.work.min())
+    assert history[int(np.argmin(history.work))].contacts(touch).line.any()
+    np.testing.assert_allclose([v[2] for v in middles(history, "velocity")], (0, -0.5), atol=0.02)
+
+
 def test_what_motions_need():
     with pytest.raises(cf.SceneError, match=r"expected one process, and a RodContact.stiffness \(N/m\^2\)"):
         cf.simulate(bars(stiffness=None), 1.0)
