@@ -115,7 +115,7 @@ def solve_in_hole(path, lengths, stiffness, weight, contact_radius, *, wall_stif
                 break
     string.leave(answer.factor)
     if elements is None and answer.error > tol:
-        raise NotAccurate(answer, tol, work)
+        raise NotAccurate(answer, tol, work.words)
     return answer
 
 
@@ -153,12 +153,12 @@ class NotAccurate(NotConverged):
         answer: the `InHole`.
     """
 
-    def __init__(self, answer, tol, work):
-        ended = f"{work.words}: " if work.words else ""
+    def __init__(self, answer, tol, ended=""):
+        ended = ended and f"{ended}: "
         super().__init__(
             f"{ended}the estimated error of the rod in contact is {answer.error:.1e} on {answer.path.elements[0]} "
-            f"elements, of which the wall's softness makes {answer.of_stiffness:.1e}: expected a tol above it, not {tol:g}, or a "
-            "stiffer wall"
+            f"elements, of which the wall's softness makes {answer.of_stiffness:.1e}: expected a tol above it, not "
+            f"{tol:g}, or a stiffer wall"
         )
         self.answer = answer
 
