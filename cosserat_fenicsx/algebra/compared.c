@@ -268,7 +268,8 @@ static void estimate(const comparison *p, const double *sizes, int turning, doub
     int ahead[4], far[4], sure = p->equal;
     const double half = pow(2, p->fine->p + 1);
     find_differences(p, turning, apart, at_ends);
-    if (sizes[0] <= p->nothing && apart[0] <= p->still) apart[0] = 0;
+    for (int k = 0; k < 2; k++)
+        if (sizes[k] <= p->nothing / (k ? p->length : 1) && apart[k] <= p->still) apart[k] = 0;
     for (int k = 0; k < 4; k++) {
         relative[k] = apart[k] / sizes[k];
         ahead[k] = apart[k] > p->ahead * at_ends[k], far[k] = apart[k] > p->far * at_ends[k];

@@ -214,8 +214,8 @@ def _norms(values):
 ROUNDING = 1e-14
 # Sizes, in the scales' units, below which a quantity is taken to vanish; and the least moment over n times the length.
 NOTHING, LEAST_MOMENT = 1e-9, 1e-9
-# Differences of positions up to this are rounding alone where the displacement vanishes: a straight column holds its
-# line to the rounding of many elements, which a load near that of buckling amplifies.
+# Differences of positions and of rotations up to this are rounding alone where displacement or rotation vanish: an
+# unloaded rod holds its line to the rounding of many elements, and so does a straight column, whose load amplifies it.
 STILL = 1e-2 * NOTHING
 # Least size of positions and of rotations over the largest of the path: unloaded states differ by rounding.
 _AT_REST = 1e-6
@@ -227,8 +227,9 @@ OF_FORCE, NOISE = 4.0, 2.0
 _EPS = np.finfo(float).eps
 
 #: sizes: (4, points) that the errors are relative to, dimensionless; turning: (points,) whether the size of positions
-#: is a rotation times the radius of gyration; rounding: (4, points) errors by rounding alone, dimensionless.
-Sizes = namedtuple("Sizes", "sizes turning rounding")
+#: is a rotation times the radius of gyration; rounding: (4, points) errors by rounding alone, dimensionless; still:
+#: (2, points) whether displacement and rotation vanish.
+Sizes = namedtuple("Sizes", "sizes turning rounding still")
 
 
 def sizes_of(path):
@@ -260,11 +261,12 @@ def sizes_of(path):
     least = 1.0 if vanishing.all() else LEAST_MOMENT
     moment = np.maximum(np.maximum(moment, least * length * force), NOTHING)
     sizes = np.array([np.maximum(moved, turned), rotation, force, moment])
-    sizes[:2] = np.maximum(sizes[:2], _AT_REST * sizes[:2].max(axis=1, initial=0.0)[:, None])
+    least = np.maximum([[NOTHING], [NOTHING / length]], _AT_REST * sizes[:2].max(axis=1, initial=0.0)[:, None])
+    still, sizes[:2] = sizes[:2] <= least, np.maximum(sizes[:2], least)
     for criterion in path.criteria:
         own = np.maximum(criterion.sizes(path), 1e-300)
         sizes, noise = np.vstack([sizes, own]), np.vstack([noise, np.zeros((1, noise.shape[1]))])
-    return Sizes(sizes, turned > moved, noise + np.zeros_like(sizes))
+    return Sizes(sizes, turned > moved, noise + np.zeros_like(sizes), still)
 
 
 def _squares(vectors):
@@ -344,7 +346,7 @@ def differences(fine, coarse):
             apart[:, part, 0] = np.maximum(apart[:, part, 0], turned)
     everywhere, at_ends = apart.max(axis=1).T, apart[:, places.ends].max(axis=1).T
     everywhere[everywhere <= np.maximum(ROUNDING, NOISE * sizes.rounding[: len(NAMES)])] = 0.0
-    everywhere[0, (sizes.sizes[0] <= NOTHING) & (everywhere[0] <= STILL)] = 0.0
+    everywhere[:2][sizes.still & (everywhere[:2] <= STILL)] = 0.0
     shared, ratios = everywhere, np.divide(fine.layout.counts, coarse.layout.counts)
     if ratios.max() > 2:
         shares = np.minimum((2 / ratios) ** fine.degree, 1.0)
