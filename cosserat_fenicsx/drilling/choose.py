@@ -74,8 +74,8 @@ def _stalls(scene):
     if not law or law.still < (stall := scene.motor.stall_torque()):
         return []
     return [
-        f"{scene.motor.name} gives at most {stall:.5g} N m at the start, and the bit at rest holds {law.still:.5g} N m: "
-        "where it sticks the motor stalls"
+        f"{scene.motor.name} gives at most {stall:.5g} N m at the start, and the bit at rest holds {law.still:.5g} N m"
+        ": where it sticks the motor stalls"
     ]
 
 

@@ -167,4 +167,7 @@ def check_apart(path, whole=None):
             )
 
 
-_ANGLE = f"; strands that touch along a line, at an angle whose sine is below {CROSSING:g}, touch at the nodes of the mesh alone"
+_ANGLE = (
+    f"; strands that touch along a line, at an angle whose sine is below {CROSSING:g}, touch at the nodes of the mesh "
+    "alone"
+)

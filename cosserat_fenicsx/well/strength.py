@@ -8,8 +8,8 @@
   allowed bending stress is that of API RP 7G, of grade E, and of S-135 from its yield strength on, which is known for
   these two alone: X95 and G105 have that of grade E.
 
-Wear: the share of the wall that is left, worn off the outside: 0.8 of the class "premium", 0.7 of "class 2". All is of the
-body: tool joints and their connections are left out, and so is damage by corrosion.
+Wear: the share of the wall that is left, worn off the outside: 0.8 of the class "premium", 0.7 of "class 2". All is of
+the body: tool joints and their connections are left out, and so is damage by corrosion.
 """
 
 import re
