@@ -21,6 +21,7 @@ from cosserat_fenicsx.drilling import (
     simulate,
     stability,
 )
+from cosserat_fenicsx.drilling.linear.reflections import fed_waves
 
 pytestmark = [pytest.mark.serial, pytest.mark.once]
 TRUTH = json.loads((Path(__file__).parent / "reference" / "controls.json").read_text())["drive reflection"]
@@ -144,6 +145,25 @@ def test_a_control_that_feeds_the_string():
     assert np.log(half[1] / half[0]) / (8 * np.pi / root.imag) == pytest.approx(root.real, rel=0.02)
 
 
+def test_waves_that_a_late_drive_feeds():
+    """Faster than those looked for, they are told: by the reflection of the drive, and where all roots are found."""
+    pipe = cf.well.DrillString([cf.well.DrillPipe(3000.0, size="5 in 19.50 lb/ft")])
+    bit, drag = BitOnRock(Stribeck(6e3, 4e3, 3.0), inertia=350.0), cf.drilling.ViscousDrag(torsion=0.1)
+    scene = Drilling(pipe, TopDrive(OM, 2900.0, ZTorque(filter=0.1, delay=0.02)), bit, drag=drag)
+    fed, answer = fed_waves(scene), stability(scene, [OM], up_to=12.0)
+    k = np.nanargmax(answer.growth)
+    assert fed.growth == pytest.approx(answer.growth.flat[k], rel=5e-3)
+    assert fed.fastest == pytest.approx(answer.frequency.flat[k], abs=0.27)  # modes are 0.54 Hz apart
+    found = stability(scene, [OM], up_to=2.0)
+    assert not found.unstable(0) and "back larger than they come" in found.cautions[-1]
+    assert "FASTER ONES DO" in str(found) and "up_to=11" in str(found)
+    with pytest.warns(cf.SceneWarning, match="limit_speed: at every speed"):
+        cf.drilling.limit_speed(scene, up_to=2.0)
+    assert "CAUTION: the drive sends waves of" in str(simulate(scene, 0.1, progress=False))
+    calm = replace(scene, drive=TopDrive(OM, 2900.0, ZTorque(filter=0.2, delay=0.01)))
+    assert fed_waves(calm) is None and not stability(calm, [OM], up_to=2.0).cautions
+
+
 @pytest.mark.parametrize("model", ["torsion", "axial and torsional"])
 def test_resumed_to_the_byte(model, tmp_path):
     for k, control in enumerate((ZTorque(filter=0.03, delay=0.02), as_linear(1e3, 5e2, delay=0.07))):
@@ -189,6 +209,8 @@ def test_in_a_scene_file(tmp_path):
      "ZTorque.delay = 0.1: expected 0 .s., or a filter"),
     (lambda: simulate(Drilling(PIPE, TopDrive(OM, control=ZTorque(Z, 0.0, 0.1))), 1.0, model="axial and torsional"),
      "ZTorque.delay = 0.1: expected 0 .s., or a filter"),
+    (lambda: simulate(Drilling(PIPE, TopDrive(OM, 2900.0, ZTorque(filter=0.0, delay=0.01, torque=2e3))), 1.0),
+     "ZTorque.delay = 0.01: expected 0 .s., or a filter"),
     (lambda: simulate(Drilling(Discs((9.0, 9.0), (5.0,)), TopDrive(OM, control=ZTorque(9.0, delay=0.1))), 1.0),
      "ZTorque.delay = 0.1: expected 0 .s., or a filter of the second order"),
     (lambda: simulate(Drilling(Discs((9.0, 9.0), (5.0,)), TopDrive(OM, control=ZTorque())), 1.0),

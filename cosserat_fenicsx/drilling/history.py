@@ -52,6 +52,8 @@ _QUANTITIES = by_name(
 # Quantities of the table beside the time; its rows in `details`.
 _SHOWN = ("drive_speed", "bit_speed", "surface_torque", "torque_on_bit", "hook_load", "weight_on_bit", "bit_advance")
 _ROWS = 16
+# Beginnings of the sentences of `why` that are part of the answer.
+_LOUD = ("APPROXIMATE", "CAUTION", "UNSTABLE")
 _CAPTION = (
     "A row holds for the end of a step, forces and torques in it are means over the step, or of torsion alone over two "
     "(at the first one, the time before the start counts with zero): history.mean_times. The motion begins at t = 0, "
@@ -247,7 +249,7 @@ class DrillingHistory(Result):
         caution = alias(self)
         if caution:
             yield f"{caution[0].upper()}{caution[1:]}."
-        yield from map(units.sentence, (*self.why[:1], *(x for x in self.why[1:] if x.startswith("APPROXIMATE"))))
+        yield from map(units.sentence, (*self.why[:1], *(x for x in self.why[1:] if x.startswith(_LOUD))))
 
     def _on_motor(self, units):
         """Sentences on the motor, and on when it stalls."""
@@ -283,7 +285,7 @@ class DrillingHistory(Result):
                 f"Impacts of the bit on rigid rock: the largest impulse {each.max():.4g} N s, at t = "
                 f"{self.times[each.argmax()]:.5g} s, together {impulse[-1]:.4g} N s; the weight on bit is without them."
             )
-        yield from (units.sentence(x) for x in self.why[1:] if not x.startswith("APPROXIMATE"))
+        yield from (units.sentence(x) for x in self.why[1:] if not x.startswith(_LOUD))
 
     def _table(self, units, rows):
         if not len(self):

@@ -179,7 +179,7 @@ def check_late(control: DriveControl, space: StateSpace | None, impedance: float
     elif impedance is None:
         grows = D[1] != 0 or (discs and C @ B[:, 1] != 0)
     else:
-        grows = abs(D[1]) * impedance > 1 + _STEADY
+        grows = abs(D[1]) * impedance > 1 - _STEADY
     if grows:
         order = " of the second order" if discs and space.of_speed else ""
         refuse(control, "delay", control.late, f"0 (s), or a filter{order}: {type(control).__name__} answers late to "

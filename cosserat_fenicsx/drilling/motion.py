@@ -74,9 +74,13 @@ def simulate(
     """
     instance("simulate", "scene", scene, Drilling, "a Drilling")
     duration, dt, save_every, profile_every = check_arguments(scene, duration, dt, elements, save_every, profile_every)
+    from cosserat_fenicsx.drilling.linear.reflections import fed_waves
+
     name, why = chosen(scene, model)
     running = model_of(scene, name, dt, elements)
     check_step(scene, running.dt, duration, save_every)
+    fed = fed_waves(scene)
+    why += [f"CAUTION: {fed}"] if fed else []
     history = DrillingHistory(scene, running.name, [*why, *running.why], running.dt, running.depths)
     apart = {
         "save_every": max(1, round((save_every or 0.0) / running.dt)),

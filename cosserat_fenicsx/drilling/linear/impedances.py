@@ -53,6 +53,10 @@ class _Section:
         """By which `through` multiplies the state."""
         return np.ones_like(s)
 
+    def decay(self, s):
+        """By how much the logarithm of a wave falls on its way through."""
+        return 0.0
+
     def down(self, s, state):
         """The state at the lower end."""
         return self.through(s, state).scaled(self.impedance)
@@ -94,6 +98,9 @@ class Uniform(_Section):
             C * dP + b * S * dw + dC * turn * P + (b * dS * turn - self.inertia * S) * w,
             state.size + (np.sqrt(square) * length).real,
         )
+
+    def decay(self, s):
+        return (np.sqrt(self._square(s)[0]) * self.length).real
 
     def _square(self, s):
         """g^2, its derivative by s, and K (1 + tau s)."""

@@ -6,9 +6,10 @@ import numpy as np
 from numpy.polynomial import chebyshev
 from scipy.optimize import brentq
 
-from cosserat_fenicsx.checks import number, positive, refuse
+from cosserat_fenicsx.checks import number, positive, refuse, warn
 from cosserat_fenicsx.drilling.linear.characteristic import Steady, box_up_to, speed_of
 from cosserat_fenicsx.drilling.linear.impedances import torsional
+from cosserat_fenicsx.drilling.linear.reflections import fed_waves
 from cosserat_fenicsx.drilling.linear.roots import all_roots
 from cosserat_fenicsx.drilling.scene import Drilling
 from cosserat_fenicsx.errors import NotConverged
@@ -105,7 +106,8 @@ def critical_slope(scene: Drilling, up_to: float = 10.0, speed: float | None = N
 
 
 def limit_weight(scene: Drilling, speed: float, *, up_to: float = 10.0) -> float:
-    """The weight on bit up to which all modes decay at a speed.
+    """The weight on bit up to which all modes decay at a speed. A drive that feeds waves faster than `up_to` is warned
+    of.
 
     Args:
         scene: a `Drilling` whose bit has a `Stribeck` law with a radius.
@@ -119,6 +121,7 @@ def limit_weight(scene: Drilling, speed: float, *, up_to: float = 10.0) -> float
         SceneError: a law whose torque does not depend on the weight.
     """
     speed = positive("limit_weight", "speed", speed, "rad/s")
+    _doubt_drive("limit_weight", scene, up_to)
     law = scene.bit.law if scene.bit else None
     if law is None or law.drills or not law.needs_weight or law.resistance(1.0) is None:
         refuse("limit_weight", "scene", scene.bit, "a bit with a Stribeck law and a radius")
@@ -147,6 +150,12 @@ def limit_weight(scene: Drilling, speed: float, *, up_to: float = 10.0) -> float
     return brentq(excess, low, high, rtol=1e-10)
 
 
+def _doubt_drive(owner, scene, up_to):
+    """Warn of a drive that feeds waves above a frequency, Hz."""
+    if fed := fed_waves(scene, up_to):
+        warn(f"{owner}: at every speed and weight {fed}")
+
+
 def _falls_at_wall(scene):
     """Whether friction at the wall falls with the slip."""
     return scene.hole is not None and scene.friction is not None and scene.friction.decays
@@ -160,7 +169,7 @@ def limit_speed(
     between: tuple[float, float] = (0.5, 50.0),
     points: int = 60,
 ) -> float:
-    """The lowest speed from which on all modes decay, up to a frequency.
+    """The lowest speed from which on all modes decay, up to a frequency; a drive that feeds faster waves is warned of.
 
     Args:
         scene: a `Drilling`. weight: on bit, N; None for that of the scene.
@@ -177,6 +186,7 @@ def limit_speed(
         NotConverged: the roots that were found are fewer than those counted.
     """
     up_to = positive("limit_speed", "up_to", up_to, "Hz")
+    _doubt_drive("limit_speed", scene, up_to)
     searched = _falls_at_wall(scene) or scene.motor is not None
     if scene.bit is None and not searched:
         refuse(scene, "bit", None, "a BitOnRock with a law, or a WallFriction that falls with the slip")

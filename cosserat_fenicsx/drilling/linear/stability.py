@@ -19,6 +19,7 @@ from cosserat_fenicsx.drilling.linear.characteristic import (
 from cosserat_fenicsx.drilling.linear.frequencies import SoftSpeed, SoftTorque, natural_frequencies, own_rule, with_rule
 from cosserat_fenicsx.drilling.linear.hfto import Hfto, oscillations
 from cosserat_fenicsx.drilling.linear.impedances import Disc
+from cosserat_fenicsx.drilling.linear.reflections import fed_waves
 from cosserat_fenicsx.drilling.linear.roots import all_roots, follow
 from cosserat_fenicsx.drilling.scene import Drilling
 from cosserat_fenicsx.drilling.stick_slip import SPEED, WEIGHT
@@ -205,9 +206,12 @@ class Stability(Result):
         if not rows:
             k = int(np.nanargmax(np.nanmax(self.growth, axis=(0, 1))))
             i, j = self.worst(k)
-            least = f"{self.frequency[i, j, k]:.4g} Hz, which decays by {-self.growth[i, j, k]:.3g} 1/s"
+            growth = self.growth[i, j, k]
+            decays = f"decays by {-growth:.3g} 1/s" if growth else "neither grows nor decays"
+            least = f"{self.frequency[i, j, k]:.4g} Hz, which {decays}"
             (rpm, kN), (speed, weight) = (x[0] for x in _case_units(units)), _case(self, units, i, j)
-            yield f"No mode grows. Least damped: {least} at {speed} {rpm}{weight and f', {weight} {kN}'}."
+            what = "No mode grows" if self._fed is None else f"No mode up to {self.up_to:.4g} Hz grows, FASTER ONES DO"
+            yield f"{what}. Least damped: {least} at {speed} {rpm}{weight and f', {weight} {kN}'}."
             return
         yield f"{count} modes grow."
         yield from (
@@ -272,7 +276,12 @@ class Stability(Result):
             at = [law.resistance(float(weight)) for weight in (self.weights.min(), self.weights.max())]
             if None not in at and all(at[0](s) == at[1](s) for s in self.speeds):
                 left_out.append("the law's torque does not depend on the weight on bit: give radius=")
-        return left_out
+        return left_out + ([str(self._fed)] if self._fed else [])
+
+    @cached_property
+    def _fed(self):
+        """The waves above `up_to` that the drive feeds, or None."""
+        return fed_waves(self.scene, self.up_to) if self.kind == "torsion" else None
 
     @property
     def unstable_modes(self) -> np.ndarray:
@@ -405,7 +414,8 @@ def stability(
         speeds: rotation, rad/s, (n,); 0 for a string without a bit that its hook moves along a hole.
         weights: on bit, N, (m,); None for that of the scene.
         modes: how many of the lowest modes of the string, counted with the lower end free; None for `up_to`.
-        up_to: highest frequency, Hz; some hundred for high-frequency torsional oscillations, see `Stability.hfto`.
+        up_to: highest frequency, Hz; where a drive that acts late feeds faster waves, `Stability.cautions` says so, and
+            up to which frequency they go; some hundred for high-frequency torsional oscillations, see `Stability.hfto`.
         kind: "torsion", or "axial" for the axial motion of a string whose bit does not cut: with a weight it stands on
             its rock, without one it is free.
 
