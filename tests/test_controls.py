@@ -24,6 +24,7 @@ from cosserat_fenicsx.drilling import (
     TopDrive,
     TorqueOverTime,
 )
+from cosserat_fenicsx.drilling.choose import chosen
 from cosserat_fenicsx.parts import Time, Torque, TorsionalDamping, TorsionalStiffness
 
 pytestmark = [pytest.mark.serial, pytest.mark.once]
@@ -138,6 +139,19 @@ def test_autodriller(truth):
     weight = scene.segments[0].weight * given["L"] - found.hook_load
     told = np.interp(rows[:, 0], found.mean_times, weight)
     truth("autodriller on waves, weight over that asked for", told, rows[:, 1], 1e-3, of=given["Ws"])
+
+
+@pytest.mark.parametrize(("law", "on_bit", "driller"), [
+    (RateLaw(18e6), None, Autodriller("2 MN", 1e-8)),
+    (RateLaw(18e6), None, Autodriller(cf.signals.Ramp((2e6,), end=5.0), 1e-8)),
+    (Stribeck(0.6, 0.4, 3.0, radius=0.1), cf.signals.Ramp((2e6,), end=5.0), None),
+])  # fmt: skip
+def test_a_weight_on_bit_above_that_of_the_string_is_told(law, on_bit, driller):
+    scene = Drilling(pipe(1000.0), TopDrive(6.0), BitOnRock(law, on_bit), hook=driller and Hook(autodriller=driller))
+    assert any("2000 kN, is more than the string weighs" in x for x in chosen(scene)[1])
+    at_most = driller and Hook(autodriller=replace(driller, weight=1e5))
+    light = replace(scene, bit=BitOnRock(law, on_bit and 1e5), hook=at_most)
+    assert not any("than the string weighs" in x for x in chosen(light)[1])
 
 
 def test_a_steady_start_below_an_autodriller_has_no_weight_on_bit():

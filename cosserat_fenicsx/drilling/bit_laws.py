@@ -51,8 +51,6 @@ from cosserat_fenicsx.parts import (
     positive,
 )
 
-# Time (s) up to which a smooth weight on bit is looked at for its largest one.
-_LONG = 600.0
 # Weights on bit up to this many static ones are tabulated.
 _TABULATED = 4.0
 # Static penetration (m) above which the rock stiffness is probably given in other units.
@@ -322,8 +320,13 @@ class BitOnRock(Part):
             if not self.law.needs_weight or self.law.lifts or self.rock_stiffness < math.inf:
                 refuse(self, "weight", self.weight, "a number (N): over time it acts where the torque alone follows "
                        "it, as that of Stribeck(..., radius=) and TableLaw(..., weights=)")  # fmt: skip
-            if not self.signal()(0.0) >= 0:
-                refuse(self, "weight", self.signal()(0.0), "a weight on bit that is not negative (N), at t = 0")
+            signal = self.signal()
+            for t in (0.0, *signal.jumps):
+                if not signal(t) >= 0:
+                    refuse(self, "weight", signal(t), f"a weight on bit that is not negative (N), at t = {t:g} s")
+            if not self.most > 0:
+                refuse(self, "weight", self.weight, "a weight on bit above 0 (N) at some time, or None for a bit off "
+                       "the rock")  # fmt: skip
         elif self.weight is not None:
             if self.weight == 0:
                 refuse(self, "weight", 0.0, "a weight on bit above 0 (N), or None for a bit off the rock")
@@ -352,13 +355,8 @@ class BitOnRock(Part):
 
     @property
     def most(self) -> float | None:
-        """The largest static weight on bit up to the last time at which it is not smooth, N, or None."""
-        if not self.varies:
-            return self.weight
-        signal = self.signal()
-        return max(
-            signal(t) for t in (*signal.jumps, *np.linspace(0.0, max(signal.jumps, default=_LONG), 201).tolist())
-        )
+        """The largest static weight on bit, see `ScalarSignal.largest`, N, or None."""
+        return self.signal().largest if self.varies else self.weight
 
 
 class EndForce(NamedTuple):

@@ -5,7 +5,7 @@ import numpy as np
 from cosserat_fenicsx.checks import refuse
 from cosserat_fenicsx.drilling.elements import AxialTorsional
 from cosserat_fenicsx.drilling.torsion import TorsionWaves
-from cosserat_fenicsx.drilling.wall_friction import law_of, rotating, static_weight
+from cosserat_fenicsx.drilling.wall_friction import law_of, rotating
 from cosserat_fenicsx.errors import NotConverged, SceneError, nearest
 from cosserat_fenicsx.well import criteria
 from cosserat_fenicsx.well.operations import TripIn, TripOut
@@ -79,9 +79,15 @@ def _stalls(scene):
     ]
 
 
+def _heaviest(scene):
+    """The largest weight on bit (N), at rest or by an autodriller; 0 without one."""
+    driller = scene.hook and scene.hook.autodriller
+    return max(scene.bit.most or 0.0 if scene.bit else 0.0, driller.signal().largest if driller else 0.0)
+
+
 def _pushed(scene):
     """A sentence where the weight on bit exceeds the weight of the string along the hole."""
-    weight = static_weight(scene)
+    weight = _heaviest(scene)
     depths = np.concatenate([[0.0], np.cumsum([part.length for part in scene.segments])])
     down = depths if scene.hole is None else np.array([scene.hole.path.position(md)[2] for md in depths])
     along = float(np.dot([part.weight for part in scene.segments], np.diff(down)))
@@ -116,7 +122,7 @@ def _buckled(scene, name):
 
 def _operations(scene):
     """Steady operations, of which the one that compresses the string most is not known in advance."""
-    bit, weight = scene.bit, static_weight(scene)
+    bit, weight = scene.bit, _heaviest(scene)
     law = None if bit is None else bit.law.resistance(bit.most)
     torque = law.kinetic if law else 0.0
     yield rotating(weight, torque)

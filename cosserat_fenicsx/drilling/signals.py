@@ -11,6 +11,8 @@ from cosserat_fenicsx.checks import call, number, refuse, warn
 
 # Speeds (rad/s) above this are probably revolutions a minute: 300 rev/min are 31.4 rad/s.
 _FAST = 32.0
+# Time (s) up to which a signal that is smooth is looked at for its largest value.
+_LONG = 600.0
 # Speeds of the block (m/s) above this are probably in other units: strings are run at up to 2 m/s.
 _FASTEST_BLOCK = 5.0
 
@@ -69,11 +71,17 @@ class ScalarSignal:
         if self.constant:
             return self._value
         given = call(self._value, t, self._where, f" at t = {t:g} s")
-        found = np.asarray(given, dtype=float).reshape(-1) if np.size(given) == 1 else np.array([np.nan])
-        if not np.isfinite(found).all():
+        found = np.asarray(given).reshape(-1) if np.size(given) == 1 else np.array([np.nan])
+        if found.dtype.kind not in "biuf" or not np.isfinite(found).all():
             refuse(self._where.split(".")[0], self._where.split(".")[1], given, f"a finite number ({self.unit}) at "
                    f"t = {t:g} s")  # fmt: skip
         return float(found[0])
+
+    @property
+    def largest(self) -> float:
+        """The largest value up to the last time at which it is not smooth, or up to 600 s."""
+        times = [0.0] if self.constant else np.linspace(0.0, max(self.jumps, default=_LONG), 201).tolist()
+        return max(self(t) for t in (*self.jumps, *times))
 
     def jump(self, t: float) -> float:
         """The height of the jump at a time, from the values just before and just after it."""

@@ -444,6 +444,10 @@ class Autodriller(Part):
             refuse(self, "limits", self.limits, "the least and the largest speed of the block downwards (m/s)")
         doubt_block_speed(self, "limits", max(*self.limits, self.rate or 0.0, key=abs))
 
+    def signal(self) -> ScalarSignal:
+        """The weight to hold at every time, N; 0 without one."""
+        return ScalarSignal(self, "weight", self.weight or 0.0, "N")
+
     def begin(self):
         """The integral, m/s."""
         return (0.0,)
@@ -453,7 +457,7 @@ class Autodriller(Part):
         low, high = self.limits[0], min(self.limits[1], self.rate or math.inf)
         if self.weight is None:
             return high, state
-        error = ScalarSignal(self, "weight", self.weight, "N")(now.time) - now.weight
+        error = self.signal()(now.time) - now.weight
         more = self.Ki * self.sample * error
         asked = self.Kp * error + float(state[0]) + more
         stops = (asked > high and more > 0) or (asked < low and more < 0)
