@@ -118,12 +118,19 @@ def test_refusals():
     cutting = cf.drilling.Cutting(0.108, 60e6, 0.6, 4)
     for scene, depth, words in (
         (string, None, "depth = None: .*lowest DrillPipe"),
-        (string, 3300.0, "depth = 3300.0: expected a depth within the string"),
+        (string, 3300.0, "depth = 3300.0: expected a depth .m. within the string"),
+        (string, 0.0, "depth = 0.0: .*above 0 and below"),
         (replace(string, drag=cf.drilling.ViscousDrag(0.3)), 3000.0, "drag = .*the same rate"),
         (drilling(cutting, weight=1e4), 3000.0, "law = .*a Stribeck"),
     ):  # fmt: skip
         with pytest.raises(cf.SceneError, match=words):
             cf.drilling.mixed_scene(scene, depth)
+    mixed = cf.drilling.mixed_scene(string, "3 km")
+    assert mixed.depth == 3000.0
+    assert (
+        str(mixed).startswith(f"Rod of {mixed.rod.length:g} m below md = 3000 m; the pipe above")
+        and len(str(mixed)) < 3000
+    )
     steep = cf.drilling.mixed_scene(drilling(cf.drilling.Stribeck(6000.0, 0.0, 0.1), inertia=0.0), 3000.0)
     with pytest.raises(cf.SceneError, match="falls faster with the speed than the rod can follow"):
         cf.simulate(steep.scene, 6.0, dt=0.01, **SMALL)

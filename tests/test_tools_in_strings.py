@@ -221,11 +221,20 @@ def test_tool_that_halves_the_pull(truth):
     truth("oscillation tool, Coulomb friction: mean pull", pull, PULLED["truth"]["mean pull with the tool"], 1e-2)
     with pytest.raises(cf.SceneError, match="mean.periods"):
         found.mean("hook_load", 10000, 16.0)
+    with pytest.raises(cf.SceneError, match="mean.periods = 8.5: expected a whole number from 1"):
+        found.mean("hook_load", 8.5, 16.0)
 
 
 @pytest.mark.parametrize(("make", "words"), [
     (lambda: motor(flow=0.0), "MudMotor.flow = 0.0: expected a flow through the motor"),
     (lambda: motor(flow=1e-4), "MudMotor.flow = 0.0001: .*stalls without load"),
+    (lambda: motor(flow=cf.signals.Table([0, 5, 10], [(0.04,), (0.0,), (0.04,)])),
+     "^MudMotor.flow = 0.0: expected a flow .* at t = 5 s above .* pumps that stop or start are not computed$"),
+    (lambda: cf.drilling.simulate(above(motor(flow=lambda t: GIVEN["Q"] * (t < 0.3))), 1.0),
+     "^MudMotor.flow = 0.0: expected a flow .* are not computed$"),
+    (lambda: motor(flow=cf.signals.Ramp((2400,))), "MudMotor.flow = 2400.0: .*at most 10 m"),
+    (lambda: motor(flow=lambda t: [1.0, 2.0]), r"MudMotor.flow = \[1.0, 2.0\]: expected a flow"),
+    (lambda: cf.well.power_curve(motor(), []), r"power_curve.flows = \[\]: expected a flow"),
     (lambda: motor(size="6 3/4 in"), "MudMotor.size"),
     (lambda: motor(length=None), "MudMotor.length"),
     (lambda: motor(leakage=0.0), "MudMotor.leakage"),
@@ -240,6 +249,26 @@ def test_tool_that_halves_the_pull(truth):
 def test_refused_by_name(make, words):
     with pytest.raises(cf.SceneError, match=words):
         make()
+
+
+@pytest.mark.parametrize(("make", "words"), [
+    (lambda: motor(displacement=26.8), "MudMotor.displacement = 26.8 m.3 is more than tools have.*'26.8 l'"),
+    (lambda: motor(flow=2.4), "MudMotor.flow = 2.4 m.3/s is more than tools have.*'2400 l/min'"),
+    (lambda: motor(flow=cf.signals.Table([0, 9], [(2.4,), (0.04,)])), "MudMotor.flow = 2.4 m.3/s is more than"),
+    (lambda: OscillationTool(2.0, outer_diameter=0.127, spring=5e6, frequency=16.0, stroke=5.0),
+     "OscillationTool.stroke = 5 m is more than tools have.*'5 mm'"),
+])  # fmt: skip
+def test_sizes_that_no_tool_has_are_doubted(make, words):
+    with pytest.warns(cf.SceneWarning, match=words):
+        make()
+
+
+def test_tools_print_with_units():
+    given = MudMotor(7.5, outer_diameter="6 3/4 in", displacement="26.8 l", leakage=1.4e-8, flow="2400 l/min")
+    lines = str(given).splitlines()
+    assert lines[0].startswith("String, mud motor: length 7.5 m, ") and "kg/m in air" in lines[0]
+    assert "2400 l/min turn it at 89.55 rpm without load, it stalls at 12.19 kN m" in " ".join(lines)
+    assert "gpm" in given.summary("field")
 
 
 def test_friction_below_a_motor_is_told():

@@ -198,7 +198,7 @@ class DrillingHistory(Result):
         if name not in SERIES and name != "pressure":
             raise SceneError(f"mean.name = {name!r}: {nearest(str(name), [*SERIES, 'pressure'])}")
         frequency = positive("mean", "frequency", frequency, "Hz")
-        periods = number("mean", "periods", periods, "a number from 1", lambda x: x >= 1 and x == int(x))
+        periods = number("mean", "periods", periods, "a whole number from 1", lambda x: x >= 1 and x == int(x))
         t, values = self.mean_times, getattr(self, name)
         first = t[-1] - periods / frequency if len(t) else 0.0
         if not len(t) or first < t[0]:

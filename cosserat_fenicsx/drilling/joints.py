@@ -65,11 +65,18 @@ def _stall(motor):
     if not callable(motor.flow):
         return ScalarSignal(motor, "flow", motor.stall_torque(), "N m")
 
-    def torque(t):
-        return motor.stall_torque(motor.flow_at(t))
+    return _Stall(motor, "flow", motor.flow, "m^3/s")
 
-    torque.jumps = getattr(motor.flow, "jumps", ())
-    return ScalarSignal(motor, "flow", torque, "N m")
+
+class _Stall(ScalarSignal):
+    """The stall torque of a motor whose flow depends on time, N m."""
+
+    def __init__(self, motor, *flow):
+        super().__init__(motor, *flow)
+        self._motor = motor
+
+    def __call__(self, t):
+        return self._motor.stall_torque(self._motor.flow_at(t))
 
 
 def speed_of_bit(scene, turning, down=None):

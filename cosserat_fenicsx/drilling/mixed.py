@@ -15,8 +15,10 @@ from cosserat_fenicsx.drilling.scene import Drilling
 from cosserat_fenicsx.drilling.wall_friction import law_of, static_weight
 from cosserat_fenicsx.numerics import directors, small_rotations
 from cosserat_fenicsx.parts import ForceSize, Inertia, at_least
+from cosserat_fenicsx.quantities import Units
 from cosserat_fenicsx.results.history import History
 from cosserat_fenicsx.results.path import Path
+from cosserat_fenicsx.results.screen import InWords
 from cosserat_fenicsx.scene.action import PointAction
 from cosserat_fenicsx.scene.curves import Line
 from cosserat_fenicsx.scene.loads import Force, LineForce
@@ -38,7 +40,7 @@ _DOWN = np.array([0.0, 0.0, 1.0])
 
 
 @dataclass(frozen=True)
-class MixedScene:
+class MixedScene(InWords):
     """A `Scene` of the lower part of a string, for `simulate`.
 
     Attributes:
@@ -57,6 +59,15 @@ class MixedScene:
     drilling: Drilling
     _string: StringScene | None = field(default=None, repr=False)
     _hook_load: float = 0.0
+
+    def sentences(self, units: Units):
+        """On the rod, what the model leaves out, and the drill-string that it was made of, in some units."""
+        yield (
+            f"Rod of {units.told(self.rod.length, 'm')} below md = {units.told(self.depth, 'm')}; the pipe above, with "
+            f"waves of torsion and stretch, pulls at it with {units.told(self.above.tension, 'N', form='.4g')}."
+        )
+        yield from (units.sentence(f"{x[0].upper()}{x[1:]}.") for x in self.why[1:])
+        yield from self.drilling.sentences(units)
 
     def rest(self, elements: int, degree: int, *, comm: MPI.Comm | None = None) -> Path:
         """The equilibrium at the wall without friction, to `start` a motion from: with the same mesh nothing moves.
@@ -198,7 +209,7 @@ def _depth(drilling, depth):
             refuse("mixed_scene", "depth", depth, "the measured depth (m) of the rod's upper end, where no component "
                    "lies below the lowest DrillPipe")  # fmt: skip
         return max(pipes)
-    return number("mixed_scene", "depth", depth, f"a depth within the string, from 0 to {drilling.bit_depth:g} m",
+    return number("mixed_scene", "depth", depth, f"a depth (m) within the string, above 0 and below {drilling.bit_depth:g} m",
                   lambda x: 0 < x < drilling.bit_depth)  # fmt: skip
 
 

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from cosserat_fenicsx.checks import File, instance
+from cosserat_fenicsx.checks import File, instance, refuse
 from cosserat_fenicsx.pictures.charts import COLOURS, draw_chart, legend, scale, stacked, unit_of
 from cosserat_fenicsx.quantities import Quantity
 from cosserat_fenicsx.ranks import world
@@ -121,10 +121,12 @@ def power_curve(motor: MudMotor, flows: Any = None, points: int = 41) -> PowerCu
             the start. points: torques of each.
 
     Raises:
-        SceneError: a flow at which the motor stalls without load.
+        SceneError: no flow, or one at which the motor stalls without load.
     """
     instance("power_curve", "motor", motor, MudMotor, "a MudMotor")
     several = [motor.flow_at(0.0)] if flows is None else flows if isinstance(flows, list | tuple) else [flows]
+    if not several:
+        refuse("power_curve", "flows", flows, "a flow (m^3/s) or several, or None for the motor's own")
     flows = [replace(motor, flow=flow).flow_at(0.0) for flow in several]
     torque = np.concatenate([np.linspace(0.0, motor.stall_torque(flow), points) for flow in flows])
     return PowerCurve(motor, np.repeat(flows, points), torque)

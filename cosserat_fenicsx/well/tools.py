@@ -15,7 +15,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from cosserat_fenicsx.checks import call, number, refuse, store
+from cosserat_fenicsx.checks import call, number, refuse, store, warn
 from cosserat_fenicsx.parts import (
     ForceSize,
     Frequency,
@@ -29,13 +29,25 @@ from cosserat_fenicsx.parts import (
     positive,
 )
 from cosserat_fenicsx.quantities import Units
-from cosserat_fenicsx.well.components import Collar
+from cosserat_fenicsx.results.screen import InWords
+from cosserat_fenicsx.well.components import Collar, DrillString
 
 # Inner diameter of a housing over the outer one, where it is not given.
 _BORE = 0.6
+# Larger ones than tools have: displacement a revolution (m^3), flow (m^3/s), stroke (m).
+_MOST_A_TURN, _MOST_FLOW, _LONGEST_STROKE = 0.2, 0.2, 0.1
 
 
-class _Tool(Collar):
+def _doubt_size(owner, field, value, most, unit, such):
+    """Warn of a value above the most that tools have, which is probably in another unit; `such`: a text with one."""
+    if value > most:
+        warn(
+            f"{type(owner).__name__}.{field} = {value:g} {unit} is more than tools have, {most:g} {unit} at most: "
+            f"values in other units are texts, such as '{such}'"
+        )
+
+
+class _Tool(InWords, Collar):
     """Base of tools: components like collars, by their diameters."""
 
     _called = "tool"
@@ -54,6 +66,11 @@ class _Tool(Collar):
             store(self, inner_diameter=_BORE * self.outer_diameter)
         super().validate()
 
+    def sentences(self, units: Units):
+        """On its sizes and on what it does, in some units."""
+        yield from DrillString((self,)).sentences(units)
+        yield self.sentence(units)
+
 
 @dataclass(frozen=True, kw_only=True)
 class MudMotor(_Tool):
@@ -68,11 +85,13 @@ class MudMotor(_Tool):
         displacement: V, m^3 a revolution of the rotor against the housing.
         leakage: flow past the seals per pressure over the motor, m^3/(s Pa).
         lost_torque: T_lost, N m, of the torque that the pressure makes.
-        flow: Q, m^3/s: a number, or a function of time, such as a `Ramp` or a `Table`, for `drilling.simulate`.
+        flow: Q, m^3/s: a number, or a function of time, such as a `Table`, for `drilling.simulate`. At every time its
+            stall torque is above 0: pumps that stop or start are not computed.
         rotor_inertia: kg m^2, of rotor and drive shaft; None for a steel cylinder of half the inner diameter.
 
     Raises:
-        SceneError: as of `Collar`; numbers that are not positive; a flow whose stall torque is not above 0.
+        SceneError: as of `Collar`; numbers that are not positive; a flow whose stall torque is not above 0. Sizes that
+            no motor has, such as litres without their unit, are taken with a warning.
     """
 
     displacement: Annotated[float, Number("volume", positive("a displacement a revolution"))]
@@ -86,10 +105,15 @@ class MudMotor(_Tool):
     def validate(self):
         """Refuse a motor that has no torque; fill in the inertia of the rotor."""
         super().validate()
+        _doubt_size(self, "displacement", self.displacement, _MOST_A_TURN, "m^3", "26.8 l")
         if self.rotor_inertia is None:
             density, radius = self.material.density, self.inner_diameter / 4
             store(self, rotor_inertia=density * math.pi / 2 * radius**4 * self.length)
-        self.flow_at(0.0)
+        times = (0.0, *getattr(self.flow, "jumps", ()))
+        flows = [self._flow_asked(t) for t in times]
+        _doubt_size(self, "flow", max(flows), _MOST_FLOW, "m^3/s", "2400 l/min")
+        for t in times:
+            self.flow_at(t)
 
     @property
     def per_radian(self) -> float:
@@ -107,12 +131,18 @@ class MudMotor(_Tool):
         Raises:
             SceneError: no number, or one whose stall torque is not above 0.
         """
-        flow, where = self.flow, f"a flow (m^3/s) at t = {t:g} s"
-        if callable(flow):
-            flow = float(np.ravel(call(flow, t, "MudMotor.flow", f" at t = {t:g} s"))[0])
         least = self.lost_torque * self.leakage / self.per_radian
-        expected = f"{where} above {least:.3g}, at which the motor stalls without load"
-        return number(self, "flow", flow, expected, lambda x: least < x < math.inf)
+        over_time = "; pumps that stop or start are not computed" if callable(self.flow) else ""
+        expected = f"a flow (m^3/s) at t = {t:g} s above {least:.3g}, at which the motor stalls without load{over_time}"
+        return number(self, "flow", self._flow_asked(t), expected, lambda x: least < x < math.inf)
+
+    def _flow_asked(self, t):
+        """The flow at a time (s), whatever its torque."""
+        flow, where = self.flow, f" at t = {t:g} s"
+        if callable(flow):
+            flow = np.ravel(call(flow, t, "MudMotor.flow", where)).tolist()
+            flow = flow[0] if len(flow) == 1 else flow
+        return number(self, "flow", flow, f"a flow (m^3/s){where}", math.isfinite)
 
     def sentence(self, units: Units) -> str:
         """On its flow, speed and torque at the start, in some units."""
@@ -169,7 +199,8 @@ class OscillationTool(_Tool):
         start: s, from which time on it works.
 
     Raises:
-        SceneError: as of `Collar`; numbers that are not positive, or force and stroke, or neither.
+        SceneError: as of `Collar`; numbers that are not positive, or force and stroke, or neither. A stroke that no
+            tool has is taken with a warning.
     """
 
     spring: Annotated[float, Number("stiffness", positive("the stiffness of its spring"))]
@@ -186,6 +217,7 @@ class OscillationTool(_Tool):
         if (self.force is None) == (self.stroke is None):
             refuse(self, "force", self.force, "either a force (N) or a stroke (m)")
         if self.force is None:
+            _doubt_size(self, "stroke", self.stroke, _LONGEST_STROKE, "m", "5 mm")
             store(self, force=self.spring * self.stroke, stroke=None)
 
     def sentence(self, units: Units) -> str:
