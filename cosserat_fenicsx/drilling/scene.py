@@ -67,6 +67,8 @@ class Drilling(InWords, Part):
         if self.depth is None and self.hole is None and self.string.components[-1].length is None:
             refuse(self.string.components[-1], "length", None, "a length (m), where there is neither hole nor depth")
         _ = self.segments
+        if self.hole is not None and self.mud is not None:
+            self.mud.doubt_depths(self.hole.length, self.bit_depth)
         if self.motor is not None and self.bit is None:
             refuse(self, "bit", None, f"a BitOnRock below {self.motor.name}, which turns it")
         self._doubt_torques()

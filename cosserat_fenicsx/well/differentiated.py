@@ -43,6 +43,11 @@ class Differentiated:
         names = [parameters] if isinstance(parameters, str) else list(parameters)
         known = self._parameters()
         for name in names:
+            if name in ("mud.density", "mud.inside") and isinstance(self.mud and self.mud.density, tuple):
+                raise SceneError(
+                    f"parameter {name!r} of a string: it is rows of depth and density, which have no one derivative: "
+                    "expected one density, Mud(density), or the difference of the answers of two Mud([...])"
+                )
             if name not in known:
                 plain = ", ".join(x for x in known if "[" not in x)
                 raise SceneError(

@@ -25,6 +25,9 @@ from cosserat_fenicsx.well.crooked import Tortuosity
 from cosserat_fenicsx.well.crooked import tortuosity as made_crooked
 from cosserat_fenicsx.well.path import WellPath
 
+# Pa, standard.
+_ATMOSPHERE = 101325.0
+
 
 @dataclass(frozen=True)
 class HoleSection(Part):
@@ -269,7 +272,8 @@ class Mud(InWords, Part):
     Args:
         density: kg/m^3; 0 for air. Of columns of fluid on top of each other, such as of a spacer and a slurry: rows of
             the measured depth of a column's lower end (m) and its density, from the surface down; the last one reaches
-            to the bottom.
+            to the bottom. A row that ends above the string's lower end, or begins below the hole, gives a
+            `SceneWarning` where both are known.
         inside: that in the string, kg/m^3, or rows as of `density`; None for the same. Where the pressures inside and
             outside differ at the lower end, something there holds the difference: a float valve, the nozzles of a bit,
             a plug.
@@ -282,7 +286,8 @@ class Mud(InWords, Part):
             since the fluid hands the loss of pressure to the wall.
 
     Raises:
-        SceneError: a number that is negative or not finite; depths that do not ascend.
+        SceneError: a number that is negative or not finite; depths that do not ascend; a pressure of flow below a
+            vacuum at the surface.
     """
 
     density: _Columns
@@ -306,6 +311,34 @@ class Mud(InWords, Part):
                     f"Mud.density = {density:g} kg/m^3 is hardly that of a mud: 1.2 g/cm^3 are 1200, 10 pounds per US "
                     "gallon 10 * units.ppg = 1198"
                 )
+        for field in ("flow_inside", "flow_outside"):
+            flow = getattr(self, field)
+            at_surface = flow[0][1] if isinstance(flow, tuple) else flow
+            if at_surface < -_ATMOSPHERE:
+                refuse(self, field, flow, f"at least -{_ATMOSPHERE:g} Pa at the surface, a vacuum; what flow loses on "
+                       "its way down the string is a positive number that falls with depth")  # fmt: skip
+
+    def doubt_depths(self, bottom: float, depth: float) -> None:
+        """Warn of columns that hardly fit a hole and a string in it, such as of depths in another unit.
+
+        Args:
+            bottom: measured depth of the bottom of the hole, m. depth: that of the lower end of the string, m.
+        """
+        for field in ("density", "inside") if self.inside != self.density else ("density",):
+            rows = getattr(self, field)
+            if not isinstance(rows, tuple):
+                continue
+            (begins, _), (ends, last) = rows[-2:]
+            if begins >= bottom:
+                warn(f"Mud.{field}: the fluid of {last:g} kg/m^3 begins at md = {begins:.6g} m, below the bottom of "
+                     f"the hole at {bottom:.6g} m, and counts nowhere: expected depths in m, or text such as "
+                     "'4000 ft'")  # fmt: skip
+            elif abs(ends * constants.foot / bottom - 1) < 0.02:
+                warn(f"Mud.{field}: the last row ends at md = {ends:.6g} m, 3.28 times as deep as the hole, as feet "
+                     "are that are taken for metres: expected depths in m, or text such as '4000 ft'")  # fmt: skip
+            elif ends < depth - 1e-3 * bottom:
+                warn(f"Mud.{field}: the last row ends at md = {ends:.6g} m, above the lower end of the string; its "
+                     "fluid is taken to reach to the bottom: expected the depth of the bottom there")  # fmt: skip
 
     @property
     def interfaces(self) -> np.ndarray:

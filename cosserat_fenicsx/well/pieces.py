@@ -174,6 +174,8 @@ def pieces_of(hole, string, operation, mud, depth):
             f"{hole.length:.10g} m (survey {hole.path.length:.10g} m, sections {hole.sections[-1].to:.10g} m)"
         )
     laid = string.laid(depth)
+    if mud is not None:
+        mud.doubt_depths(hole.length, depth)
     ends = [place.top for place in laid]
     interfaces = [] if mud is None else mud.interfaces
     cuts = np.concatenate([hole.path.md, ends, [section.to for section in hole.sections], interfaces, [depth]])
