@@ -86,7 +86,7 @@ DIMENSIONS = {
     "moment of inertia": Dimension(
         "kg m^2", {"kg m^2": 1.0, "lbm ft^2": units.pound * units.foot**2}, "lbm ft^2", 1e10),
     "stiffness": Dimension(
-        "N/m", {"N/m": 1.0, "kN/m": units.kN, "MN/m": units.MN, "kN/mm": units.kN / units.mm,
+        "N/m", {"N/m": 1.0, "kN/m": units.kN, "MN/m": units.MN, "N/mm": units.kN, "kN/mm": units.kN / units.mm,
                 "lbf/ft": units.lbf_per_ft, "lbf/in": units.lbf / units.inch}, "lbf/ft", 1e13),
     "torsional stiffness": Dimension(
         "N m/rad", {"N m/rad": 1.0, "kN m/rad": units.kNm, "ft-lbf/rad": units.ft_lbf}, "ft-lbf/rad"),
@@ -104,7 +104,7 @@ DIMENSIONS = {
     "power": Dimension("W", {"W": 1.0, "kW": 1e3, "MW": 1e6, "hp": 550 * units.ft_lbf}, "hp"),
     "volume": Dimension("m^3", {"m^3": 1.0, "l": units.litre, "gal": units.gallon}, "gal"),
     "flow": Dimension(
-        "m^3/s", {"m^3/s": 1.0, "l/s": units.litre, "l/min": units.litre / units.minute,
+        "m^3/s", {"m^3/s": 1.0, "l/s": units.litre, **_same(units.litre / units.minute, "l/min", "lpm", "L/min"),
                   **_same(units.gallon / units.minute, "gpm", "gal/min")}, "gpm", 10.0),
     "curvature": Dimension("1/m", {"1/m": 1.0, "1/ft": 1 / units.foot}, "1/ft"),
 }  # fmt: skip

@@ -291,6 +291,8 @@ def test_what_a_file_says():
     ("20 klbs", "force", 88964.43230521),
     ("12 lb/ft", "force per length", 175.1268324),
     ("12 lb/ft", "mass per length", 17.8579673),
+    ("800 N/mm", "stiffness", 8e5),
+    ("1800 lpm", "flow", 0.03),
 ])  # fmt: skip
 def test_field_units(text, dimension, value):
     assert in_si("x", text, dimension) == pytest.approx(value, rel=1e-7)

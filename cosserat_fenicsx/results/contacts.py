@@ -262,7 +262,7 @@ def check_passes(path, share=1e-2, whole=None):
                 k, *where = np.unravel_index(np.argmax(excess), excess.shape)
                 raise Passes(
                     f"rod '{rod.name}' passes into {describe(obstacle)} by {inside[(k, *where)]:.3g} m between two "
-                    f"nodes, at s = {between[tuple(where)] * rod.length:.6g} m, at the {path.axis} "
-                    f"{path.along_axis[k]:.6g}{' s' * (path.axis == 'time')}: expected more elements there",
+                    f"nodes, at s = {between[tuple(where)] * rod.length:.6g} m, at the "
+                    f"{path.place_of(k)}: expected more elements there",
                     path if whole is None else whole,
                 )

@@ -114,7 +114,7 @@ def rod_contacts_of(path, k):
     np.add.at(share, strands.cells, strands.sizes[:, None] * path.rule.lobatto * length)
     line = found.node >= 0
     pressure = np.where(line, forces / share[np.maximum(found.node, 0)], np.nan)
-    title = f"Contacts of rods at the {path.axis} {path.along_axis[k]:.6g}"
+    title = f"Contacts of rods at the {path.place_of(k)}"
     return RodContacts(rod, s, other, other_s, place + radius[:, None] * found.normal, found.gap * length, forces, line,
                        pressure, found.normal, title)  # fmt: skip
 
@@ -161,7 +161,7 @@ def check_apart(path, whole=None):
             (a, s), (b, t) = (place[i] for place in places)
             raise NotConverged(
                 f"rod '{scene.rods[int(a)].name}' at s = {s:.6g} m overlaps rod '{scene.rods[int(b)].name}' at s = "
-                f"{t:.6g} m by {-gap[i]:.3g} m, at the {path.axis} {path.along_axis[k]:.6g}: expected more elements "
+                f"{t:.6g} m by {-gap[i]:.3g} m, at the {path.place_of(k)}: expected more elements "
                 f"there{_ANGLE}",
                 path if whole is None else whole,
             )

@@ -62,6 +62,10 @@ class States(OnNodes):
         """The factor of a load in state k."""
         return float(self.along_axis[k]) if load.scaled and self.axis != "time" else 1.0
 
+    def place_of(self, k):
+        """Where state k is on the path or in time, in words: "load factor 0.5", "time 0.001 s"."""
+        return f"{self.axis} {self.along_axis[k]:.6g}{' s' * (self.axis == 'time')}"
+
     def supports_at(self, k):
         """The supports that hold in state k."""
         return self.scene.supports
