@@ -72,10 +72,11 @@ def _unit_of(expected):
 
 def _in_si(owner, field, value, unit, dimension=None):
     """A number from text with a unit of a dimension, None for that of `unit`; anything else as it is."""
-    dimension = dimension or BY_UNIT.get(unit)
+    dimension = dimension or ("angle" if unit == "degrees" else BY_UNIT.get(unit))
     if not isinstance(value, str) or dimension is None:
         return value
-    return in_si(f"{name_of(owner)}.{field}", value, dimension)
+    found = in_si(f"{name_of(owner)}.{field}", value, dimension)
+    return math.degrees(found) if unit == "degrees" else found
 
 
 class _Typed(str):

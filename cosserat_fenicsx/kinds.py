@@ -336,9 +336,10 @@ class Number(Kind):
         low, high = self.limits.low, self.limits.high
         bounds = {"exclusiveMinimum" if self.limits.above else "minimum": low} if low > -math.inf else {}
         bounds |= {"maximum": high} if high < math.inf else {}
-        if not self.dimension:
+        dimension = self.dimension or ("angle" if "(degrees)" in self.words else None)
+        if not dimension:
             return {"type": "integer" if self.whole else "number", **bounds}
-        names = ", ".join(DIMENSIONS[self.dimension].units)
+        names = ", ".join(DIMENSIONS[dimension].units)
         text = {"type": "string", "pattern": r"^\s*[-+]?[0-9.]", "description": f"a number with a unit: {names}"}
         return {"description": self.words, "anyOf": [{"type": "number", **bounds}, text]}
 

@@ -388,17 +388,21 @@ def test_tortuosity(well):
     for wrong in ((-1.0, 100.0), (0.5, 1e5), (0.5, 100.0, 1.5), (0.5, 1e-3), (20.0, 100.0), ("2 m", 100.0)):
         with pytest.raises(cf.SceneError, match="tortuosity"):
             W.tortuosity(path, *wrong)
+    with pytest.warns(cf.SceneWarning, match="period = 1 m turn the hole by 94.2 degrees per 30 m"):
+        W.tortuosity(path, "0.5 deg", 1.0)
 
 
 def test_tortuosity_in_a_scene_file(tmp_path):
     text = (Path(__file__).parents[1] / "demos" / "wells" / "strength.toml").read_text()
-    crooked = 'tortuosity = { amplitude = 0.5, period = "300 ft", seed = 1 }\nsections ='
+    crooked = 'tortuosity = { amplitude = "0.5 deg", period = "300 ft", seed = 1 }\nsections ='
     (tmp_path / "plan.toml").write_text(text)
     (tmp_path / "scene.toml").write_text(text.replace("sections =", crooked, 1))
-    plan, found = (cf.read(tmp_path / f"{name}.toml").hole.path for name in ("plan", "scene"))
+    scene = cf.read(tmp_path / "scene.toml")
+    plan, found = cf.read(tmp_path / "plan.toml").hole.path, scene.hole.path
+    assert "amplitude 0.5 degrees, period 91.44 m, seed 1" in " ".join(scene.summary().split())
     same = W.tortuosity(plan, 0.5, 300 * u.foot, 1)
     assert found.inclination == pytest.approx(same.inclination, abs=1e-12) and len(found.md) > len(plan.md)
-    (tmp_path / "wrong.toml").write_text(text.replace("sections =", crooked.replace("0.5", "50"), 1))
+    (tmp_path / "wrong.toml").write_text(text.replace("sections =", crooked.replace('"0.5 deg"', "50"), 1))
     with pytest.raises(cf.SceneError, match="line [0-9]+.*amplitude = 50: expected an angle"):
         cf.read(tmp_path / "wrong.toml")
 

@@ -7,23 +7,29 @@ from typing import Annotated
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from cosserat_fenicsx.checks import instance, number, refuse
+from cosserat_fenicsx.checks import instance, refuse, store, warn
 from cosserat_fenicsx.parts import Length, Number, Part, at_least, between
+from cosserat_fenicsx.units import deg_per_30m
 from cosserat_fenicsx.well.path import WellPath
 
-# Stations a period, and nodes a period of random numbers; most stations.
-_STATIONS, _NODES, _MOST = 12, 2, 200_000
+# Stations a period, and nodes a period of random numbers; most stations; degrees per 30 m that no plan is made worse by.
+_STATIONS, _NODES, _MOST, _STEEP = 12, 2, 200_000, 20.0
 
 
 @dataclass(frozen=True)
 class Tortuosity(Part):
-    """Arguments of `tortuosity` in a scene file: amplitude (degrees), period (m) and seed."""
+    """Arguments of `tortuosity`, in a scene file too: amplitude (degrees), period (m) and seed; text with a unit."""
 
     amplitude: Annotated[float, between(0, 10, "an angle (degrees)")]
     period: Length
     seed: Annotated[int, Number(limits=at_least(0), whole=True)] | None = None
 
     called = "tortuosity"
+
+    def in_words(self, units):
+        """What it makes of a plan, in some units."""
+        how = "a helix, without a seed" if self.seed is None else f"seed {self.seed}"
+        return f"amplitude {self.amplitude:g} degrees, period {units.told(self.period, 'm')}, {how}"
 
 
 def tortuosity(path: WellPath, amplitude: float | str, period: float | str, seed: int | None = None) -> WellPath:
@@ -40,29 +46,30 @@ def tortuosity(path: WellPath, amplitude: float | str, period: float | str, seed
         seed: of the random numbers, a whole number; the same one gives the same path.
 
     Raises:
-        SceneError: a number outside its range; so short a period that there were more than 200 000 stations.
+        SceneError: a number outside its range; so short a period that there were more than 200 000 stations. A hole
+            that turns by more than 20 degrees per 30 m gives a `SceneWarning`.
     """
-    who = "tortuosity"
-    instance(who, "path", path, WellPath, "a WellPath")
-    if isinstance(amplitude, str):
-        amplitude = math.degrees(number(who, "amplitude", amplitude, "an angle (rad)", math.isfinite))
-    amplitude = math.radians(
-        number(who, "amplitude", amplitude, "an angle from 0 to 10 degrees", lambda x: 0 <= x <= 10)
-    )
-    most = path.length / 2
-    period = number(
-        who, "period", period, f"a length (m), at most half of the path's, {most:g}", lambda x: 0 < x <= most
-    )
+    given = Tortuosity(amplitude, period, seed)
+    instance(given, "path", path, WellPath, "a WellPath")
+    amplitude, period, seed = math.radians(given.amplitude), given.period, given.seed
+    if period > path.length / 2:
+        refuse(given, "period", period, f"a length (m), at most half of the path's, {path.length / 2:g}")
     if path.length / period * _STATIONS > _MOST:
-        refuse(who, "period", period, f"at least {path.length * _STATIONS / _MOST:.3g} m, for {_MOST} stations at most")
-    if seed is not None and (isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0):
-        refuse(who, "seed", seed, "a whole number from 0 on, or None")
+        expected = f"at least {path.length * _STATIONS / _MOST:.3g} m, for {_MOST} stations at most"
+        refuse(given, "period", period, expected)
+    turn = 2 * math.pi * amplitude / period
+    if turn > _STEEP * deg_per_30m:
+        warn(f"tortuosity: amplitude = {given.amplitude:g} degrees and period = {period:g} m turn the hole by "
+             f"{turn / deg_per_30m:.3g} degrees per 30 m; drilled ones are crooked by a few: 300 feet are '300 ft' or "
+             "91.44")  # fmt: skip
     md = np.linspace(0.0, path.length, math.ceil(path.length / period * _STATIONS) + 1)
     high, right = _deviations(md, path.length, amplitude, period, seed)
     tangent, across, aside = _frames(path, md)
     bent = tangent + np.tan(high)[:, None] * across + np.tan(right)[:, None] * aside
     inc, azi = np.arctan2(np.hypot(bent[:, 0], bent[:, 1]), bent[:, 2]), np.arctan2(bent[:, 1], bent[:, 0])
-    return WellPath.from_survey(md, inc, azi % (2 * np.pi), degrees=False)
+    found = WellPath.from_survey(md, inc, azi % (2 * np.pi), degrees=False)
+    store(found, crooked=given)
+    return found
 
 
 def _deviations(md, length, amplitude, period, seed):

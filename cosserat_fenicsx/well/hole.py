@@ -190,6 +190,7 @@ class Borehole(InWords, Part):
             f"{east} and down {down}; largest inclination {math.degrees(path.inclination.max()):.2f} degrees, largest "
             f"dogleg {path.dogleg_severity[worst] / size:.2f} degrees per {unit} below "
             f"{units.told(path.md[worst], 'm')}."
+            + (f" A plan made crooked by tortuosity: {path.crooked.in_words(units)}." if path.crooked else "")
         )
 
     def sections_in_words(self, units: Units) -> list[str]:

@@ -38,7 +38,10 @@ class WellPath(Part):
         length: md of the last station, m.
         dogleg: (n - 1,) angle between the tangents at both ends of each section, rad.
         dogleg_severity: (n - 1,) dogleg per length, rad/m: over `units.deg_per_30m` in degrees per 30 m.
+        crooked: the `Tortuosity` by which `tortuosity` made it from a plan, or None.
     """
+
+    crooked = None
 
     md: np.ndarray
     inclination: np.ndarray
