@@ -171,3 +171,10 @@ def test_in_a_scene_file(tmp_path):
     ):  # fmt: skip
         (tmp_path / "scene.toml").write_text(text.replace(law, given), encoding="utf-8")
         assert cf.read(tmp_path / "scene.toml").scene.bit == expected
+
+
+def test_a_weight_over_time_is_said_to_change():
+    changing = cf.signals.Ramp((50e3,), end=5.0)
+    for weight, words in ((50e3, "the weight on bit stays as it is"), (changing, "weight on bit is the one given over")):
+        bit = BitOnRock(Stribeck(0.4, 0.3, 2.0, radius=0.1), weight=weight, inertia=50.0)
+        assert words in simulate(Drilling(PIPE, TopDrive(6.0), bit), 0.1, progress=False).why[0]

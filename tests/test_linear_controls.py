@@ -165,6 +165,22 @@ def test_waves_that_a_late_drive_feeds():
 
 
 @pytest.mark.parametrize("model", ["torsion", "axial and torsional"])
+def test_a_motion_without_bound_is_told(model):
+    control = LinearControl(((5.0,),), ((1.0, 0.0),), (900.0,), (1200.0, 0.0))
+    found = simulate(Drilling(PIPE, TopDrive(OM, 2900.0, control)), 5.0, model=model, progress=False)
+    assert found.stick_slip().unbounded and "UNSTABLE, the motion grows without bound" in str(found)
+    assert found.why[-1].startswith("UNSTABLE: drive or bit reach") and "stick-slip" not in str(found)
+
+
+def test_a_drive_without_torque_says_what_it_lacks():
+    scene = Drilling(PIPE, TopDrive(OM, 2900.0, ZTorque(Z)), BitOnRock(Stribeck(3 * Z * OM, Z * OM)))
+    found = simulate(scene, 5.0, progress=False)
+    assert f"stands at {Z * OM:.4g} N m: expected torque= (N m)" in found.stick_slip().caution
+    given = replace(scene, drive=TopDrive(OM, 2900.0, ZTorque(Z, torque=3 * Z * OM)))
+    assert not simulate(given, 5.0, progress=False).stick_slip().caution
+
+
+@pytest.mark.parametrize("model", ["torsion", "axial and torsional"])
 def test_resumed_to_the_byte(model, tmp_path):
     for k, control in enumerate((ZTorque(filter=0.03, delay=0.02), as_linear(1e3, 5e2, delay=0.07))):
         scene = Drilling(

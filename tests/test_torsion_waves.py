@@ -459,6 +459,25 @@ def test_a_motion_that_is_not_periodic_says_that_its_errors_are_not_known(second
     assert history.stick_slip().irregular == told == ("The motion is not periodic" in " ".join(str(history).split()))
 
 
+@pytest.mark.parametrize(
+    ("drive", "bit", "severity", "words"),
+    [
+        (0.0, 5.0, 0.4, "severity 0.4;"),
+        (0.0, 0.0, np.nan, "neither drive nor bit turns"),
+        (2.0, 1.0, 1.0, "the bit swings back and does not stick: period 5 s"),
+    ],
+)
+def test_a_bit_that_swings_or_turns_below_a_drive_that_stands(drive, bit, severity, words):
+    rows = np.zeros((4001, 1 + len(SERIES) + len(LEDGER)))
+    t = rows[:, 0] = 0.005 * np.arange(4001)
+    rows[:, 1 + SERIES.index("drive_speed")] = drive
+    rows[:, 1 + SERIES.index("bit_speed")] = (bit + 2 * np.sin(2 * np.pi * t / 5)) * (bit > 0)
+    history = cf.drilling.DrillingHistory(pipe_and_collars(), "torsion", (), 0.005, np.arange(2.0), rows)
+    found = history.stick_slip(since=0.0)
+    assert found.severity == pytest.approx(severity, rel=1e-4, nan_ok=True)
+    assert words in str(found) and ": stick-slip" not in str(found)
+
+
 def test_critical_speeds_of_a_pipe(tmp_path):
     """A free end in torsion, (k + 1/2)/2 c/L; a fixed one in axial motion, k c/(2 L)."""
     bit = cf.drilling.BitOnRock(cf.drilling.Lobes(3, 0.002), weight=8e4)

@@ -32,7 +32,8 @@ def chosen(scene, model="auto"):
     asks = _asks_for_axial(scene)
     if model == "auto":
         name = BOTH if asks else TORSION
-        stays = ", and the weight on bit stays as it is" if scene.bit and scene.bit.law.needs_weight else ""
+        weight = "is the one given over time" if scene.bit and scene.bit.varies else "stays as it is"
+        stays = f", and the weight on bit {weight}" if scene.bit and scene.bit.law.needs_weight else ""
         why = asks or [f"nothing moves along the axis{stays}"]
         return name, [f"{name}: {'; '.join(why)}", *_left_out(scene, name)]
     why = [f"{model}: as asked"]

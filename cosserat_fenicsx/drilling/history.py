@@ -6,6 +6,8 @@ from typing import Any
 import numpy as np
 
 from cosserat_fenicsx.checks import File, number, positive, refuse
+from cosserat_fenicsx.drilling.choose import fastest
+from cosserat_fenicsx.drilling.linear_control import ZTorque
 from cosserat_fenicsx.drilling.protocol import LEDGER, PROFILE, SERIES
 from cosserat_fenicsx.drilling.scene import Drilling
 from cosserat_fenicsx.drilling.stick_slip import SPEED, TORQUE, StickSlip, alias, stick_slip_of
@@ -52,6 +54,8 @@ _QUANTITIES = by_name(
 # Quantities of the table beside the time; its rows in `details`.
 _SHOWN = ("drive_speed", "bit_speed", "surface_torque", "torque_on_bit", "hook_load", "weight_on_bit", "bit_advance")
 _ROWS = 16
+# A motion grows without bound at so many times the speed asked for, and at least this one (rad/s).
+_BEYOND, _USUAL = 100.0, 10.0
 # Beginnings of the sentences of `why` that are part of the answer.
 _LOUD = ("APPROXIMATE", "CAUTION", "UNSTABLE")
 _CAPTION = (
@@ -59,6 +63,16 @@ _CAPTION = (
     "(at the first one, the time before the start counts with zero): history.mean_times. The motion begins at t = 0, "
     "and ends with the step that reaches its duration."
 )
+
+
+def _without_torque(scene):
+    """A sentence on a `ZTorque` without a torque, from rest, under which a bit never turned; else ""."""
+    control, speed = scene.drive.control, scene.drive.speed
+    if scene.start != "rest" or not isinstance(control, ZTorque) or control.torque is not None or callable(speed):
+        return ""
+    Z = control.impedance or scene.segments[0].torsional_impedance
+    return (f"ZTorque without torque= has the speed asked for at 0 N m, from rest, and stands at {Z * speed:.4g} N m: "
+            'expected torque= (N m), that of the steady rotation, or start="steady".')  # fmt: skip
 
 
 class DrillingHistory(Result):
@@ -87,8 +101,7 @@ class DrillingHistory(Result):
 
     Attributes:
         scene: the `Drilling`.
-        model: "torsion", "axial and torsional", or "rod below pipe" (`MixedScene`). why: sentences on the choice of
-            the model and its approximations.
+        model: "torsion", "axial and torsional", or "rod below pipe" (`MixedScene`).
         dt: step, s. counts: {name: number} of the solver, such as steps that were halved.
         times: (n,) s, each at the end of a step. mean_times: (n,) s, the middles of those over which means are taken.
         profile_times: (k,) s. depths: (m,) measured depths, m.
@@ -103,7 +116,7 @@ class DrillingHistory(Result):
 
     def __init__(self, scene, model, why, dt, depths, rows=None, profiles=None, counts=None, folder=None):
         self.scene: Drilling = scene
-        self.model, self.why, self.dt, self.depths = model, tuple(why), float(dt), np.asarray(depths, dtype=float)
+        self.model, self._why, self.dt, self.depths = model, tuple(why), float(dt), np.asarray(depths, dtype=float)
         self.counts: dict[str, int] = dict(counts or {})
         self.folder, self.errors = folder, None
         self._pieces = [np.empty((0, len(COLUMNS))) if rows is None else rows]
@@ -155,6 +168,26 @@ class DrillingHistory(Result):
 
     def __dir__(self):
         return sorted({*super().__dir__(), *COLUMNS, *PROFILE, "profile_times"})
+
+    @property
+    def why(self) -> tuple[str, ...]:
+        """Sentences on the choice of the model, its approximations, and a motion that grows without bound."""
+        speed, most = self._speeds
+        if not speed > most:
+            return self._why
+        return (*self._why, f"UNSTABLE: drive or bit reach {speed:.3g} rad/s, more than {most:.3g} rad/s, {_BEYOND:g} "
+                "times what drives turn at: the motion grows without bound, and its numbers mean nothing. stability "
+                "with a high up_to says which mode grows; a control may grow by itself, and a free string under a "
+                "given torque without drag")  # fmt: skip
+
+    @property
+    def _speeds(self):
+        """The largest speed of drive and bit, and the one above which a motion grows without bound, rad/s."""
+        if not len(self):
+            return 0.0, np.inf
+        usual = max(_USUAL, fastest(self.scene, float(self.times[-1])))
+        usual += 0.0 if self.scene.motor is None else self.scene.motor.speed(0.0)
+        return max(float(np.abs(x).max()) for x in (self.drive_speed, self.bit_speed)), _BEYOND * usual
 
     @property
     def mean_times(self) -> np.ndarray:
@@ -223,8 +256,10 @@ class DrillingHistory(Result):
                              f"{last:g} s")  # fmt: skip
         from cosserat_fenicsx.drilling.linear.stability import undisturbed
 
-        found = stick_slip_of(self, since)
-        return replace(found, caution=undisturbed(self.scene, found.least, found.peak))
+        found, (speed, most) = stick_slip_of(self, since), self._speeds
+        caution = _without_torque(self.scene) if found.stuck == 1 else ""
+        caution = caution or undisturbed(self.scene, found.least, found.peak)
+        return replace(found, caution=caution, unbounded=speed > most)
 
     # -- tables ------------------------------------------------------------------------------------------------------
 
@@ -247,7 +282,7 @@ class DrillingHistory(Result):
                 yield "The motion is not periodic: its numbers depend on any step, and may differ by more than that."
         yield from self._on_motor(units)
         caution = alias(self)
-        if caution:
+        if caution and not cycle.unbounded:
             yield f"{caution[0].upper()}{caution[1:]}."
         yield from map(units.sentence, (*self.why[:1], *(x for x in self.why[1:] if x.startswith(_LOUD))))
 

@@ -32,10 +32,12 @@ class StickSlip:
             where it ceases to turn with the drive, and starts where it does so again.
         stuck: share of the time that the bit is at rest, over whole periods where there are some; 1 where it never
             turns.
-        severity: half the range of the bit's speed over the mean speed of the drive: 0 for a steady rotation, 1 and
-            more where the bit comes to rest.
+        severity: half the range of the bit's speed over the mean speed of the drive, or of the bit where the drive
+            stands: 0 for a steady rotation, 1 and more where the bit comes to rest; NaN where both stand in the mean.
         torque: (smallest, largest) surface torque, N m. bit_torque: the same at the bit.
-        caution: a sentence where the bit stays in an unstable steady state that nothing disturbs; else "".
+        caution: a sentence where the bit stays in an unstable steady state that nothing disturbs, or where a `ZTorque`
+            has no torque to free it; else "".
+        unbounded: whether the motion grows without bound: to speeds that no string has.
     """
 
     since: float
@@ -53,6 +55,7 @@ class StickSlip:
     torque: tuple[float, float]
     bit_torque: tuple[float, float]
     caution: str = ""
+    unbounded: bool = False
 
     @property
     def sticks(self) -> bool:
@@ -78,16 +81,20 @@ class StickSlip:
             return f"From {self.since:g} to {self.until:g} s neither drive nor bit turns."
         least, peak, mean = (x / turning for x in (self.least, self.peak, self.mean))
         speed = f"bit speed {least:.4g} to {peak:.4g} {rpm}, mean {mean:.4g} {rpm}"
-        if self.stuck == 1:
+        again = "" if np.isnan(self.period) else f"period {self.period:.5g} s, "
+        if self.unbounded:
+            what = f"UNSTABLE, the motion grows without bound: {speed}"
+        elif self.stuck == 1:
             what = (
                 "the bit never turned. Where the surface torque still grows, simulate a longer time; where it does "
                 "not, the drive's torque does not free the bit and the string: expected less static torque on bit or "
                 "friction, or a stronger drive"
             )
         elif not self.sticks:
-            what = f"no stick-slip: {speed}, severity {self.severity:.3g}"
+            what = f"no stick-slip: {speed}, severity {as_text(self.severity, 3)}"
+        elif self.stuck < 1e-3:
+            what = f"the bit swings back and does not stick: {again}{speed}"
         else:
-            again = "" if np.isnan(self.period) else f"period {self.period:.5g} s, "
             what = f"stick-slip: {again}{speed}, at rest {100 * self.stuck:.3g} % of the time"
         low, high = (as_text(x / size, 4) for x in self.torque)
         told = f"From {self.since:g} to {self.until:g} s: {what}; surface torque {low} to {high} {moment}."
@@ -126,11 +133,12 @@ def stick_slip_of(history, since):
     whole = (t[1:] > starts[0]) & (t[1:] <= starts[-1]) if len(periods) else np.full(len(lengths), True)
     mean_drive, mean = (_mean(values, lengths * whole) for values in (drive, bit))
     slow = whole & (np.abs(bit[1:]) <= level) & (np.abs(bit[:-1]) <= level)
+    of = abs(mean_drive) if abs(mean_drive) > AT_REST * abs(mean) else abs(mean)
     torque, bit_torque = history.surface_torque[rows], history.torque_on_bit[rows]
     return StickSlip(
         float(t[0]), float(t[-1]), mean_drive, mean, float(bit.max()), float(bit.min()),
         float(periods.mean()) if len(periods) else np.nan, periods, starts, stops,
-        float(lengths[slow].sum() / lengths[whole].sum()), float(np.ptp(bit) / 2 / max(abs(mean_drive), 1e-300)),
+        float(lengths[slow].sum() / lengths[whole].sum()), float(np.ptp(bit) / 2 / of) if of else np.nan,
         (float(torque.min()), float(torque.max())), (float(bit_torque.min()), float(bit_torque.max())),
     )  # fmt: skip
 
