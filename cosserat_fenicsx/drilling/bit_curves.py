@@ -39,7 +39,8 @@ class _Rows(Values):
 
 @dataclass(frozen=True)
 class TableLaw(BitLaw):
-    """A torque on bit from a table, by monotone cubics between its points, constant beyond the last speed.
+    """A torque on bit from a table, by monotone cubics over the speed, and over the weight,
+    between its points, constant beyond the last speed.
 
     Args:
         speeds: ascending from 0 on, rad/s. torques: one for each, N m, not negative; the first one holds at rest. With

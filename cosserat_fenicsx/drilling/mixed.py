@@ -135,7 +135,7 @@ def mixed_scene(drilling: Drilling, depth: float | None = None) -> MixedScene:
 
     Args:
         drilling: a `Drilling` with a `DrillString`.
-        depth: measured depth of the rod's upper end, m; None for the lower end of the lowest `DrillPipe`. A joint or
+        depth: measured depth of the rod's upper end, m or text, such as "9800 ft"; None for the lower end of the lowest `DrillPipe`. A joint or
             two of pipe above, such as 30.0, leave a rod for the whole string.
 
     Returns:
@@ -209,8 +209,8 @@ def _depth(drilling, depth):
             refuse("mixed_scene", "depth", depth, "the measured depth (m) of the rod's upper end, where no component "
                    "lies below the lowest DrillPipe")  # fmt: skip
         return max(pipes)
-    return number("mixed_scene", "depth", depth, f"a depth (m) within the string, above 0 and below {drilling.bit_depth:g} m",
-                  lambda x: 0 < x < drilling.bit_depth)  # fmt: skip
+    expected = f"a depth (m) within the string, above 0 and below {drilling.bit_depth:g} m"
+    return number("mixed_scene", "depth", depth, expected, lambda x: 0 < x < drilling.bit_depth)
 
 
 def _axis(drilling, md):
