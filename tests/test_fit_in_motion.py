@@ -116,7 +116,7 @@ speed = "7 rad/s"
 inertia = 2900.0
 control = { type = "PI", Kp = 1500.0, Ki = 1200.0 }
 [bit]
-law = { type = "Stribeck", static = "5 kN m", dynamic = "4.2 kN m", speed = "3 rad/s" }
+law = { type = "Stribeck", static = "6.2 kN m", dynamic = "4.2 kN m", speed = "3 rad/s" }
 [simulate]
 dt = 0.01
 [fit]
@@ -136,7 +136,9 @@ def test_a_fit_in_a_scene_file(tmp_path):
     (tmp_path / "rig.csv").write_text("".join(READ.read_text().splitlines(keepends=True)[:301]))
     (tmp_path / "fit.toml").write_text(FILE)
     asked = cf.read(tmp_path / "fit.toml")
-    assert "bit.law.static from 600 readings of drive_speed, surface_torque" in " ".join(str(asked).split())
+    told = " ".join(str(asked).split())
+    assert "fit 600 readings of drive_speed (noise 0.05 rad/s), surface_torque (noise 100 N m); clock 0 s" in told
+    assert "Unknown: bit.law.static between 6 kN m and 7 kN m, here 6.2 kN m" in told
     assert main(["run", str(tmp_path / "fit.toml"), "-o", str(tmp_path / "out")]) == 0
     readings = cf.drilling.Readings.from_csv(tmp_path / "rig.csv", NOISE)
     found = cf.drilling.fit(asked.scene, readings, {"bit.law.static": (6e3, 7e3)}, dt=0.01)
@@ -147,8 +149,12 @@ def test_a_fit_in_a_scene_file(tmp_path):
     assert cf.read(tmp_path / "again.toml").fit == asked.fit
     for old, new, words in (
         ('"rig.csv"', '"rag.csv"', "rag.csv: cannot be read"), ("bit.law.static", "bit.law.sta", "bit.law.sta"),
+        ('"100 N m" }', '"100 N m" }\nclock = "5 min ago"', "clock = '5 min ago': did you mean"),
         ('"7 kN m"', '"5 kN m"', "ascending"), ("0.05", "-1.0", "noise.*above 0"), ('"100 N m"', '"100 N"', "unit"),
     ):  # fmt: skip
         (tmp_path / "wrong.toml").write_text(FILE.replace(old, new))
         with pytest.raises(cf.SceneError, match=f"line [0-9]+.*{words}"):
             cf.read(tmp_path / "wrong.toml")
+    (tmp_path / "outside.toml").write_text(FILE.replace('"6.2 kN m"', '"12 kN m"'))
+    with pytest.warns(cf.SceneWarning, match="bit.law.static = 12000 N m in the scene is outside its bounds, 6000 to"):
+        cf.read(tmp_path / "outside.toml")

@@ -183,7 +183,8 @@ def ranges_of(scene, unknowns):
         refuse("fit", "unknowns", unknowns, "{'bit.law.static': (least, largest)}")
     found = {}
     for name, ends in unknowns.items():
-        unit = parameter_of(scene, name).unit
+        here = parameter_of(scene, name)
+        unit = here.unit
         if np.shape(ends) == (2,) and unit in BY_UNIT:
             ends = [in_si(f"fit.unknowns['{name}']", x, BY_UNIT[unit]) for x in ends]
         if (
@@ -192,7 +193,10 @@ def ranges_of(scene, unknowns):
             or not -math.inf < ends[0] < ends[1] < math.inf
         ):
             refuse("fit", f"unknowns['{name}']", ends, "two numbers, (least, largest), ascending")
-        found[name] = tuple(map(float, ends))
+        found[name] = low, high = tuple(map(float, ends))
+        if not low <= here.value <= high:
+            warn(f"fit: {name} = {here.value:g} {unit} in the scene is outside its bounds, {low:g} to {high:g}: the "
+                 "search begins in their middle; expected a value between them, or wider bounds")  # fmt: skip
     return found
 
 

@@ -29,6 +29,7 @@ duration = 60.0
 Numbers are in SI, or text with a unit (`dimensions`).
 """
 
+import math
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -36,7 +37,7 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 
-from cosserat_fenicsx.checks import File, instance, refuse, store
+from cosserat_fenicsx.checks import File, instance, number, refuse, store
 from cosserat_fenicsx.drilling.bit_laws import BitOnRock
 from cosserat_fenicsx.drilling.choose import chosen
 from cosserat_fenicsx.drilling.fitting import DrillingFit, fit, ranges_of
@@ -46,7 +47,7 @@ from cosserat_fenicsx.drilling.linear.response import FrequencyResponse, frequen
 from cosserat_fenicsx.drilling.linear.stability import Stability, stability
 from cosserat_fenicsx.drilling.motion import check_arguments as check_simulation
 from cosserat_fenicsx.drilling.motion import simulate
-from cosserat_fenicsx.drilling.readings import Readings
+from cosserat_fenicsx.drilling.readings import READ, Readings
 from cosserat_fenicsx.drilling.scene import Drilling
 from cosserat_fenicsx.drilling.segments import Discs
 from cosserat_fenicsx.drilling.top_drive import DriveControl, Hook, TopDrive
@@ -69,6 +70,7 @@ from cosserat_fenicsx.parts import (
 )
 from cosserat_fenicsx.quantities import Units
 from cosserat_fenicsx.results.screen import InWords
+from cosserat_fenicsx.scene.parameters import parameter_of
 from cosserat_fenicsx.well.components import DrillString
 from cosserat_fenicsx.well.hole import Borehole, Mud
 
@@ -184,6 +186,8 @@ class FitToReadings(Part):
             refuse(self, "unknowns", [x.name for x in self.unknowns], "at least one, each with a name of its own")
         store(self, readings=os.path.abspath(self.readings),
               data=Readings.from_csv(self.readings, self.noise, self.columns))  # fmt: skip
+        if self.clock != "unknown":
+            store(self, clock=number(self, "clock", self.clock, "a time (s), or 'unknown'", math.isfinite))
 
     @property
     def ranges(self) -> dict[str, tuple]:
@@ -247,7 +251,7 @@ class DrillingScene(InWords, Part):
             self.scene.with_case(weight=self.weights[0])  # refused where there is no bit
         if self.fit:
             with concerning("fit", "unknowns"):
-                ranges_of(self.scene, self.fit.ranges)
+                store(self, _ranges=ranges_of(self.scene, self.fit.ranges))
 
     def sentences(self, units: Units):
         """On the `Drilling` and on what is asked for, in some units."""
@@ -263,8 +267,23 @@ class DrillingScene(InWords, Part):
         if self.response:
             yield f"Asked for: frequency response in {self.response.kind}."
         if self.fit:
-            count = sum(np.isfinite(x).sum() for x in self.fit.data.values.values())
-            yield f"Asked for: {', '.join(self.fit.ranges)} from {count} readings of {', '.join(self.fit.data.values)}."
+            yield from self._fit_in_words(units)
+
+    def _fit_in_words(self, units):
+        """On readings, noise, clock, and bounds and start of each unknown of [fit]."""
+
+        def told(value, unit):
+            return f"{value:g}" if unit in ("", "1") else units.told(value, unit)
+
+        data, clock = self.fit.data, self.fit.clock
+        count = sum(np.isfinite(x).sum() for x in data.values.values())
+        noise = ", ".join(f"{name} (noise {told(data.noise[name], READ[name])})" for name in data.values)
+        late = "unknown" if clock == "unknown" else told(clock, "s")
+        yield f"Asked for: numbers that fit {count} readings of {noise}; clock {late}."
+        for name, (low, high) in self._ranges.items():
+            here = parameter_of(self.scene, name)
+            ends = f"{told(low, here.unit)} and {told(high, here.unit)}"
+            yield f"Unknown: {name} between {ends}, here {told(here.value, here.unit)}."
 
     @property
     def settings(self) -> dict[str, Any]:
