@@ -97,8 +97,10 @@ def pressures_figure(answer, between=None):
         (panels[2], _TENSION, {"effective tension": answer.tension, "true tension": answer.true_tension}),
     ):
         heading, size = scale(quantity)
-        for (name, values), colour in zip(lines.items(), ("black", "tab:blue"), strict=True):
-            panel.plot(values[rows] / size, answer.md[rows] / length, color=colour, label=name)
+        # the second one is dashed, so that both are seen where they are equal
+        styles = {"color": "black"}, {"color": "tab:blue", "linestyle": (0, (4, 4)), "linewidth": 2.2}
+        for (name, values), style in zip(lines.items(), styles, strict=True):
+            panel.plot(values[rows] / size, answer.md[rows] / length, label=name, **style)
         for end in ends[1:-1] / length:
             panel.axhline(end, color=GREY, linewidth=0.6, linestyle=(0, (6, 3)))
         panel.set_xlabel(heading.replace("effective tension", "tension"))
