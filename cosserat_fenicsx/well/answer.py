@@ -434,7 +434,8 @@ class TorqueAndDrag(Differentiated, Result):
             model: "soft"; "buckled", whose helix also holds the string back; or "rod", the exact rod in contact, of
                 which at most 14 equilibria are solved, each with its hook load to 1e-3 of the largest tension: with its
                 own tensions, bending moments and clearances; for "sinusoidal" it must not buckle by its second
-                variation either. A string of which no equilibrium is found beyond some weight is limited by that.
+                variation either. A string of which no equilibrium is found beyond some weight is limited by that, and
+                not by lock-up, which the rod does not name. The rod takes about 20 to 50 s.
                 This answer may be of another model.
             progress: of the rod; True or False; None shows it in runs of more than two seconds.
 
