@@ -145,18 +145,21 @@ def test_a_control_that_feeds_the_string():
     assert np.log(half[1] / half[0]) / (8 * np.pi / root.imag) == pytest.approx(root.real, rel=0.02)
 
 
-def test_waves_that_a_late_drive_feeds():
+@pytest.mark.parametrize("control", [ZTorque(filter=0.1, delay=0.02), LinearControl(
+    ((-50.0, 0.0), (50.0, -50.0)), ((0.0, 50.0), (0.0, 0.0)), (0.0, -1 / 341.1), commands="speed")],
+    ids=["late", "two filters"])  # fmt: skip
+def test_waves_that_a_drive_feeds(control):
     """Faster than those looked for, they are told: by the reflection of the drive, and where all roots are found."""
     pipe = cf.well.DrillString([cf.well.DrillPipe(3000.0, size="5 in 19.50 lb/ft")])
     bit, drag = BitOnRock(Stribeck(6e3, 4e3, 3.0), inertia=350.0), cf.drilling.ViscousDrag(torsion=0.1)
-    scene = Drilling(pipe, TopDrive(OM, 2900.0, ZTorque(filter=0.1, delay=0.02)), bit, drag=drag)
-    fed, answer = fed_waves(scene), stability(scene, [OM], up_to=12.0)
+    scene = Drilling(pipe, TopDrive(OM, 2900.0, control), bit, drag=drag)
+    fed, answer = fed_waves(scene), stability(scene, [OM], up_to=20.0)
     k = np.nanargmax(answer.growth)
     assert fed.growth == pytest.approx(answer.growth.flat[k], rel=5e-3)
     assert fed.fastest == pytest.approx(answer.frequency.flat[k], abs=0.27)  # modes are 0.54 Hz apart
     found = stability(scene, [OM], up_to=2.0)
     assert not found.unstable(0) and "back larger than they come" in found.cautions[-1]
-    assert "FASTER ONES DO" in str(found) and "up_to=11" in str(found)
+    assert "FASTER ONES DO" in str(found) and f"up_to={np.ceil(1.2 * fed.fastest):.0f}" in str(found)
     with pytest.warns(cf.SceneWarning, match="limit_speed: at every speed"):
         cf.drilling.limit_speed(scene, up_to=2.0)
     assert "CAUTION: the drive sends waves of" in str(simulate(scene, 0.1, progress=False))
@@ -235,3 +238,8 @@ def test_in_a_scene_file(tmp_path):
 def test_refused_by_name(make, words):
     with pytest.raises(cf.SceneError, match=words):
         make()
+
+
+def test_a_mode_without_losses_neither_grows_nor_decays():
+    found = str(stability(Drilling(PIPE, TopDrive(OM)), [OM], kind="axial", up_to=5.0))
+    assert "which neither grows nor decays at" in found and "-0" not in found
