@@ -104,7 +104,7 @@ def test_in_an_inclined_hole_it_lies_on_the_wall_and_hangs_in_the_pipe():
     mixed = cf.drilling.mixed_scene(inclined(), 3000.0)
     weight = 200 * 100.0
     assert mixed.above.tension == pytest.approx(weight * math.cos(0.5), rel=1e-12)
-    start = cf.solve(mixed.at_rest, [1.0], elements=10, degree=2)
+    start = mixed.rest(elements=10, degree=2)
     offset = start.displacement(mixed.rod.at(100.0))[0]
     assert np.linalg.norm(offset) == pytest.approx((0.2159 - 0.1651) / 2, rel=0.02) and offset[2] > 0
     assert np.abs(start.displacement(mixed.rod.start)).max() < 1e-5

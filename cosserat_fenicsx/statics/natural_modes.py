@@ -117,24 +117,34 @@ def modes(
     comm, slowed = communicator(comm), _slowed(scene)
     if damped is None and (near is not None or rotation is not None or slowed):
         damped = True
-    following = _Following()
+    following, last = _Following(), []
 
     def on_mesh(layout):
         found = _on_mesh(scene, layout, count, load_factor, degree, comm, damped, near, rotation)
+        last[:] = [found.rounding]
         return following.in_turn(found) if found.complex else found
 
-    found, error = until_two_meshes_agree(
-        "modes", scene, on_mesh, tol, most=_MOST_ELEMENTS, elements=elements, degree=degree,
-        advice="a larger tol or fewer modes", progress=progress, comm=comm,
-        gains=lambda found: 2 * degree - (_OF_EIGENVALUES if found.complex else _OF_SQUARES),
-    )  # fmt: skip
+    try:
+        found, error = until_two_meshes_agree(
+            "modes", scene, on_mesh, tol, most=_MOST_ELEMENTS, elements=elements, degree=degree,
+            advice="a larger tol or fewer modes", progress=progress, comm=comm,
+            gains=lambda found: 2 * degree - (_OF_EIGENVALUES if found.complex else _OF_SQUARES),
+        )  # fmt: skip
+    except NotConverged:
+        if last and (last[0] > tol).any():  # meshes scatter by rounding
+            raise _rounded(tol, last[0]) from None
+        raise
     error = np.maximum(error, found.rounding)  # NaN stays
     if (error > tol).any():
-        raise NotConverged(
-            f"the accuracy tol = {tol:g} is out of reach: rounding of rods as slender as these, and bounds in place of "
-            f"infinite stiffnesses, may change the squares by {error.max():.2g} of themselves. Ask for a larger tol."
-        )
+        raise _rounded(tol, error)
     return _result(scene, found, error, comm, near or 0.0)
+
+
+def _rounded(tol, errors):
+    return NotConverged(
+        f"the accuracy tol = {tol:g} is out of reach: rounding of rods as slender as these, and bounds in place of "
+        f"infinite stiffnesses, may change the squares by {errors.max():.2g} of themselves. Ask for a larger tol."
+    )
 
 
 def admit(owner, scene, damped):
