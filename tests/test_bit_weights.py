@@ -175,6 +175,22 @@ def test_in_a_scene_file(tmp_path):
 
 def test_a_weight_over_time_is_said_to_change():
     changing = cf.signals.Ramp((50e3,), end=5.0)
-    for weight, words in ((50e3, "the weight on bit stays as it is"), (changing, "weight on bit is the one given over")):
+    for weight, words in (
+        (50e3, "the weight on bit stays as it is"),
+        (changing, "weight on bit is the one given over"),
+    ):
         bit = BitOnRock(Stribeck(0.4, 0.3, 2.0, radius=0.1), weight=weight, inertia=50.0)
         assert words in simulate(Drilling(PIPE, TopDrive(6.0), bit), 0.1, progress=False).why[0]
+
+
+def test_the_largest_weight_of_an_oscillation_is_found():
+    def weight(t):
+        return 2e4 + 1.9e4 * math.sin(2 * math.pi * t)
+
+    assert BitOnRock(Stribeck(0.6, 0.4, 3.0, radius=0.1), weight=weight).most == pytest.approx(39e3, rel=1e-4)
+
+
+def test_a_fluid_that_ends_beside_a_component_cuts_no_sliver():
+    string = cf.well.DrillString([cf.well.Collar(x, "NC46-65") for x in (5.1, 7.7, None)])
+    laid = string.laid(1000.0)  # the top of the second one is 987.2 less rounding
+    assert len(cf.well.components.in_columns(laid, cf.well.Mud([(987.2, 1200), (1000, 1210)]))) == 3

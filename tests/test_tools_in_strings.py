@@ -306,3 +306,38 @@ def test_scene_files():
         scene = cf.read(Path(__file__).parent.parent / "demos" / "strings" / f"{name}.toml").scene
         assert cf.drilling.choose.chosen(scene)[0] == ("torsion" if scene.motor else "axial and torsional")
         assert scene.joints
+
+
+def below(hole, start="rest", mud=None, law=None, weight=None):
+    """A string with collars below a motor in a hole, at 6 rad/s."""
+    string = DrillString([Collar(100.0, "NC46-65"), motor(), Collar(None, "NC46-65")])
+    bit = BitOnRock(law or Stribeck(2000.0, 2000.0), weight=weight, inertia=50.0)
+    return Drilling(string, TopDrive(6.0), bit, hole=hole, start=start, mud=mud or cf.well.Mud(1200.0))
+
+
+def straight(inclination, length, friction=0.3):
+    path = cf.well.WellPath.from_survey([0, length], [inclination] * 2, [0, 0])
+    return cf.well.Borehole(path, cf.well.HoleSection(to=length, diameter="12.25 in", friction=friction))
+
+
+def test_fluids_that_cut_components_leave_the_motor_in_its_place():
+    cut = below(straight(0, 1000.0), mud=cf.well.Mud([(300, 1000), (600, 1200), (985.5, 1300), (1000, 1400)]))
+    assert [part.length for part in cut.turned] == pytest.approx([85.5, 14.5]) and len(cut.segments) == 6
+    assert cut.segments[cut.joints[0].segment].length == 1.0
+
+
+def test_the_wall_holds_what_turns_with_the_bit_of_a_steady_start():
+    """The bit keeps its speed; dashpots of the wall below the motor are those of the bit's speed."""
+    scene = below(straight(80, 1500.0), start="steady")
+    history = cf.drilling.simulate(scene, 3.0, model="axial and torsional")
+    assert np.ptp(history.bit_speed) < 1e-6 and np.ptp(history.surface_torque) < 1e-3
+    assert history.bit_speed[0] < Steady(scene, "torsion").speed_of_bit(6.0, None) - 0.1  # without the wall
+    rates = Steady(scene, "axial").walls(None).rates(6.0, 0.0, 12.0)
+    assert rates[-1][0][2] == pytest.approx(rates[0][0][2] / 2, rel=1e-2)
+
+
+def test_blades_below_a_motor_need_steps_for_the_motors_speed_too():
+    scene = below(straight(0, 500.0), law=cf.drilling.Lobes(3, 0.002), weight=2e4)
+    fast = 6.0 + motor().speed(0.0)
+    with pytest.raises(cf.SceneError, match=f"a step of at most {np.pi / 6 / fast:.3g} s"):
+        cf.drilling.simulate(scene, 1.0, dt=np.pi / 6 / fast * 1.05)

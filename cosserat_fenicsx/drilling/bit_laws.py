@@ -27,6 +27,7 @@ since the start predicted for the end of the step. The rock is rigid or a spring
 import math
 from bisect import bisect_right
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
@@ -353,7 +354,7 @@ class BitOnRock(Part):
         """The static weight on bit at the start, N, or None."""
         return self.signal()(0.0) if self.varies else self.weight
 
-    @property
+    @cached_property
     def most(self) -> float | None:
         """The largest static weight on bit, see `ScalarSignal.largest`, N, or None."""
         return self.signal().largest if self.varies else self.weight

@@ -15,6 +15,7 @@ from scipy.optimize import brentq
 
 from cosserat_fenicsx.checks import number, positive, refuse
 from cosserat_fenicsx.drilling.chain import chain_of, fewest_in_period, unresolved, usual_step
+from cosserat_fenicsx.drilling.joints import largest_speed
 from cosserat_fenicsx.drilling.laws import InC, check_bit
 from cosserat_fenicsx.drilling.linear_control import step_for
 from cosserat_fenicsx.drilling.protocol import StringModel
@@ -32,6 +33,8 @@ from cosserat_fenicsx.drilling.wall_friction import law_of, static_weight
 from cosserat_fenicsx.errors import SceneError
 
 _TRIALS = 30
+# Speeds at which a steady bit below a motor is looked for.
+_SPEEDS = 60
 _ELEMENTS = 1_000_000
 _SUMS = ("drive", "hook", "tools", "bit", "wall", "mud")
 _BIT = ("weight", "torque", "share", "impulse", "slowed", "slowing", "floor", "sinking", "face")
@@ -257,8 +260,17 @@ class AxialTorsional(StringModel):
             return kept["limit"]
 
         def found(down):
+            of_bit = steady_speed_of_bit(self.scene, down if self._axial else None)
+            if turned is not None:  # the wall holds what turns with the bit, too
+                of_bit = largest_speed(
+                    self.scene.motor, lambda om: -at(down, om)[3][turned, -1], of_bit, turning, _SPEEDS
+                )
+            bears, velocities, x, below = at(down, of_bit)
+            return bears, velocities, x, below[0]
+
+        def at(down, of_bit):
             bit = self.scene.bit
-            motion[:] = down, steady_speed_of_bit(self.scene, down if self._axial else None)
+            motion[:] = down, of_bit
             velocities = np.full((m.nodes, 2), [down, turning])
             if turned is not None:
                 velocities[turned:, 1] = motion[1]
@@ -312,8 +324,9 @@ class AxialTorsional(StringModel):
             if self.end is not None:
                 self._take(self.end.begin(self, part[0, 0]))
             cast, out = self._ffi.cast, rows[self.steps - start :]
+            now = weights + (self.steps - start) if weights else weights
             done = self._lib.advance_elements(
-                self._m, len(part), cast("double *", part.ctypes.data), weights, cast("double *", out.ctypes.data)
+                self._m, len(part), cast("double *", part.ctypes.data), now, cast("double *", out.ctypes.data)
             )
             self.steps += int(part[:done, -1].sum())
             if done < len(part):

@@ -101,9 +101,18 @@ def speed_of_bit(scene, turning, down=None):
         torque = float(bit.law.steady_forces(bit.resting or 0.0, np.array([velocity, om]))[1])
         return stall - motor.slope * (om - turning) - torque - drag * om
 
-    speeds = turning + np.linspace(stall / motor.slope, 0.0, _TRIED)[:-1]
+    return largest_speed(motor, excess, turning + stall / motor.slope, turning)
+
+
+def largest_speed(motor, excess, fastest, slowest, tried=_TRIED):
+    """The largest speed of a bit below a motor (rad/s) at which the torque in excess of what it takes is 0.
+
+    Raises:
+        SceneError: the motor stalls.
+    """
+    speeds = np.linspace(fastest, slowest, tried)[:-1]
     values = np.array([excess(om) for om in speeds])
-    k = int(np.argmax(values >= 0))
+    k, stall = int(np.argmax(values >= 0)), motor.stall_torque()
     if values[k] < 0:
         raise SceneError(f"{motor.name}: it stalls: with {motor.flow_at(0.0):.4g} m^3/s it gives less than {stall:.5g} "
                          "N m, and the bit takes more at every speed: expected less weight on bit, more flow or "

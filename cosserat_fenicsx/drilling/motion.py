@@ -217,13 +217,12 @@ def check_step(scene, dt, duration, save_every=None):
     if duration / max(dt, save_every or 0.0) > MOST_ROWS:
         refuse(where, "save_every", save_every, f"at least {duration / MOST_ROWS:.3g} s: {MOST_ROWS:g} rows in "
                f"{duration:g} s")  # fmt: skip
-    if scene.motor is not None:
-        speed += scene.motor.speed(0.0) / _FASTER
+    own = scene.motor.speed(0.0) if scene.motor else 0.0
     most, words = _largest_turn(scene)
     if words:
-        what = f"{words} at that speed"
+        what, speed = f"{words} at that speed", speed + own
     else:
-        what, speed = f"{most:g} rad in a step at {_FASTER:g} times the speed of the drive", _FASTER * speed
+        what, speed = f"{most:g} rad in a step at {_FASTER:g} times the speed of the drive", _FASTER * speed + own
     if speed * dt > most:
         refuse(where, "dt", dt, f"a step of at most {most / speed:.3g} s, too short for more than {what}")
 

@@ -89,6 +89,11 @@ class StringModel(Pointers):
         if not (late or space.of_speed):
             x = np.linalg.solve(np.eye(n) - self.dt / 2 * A, B[:, 1])
             check_step(drive.control, float(D[1] + self.dt / 2 * C @ x), self.dt)
+        if space.of_speed and not late and impedance is not None:
+            own, answer = D + self.dt / 2 * C @ np.linalg.solve(np.eye(n) - self.dt / 2 * A, B)
+            if answer > 0 and impedance - (1 + own) / answer < 0:
+                refuse("simulate", "dt", self.dt, "a shorter step (s): in this one the speed of the drive rises with "
+                       "the torque on it; or model='axial and torsional'")  # fmt: skip
 
     def _settle_linear(self, record, drive, space, torque):
         """The state of a linear control in steady rotation under a torque (N m)."""
@@ -103,6 +108,9 @@ class StringModel(Pointers):
         if (low := found.min()) < 0:
             t = (first + int(found.argmin())) * self.dt
             refuse(bit, "weight", low, f"a weight on bit that is not negative (N), at t = {t:g} s")
+        if found.max() > 1.01 * bit.most:
+            refuse(bit, "weight", found.max(), "a weight on bit (N) whose largest value does not hide in a short peak: "
+                   "a signal with `jumps` where it is not smooth")  # fmt: skip
         return self._ffi.from_buffer("double[]", found)
 
     def _given(self):

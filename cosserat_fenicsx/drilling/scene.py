@@ -121,7 +121,10 @@ class Drilling(InWords, Part):
     @cached_property
     def joints(self) -> tuple[Joint, ...]:
         """Where tools part the string, from the top down."""
-        return () if self.discs else joints_of(self.laid)
+        if self.discs:
+            return ()
+        ends, down = [place.bottom for place in self.places], self.laid[::-1]  # components are cut between fluids
+        return tuple(replace(x, segment=ends.index(down[x.segment].bottom)) for x in joints_of(self.laid))
 
     @cached_property
     def motor(self):

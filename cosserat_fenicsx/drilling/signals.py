@@ -80,8 +80,11 @@ class ScalarSignal:
     @property
     def largest(self) -> float:
         """The largest value up to the last time at which it is not smooth, or up to 600 s."""
-        times = [0.0] if self.constant else np.linspace(0.0, max(self.jumps, default=_LONG), 201).tolist()
-        return max(self(t) for t in (*self.jumps, *times))
+        if self.constant:
+            return self._value
+        # at times that are no multiples of any period
+        times = max(self.jumps, default=_LONG) * (np.arange(2001) * (math.sqrt(5) - 1) / 2 % 1)
+        return max(self(t) for t in (*self.jumps, *times.tolist()))
 
     def jump(self, t: float) -> float:
         """The height of the jump at a time, from the values just before and just after it."""

@@ -97,7 +97,7 @@ def steady_state(velocities, chain, limits, friction, bit, pairs=()):
         pairs: (element, unknown, force) of forces that drive its nodes apart, N or N m.
 
     Returns:
-        x (nodes, dofs); (dofs,) force along the string above the first node: compression (N), torque (N m).
+        x (nodes, dofs); (nodes, dofs) force along the string above each node: compression (N), torque (N m).
 
     Raises:
         NotConverged: friction and the tension that it causes increase each other without end.
@@ -129,5 +129,5 @@ def steady_state(velocities, chain, limits, friction, bit, pairs=()):
         new = np.concatenate([np.zeros((1, n)), np.cumsum(-below[1:] / spring, axis=0)])
         change, x = np.abs(new - x).max(), new
         if change <= _SAME * np.abs(x).max():
-            return x, below[0]
+            return x, below
     raise NotConverged("Drilling.start = 'steady': the friction grows by the tension that it makes: expected 'rest'")

@@ -521,12 +521,17 @@ class Laid:
         return float(weight_in_mud(self.component, mud, (self.top + self.bottom) / 2))
 
 
+# Length (m) of a part below which a fluid that ends beside the end of a component ends there.
+_SLIVER = 1e-4
+
+
 def in_columns(laid, mud):
     """Components in their places, from the bit up, cut where a fluid gives way to another one."""
     cuts = [] if mud is None else mud.interfaces[::-1].tolist()
     found = []
     for place in laid:
-        inside = [x for x in cuts if place.top < x < place.bottom and place.component.weight is None]
+        shared = place.component.weight is None
+        inside = [x for x in cuts if shared and place.top + _SLIVER < x < place.bottom - _SLIVER]
         found += [Laid(top, bottom, place.component) for bottom, top in pairwise([place.bottom, *inside, place.top])]
     return found
 

@@ -251,7 +251,8 @@ class Steady:
         if walls is None:
             speed = weight = None
         if (speed, weight) not in self._guides:
-            rates, scene = walls and walls.rates(speed, self.sliding), self.scene
+            of_bit = self.speed_of_bit(speed, weight) if walls and self.scene.turned else None
+            rates, scene = walls and walls.rates(speed, self.sliding, of_bit), self.scene
             turns, moves = self.cuts or self.kind == "torsion", self.cuts or self.kind == "axial"
             found = turns and torsional(scene, rates), moves and axial(scene, rates)
             self._guides = {(speed, weight): tuple(x for x in found if x)}  # of the last case alone

@@ -50,18 +50,19 @@ class WallDashpots:
                 start = k
         return found
 
-    def rates(self, speed, sliding):
+    def rates(self, speed, sliding, of_bit=None):
         """[[(length, torsional, axial rate)]] of the pieces in each segment (m, 1/s), at a speed of rotation (rad/s)
-        and along the hole (m/s).
+        and along the hole (m/s); of_bit: speed of what turns with the bit below a motor.
 
         Raises:
             SceneError: the string is at rest, or it slides and rotates at once.
         """
         law, found = self._law, []
-        for segment, pieces in zip(self.scene.segments, self.pieces, strict=True):
-            row = []
+        above = len(self.scene.segments) - len(self.scene.turned)
+        for k, (segment, pieces) in enumerate(zip(self.scene.segments, self.pieces, strict=True)):
+            row, turning = [], speed if k < above else of_bit
             for length, load, radius in pieces:
-                around, along = self._dashpots(law, speed, abs(sliding), radius) if load else (0.0, 0.0)
+                around, along = self._dashpots(law, turning, abs(sliding), radius) if load else (0.0, 0.0)
                 row.append((length, load * around / segment.rhoJ, load * along / segment.rhoA))
             found.append(row)
         return found
