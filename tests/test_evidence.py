@@ -98,7 +98,10 @@ def test_sanitizers_find_what_is_read_out_of_bounds(tmp_path, monkeypatch):
         "    assert lib.third(ffi.new('double[]', [1.0, 2.0, 3.0]), n) == 3\n"
     )
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "none"))
-    assert sanitizers.main([f"{test}::test[2]"], tmp_path / "out") [0] == 0
+    code, said = sanitizers.main([f"{test}::test[2]"], tmp_path / "out")
+    if code < 0 and "Sanitizer" not in said:
+        pytest.skip(f"Python ends by signal {-code} with this compiler's libraries of the sanitizers")
+    assert code == 0, said
     code, said = sanitizers.main([f"{test}::test[3]"], tmp_path / "out")
     assert code and "heap-buffer-overflow" in said and "third.c:1 in third" in said
 

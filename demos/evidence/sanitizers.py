@@ -77,4 +77,6 @@ def main(arguments, out=ROOT / "out" / "sanitized"):
 if __name__ == "__main__":
     code, said = main(sys.argv[1:])
     print(said)
+    if code < 0:
+        print(f"Python ended by signal {-code}: an error above, or libraries of the sanitizers that do not fit it.")
     sys.exit(code)
