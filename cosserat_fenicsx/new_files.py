@@ -14,12 +14,13 @@ class NotWritten(OSError):
 
 
 @contextlib.contextmanager
-def replaced(file):
+def replaced(file, each_process=False):
     """Context manager: the name of a new file of the same ending, in the same folder, which is made; it replaces `file`
     at the end, or is removed where the block fails. A special file, such as a pipe, is written to directly.
-    `NotWritten` where it cannot be written."""
+    `NotWritten` where it cannot be written. each_process: whether several may write the same at once, each its own new
+    file."""
     file = Path(os.path.realpath(file))
-    fresh = file.with_name(f"{file.stem}.new{file.suffix}")
+    fresh = file.with_name(f"{file.stem}.new{os.getpid() if each_process else ''}{file.suffix}")
     if file.exists() and not file.is_file():
         fresh = file
     try:

@@ -16,6 +16,7 @@ from typing import Any
 from cosserat_fenicsx.checks import File, refuse, store
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.files.toml import place_of, text_and_tables, to_toml
+from cosserat_fenicsx.new_files import replaced
 from cosserat_fenicsx.parts import Part, Reading, made, misplaced, schema, to_data, use
 from cosserat_fenicsx.scene.sections import Material
 from cosserat_fenicsx.storage.store import read as stored
@@ -103,7 +104,9 @@ def write(scene: Part, file: File) -> None:
     Raises:
         NotData: a function written in Python, or a class that is known by no name.
     """
-    Path(file).write_text(to_toml(to_data(scene, whole=False)), encoding="utf-8")
+    text = to_toml(to_data(scene, whole=False))
+    with replaced(file, each_process=True) as fresh:
+        fresh.write_text(text, encoding="utf-8")
 
 
 def schema_of_files() -> dict:
