@@ -52,6 +52,7 @@ def test_auto_goes_on_to_the_rod_and_says_why(out):
     )
 
 
+@pytest.mark.serial
 @pytest.mark.parametrize("model, told", [("auto", "error in the hook load exceeds tol = 0.0001: "), ("rod", "")])
 def test_what_is_about_to_be_done_is_said_before_a_long_run(model, told, monkeypatch, capsys):
     asked = hole(build()), STRING, cf.well.TripOut(weight=-50e3)
