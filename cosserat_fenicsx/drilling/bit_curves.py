@@ -10,7 +10,7 @@ from functools import cached_property
 from typing import Annotated
 
 import numpy as np
-from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
+from scipy.interpolate import PchipInterpolator
 
 from cosserat_fenicsx.checks import finite_array, number, refuse
 from cosserat_fenicsx.drilling.bit_laws import BitLaw, EndCondition, EndForce
@@ -79,10 +79,7 @@ class TableLaw(BitLaw):
         loads = np.array(self.weights or [0.0])
         values = np.reshape(self.torques, (len(loads), len(self.speeds))).T
         rise = PchipInterpolator(loads, values, axis=1).derivative()(loads) if self.weights else np.zeros_like(values)
-        splines = [PchipInterpolator(self.speeds, x) for x in (values, rise)]
-        splines = [
-            CubicHermiteSpline(x.x, y, x.derivative()(x.x)) for x, y in zip(splines, (values, rise), strict=True)
-        ]
+        splines = (PchipInterpolator(self.speeds, x) for x in (values, rise))
         return Surface(loads, *splines, np.array([values[0], rise[0]]))
 
     def torque(self, speed, weight):

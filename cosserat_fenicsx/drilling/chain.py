@@ -151,8 +151,7 @@ def _chain_of_string(drilling, dt, elements, axial):
     def of(name):
         return np.array([getattr(s, name) for s in segments])[which]
 
-    drag, damping_time = drilling.drag, of("damping_time")
-    rates = (0.0, 0.0) if drag is None else (drag.axial, drag.torsion)
+    damping_time, rates = of("damping_time"), drilling.drag_rates
     kinds = [("rhoA", "EA", rates[0])] * axial + [("rhoJ", "GJ", rates[1])]
     columns = []
     for d, (inertia, stiffness, rate) in enumerate(kinds):

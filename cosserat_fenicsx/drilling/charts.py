@@ -182,17 +182,8 @@ def _panels(history, rows):
 
 
 #: Colours of the ledger; styles by the beginnings of its names.
-_COLOURS = (
-    "tab:blue",
-    "tab:orange",
-    "tab:green",
-    "tab:olive",
-    "tab:cyan",
-    "tab:red",
-    "tab:brown",
-    "tab:purple",
-    "tab:gray",
-)
+_COLOURS = ("tab:blue", "tab:orange", "tab:green", "tab:olive", "tab:cyan", "tab:red", "tab:brown", "tab:purple",
+            "tab:gray")  # fmt: skip
 _STYLES = {"work": "--", "lost": ":"}
 # A chart with more oscillations of the bit than this shows the bands between their extremes.
 _SWINGS = 80

@@ -87,9 +87,8 @@ class AxialTorsional(StringModel):
         controls = [scene.drive.control, scene.hook and self._axial and scene.hook.autodriller]
         periods = [divided(x, self.dt, dt is not None) for x in controls if x]
         period = min((x for x in periods if x), default=None)
-        if dt is None and not scene.drive.control.sampled:
-            Z = None if scene.discs else scene.segments[0].torsional_impedance
-            self.dt = step_for(scene.drive.control.gains(Z), self.dt)
+        if dt is None and self._gains:
+            self.dt = step_for(self._gains, self.dt)
         if period:
             self.dt = period / max(2, math.ceil(period / self.dt * (1 - 1e-9)))
             dt = dt and self.dt
@@ -194,14 +193,13 @@ class AxialTorsional(StringModel):
         return hook.signal()
 
     def _set_drive(self, drive):
-        top, segments = self._m.top[self._dofs - 1], None if self.scene.discs else self.scene.segments
+        top = self._m.top[self._dofs - 1]
         top.inertia = drive.inertia
         self._kept["mass"][0, -1] += drive.inertia
         if drive.control.sampled:
             top.rigid = drive.control.of_speed
         else:
-            gains = drive.control.gains(segments and segments[0].torsional_impedance)
-            top.rigid, top.given, top.proportional, top.integral, self._space = gains
+            top.rigid, top.given, top.proportional, top.integral, self._space = self._gains
             if self._space is not None:
                 top.rigid = self._space.of_speed and drive.control.late > 0
                 self._set_linear(self._m.control, drive, self._space, None)

@@ -384,8 +384,8 @@ class _Problem:
                 )
         if found.misfit > _BAD:
             yield (
-                f"misfit {found.misfit:.3g} where 1 is as the noise says: the numbers are not to be relied on: expected "
-                "other unknowns, a scene closer to the rig, or the clock of the readings (clock=None finds it)"
+                f"misfit {found.misfit:.3g} where 1 is as the noise says: the numbers are not to be relied on: "
+                "expected other unknowns, a scene closer to the rig, or the clock of the readings (clock=None finds it)"
             )
         for i, name in enumerate(names):
             if found.values[i] < 1e-6 or found.values[i] > 1 - 1e-6:

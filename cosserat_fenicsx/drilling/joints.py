@@ -39,19 +39,20 @@ class Joint:
     force: ScalarSignal
 
 
-def joints_of(laid) -> tuple[Joint, ...]:
-    """The `Joint`s of components in their places, from the top down.
+def joints_of(laid, bottoms) -> tuple[Joint, ...]:
+    """The `Joint`s of components in their places, from the top down; bottoms: measured depths of the lower ends of the
+    segments, in which fluids may cut components.
 
     Raises:
         SceneError: more than one motor.
     """
     found = []
-    for k, place in enumerate(reversed(laid)):
-        tool = place.component
+    for place in reversed(laid):
+        tool, k = place.component, bottoms.index(place.bottom)
         if isinstance(tool, MudMotor):
             found.append(Joint(tool, k, True, 0.0, tool.slope, _stall(tool)))
         if isinstance(tool, OscillationTool):
-            if k == len(laid) - 1:
+            if place is laid[0]:
                 refuse("DrillString", "components", tool.name, f"a component below {tool.name}, which it shakes")
             found.append(Joint(tool, k, False, tool.spring, 0.0, ScalarSignal(tool, "force", tool, "N")))
     motors = [x.tool.name for x in found if x.turns]
@@ -93,8 +94,7 @@ def speed_of_bit(scene, turning, down=None):
     motor, bit = scene.motor, scene.bit
     if motor is None:
         return turning
-    rate = 0.0 if scene.drag is None else scene.drag.torsion
-    drag, stall = rate * sum(x.rhoJ * x.length for x in scene.turned), motor.stall_torque()
+    drag, stall = scene.drag_rates[1] * scene.turned_inertia, motor.stall_torque()
 
     def excess(om):
         velocity = bit.law.rate(bit.resting, om) if down is None and bit.law.drills else down or 0.0

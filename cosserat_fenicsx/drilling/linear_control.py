@@ -186,7 +186,7 @@ def check_late(control: DriveControl, space: StateSpace | None, impedance: float
                "fast torques by as much as they are or more, and motions of all frequencies grow")  # fmt: skip
 
 
-def check_step(control: DriveControl, answer: float, dt: float) -> None:
+def check_answer(control: DriveControl, answer: float, dt: float) -> None:
     """Refuse a step dt (s) in which a control answers to the mean torque by a factor `answer` of 1 or more.
 
     Raises:

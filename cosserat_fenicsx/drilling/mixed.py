@@ -135,8 +135,8 @@ def mixed_scene(drilling: Drilling, depth: float | None = None) -> MixedScene:
 
     Args:
         drilling: a `Drilling` with a `DrillString`.
-        depth: measured depth of the rod's upper end, m or text, such as "9800 ft"; None for the lower end of the lowest `DrillPipe`. A joint or
-            two of pipe above, such as 30.0, leave a rod for the whole string.
+        depth: measured depth of the rod's upper end, m or text, such as "9800 ft"; None for the lower end of the lowest
+            `DrillPipe`. A joint or two of pipe above, such as 30.0, leave a rod for the whole string.
 
     Returns:
         MixedScene.

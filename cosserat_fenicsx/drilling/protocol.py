@@ -5,6 +5,7 @@ x runs along the string from the top drive down. Angles and rotation are positiv
 hanging equilibrium; tension is positive. Models of torsion alone record NaN for axial quantities.
 """
 
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,7 @@ import numpy as np
 from cosserat_fenicsx.algebra.building import Pointers
 from cosserat_fenicsx.checks import refuse
 from cosserat_fenicsx.drilling.laws import SOURCES
-from cosserat_fenicsx.drilling.linear_control import arrays_of, check_late, check_step, steady_control
+from cosserat_fenicsx.drilling.linear_control import arrays_of, check_answer, check_late, steady_control
 from cosserat_fenicsx.drilling.signals import means
 from cosserat_fenicsx.drilling.top_drive import Sample, Sampler
 from cosserat_fenicsx.errors import NotConverged
@@ -75,6 +76,13 @@ class StringModel(Pointers):
             self._samplers["drive"] = Sampler(control, name, self.dt, drive.signal(), first)
             self._given()
 
+    @cached_property
+    def _gains(self):
+        """The `Gains` of the drive's control; None of one that is sampled."""
+        scene, control = self.scene, self.scene.drive.control
+        Z = None if scene.discs else scene.segments[0].torsional_impedance
+        return None if control.sampled else control.gains(Z)
+
     def _set_linear(self, record, drive, space, impedance):
         """Fill C's record of a linear control, a `StateSpace`, for steps of `dt`, at rest; impedance (N m s/rad): of
         the waves below the drive, None above a body."""
@@ -86,12 +94,11 @@ class StringModel(Pointers):
         for name, values in (("A", A), ("B", B), ("C", C), ("D", D), ("state", np.zeros(n)), ("mean", np.zeros(n)),
                              ("waiting", np.zeros(late + 1)), ("work", np.zeros((n, 2 * n)))):  # fmt: skip
             self._array(record, name, values)
-        if not (late or space.of_speed):
-            x = np.linalg.solve(np.eye(n) - self.dt / 2 * A, B[:, 1])
-            check_step(drive.control, float(D[1] + self.dt / 2 * C @ x), self.dt)
-        if space.of_speed and not late and impedance is not None:
-            own, answer = D + self.dt / 2 * C @ np.linalg.solve(np.eye(n) - self.dt / 2 * A, B)
-            if answer > 0 and impedance - (1 + own) / answer < 0:
+        if not late:
+            own, answer = (D + self.dt / 2 * C @ np.linalg.solve(np.eye(n) - self.dt / 2 * A, B)).tolist()
+            if not space.of_speed:
+                check_answer(drive.control, answer, self.dt)
+            elif impedance is not None and answer > 0 and impedance - (1 + own) / answer < 0:
                 refuse("simulate", "dt", self.dt, "a shorter step (s): in this one the speed of the drive rises with "
                        "the torque on it; or model='axial and torsional'")  # fmt: skip
 

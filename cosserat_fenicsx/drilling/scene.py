@@ -121,10 +121,7 @@ class Drilling(InWords, Part):
     @cached_property
     def joints(self) -> tuple[Joint, ...]:
         """Where tools part the string, from the top down."""
-        if self.discs:
-            return ()
-        ends, down = [place.bottom for place in self.places], self.laid[::-1]  # components are cut between fluids
-        return tuple(replace(x, segment=ends.index(down[x.segment].bottom)) for x in joints_of(self.laid))
+        return () if self.discs else joints_of(self.laid, [place.bottom for place in self.places])
 
     @cached_property
     def motor(self):
@@ -136,6 +133,16 @@ class Drilling(InWords, Part):
         """The parts below a motor, which turn with the bit; none without one."""
         parted = [x.segment for x in self.joints if x.turns]
         return self.segments[parted[0] + 1 :] if parted else ()
+
+    @cached_property
+    def turned_inertia(self) -> float:
+        """Of the parts below a motor, kg m^2."""
+        return math.fsum(x.rhoJ * x.length for x in self.turned)
+
+    @property
+    def drag_rates(self) -> tuple[float, float]:
+        """Rates of drag along the axis and of torsion, 1/s."""
+        return (0.0, 0.0) if self.drag is None else (self.drag.axial, self.drag.torsion)
 
     @property
     def bit_inertia(self) -> float:

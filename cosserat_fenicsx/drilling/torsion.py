@@ -156,21 +156,8 @@ def _long_enough(parts, dt):
 
 
 # Numbers of C that change in a step.
-_NUMBERS = (
-    "bit_angle",
-    "turned",
-    "last_turned",
-    "tools",
-    "drive_speed",
-    "integral",
-    "bit_speed",
-    "last_on_bit",
-    "work",
-    "at_bit",
-    "at_wall",
-    "in_mud",
-    "iterations",
-)
+_NUMBERS = ("bit_angle", "turned", "last_turned", "tools", "drive_speed", "integral", "bit_speed", "last_on_bit",
+            "work", "at_bit", "at_wall", "in_mud", "iterations")  # fmt: skip
 
 
 class TorsionWaves(StringModel):
@@ -202,7 +189,7 @@ class TorsionWaves(StringModel):
         self.scene, self.normal_force = scene, normal_force
         self._law = None if scene.bit is None else scene.bit.law.resistance(scene.bit.most)
         self._wall = law_of(scene.friction)[0]
-        drag = 0.0 if scene.drag is None else scene.drag.torsion
+        _, drag = scene.drag_rates
         self._parts = scene.segments[: len(scene.segments) - len(scene.turned)]
         time = math.fsum(x.length / x.torsional_speed for x in self._parts)
         if dt is not None:
@@ -213,9 +200,8 @@ class TorsionWaves(StringModel):
         asked = dt = dt or time / min(max(scene.bit_depth / _SET.length, _SET.fewest), _SET.cells)
         period = divided(scene.drive.control, dt, given)
         dt = min(dt, period / 2) if period else dt
-        if not scene.drive.control.sampled:
-            self._gains = scene.drive.control.gains(scene.segments[0].torsional_impedance)
-            dt = dt if given else step_for(self._gains, dt)
+        if self._gains and not given:
+            dt = step_for(self._gains, dt)
         if time / dt > _SET.most:
             refuse(
                 "TorsionWaves", "dt", dt, f"at least {1 / _SET.most:g} of the travel time of the string, {time:.4g} s"
@@ -274,7 +260,7 @@ class TorsionWaves(StringModel):
     @property
     def _bit_inertia(self):
         """Of bit, rotor, and the parts below a motor, which turn as one body, kg m^2."""
-        return self.scene.bit_inertia + math.fsum(x.rhoJ * x.length for x in self.scene.turned)
+        return self.scene.bit_inertia + self.scene.turned_inertia
 
     def _reasons(self, asked):
         cells, scene = self.cells, self.scene
@@ -344,8 +330,7 @@ class TorsionWaves(StringModel):
         c.bit_inertia = self._bit_inertia
         if scene.motor is not None:
             c.slope = scene.motor.slope
-            rate = 0.0 if scene.drag is None else scene.drag.torsion
-            c.dragged = rate * math.fsum(x.rhoJ * x.length for x in scene.turned)
+            c.dragged = scene.drag_rates[1] * scene.turned_inertia
         self._laws = [InC(self._ffi, self._wall)]
         self._laws[0].fill(c.wall)
         if self._law is not None and self._law.function is not None:

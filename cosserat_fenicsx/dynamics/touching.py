@@ -277,8 +277,7 @@ class _Polygons:
             return np.zeros((len(s), 3))
 
         _, *self._of = scene.rod_contact.polygons(scene.rods, at)
-        parts = (np.concatenate(part) for part in (weights, rows, columns))
-        weights, rows, columns = parts
+        weights, rows, columns = (np.concatenate(part) for part in (weights, rows, columns))
         nodes = p * starts[-1] + len(layout.counts)
         self._matrix = csr_array((weights, (rows, columns)), shape=(count, nodes))
         self._radius, self._seen = self._of[2].min(), None

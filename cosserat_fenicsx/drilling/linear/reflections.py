@@ -32,7 +32,8 @@ class FedWaves(NamedTuple):
         return (
             f"the drive sends waves of {self.low:.3g} to {self.high:.3g} Hz back larger than they come, by more than "
             f"the string loses: those of {self.fastest:.3g} Hz grow by about {self.growth:.2g} 1/s. A longer filter or "
-            f"a shorter delay of its control helps; stability(..., up_to={math.ceil(1.2 * self.fastest)}) has the fastest"
+            "a shorter delay of its control helps; "
+            f"stability(..., up_to={math.ceil(1.2 * self.fastest)}) has the fastest"
         )
 
 
@@ -43,14 +44,16 @@ def fed_waves(scene, above: float = 0.0) -> FedWaves | None:
     if scene.discs:
         return None
     try:
+        Z = scene.segments[0].torsional_impedance
+        gains = control.gains(Z)
+        rates = [] if gains.linear is None else [*np.abs(np.linalg.eigvals(arrays_of(gains.linear)[0]))]
+        rates += [1 / control.late] if control.late else []
+        if not rates:  # of most controls
+            return None
         guide = torsional(scene)
     except SceneError:  # a control without gains
         return None
-    Z = guide.parts[0].impedance
-    gains = control.gains(Z)
-    rates = [] if gains.linear is None else [*np.abs(np.linalg.eigvals(arrays_of(gains.linear)[0]))]
-    rates += [1 / control.late] if control.late else []
-    lowest, highest = max(above, _LOWEST / guide.travel), _HIGHEST * max(rates, default=0.0)
+    lowest, highest = max(above, _LOWEST / guide.travel), _HIGHEST * max(rates)
     if lowest >= highest:
         return None
     f = np.geomspace(lowest, highest, _SAMPLES)
