@@ -72,7 +72,8 @@ DIMENSIONS = {
     "angular velocity": Dimension("rad/s", {"rad/s": 1.0, **_same(units.rpm, "rpm", "RPM", "1/min")}, "rpm", 1e5),
     "pressure": Dimension(
         "Pa", {**_same(1.0, "Pa", "N/m^2"), "kPa": units.kPa, "MPa": units.MPa, "GPa": units.GPa,
-               "bar": units.bar, "psi": units.psi, "ksi": units.ksi, **_same(units.kPa, "kN/m^2", "kN/m2"), **_same(1e4 * units.kPa, "kN/cm^2", "kN/cm2"),
+               "bar": units.bar, "psi": units.psi, "ksi": units.ksi, **_same(units.kPa, "kN/m^2", "kN/m2"),
+               **_same(1e4 * units.kPa, "kN/cm^2", "kN/cm2"),
                **_same(units.MPa, "N/mm^2", "N/mm2", "N/mm²", "MN/m^2", "MN/m2"), "N/cm^2": 1e4,
                **_same(units.GPa, "kN/mm^2", "kN/mm2", "kN/mm²"), **_same(1.0, "N/m2", "N/m²")}, "psi", 1e15),
     "angle": Dimension("rad", {"rad": 1.0, **_same(units.deg, "deg", "°")}, "deg"),

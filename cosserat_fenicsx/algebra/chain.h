@@ -217,7 +217,8 @@ typedef struct {
     const double *start, *move_weight; /* (numbers,) a point of the fine mesh at rest; what is added to it: numbers of */
     const int *move_to, *move_from; /* the coarse state, each (moves,): unknowns of the nodes, then n at Gauss points */
     double length, held[2];         /* longest rod; force and moment that actions without stress would need */
-    double ahead, far, of_ends, safety, safety_below, asymptotic, nothing, still, least_moment, vanishing, rounding, noise;
+    double ahead, far, of_ends, safety, safety_below, asymptotic, nothing, still, least_moment, vanishing, rounding;
+    double noise;
     double resolved, tol, in_layer, turned;
     query *query;
 } comparison;

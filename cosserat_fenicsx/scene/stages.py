@@ -144,8 +144,8 @@ def refuse_stages(owner, scene):
     if scene.stages:
         raise SceneError(
             f"Scene.stages: {owner} knows no stages: expected `solve`, whose path.events tell where a stage loses its "
-            "stability (also beyond its loads, Stage(load_factors=(0, 5))), path.part(stage).modes() for vibrations, or "
-            "the scene without stages, dataclasses.replace(scene, stages=())"
+            "stability (also beyond its loads, Stage(load_factors=(0, 5))), path.part(stage).modes() for vibrations, "
+            "or the scene without stages, dataclasses.replace(scene, stages=())"
         )
 
 

@@ -446,8 +446,8 @@ class TorqueAndDrag(Differentiated, Result):
         return most_weight_of(self, grade, wear, safety, buckling, model, progress)
 
     def of_flexible(self, operation, model, solved):
-        """The `TorqueAndDrag` of the same string with another operation and what was found for it, of a flexible string;
-        its estimates of errors are those of this one."""
+        """The `TorqueAndDrag` of the same string with another operation and what was found for it, of a flexible
+        string; its estimates of errors are those of this one."""
         given = {field.name: getattr(self, field.name) for field in fields(TorqueAndDrag)}
         return TorqueAndDrag(**{**given, "operation": operation, "model": model, "solved": solved})
 

@@ -11,8 +11,8 @@ lean on, h how far a joint stands out from the body:
              the span, s long, with A = K: its two integrals give B and s
 
 In compression, k = i q: K q L/sin(q L) in the middle, up to q L = pi/2, where a span with hinges buckles. The weight of
-the span is left out. A. Lubinski, J. Petr. Technol. 13 (1961) 175, doi:10.2118/1543-G-PA; P. R. Paslay & E. Y. Cernocky,
-SPE 22547 (1991), doi:10.2118/22547-MS.
+the span is left out. A. Lubinski, J. Petr. Technol. 13 (1961) 175, doi:10.2118/1543-G-PA; P. R. Paslay &
+E. Y. Cernocky, SPE 22547 (1991), doi:10.2118/22547-MS.
 """
 
 from collections import namedtuple
@@ -90,8 +90,8 @@ def bending_between_joints(pipe: StringPart, tension: float, curvature: float) -
     found = bent(EI, half, gap, np.array(tension), np.array(curvature))
     if found.mode == UNKNOWN:
         raise SceneError(
-            f"{who}: tension = {tension:g} N: with this compression the body of {pipe.name} touches the wall or buckles "
-            f"between its joints, {2 * half:g} m apart: expected less compression, or solve the rod in contact, "
+            f"{who}: tension = {tension:g} N: with this compression the body of {pipe.name} touches the wall or "
+            f"buckles between its joints, {2 * half:g} m apart: expected less compression, or solve the rod in contact, "
             "torque_and_drag(..., model='rod'), with the joints as rings: Centraliser(spacing, diameter)"
         )
     mode, joint, middle, deviation, force = (float(x) for x in found)

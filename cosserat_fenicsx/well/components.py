@@ -7,8 +7,8 @@ Standard sizes are in standard_sizes.csv. Drill pipe: bodies of API Spec 5DP (IS
 them of API RP 7G, for new grade E75 pipe with the connection named, which other grades and connections exceed by up to
 a tenth. Casing: API Spec 5CT (ISO 11960), nominal weights with threads and couplings; its inner diameter is that of the
 body, which the drift diameter is less than. Drill collars: number, outer diameter and bore of API Spec 7-1 (ISO
-10424-1); of those with two bores the larger one. Heavy-weight pipe: Drilco's Hevi-Wate; other makes differ by about 1 %. Sizes
-without a weight have the weight of the plain section.
+10424-1); of those with two bores the larger one. Heavy-weight pipe: Drilco's Hevi-Wate; other makes differ by about
+1 %. Sizes without a weight have the weight of the plain section.
 """
 
 import csv
@@ -198,8 +198,8 @@ class Component(_Bendable):
         weight: in mud, N/m.
         contact_radius: where it touches the wall, m: of the tool joints, if it has any.
         name: in tables.
-        damping_time: of Kelvin and Voigt, s: torques and forces along the string grow by it times the rates of twist and
-            stretch; a mode of the frequency f gets the damping ratio pi f times it.
+        damping_time: of Kelvin and Voigt, s: torques and forces along the string grow by it times the rates of twist
+            and stretch; a mode of the frequency f gets the damping ratio pi f times it.
         bend, bend_at, tool_face: as of `Collar`.
 
     Raises:

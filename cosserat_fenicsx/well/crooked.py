@@ -12,7 +12,7 @@ from cosserat_fenicsx.parts import Length, Number, Part, at_least, between
 from cosserat_fenicsx.units import deg_per_30m
 from cosserat_fenicsx.well.path import WellPath
 
-# Stations a period, and nodes a period of random numbers; most stations; degrees per 30 m that no plan is made worse by.
+# Stations a period, and nodes a period of random numbers; most stations; degrees per 30 m above which is warned.
 _STATIONS, _NODES, _MOST, _STEEP = 12, 2, 200_000, 20.0
 
 

@@ -195,8 +195,8 @@ def most_weight_of(answer, grade, wear, safety, buckling, model, progress=None):
     high, least = float(answer.pieces.weight @ (answer.pieces.bottom - answer.pieces.top)), soft(0.0)
     if not 0 < least.hook_load < np.inf:
         raise SceneError(
-            f"{who}: the string cannot go down by its own weight even without weight on bit: expected less friction, or "
-            "heavier pipe in the upper part"
+            f"{who}: the string cannot go down by its own weight even without weight on bit: expected less friction, "
+            "or heavier pipe in the upper part"
         )
     # up to the first helix the buckled string is the soft one
     high = _first_zero(lambda w: soft(w).hook_load, 0.0, high)

@@ -194,8 +194,8 @@ def build_rate(
     turning = [place.component.name for place in laid if place.component.bend] if operation.direction(1.0)[1] else []
     if turning:
         why.append(
-            f"ONE MOMENT of a turn: {' and '.join(turning)} rotates, and its bend with it: the rates are those of a string "
-            "that slides"
+            f"ONE MOMENT of a turn: {' and '.join(turning)} rotates, and its bend with it: the rates are those of a "
+            "string that slides"
         )
     return BuildRate(np.array([*rates, three]), tuple(why), anisotropy, straight.side_force, straight.tilt,
                      tuple(straight.contacts), _LOOKED_FOR, side_force, tilt, beam)  # fmt: skip

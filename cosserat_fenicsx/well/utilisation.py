@@ -323,8 +323,8 @@ class Utilisation(Result):
 
     def plot(self, file: File | None = None, between: tuple[float, float] | None = None, *, units: Any = "SI",
              width: int | None = None):  # fmt: skip
-        """Draw the string in its hole, its utilisation, tension with what it may be, and the dogleg of the hole with what
-        is allowed, depth downwards.
+        """Draw the string in its hole, its utilisation, tension with what it may be, and the dogleg of the hole with
+        what is allowed, depth downwards.
 
         Args:
             file, between, units, width: see `TorqueAndDrag.plot`.
