@@ -86,27 +86,40 @@ def test_the_tables_of_api(grade, wear):
     assert found == pytest.approx(API[grade, wear], abs=0.7)
 
 
-#: Casing by API Bulletin 5C2 (21st edition, 1999: collapse and internal yield, psi, rounded to 10) and API
-#: Spec 5CT (drift, in), at a yield strength (psi). Written from memory of these tables, not compared with a copy.
+#: Casing (diameter, lb/ft), yield strength (psi), collapse and internal yield (psi, rounded to 10). 4 1/2 in: the casing
+#: data table on engineersedge.com (13213); 7 and 9 5/8 in: the catalogue in rep/roque1996.xlsx of the public repository
+#: lcsgouveia/casing_selection (3cb96f0), which has 7930 psi, 20 psi less than the formula, for 53.50 of 110e3 psi.
 CASINGS = {
-    "4 1/2 in 11.60": (80e3, 6350, 7780, 3.875), "5 1/2 in 17.00": (80e3, 6290, 7740, 4.767),
-    "5 1/2 in 20.00": (110e3, 11100, 12640, 4.653), "7 in 26.00": (55e3, 4330, 4980, 6.151),
-    "7 in 29.00": (110e3, 8530, 11220, 6.059), "9 5/8 in 36.00": (55e3, 2020, 3520, 8.765),
-    "9 5/8 in 47.00": (80e3, 4750, 6870, 8.525), "9 5/8 in 53.50": (110e3, 7950, 10900, 8.379),
-    "13 3/8 in 54.50": (55e3, 1130, 2730, 12.459), "13 3/8 in 68.00": (55e3, 1950, 3450, 12.259),
-    "13 3/8 in 72.00": (80e3, 2670, 5380, 12.191), "20 in 94.00": (55e3, 520, 2110, 18.936),
+    "4 1/2 in 9.50": (55e3, 3310, 4380), "4 1/2 in 10.50": (55e3, 4010, 4790), "4 1/2 in 11.60": (80e3, 6350, 7780),
+    "7 in 23.00": (80e3, 3830, 6340), "7 in 26.00": (55e3, 4320, 4980), "7 in 29.00": (110e3, 8530, 11220),
+    "7 in 32.00": (80e3, 8610, 9060), "9 5/8 in 36.00": (55e3, 2020, 3520), "9 5/8 in 40.00": (80e3, 3090, 5750),
+    "9 5/8 in 43.50": (80e3, 3810, 6330), "9 5/8 in 47.00": (80e3, 4750, 6870), "9 5/8 in 53.50": (80e3, 6620, 7930),
 }  # fmt: skip
 
 
 @pytest.mark.parametrize("name", CASINGS)
-def test_casing_sizes_bear_what_api_says(name):
-    size, (strength, collapse, burst, drift) = standard_size("Casing", name), CASINGS[name]
+def test_casing_bears_what_tables_say(name):
+    size, (strength, collapse, burst) = standard_size("Casing", name), CASINGS[name]
     outer, inner = size["outer_diameter"], size["inner_diameter"]
     pipe = W.PipeStrength(W.DrillPipe(outer_diameter=outer, inner_diameter=inner), strength * u.psi)
-    assert float(pipe.collapse()) / u.psi == pytest.approx(collapse, abs=10)
+    assert float(pipe.collapse()) / u.psi == pytest.approx(collapse, abs=7)
     assert pipe.burst / u.psi == pytest.approx(burst, abs=6)
-    gap = 1 / 8 if outer < 9.6 * u.inch else 5 / 32 if outer < 13.4 * u.inch else 3 / 16
-    assert inner / u.inch - gap == pytest.approx(drift, abs=6e-4)
+
+
+#: Drift diameters (in) of casing, by src/database/casingsTubings.ts of the public repository VFTHV/wireline_calcs.
+DRIFTS = {
+    "4 1/2 in 11.60": 3.875, "5 1/2 in 17.00": 4.767, "5 1/2 in 20.00": 4.653, "7 in 26.00": 6.151,
+    "7 in 29.00": 6.059, "9 5/8 in 36.00": 8.765, "9 5/8 in 47.00": 8.525, "9 5/8 in 53.50": 8.379,
+    "13 3/8 in 54.50": 12.459, "13 3/8 in 68.00": 12.259, "13 3/8 in 72.00": 12.191,
+}  # fmt: skip
+
+
+def test_casing_is_wider_than_its_drift():
+    """By an eighth of an inch below 9 5/8 in, by 5/32 in from there on: the rule of API Spec 5CT."""
+    for name, drift in DRIFTS.items():
+        size = standard_size("Casing", name)
+        gap = 1 / 8 if size["outer_diameter"] < 9.6 * u.inch else 5 / 32
+        assert size["inner_diameter"] / u.inch - gap == pytest.approx(drift, abs=6e-4)
 
 
 def test_walls_of_casing_are_those_of_api():
