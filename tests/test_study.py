@@ -270,7 +270,7 @@ def test_all_ranks_go_on_with_what_one_has_begun(tmp_path_all):
 
 
 @pytest.mark.ranks
-def test_failures_are_tried_again_where_this_is_asked_for(tmp_path_all):
+def test_failures_are_tried_again_where_this_is_asked_for(tmp_path_all, capsys):
     STOPS.append("nothing")
 
     def task(i):
@@ -282,7 +282,8 @@ def test_failures_are_tried_again_where_this_is_asked_for(tmp_path_all):
     assert [why[:10] for _, why in cf.study(task, cases, folder=tmp_path_all).failures] == ["OSError: 1"] * 2
     STOPS.append("more")
     for retry in (True, False):
-        found = cf.study(task, cases, folder=tmp_path_all, retry=retry)
+        found = cf.study(task, cases, folder=tmp_path_all, retry=retry, progress=True)
+        assert ("study: 4 of 4 cases, 1 failed" in capsys.readouterr().err) == (COMM.rank == 0)
         assert found.results == [0, 1, None, 3] and [why[:10] for _, why in found.failures] == ["OSError: 2"]
     STOPS.clear()
     COMM.barrier()
