@@ -105,10 +105,13 @@ class Strands:
         self.joined = np.flatnonzero(self._next >= 0), self._next[self._next >= 0]
         self._slopes = rule.derivative([0.0, 1.0], 1)
         cubics = [np.polynomial.Polynomial(c) for c in ((0, 1, -2, 1), (0, 0, -1, 1))]
-        self._hermite = np.zeros((3, 2, 4))
+        # of every order: coefficients of powers of 2 x - 1 of an element's basis, and of half of Hermite's slopes
+        many = np.cos(np.pi * (np.arange(max(len(self._nodes), 4)) + 0.5) / max(len(self._nodes), 4))
+        inverse, places = np.linalg.inv(np.vander(many, increasing=True)), (many + 1) / 2
+        self._powers, self._coefficients = np.arange(len(many)), []
         for order in range(3):
-            for k, cubic in enumerate(cubics):
-                self._hermite[order, k, : 4 - order] = cubic.deriv(order).coef if order else cubic.coef
+            slopes = [cubic.deriv(order)(places) / 2 if order else cubic(places) / 2 for cubic in cubics]
+            self._coefficients.append(inverse @ np.column_stack([rule.derivative(places, order), *slopes]))
         self._of = np.repeat(count, _PLACES)
         self._at = np.tile((np.arange(_PLACES) + 0.5) / _PLACES, len(rods))
         self._spacing = sizes.max() / _PLACES
@@ -128,26 +131,39 @@ class Strands:
         return cls(cells, rods, sizes, np.concatenate(starts), radii[rods], rule, apart)
 
     def basis(self, element, place, order=0):
-        """(n, 3 (p + 1)) derivatives of an order of the basis by the place in the element, of `stencil`."""
-        own, slopes = self._rule.derivative(place, order), self._slopes
-        powers = np.vander(place, 4, increasing=True) / 2
-        start, end = powers @ self._hermite[order, 0], powers @ self._hermite[order, 1]
-        before, after = self._before[element], self._next[element]
-        start, end = np.where(before < 0, 0.0, start)[:, None], np.where(after < 0, 0.0, end)[:, None]
-        ratio = self.sizes[element][:, None] / self.sizes[[before, after]][..., None]
-        parts = start * ratio[0] * slopes[1], own - start * slopes[0] - end * slopes[1], end * ratio[1] * slopes[0]
-        return np.concatenate(parts, axis=1)
+        """(n, 3 (p + 1)) derivatives of an order of the basis by the place in the element, of `stencil`; (n, orders, 3
+        (p + 1)) where `order` is a tuple."""
+        orders, slopes, count = order if isinstance(order, tuple) else (order,), self._slopes, len(self._nodes)
+        powers = (2 * place - 1)[:, None] ** self._powers
+        found = np.stack([powers @ self._coefficients[k] for k in orders], axis=1)
+        own, ends = found[..., :count], found[..., count:]
+        beside = np.stack([self._before[element], self._next[element]], axis=1)
+        ends = np.where(beside[:, None] < 0, 0.0, ends)
+        ratio = (self.sizes[element][:, None] / self.sizes[beside])[:, None] * ends
+        parts = ratio[..., :1] * slopes[1], own - ends @ slopes, ratio[..., 1:] * slopes[0]
+        found = np.concatenate(parts, axis=2)
+        return found if isinstance(order, tuple) else found[:, 0]
 
     def at(self, x, element, place, order=0):
-        """(n, 3) position, or its derivative by arc length, for positions x (N, 3) of the nodes."""
+        """(n, 3) position, or its derivative by arc length, for positions x (N, 3) of the nodes; (n, orders, 3) where
+        `order` is a tuple."""
+        orders = order if isinstance(order, tuple) else (order,)
         nodes = x[self.stencil[element]]
         first = nodes[:, :1]  # subtracted for the sake of rounding
-        values = np.einsum("nj,nji->ni", self.basis(element, place, order), nodes - first)
-        return values / self.sizes[element][:, None] ** order if order else values + first[:, 0]
+        values = self.basis(element, place, orders) @ (nodes - first)
+        values /= self.sizes[element][:, None, None] ** np.array(orders)[:, None]
+        if 0 in orders:
+            values[:, orders.index(0)] += first[:, 0]
+        return values if isinstance(order, tuple) else values[:, 0]
 
     def s(self, element, place):
         """(n,) arc lengths."""
         return self.starts[element] + self.sizes[element] * place
+
+    def place_of(self, touches, k, length):
+        """[(rod, arc length in units of 1/length)] of both points of the pair k."""
+        return [(self.rods[e], self.s(e, a) * length)
+                for e, a in zip(touches.element[k], touches.place[k], strict=True)]  # fmt: skip
 
     def _may_touch(self, first, second):
         (e, a), (f, b) = first, second
@@ -176,7 +192,8 @@ class Strands:
         slides = np.ones((len(e), 2), dtype=bool)
         for step in range(_STEPS):
             both = np.concatenate([e, f]), np.concatenate([a, b])
-            (p, q), (t, u), (tt, uu) = (np.split(self.at(x, *both, order), 2) for order in (0, 1, 2))
+            found = self.at(x, *both, (0, 1, 2)).swapaxes(0, 1)
+            (p, t, tt), (q, u, uu) = found[:, : len(e)], found[:, len(e) :]
             w = q - p
             g, k = -np.sum(w * t, axis=1), np.sum(w * u, axis=1)
             G, K = np.sum(t * t - w * tt, axis=1), np.sum(u * u + w * uu, axis=1)
@@ -258,7 +275,7 @@ class Strands:
         return found.of(self._may_touch(*((found.element[:, k], found.place[:, k]) for k in (0, 1))))
 
     def followed(self, x, touches):
-        """The `Touches` next to others, those of positions before."""
+        """The `Touches` next to others, those of other positions."""
         return self._followed(x, touches.element, touches.place, touches.node)
 
     def _followed(self, x, element, place, node):
@@ -271,7 +288,8 @@ class Strands:
 
     def apart(self, x, element, place):
         """(m, 3) vectors from the first to the second points of pairs of places (m, 2), linear in the positions x."""
-        return self.at(x, element[:, 1], place[:, 1]) - self.at(x, element[:, 0], place[:, 0])
+        first, second = np.split(self.at(x, element.T.ravel(), place.T.ravel()), 2)
+        return second - first
 
     def between(self, first, second, share):
         """Elements and places (m, 2) at a share (m,) of the arc lengths from the points of some `Touches` to those of
@@ -344,8 +362,12 @@ class Strands:
     def pulls(self, element, place, direction):
         """(m, n, 3) derivatives of how far apart pairs of places are along directions (m, 3), by the positions of
         `movers`."""
-        first, second = (self.basis(element[:, k], place[:, k]) for k in (0, 1))
+        first, second = self.bases(element, place)
         return np.concatenate([-first, second], axis=1)[..., None] * direction[:, None, :]
+
+    def bases(self, element, place):
+        """(2, m, 3 (p + 1)) `basis` at both points of pairs of places (m, 2)."""
+        return np.stack(np.split(self.basis(element.T.ravel(), place.T.ravel()), 2))
 
     def curvatures(self, x, touches):
         """The second derivatives of the gaps by the positions of `nodes_of`, with the points that slide, as sums of
@@ -430,3 +452,20 @@ def closest_segments(points, rods, s, radii, apart, reach):
     close = gap < reach
     places = [np.c_[rods[side[k]], at][close] for k, at in zip((i, j), where, strict=True)]
     return gap[close], (sag[i] + sag[j])[close], *places
+
+
+def in_words(rods, places, verb):
+    """Two places of rods, (number, arc length in m) each, in words."""
+    (a, s), (b, t) = places
+    return f"rod '{rods[int(a)].name}' at s = {s:.6g} m {verb} rod '{rods[int(b)].name}' at s = {t:.6g} m"
+
+
+def overlap(rods, found, allowed):
+    """Where polygons overlap most beyond depths that are allowed (m, one or one each), in words; "" where they do not.
+    found: of `closest_segments`, in m."""
+    gap, sag, *places = found
+    deep = -(gap + sag) - allowed
+    if not len(gap) or deep.max() <= 0:
+        return ""
+    k = int(np.argmax(deep))
+    return f"{in_words(rods, [place[k] for place in places], 'overlaps')} by {-gap[k]:.3g} m"

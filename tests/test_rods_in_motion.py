@@ -19,12 +19,12 @@ STIFFNESS = 1e8
 POINT = 4 / 3 * STIFFNESS * math.sqrt(4 * RADIUS)
 
 
-def bars(d=(0.0, 0.0), speed=1.0, stiffness=STIFFNESS, bending=1e6, **contact):
+def bars(d=(0.0, 0.0), speed=1.0, stiffness=STIFFNESS, bending=1e6, turning=1e-12, **contact):
     """Two bars that cross at a right angle; the upper one falls at a speed on the lower one, at distances d from both
     middles."""
     rods = []
     for name, m, L, e, along in zip("ab", MASSES, LENGTHS, d, np.eye(3)[:2], strict=True):
-        section = cf.Stiffness((1e8, 1e8), 1e8, (bending,) * 2, bending, mass=m / L, inertia=(1e-12, 1e-12, 2e-12))
+        section = cf.Stiffness((1e8, 1e8), 1e8, (bending,) * 2, bending, mass=m / L, inertia=(turning, turning, 2 * turning))
         middle = np.array((0, 0, 2 * RADIUS + APART)) * (name == "a") - e * along
         curve = cf.Line(tuple(middle - L / 2 * along), tuple(middle + L / 2 * along))
         rods.append(cf.Rod(curve, section, name=name))
@@ -97,10 +97,83 @@ def test_what_motions_need():
 
 def test_a_surface_that_is_too_soft():
     with pytest.raises(
-        cf.NotConverged, match=r"rod 'a' at s = .* enters rod 'b' .*its stiffness is too small"
+        cf.NotConverged, match=r"rod 'a' at s = .* overlaps rod 'b' .*its stiffness is too small"
     ) as found:
         cf.simulate(bars(stiffness=1e4), 0.1, dt=1e-3, elements=1, degree=2)
     assert len(found.value.path)
+
+
+#: kg, m, m/s^2, coefficient of friction
+MASS, ROLLER, GRAVITY, FRICTION = 0.2, 0.01, 9.81, 0.3
+
+
+def on_rails(loads=(), **velocity):
+    """A solid, stiff rod of the radius ROLLER along x, that lies with its weight on two clamped rods along y."""
+    turning = MASS / 0.4 * ROLLER**2 / 4
+    section = cf.Stiffness((1e6,) * 2, 1e6, (1e4,) * 2, 1e4, mass=MASS / 0.4, inertia=(turning, turning, 2 * turning))
+    rails = [cf.Rod(cf.Line((x, -0.1, 0), (x, 0.3, 0)), section, name=name) for name, x in (("a", -0.1), ("b", 0.1))]
+    rod = cf.Rod(cf.Line((-0.2, 0, 2 * ROLLER), (0.2, 0, 2 * ROLLER)), section, name="rod")
+    touch = cf.RodContact(radius=ROLLER, stiffness=1e7, damping=50.0, friction=FRICTION)
+    weight = cf.Force(rod.at(0.2), (0, 0, -MASS * GRAVITY))
+    held = [cf.Clamp(end) for rail in rails for end in (rail.start, rail.end)]
+    loads = [load(rod) for load in loads]
+    return cf.Scene([*rails, rod], held, [touch, weight, *loads], velocities=[cf.InitialVelocity(rod, **velocity)])
+
+
+@pytest.mark.parametrize(("speed", "spin"), [(0.6, 0.0), (0.0, -60.0)], ids=["slides", "spins"])
+def test_a_rod_that_slides_or_spins_begins_to_roll(speed, spin):
+    """Angular momentum about the surface that it rolls on stays: v = (2 v0 - r w0)/3; in sliding the speed changes by
+    mu g t. What friction takes is what is missing."""
+    scene = on_rails(linear=(0, speed, 0), angular=(spin, 0, 0))
+    history = cf.simulate(scene, 0.08, dt=1e-3, elements=1, degree=2)
+    middle = scene.rods[2].at(0.2)
+    v, w = (getattr(history, name)(middle) for name in ("velocity", "angular_velocity"))
+    rolls = (2 * speed - ROLLER * spin) / 3
+    assert v[-8:, 1].mean() == pytest.approx(rolls, rel=1e-2)
+    assert -ROLLER * w[-8:, 0].mean() == pytest.approx(rolls, rel=1e-2)
+    half = int(np.argmin(np.abs(history.times - abs(rolls - speed) / (FRICTION * GRAVITY) / 2)))
+    assert v[half, 1] - speed == pytest.approx(math.copysign(FRICTION * GRAVITY, rolls - speed) * history.times[half],
+                                               rel=0.02)  # fmt: skip
+    assert np.diff(history.dissipated).min() >= 0
+    assert np.abs(history.balance).max() < 2e-6 * history.kinetic[0]
+    lost = MASS * (speed + ROLLER * spin) ** 2 / 6  # that of slip
+    assert history.dissipated[-1] == pytest.approx(lost, rel=0.02)
+
+
+def test_a_rod_sticks_below_the_friction_cone_and_slides_above():
+    """Pulled along its axis by a force that grows to twice friction: it does not creep before, and then moves as
+    c (t - t1)^3/6 with the rate c of the force over the mass, which begins to pull when its share is mu."""
+    rate = 2 * FRICTION * GRAVITY / 0.2  # m/s^3
+    pull = lambda rod: cf.Force(rod.start, lambda t: (MASS * rate * t, 0, 0))  # noqa: E731
+    scene = on_rails([pull])
+    history = cf.simulate(scene, 0.2, dt=1e-3, elements=1, degree=2)
+    x = history.position(scene.rods[2].at(0.2))[:, 0]
+    holds = (history.times > 0.045) & (history.times < 0.095)
+    assert np.ptp(x[holds]) < 2e-7  # it is tilted by the pull and the depths of both contacts
+    assert x[-1] - x[holds][-1] == pytest.approx(rate * 0.1**3 / 6, rel=0.01)
+
+
+def test_a_rod_slides_to_rest(truth):
+    """v^2/(2 mu g) along its axis, of motions in the truths with other numbers."""
+    scene = on_rails(linear=(0.5, 0, 0))
+    history = cf.simulate(scene, 0.2, dt=1e-3, elements=1, degree=2)
+    x = history.position(scene.rods[2].at(0.2))[:, 0]
+    truth("a rod that slides to rest on others, its way", x[-1] - x[0], 0.5**2 / (2 * FRICTION * GRAVITY), 1e-2)
+
+
+@pytest.mark.parametrize("scheme", ["momentum", "energy", "generalised-alpha"])
+def test_friction_between_free_rods(scheme):
+    """It is equal and opposite at one point of space, and takes energy that is booked."""
+    scene = bars((0.1, 0.3), friction=0.4, turning=1e-5)
+    scene = cf.Scene(scene.rods, [], scene.loads, velocities=[
+        cf.InitialVelocity(scene.rods[0], linear=(0.5, -0.3, -1.0), angular=(20.0, 0, 3.0))])  # fmt: skip
+    history = cf.simulate(scene, 3e-3, dt=3e-5, scheme=scheme, elements=1, degree=2)
+    exact = scheme != "generalised-alpha"
+    assert np.ptp(history.linear_momentum, axis=0).max() < (1e-10 if exact else 1e-4) * MASSES[0]
+    assert np.ptp(history.angular_momentum, axis=0).max() < {"momentum": 1e-10, "energy": 1e-6}.get(scheme, 1e-4)
+    assert np.abs(history.balance).max() < (1e-8 if exact else 2e-2) * history.kinetic[0]
+    assert np.diff(history.dissipated).min() >= 0
+    assert history.dissipated[-1] > 0.02 * history.kinetic[0]
 
 
 def closest(history):

@@ -9,9 +9,9 @@ import numpy as np
 
 from cosserat_fenicsx.checks import refuse
 from cosserat_fenicsx.errors import SceneError, nearest
-from cosserat_fenicsx.parts import Length, Number, WallStiffness, at_least
+from cosserat_fenicsx.parts import Friction, Length, Number, WallStiffness, at_least
 from cosserat_fenicsx.scene.action import LineAction
-from cosserat_fenicsx.strands import Apart, closest_segments
+from cosserat_fenicsx.strands import Apart, closest_segments, overlap
 
 # Length of the sides of the polygons that are compared at rest, over the radius; most sides of a rod; depth over the
 # radius that is rounding.
@@ -64,7 +64,7 @@ class Surface:
 
 @dataclass(frozen=True)
 class RodContact(LineAction):
-    """Rods that do not pass through each other or themselves, without friction.
+    """Rods that do not pass through each other or themselves; in motions with Coulomb friction.
 
     It stands among the loads, once in a scene, and is not multiplied by the load factor. Where strands cross at more
     than 11.5 degrees they touch in one point, between the nearest points of both centrelines; otherwise along a line,
@@ -73,7 +73,8 @@ class RodContact(LineAction):
     In `solve` surfaces are hard, without `stiffness`. In `simulate` they have a `stiffness` k: the force of surfaces
     that overlap by a depth p is ``k p`` per length along a line, and in a point ``(4/3) k sqrt(2 (r1 + r2)) p^1.5``,
     which the line's law gives for straight rods that cross at a right angle. Both are multiplied by ``1 + damping p'``,
-    and are never adhesion (Hunt & Crossley 1975, doi:10.1115/1.3423596).
+    and are never adhesion (Hunt & Crossley 1975, doi:10.1115/1.3423596). Friction acts on the surfaces, with a moment
+    about the centrelines.
 
     Args:
         radius: of the rods' surfaces, m; None for that of their sections, which are `Circle` or `Tube`.
@@ -83,6 +84,7 @@ class RodContact(LineAction):
             radius: on less, a rod cannot bend back onto itself without folding its surface.
         stiffness: N/m^2, in motions; None for the hard surfaces of equilibria.
         damping: s/m, over the speed at which surfaces approach.
+        friction: coefficient of Coulomb friction, in motions; surfaces that stick do not slip at all.
 
     Raises:
         SceneError: no radius known, or none that is the same all along a rod; one above the radius of curvature at
@@ -95,6 +97,7 @@ class RodContact(LineAction):
     exclude: Length | None = None
     stiffness: WallStiffness | None = None
     damping: Annotated[float, Number(limits=at_least(0))] = 0.0
+    friction: Friction = 0.0
 
     rod, work, scaled, rods_touch = None, None, False, True
     #: It depends on the positions of rods, and drives them out of planes.
@@ -106,8 +109,9 @@ class RodContact(LineAction):
         for pair in self.pairs or ():
             if len(pair) != 2:
                 refuse(self, "pairs", self.pairs, "two names of rods each")
-        if self.damping and self.stiffness is None:
-            refuse(self, "damping", self.damping, "0 without a stiffness, since hard surfaces have none")
+        for name in ("damping", "friction"):
+            if getattr(self, name) and self.stiffness is None:
+                refuse(self, name, getattr(self, name), "0 without a stiffness, since hard surfaces have none")
 
     def acts_on(self, rod):
         return self.pairs is None or any(rod.name in pair for pair in self.pairs)
@@ -177,15 +181,9 @@ class RodContact(LineAction):
                     f"of curvature at rest, {1 / turns.max():.4g} m: its surface overlaps itself"
                 )
         points = self.polygons(scene.rods, lambda rod, s: rod.curve.position(s))
-        radius = points[3].min()
-        gap, sag, *places = closest_segments(*points, self.apart(scene), 0.0)
-        deep = gap + sag + _NOTHING * radius
-        if len(gap) and deep.min() < 0:
-            k = int(np.argmin(deep))
-            (a, s), (b, t) = (place[k] for place in places)
-            first, second = (scene.rods[int(i)] for i in (a, b))
+        found = closest_segments(*points, self.apart(scene), 0.0)
+        if why := overlap(scene.rods, found, _NOTHING * points[3].min()):
             raise SceneError(
-                f"RodContact: rod '{first.name}' at s = {s:.6g} m overlaps rod '{second.name}' at s = {t:.6g} m by "
-                f"{-gap[k]:.3g} m at rest: expected rods that touch at most, which are farther apart by that; "
+                f"RodContact: {why} at rest: expected rods that touch at most, which are farther apart by that; "
                 "`exclude` is the arc length next to a point, or to a joint, within which rods do not touch"
             )

@@ -80,6 +80,17 @@ typedef struct {
     double missing, omitted;        /* the last of these errors; by it, norm of what the last response leaves out */
 } contact;
 
+/* Contacts of rods with each other in a time step, see pairs.c. Each has a normal force and, with friction, two forces
+   across it; their motions are the gap at the end of the step and two slips in it. */
+typedef struct {
+    int count, parts, most;         /* contacts; 1, or 3 with friction; sweeps */
+    double friction, share, smallest; /* coefficient; changes that end the sweeps, of the first one and of all */
+    const double *compliance;       /* (count parts, count parts) by each unit force all motions */
+    const double *gap, *normal, *slope; /* (count,) the normal force at a gap, and its slope by the depth */
+    double *motion, *force;         /* (count, parts) with the forces */
+    double *multiplier;             /* (count,) of friction at its bound, the last ones */
+} pairs;
+
 /* The equations of a problem. */
 typedef struct {
     kernel *residual, *tangent, *advance; /* the last one, of the carried contact force, or 0 */
@@ -265,6 +276,8 @@ int broken(const contact *c);
 void slips(const contact *c, double *size);
 double stored(const contact *c, int at_start);
 double lost(const contact *c, const double *before);
+
+int settle_pairs(pairs *c);
 
 double step_goal(const step_control *c, double here, double load_factor);
 double step_growth(const step_control *c, double off, int order, int iterations);

@@ -7,14 +7,21 @@ equal. The force of the step acts there: its size is the mean one between both d
 (`Surface.mean_force`), its direction the mean of w at the start and at the end. Then its work is the change of the
 stored energy, exactly, also where contacts slide; and it has no resultant force and no resultant moment.
 
-Newton's method has the tangent of the rods without contact, by whose inverse gaps respond linearly to forces. With it
-the forces of all contacts are found before a step is taken; what is not linear is in the next residual.
+Friction acts across it at one point of space between both, on either rod with its moment about the centreline. Its law
+is set-valued: the slip of the surfaces in the step is zero, or else opposite to a friction at its bound. So what sticks
+does not creep, and the work of friction is never positive.
+
+Newton's method has the tangent of the rods without contact, by whose inverse gaps and slips respond linearly to forces.
+With it the forces of all contacts are found before a step is taken (algebra/pairs.c); what is not linear is in the next
+residual.
 """
 
 import numpy as np
 from scipy.sparse import csr_array
 
-from cosserat_fenicsx.strands import Strands, closest_segments
+from cosserat_fenicsx.algebra.building import Pointers
+from cosserat_fenicsx.numerics import cross, small_rotations
+from cosserat_fenicsx.strands import Strands, closest_segments, in_words, overlap
 
 # Gaps of contacts that are looked for, over the largest radius; movement of a node, over the smallest radius, after
 # which they are looked for again where there are some, and the least gap, over the largest, where there are none.
@@ -22,10 +29,18 @@ _REACH, _AGAIN, _NEAR = 8.0, 0.25, 4.0
 # Largest movement of a node in a step over the smallest radius and the gap (a point between nodes moves up to 1.3 times
 # as far, so that two strands approach each other by less than the sum of their radii); the same of a pair.
 _SHARE, _PAIR = 0.35, 2.6
+# Gaps of polygons that are looked for where rods touch, over the largest radius.
+_CLOSE = 0.25
 # Largest depth, over the sum of the radii; and that of polygons where no contact is known, over the smallest radius.
 _DEEPEST, _DEEP = 0.5, 0.02
 # Steps to the place where a force acts; Newton steps for the forces, and their relative change that ends them.
 _TO_PLACE, _MOST, _SMALL = 6, 40, 1e-13
+# Sweeps over the contacts for forces by a linear law; changes of the motion that end them, over the first one and over
+# the largest radius.
+_SWEEPS, _SHARE_LEFT, _SMALLEST = 500, 1e-8, 1e-15
+# Slip over the largest movement in the step, and over the largest radius, below which a contact sticks; error of a
+# friction over the largest bound.
+_STICKS, _ROUNDING, _BROKEN = 1e-6, 1e-9, 1e-3
 
 
 def _farthest(x, before):
@@ -45,16 +60,24 @@ class _Look:
 
 class _Pairs:
     """The contacts of a step, from a `_Look` at its start to positions x at its end, with their forces: `force` (m,)
-    with its derivative `slope` by the depth at the end, at the places `element`, `place` (m, 2), along `direction`."""
+    with its derivative `slope` by the depth at the end, at the places `element`, `place` (m, 2), along `direction`;
+    `apart`: (m,) the distance of these places where forces act. now: `Touches` at x where they are known, or None; last:
+    the pairs of positions near x, or None."""
 
-    def __init__(self, strands, surface, start, x, h, at_end, now=None):
+    def __init__(self, strands, surface, start, x, h, at_end, now, last):
         self._strands, self._surface, self._start, self._h, self._at_end = strands, surface, start, h, at_end
         before = start.touches
         self.which = np.flatnonzero(before.gap < _PAIR * _farthest(x, start.x))
         self.before, self.law = before.of(self.which), tuple(part[self.which] for part in start.law)
-        self.now = strands.followed(x, self.before) if now is None else now.of(self.which)
+        if now is None:
+            same = last is not None and np.array_equal(last.which, self.which)
+            now = strands.followed(x, last.now if same else self.before)
+        else:
+            now = now.of(self.which)
+        self.now = now
         self.force, self.slope, self.mean = self.forces(-self.now.gap)
         self.element, self.place, self.direction = self.now.element, self.now.place, self.now.normal
+        self.apart = self.now.distance
         if not at_end and len(self.now):
             self._find_places(start.x, x)
 
@@ -72,12 +95,16 @@ class _Pairs:
 
     def _find_places(self, x0, x1):
         """Find the points where forces act, by false position, and the directions there."""
-        strands, before, now = self._strands, self.before, self.now
+        pressed = np.flatnonzero(self.force)
+        if not len(pressed):
+            return
+        strands, before, now = self._strands, self.before.of(pressed), self.now.of(pressed)
         target = (now.distance - before.distance) * (now.distance + before.distance)
+        both = np.concatenate([x0, x1 - x0], axis=1)
 
         def off(share):
             element, place = strands.between(before, now, share)
-            start, change = (strands.apart(x, element, place) for x in (x0, x1 - x0))
+            start, change = np.split(strands.apart(both, element, place), 2, axis=1)
             return np.sum(change * (2 * start + change), axis=1) - target, (element, place, 2 * start + change)
 
         low, high = np.zeros(len(now)), np.ones(len(now))
@@ -95,32 +122,50 @@ class _Pairs:
             low, high = np.where(above, share, low), np.where(above, high, share)
             at_low = np.where(above, left, at_low * (0.5 if step else 1.0))
             at_high = np.where(above, at_high * (0.5 if step else 1.0), left)
-        self.element, self.place, mean = found
-        self.direction = mean / (now.distance + before.distance)[:, None]
+        self.element, self.place, self.direction, self.apart = (
+            part.copy() for part in (self.element, self.place, self.direction, self.apart)
+        )
+        self.element[pressed], self.place[pressed], mean = found
+        self.direction[pressed] = mean / (now.distance + before.distance)[:, None]
+        self.apart[pressed] = np.linalg.norm(mean, axis=1) / 2
 
-    def pulls(self, rows):
-        """Rows (m, n) of the unknowns, -1 where clamped, and (m, n) what unit forces are there; rows: (N, 3)."""
-        strands, shape = self._strands, (len(self.now), -1)
-        pulls = strands.pulls(self.element, self.place, self.direction)
-        return rows[strands.movers(self.element)].reshape(shape), pulls.reshape(shape)
+    def across(self, which):
+        """(k, 2, 3) two unit vectors across the forces of some pairs, which turn with them in the step."""
+        n, first = self.direction[which], np.eye(3)[np.abs(self.before.normal[which]).argmin(axis=1)]
+        n = n / np.linalg.norm(n, axis=1)[:, None]
+        first = cross(n, first)
+        first /= np.linalg.norm(first, axis=1)[:, None]
+        return np.stack([first, cross(n, first)], axis=1)
 
-    def gradients(self, rows):
-        """The same with the derivatives of the gaps at the end."""
-        shape = len(self.now), -1
-        return (rows[self._strands.nodes_of(self.now)].reshape(shape),
-                self._strands.gradients(self.now).reshape(shape))  # fmt: skip
+    def pulls(self, which, parts):
+        """Nodes (k, n) that move the places of some pairs, and forces and moments there, (k, parts, n, 6), of unit
+        forces along `direction` and, of three parts, `across` it on the surfaces."""
+        strands, element, place = self._strands, self.element[which], self.place[which]
+        first, second = strands.bases(element, place)
+        moves = np.concatenate([-first, second], axis=1)
+        found = np.zeros((len(moves), parts, moves.shape[1], 6))
+        found[:, 0, :, :3] = moves[..., None] * self.direction[which][:, None]
+        if parts > 1:
+            radii, across = strands.radii[element], self.across(which)
+            deep = (radii.sum(axis=1) - self.apart[which]) / 2
+            arms = np.concatenate([(radii[:, k] - deep)[:, None] * basis for k, basis in ((0, first), (1, second))], 1)
+            found[:, 1:, :, :3] = moves[:, None, :, None] * across[:, :, None]
+            turned = np.stack([across[:, 1], -across[:, 0]], axis=1)  # n x t
+            found[:, 1:, :, 3:] = -arms[:, None, :, None] * turned[:, :, None]
+        return strands.movers(element), found
 
 
-class RodsTouching:
+class RodsTouching(Pointers):
     """The contacts of a scene's rods in the steps of a loaded `StepProblem`; its methods are those of `SpinLaw`."""
 
     def __init__(self, problem):
+        super().__init__()
         model = problem.model
         scene, layout, length = model.scene, model.layout, model.scales.length
         self._problem, self._scene, self._length = problem, scene, length
         self._at_end = problem.acting_share == 1
         action = scene.rod_contact
-        self._nodal = model.nodal[np.argsort(model.slots)][:, :3]
+        self._nodal = model.nodal[np.argsort(model.slots)]
         self._rows = model.numbering.rows[self._nodal]
         self._strands = strands = Strands.of(scene, layout, model.rule, length)
         counts = np.multiply(layout.counts, model.signature.degree) + 1
@@ -129,11 +174,18 @@ class RodsTouching:
         radii = strands.radii
         self._radius, self._largest = radii[radii > 0].min(), radii.max()
         self._vectors = problem.numbering.vector(), problem.numbering.vector()
+        self._parts = 3 if action.friction else 1
+        self._c = self._ffi.new("pairs *", {"parts": self._parts, "most": _SWEEPS, "friction": action.friction,
+                                            "share": _SHARE_LEFT, "smallest": _SMALLEST * self._largest})  # fmt: skip
         self._look, self._polygons = None, _Polygons(scene, layout, model.rule, length)
 
     @property
     def _x(self):
-        return self._problem.state[self._nodal] + self._origins
+        return self._problem.state[self._nodal[:, :3]] + self._origins
+
+    @property
+    def _q(self):
+        return self._problem.state[self._nodal[:, 3:]]
 
     def _looked(self, x):
         reach = _REACH * self._largest
@@ -154,59 +206,134 @@ class RodsTouching:
         x = self._x
         if self._look is None or not np.array_equal(x, self._look.x):
             self._look = self._looked(x)
-        self._start, self._h, self._columns = self._look, h, {}
-        self._end = self._pairs = None
+        self._start, self._q0, self._h, self._columns, self._near = self._look, self._q, h, {}, None
+        self._rubbing = np.zeros((len(self._start.touches), 2))
+        self._end = self._pairs = self._now = None
         self._longest = _SHARE * (self._radius + max(self._look.gap, 0.0))
 
     def give_up(self):
         self._end = None
 
-    def _at(self, x, now=None):
-        return _Pairs(self._strands, self._surface, self._start, x, self._h, self._at_end, now)
+    def _at(self, x, now=None, last=None):
+        return _Pairs(self._strands, self._surface, self._start, x, self._h, self._at_end, now, last)
+
+    def _friction(self, pairs):
+        """(m, 2) the friction of pairs, at most in proportion to their normal forces."""
+        return self._rubbing[pairs.which] * (pairs.force > 0)[:, None]
 
     def add_forces(self, b):
-        self._now = pairs = self._at(self._x)
+        self._now = pairs = self._at(self._x, last=self._now)
         pressed = np.flatnonzero(pairs.force)
         if len(pressed):
-            rows, pulls = (part[pressed] for part in pairs.pulls(self._rows))
-            np.add.at(b, np.maximum(rows, 0), np.where(rows < 0, 0.0, -pulls * pairs.force[pressed][:, None]))
+            nodes, pulls = pairs.pulls(pressed, self._parts)
+            forces = pairs.force[pressed][:, None]
+            if self._parts > 1:
+                forces = np.c_[forces, self._friction(pairs)[pressed]]
+            total = np.einsum("kp,kpni->kni", forces, pulls)
+            rows = self._rows[nodes][:, :, [0, 1, 2, 4, 5, 6]]
+            np.subtract.at(b, np.maximum(rows, 0), np.where(rows < 0, 0.0, total))
 
     def meet(self, x, change):
         """Change Newton's step so that the laws hold after it."""
-        pairs = self._now
+        pairs, parts = self._now, self._parts
         if not len(pairs.now):
             return
-        rows, gradients = pairs.gradients(self._rows)
-        gradients, rows = np.where(rows < 0, 0.0, gradients), np.maximum(rows, 0)
-        free = np.einsum("kj,kj->k", gradients, change[rows]) - pairs.now.gap  # depths without a change of forces
-        near = np.flatnonzero((free > 0) | (pairs.force > 0))
+        free = pairs.now.gap - self._changes(change, *self._gradients(pairs, slice(None)))
+        near = np.flatnonzero((free < 0) | (pairs.force > 0))
         if not len(near):
             return
-        columns = np.column_stack([self._response(pairs, k) for k in near])
-        A = np.einsum("kj,kjl->kl", gradients[near], columns[rows[near]])
-        depth, before, law = -pairs.now.gap[near], pairs.force[near], pairs.forces
-        whole = -pairs.now.gap
+        nodes, pulls = pairs.pulls(near, parts)
+        A, columns = self._compliance(pairs, near, nodes, pulls)
+        before, motion = np.zeros((2, len(near), parts))
+        before[:, 0], motion[:, 0] = pairs.force[near], free[near]
+        if parts > 1:
+            before[:, 1:] = self._friction(pairs)[near]
+            motion[:, 1:] = self._slips(nodes, pulls) - self._changes(change, *self._by_unknowns(nodes, pulls[:, 1:]))
+        force, gap, multiplier, law = before.copy(), pairs.now.gap[near], np.zeros(len(near)), self._c
+        whole = pairs.now.gap.copy()
+        law.count, law.compliance = len(near), self._pointer(A)
+        law.motion, law.force, law.multiplier = (self._pointer(part) for part in (motion, force, multiplier))
         for _ in range(_MOST):
-            whole[near] = depth
-            force, slope, _ = (part[near] for part in law(whole))
-            off = depth - free[near] + A @ (force - before)
-            step = np.linalg.solve(np.eye(len(near)) + A * slope, off)
-            depth = depth - step
-            if np.abs(step).max() <= _SMALL * self._largest:
+            whole[near] = gap
+            normal, slope = (np.ascontiguousarray(part[near]) for part in pairs.forces(-whole)[:2])
+            law.gap, law.normal, law.slope = (self._pointer(part) for part in (gap, normal, slope))
+            self._lib.settle_pairs(law)
+            last, gap = gap, motion[:, 0].copy()
+            if np.abs(gap - last).max() <= _SMALL * self._largest:
                 break
-        whole[near] = depth
-        change -= columns @ (law(whole)[0][near] - before)
+        if parts > 1:
+            self._rubbing[:] = 0.0
+            self._rubbing[pairs.which[near]] = force[:, 1:]
+        change -= columns @ (force - before).ravel()
 
-    def _response(self, pairs, k):
-        """The change of the unknowns by a unit force of a pair, as at its first contact in the step."""
-        name = pairs.which[k]
+    def _pointer(self, array):
+        """C's pointer to an array that lives as long as it is used."""
+        return self._ffi.cast("double *", array.ctypes.data)
+
+    @staticmethod
+    def _changes(change, rows, by):
+        """Changes of motions (..., n) by those of the unknowns; rows: -1 where clamped."""
+        return np.sum(np.where(rows < 0, 0.0, change[rows]) * by, axis=-1)
+
+    def _gradients(self, pairs, which):
+        """Rows of the unknowns (k, n) and derivatives of the gaps at the end."""
+        now = pairs.now.of(which)
+        rows = self._rows[self._strands.nodes_of(now)][..., :3]
+        return rows.reshape(len(now), -1), self._strands.gradients(now).reshape(len(now), -1)
+
+    def _by_unknowns(self, nodes, pulls):
+        """Rows (k, 1, n) and derivatives (k, parts, n) of the work of forces and moments (k, parts, nodes, 6) by the
+        unknowns."""
+        turning = small_rotations((self._q0 + self._q) / 2)[nodes]
+        of_q = np.einsum("kpni,knij->kpnj", pulls[..., 3:], turning)
+        by = np.concatenate([pulls[..., :3], of_q], axis=3)
+        return self._rows[nodes].reshape(len(nodes), 1, -1), by.reshape(*by.shape[:2], 7 * nodes.shape[1])
+
+    def _slips(self, nodes, pulls):
+        """(k, 2) slips in the step across pairs, by the motion between both its ends."""
+        turned = small_rotations((self._q0 + self._q) / 2) @ (self._q - self._q0)[:, :, None]
+        motion = np.concatenate([self._x - self._start.x, turned[..., 0]], axis=1)
+        return np.einsum("kpni,kni->kp", pulls[:, 1:], motion[nodes])
+
+    def _compliance(self, pairs, near, nodes, pulls):
+        """Motions (k parts, k parts) of contacts, of the gaps and the slips, by unit forces, and of all unknowns
+        (unknowns, k parts): those of the first contacts in the step, until others come near."""
+        names, parts = pairs.which[near], self._parts
+        if self._near is None or not np.array_equal(self._near[0], names):
+            rows = self._rows[nodes][:, :, [0, 1, 2, 4, 5, 6]]
+            columns = np.concatenate(
+                [self._response(name, *both) for name, *both in zip(names.tolist(), rows, pulls, strict=True)]
+            )
+            k = len(near)
+            A = np.empty((k, parts, len(columns)))  # of motions
+            for first, (at, by) in ((0, self._gradients(pairs, near)), (1, self._by_unknowns(nodes, pulls[:, 1:]))):
+                if by.size:
+                    A[:, first:] = self._of_columns(columns, at.reshape(k, 1, -1), by.reshape(k, -1, at.shape[-1]))
+            A = np.ascontiguousarray(A.reshape(k * parts, -1).T)
+            self._near = names, A, np.ascontiguousarray(columns.T)
+        return self._near[1:]
+
+    @staticmethod
+    def _of_columns(columns, rows, by):
+        """(k, p, c) products of rows of a matrix, derivatives (k, p, n) at the unknowns `rows` (k, 1, n), and columns
+        (c, unknowns)."""
+        k, p, n = by.shape
+        rows = np.broadcast_to(rows, by.shape)
+        held = np.where(rows < 0, 0.0, by).ravel()
+        starts = np.arange(0, k * p * n + 1, n)
+        matrix = csr_array((held, np.maximum(rows, 0).ravel(), starts), shape=(k * p, columns.shape[1]))
+        return (matrix @ columns.T).reshape(k, p, -1)
+
+    def _response(self, name, rows, pulls):
+        """(parts, unknowns) changes by unit forces of a pair, as at its first contact in the step."""
         if name not in self._columns:
             load, answer = self._vectors
-            rows, pulls = (part[k] for part in pairs.pulls(self._rows))
-            load.set(0.0)
-            np.add.at(load.array_w, np.maximum(rows, 0), np.where(rows < 0, 0.0, pulls))
-            self._problem.solve(load, answer)
-            self._columns[name] = answer.array_r.copy()
+            self._columns[name] = found = np.empty((len(pulls), len(load.array_r)))
+            for column, pull in zip(found, pulls, strict=True):
+                load.set(0.0)
+                np.add.at(load.array_w, np.maximum(rows, 0), np.where(rows < 0, 0.0, pull))
+                self._problem.solve(load, answer)
+                column[:] = answer.array_r
         return self._columns[name]
 
     # -- after a step ------------------------------------------------------------------------------------------------
@@ -222,22 +349,38 @@ class RodsTouching:
         both = self._strands.radii[look.touches.element].sum(axis=1)
         if (-look.touches.gap > _DEEPEST * both).any():
             k = int(np.argmin(look.touches.gap / both))
-            return f"{self._in_words(look.touches, k)}, more than half of both radii: its stiffness is too small"
+            found = in_words(self._scene.rods, self._strands.place_of(look.touches, k, self._length), "overlaps")
+            deep = -look.touches.gap[k] * self._length
+            return f"{found} by {deep:.3g} m, more than half of both radii: its stiffness is too small"
+        if self._parts > 1 and self._breaks_friction():
+            return "the friction between rods does not follow from the motion"
         return self._polygons.objection(x, look.touches, self._strands)
 
-    def _in_words(self, touches, k):
-        (a, s), (b, t) = (
-            (self._scene.rods[self._strands.rods[touches.element[k, i]]].name,
-             self._strands.s(touches.element[:, i], touches.place[:, i])[k] * self._length) for i in (0, 1)
-        )  # fmt: skip
-        deep = -touches.gap[k] * self._length
-        return f"rod '{a}' at s = {s:.6g} m enters rod '{b}' at s = {t:.6g} m by {deep:.3g} m"
+    def _rubbed(self):
+        """Normal forces (k,), frictions and slips (k, 2) in the step, of pairs that press."""
+        pairs = self._pairs
+        pressed = np.flatnonzero(pairs.force)
+        friction = self._friction(pairs)[pressed]
+        return pairs.force[pressed], friction, self._slips(*pairs.pulls(pressed, self._parts))
+
+    def _breaks_friction(self):
+        """Whether frictions are beyond their bounds, or do not follow from slips."""
+        normal, friction, slip = self._rubbed()
+        bound, size = self._scene.rod_contact.friction * normal, np.linalg.norm(slip, axis=1)
+        moved = _STICKS * _farthest(self._x, self._start.x) + _ROUNDING * self._largest
+        rubs = size > moved
+        off = np.linalg.norm(friction + bound[:, None] * slip / np.where(rubs, size, 1.0)[:, None], axis=1)
+        beyond = np.linalg.norm(friction, axis=1) - bound
+        return bool((np.where(rubs, off, beyond) > _BROKEN * bound.max(initial=0.0)).any())
 
     def books(self):
         """Change of the stored energy in the step, and what was dissipated; dimensionless."""
         pairs = self._pairs
-        lost = (pairs.force - pairs.mean) * (pairs.before.gap - pairs.now.gap)
-        return self._end.energy - self._start.energy, float(lost.sum())
+        lost = float(np.sum((pairs.force - pairs.mean) * (pairs.before.gap - pairs.now.gap)))
+        if self._parts > 1:
+            _, friction, slip = self._rubbed()
+            lost += float(np.maximum(-np.sum(friction * slip, axis=1), 0.0).sum())
+        return self._end.energy - self._start.energy, lost
 
     def accept(self):
         """Accept the step."""
@@ -284,25 +427,19 @@ class _Polygons:
 
     def objection(self, x, touches, strands):
         """See `RodsTouching.objection`, for positions x and the contacts known there, those of `Strands`."""
-        reach = _NEAR * self._of[2].max()
         if self._seen is not None:
-            last, clear = self._seen
-            if clear > _PAIR * _farthest(x, last) * self._length:
+            last, spare = self._seen
+            if spare > 2 * _PAIR * _farthest(x, last) * self._length:
                 return ""
         rods, s, radii = self._of
-        gap, sag, *places = closest_segments(self._matrix @ x * self._length, rods, s, radii, self._apart, reach)
-        depth = -(gap + sag) - _DEEP * self._radius
-        deep = np.flatnonzero(depth > 0)
-        if len(deep):
-            pair = np.sort(strands.rods[touches.element], axis=1)
-            for k in deep[np.argsort(-depth[deep])]:
-                (a, u), (b, v) = (place[k] for place in places)
-                same = (pair == np.sort([int(a), int(b)])).all(axis=1)
-                if depth[k] > -touches.gap[same].min(initial=0.0) * self._length:
-                    first, second = (self._scene.rods[int(i)].name for i in (a, b))
-                    return (
-                        f"rod '{first}' at s = {u:.6g} m enters rod '{second}' at s = {v:.6g} m by {-gap[k]:.3g} m, "
-                        "deeper than at the contacts that the mesh shows: expected more elements"
-                    )
-        self._seen = x, (gap - sag).min(initial=reach)
+        reach, count = (_CLOSE if (touches.gap < 0).any() else _NEAR) * radii.max(), len(self._scene.rods)
+        found = closest_segments(self._matrix @ x * self._length, rods, s, radii, self._apart, reach)
+        known = np.zeros((count, count))
+        pair = tuple(np.sort(strands.rods[touches.element], axis=1).T)
+        np.maximum.at(known, pair, -touches.gap * self._length)
+        pair = tuple(np.sort([place[:, 0] for place in found[2:]], axis=0).astype(int))
+        allowed = known[pair] + _DEEP * self._radius
+        if why := overlap(self._scene.rods, found, allowed):
+            return f"{why}, deeper than at the contacts that the mesh shows: expected more elements"
+        self._seen = x, (allowed + found[0] + found[1]).min(initial=reach)
         return ""

@@ -7,7 +7,7 @@ import numpy as np
 from cosserat_fenicsx.errors import NotConverged
 from cosserat_fenicsx.quantities import Quantity, Units
 from cosserat_fenicsx.results import screen
-from cosserat_fenicsx.strands import CROSSING, Strands, closest_segments
+from cosserat_fenicsx.strands import CROSSING, Strands, closest_segments, overlap
 
 # Gaps over the radius up to which rods may touch; forces over the largest that are rounding.
 _TOUCHES, _NOTHING = 1e-5, 1e-9
@@ -154,17 +154,9 @@ def check_apart(path, whole=None):
     apart = action.apart(scene)
     for k in range(len(path)):
         points = action.polygons(scene.rods, lambda rod, s, k=k: path.sample(k, rod, s / rod.length)[0])
-        gap, sag, *places = closest_segments(*points, apart, 0.0)
-        deep = gap + sag + _DEEP * points[3].min()
-        if len(gap) and deep.min() < 0:
-            i = int(np.argmin(deep))
-            (a, s), (b, t) = (place[i] for place in places)
-            raise NotConverged(
-                f"rod '{scene.rods[int(a)].name}' at s = {s:.6g} m overlaps rod '{scene.rods[int(b)].name}' at s = "
-                f"{t:.6g} m by {-gap[i]:.3g} m, at the {path.place_of(k)}: expected more elements "
-                f"there{_ANGLE}",
-                path if whole is None else whole,
-            )
+        if why := overlap(scene.rods, closest_segments(*points, apart, 0.0), _DEEP * points[3].min()):
+            why = f"{why}, at the {path.place_of(k)}: expected more elements there{_ANGLE}"
+            raise NotConverged(why, path if whole is None else whole)
 
 
 _ANGLE = (

@@ -16,7 +16,7 @@ import numpy as np
 
 from cosserat_fenicsx.algebra.newton import LimitedNewton, Solved
 from cosserat_fenicsx.interrupts import obey
-from cosserat_fenicsx.strands import Strands
+from cosserat_fenicsx.strands import Strands, in_words
 
 # Largest movement of a node in a step over the smallest radius and the gap (a point between nodes moves up to 1.3 times
 # as far, so that two strands approach each other by less than the sum of their radii); largest rotation, rad.
@@ -195,15 +195,9 @@ class RodContacts:
     def _in_words(self, touches):
         if not len(touches):
             return "without a contact of rods"
-        k, rods = int(np.argmin(touches.gap)), self._model.scene.rods
-        (a, s), (b, t) = (
-            (rods[self.strands.rods[touches.element[k, i]]],
-             self.strands.s(touches.element[:, i], touches.place[:, i])[k] * self._length) for i in (0, 1)
-        )  # fmt: skip
-        return (
-            f"with rod '{a.name}' at s = {s:.6g} m next to rod '{b.name}' at s = {t:.6g} m, at a gap of "
-            f"{touches.gap[k] * self._length:.3g} m"
-        )
+        k = int(np.argmin(touches.gap))
+        found = in_words(self._model.scene.rods, self.strands.place_of(touches, k, self._length), "next to")
+        return f"with {found}, at a gap of {touches.gap[k] * self._length:.3g} m"
 
     def _known_forces(self, touches):
         """The forces of the iteration before at the same contacts; 0 at new ones."""
