@@ -132,7 +132,7 @@ truths: setup
 	$(PYTHON) demos/evidence/put_in_docs.py truths
 
 tangles: setup
-	$(PYTHON) -m pytest tests/test_rod_contact.py -k passes_through --tangles 300
+	$(PYTHON) -m pytest tests/test_rod_contact.py tests/test_rods_in_motion.py -k passes_through --tangles 300
 
 folders: setup
 	$(PYTHON) -m pytest tests/test_store.py -k damaged_folders --mutations 200

@@ -98,3 +98,12 @@ def test_motion(tmp_path_all, capsys):
     else:
         assert printed == ""
     COMM.barrier()
+
+
+@pytest.mark.serial
+def test_a_small_heap():
+    import heap
+
+    history, checks = heap.six_rods()
+    assert all(deviation(check) <= check.allowed for check in checks), checks
+    assert np.diff(history.dissipated).min() >= 0

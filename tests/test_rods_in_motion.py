@@ -24,7 +24,9 @@ def bars(d=(0.0, 0.0), speed=1.0, stiffness=STIFFNESS, bending=1e6, turning=1e-1
     middles."""
     rods = []
     for name, m, L, e, along in zip("ab", MASSES, LENGTHS, d, np.eye(3)[:2], strict=True):
-        section = cf.Stiffness((1e8, 1e8), 1e8, (bending,) * 2, bending, mass=m / L, inertia=(turning, turning, 2 * turning))
+        section = cf.Stiffness(
+            (1e8, 1e8), 1e8, (bending,) * 2, bending, mass=m / L, inertia=(turning, turning, 2 * turning)
+        )
         middle = np.array((0, 0, 2 * RADIUS + APART)) * (name == "a") - e * along
         curve = cf.Line(tuple(middle - L / 2 * along), tuple(middle + L / 2 * along))
         rods.append(cf.Rod(curve, section, name=name))
@@ -192,6 +194,35 @@ def test_fast_rods_do_not_pass_through_each_other():
                           for rod, d in zip(history.scene.rods, (0.05, 0.0), strict=True)))  # fmt: skip
     assert above.min() > 0 and closest(history) > 1.5 * RADIUS
     assert drift(history.linear_momentum) < 1e-10
+
+
+def test_no_rod_passes_through_another_in_motion(tangle):
+    """Two to five rods at random angles and speeds fall on each other; the lowest is held, and friction is random. In
+    each step all keep their distance, and the one above stays above, or the motion ends with two rods by name."""
+    random, radius, count = np.random.default_rng(tangle), 0.01, 2 + tangle % 4
+    section = cf.Stiffness((1e4, 1e4), 1e5, (2.0, 2.0), 1.5, mass=0.3, inertia=(1e-5, 1e-5, 2e-5))
+    rods, velocities = [], []
+    for k in range(count):
+        angle = random.uniform(0.3, 1.2) + k * math.pi / count
+        half = random.uniform(0.1, 0.2) * np.array([math.cos(angle), math.sin(angle), 0])
+        middle = np.array([*random.uniform(-0.05, 0.05, 2), 2.1 * radius * k])
+        rods.append(cf.Rod(cf.Line(tuple(middle - half), tuple(middle + half)), section, name=f"rod {k}"))
+        falls = (*random.uniform(-1, 1, 2), -random.uniform(1, 3) * k)
+        velocities += [cf.InitialVelocity(rods[-1], linear=falls)] if k else []
+    touch = cf.RodContact(radius=radius, stiffness=3e8, friction=random.uniform(0, 0.8), damping=0.05)
+    scene = cf.Scene(rods, [cf.Clamp(rods[0].start), cf.Clamp(rods[0].end)], [touch], velocities=velocities)
+    try:
+        history = cf.simulate(scene, 4e-3, dt=1e-4, elements=3, degree=2)
+    except cf.NotConverged as failure:
+        history = failure.path
+        assert "rod 'rod " in str(failure)
+    assert closest(history) > 1.5 * radius
+    shapes = [history.sample(len(history) - 1, rod, np.linspace(0, 1, 300))[0] for rod in rods]
+    for upper, p in enumerate(shapes):
+        for q in shapes[:upper]:  # seen from above, where they cross
+            apart = np.linalg.norm(p[:, None, :2] - q[:, :2], axis=2)
+            i, j = np.unravel_index(apart.argmin(), apart.shape)
+            assert apart[i, j] > 2.5e-3 or p[i, 2] > q[j, 2]
 
 
 def test_it_goes_on_from_its_folder(monkeypatch, tmp_path):
