@@ -16,7 +16,7 @@ from known_numbers import Check, command, run_all
 import cosserat_fenicsx as cf
 
 #: Of the rods: diameter, length, distance of two side by side, m; coefficient of friction; times of the motions, s.
-DIAMETER, LENGTH, APART, FRICTION, LONG, SHORT = 0.012, 0.3, 0.1, 0.3, 0.8, 0.1
+DIAMETER, LENGTH, APART, FRICTION, LONG, SHORT = 0.012, 0.3, 0.1, 0.3, 0.6, 0.1
 
 
 def heap(layers, seed=3):
@@ -50,8 +50,8 @@ def closest(history, k):
 
 
 def comes_to_rest(layers, duration, dt, still, folder=None):
-    """Its history, and the `Check`s: what is left of the energy that it had above the floor, at most `still`, how deep rods overlap at
-    any time, and between which heights they lie."""
+    """Its history, and the `Check`s: what is left of the energy that it had above the floor (at most `still`), how deep
+    rods overlap at any time, and between which heights they lie."""
     scene = heap(layers)
     history = cf.simulate(scene, duration, dt=dt, elements=3, degree=2, save_every=0.02)
     z = np.array([history.position(rod.at(LENGTH / 2))[:, 2] for rod in scene.rods])

@@ -228,10 +228,10 @@ def test_no_rod_passes_through_another_in_motion(tangle):
 def test_it_goes_on_from_its_folder(monkeypatch, tmp_path):
     """A motion that is continued while rods touch has the same digits; forces of contacts are read from its states."""
     settings = {"dt": 5e-5, "elements": 1, "degree": 2}
-    whole = cf.simulate(bars((0.1, 0.3)), 1e-3, **settings)
+    whole = cf.simulate(bars((0.1, 0.3), friction=0.3), 1e-3, **settings)
     stop_at(monkeypatch, 12, 0)
     with pytest.raises(Stopped):
-        cf.simulate(bars((0.1, 0.3)), 1e-3, folder=tmp_path / "bars", **settings)
+        cf.simulate(bars((0.1, 0.3), friction=0.3), 1e-3, folder=tmp_path / "bars", **settings)
     stored = cf.resume(tmp_path / "bars")
     for rod, same in zip(whole.scene.rods, stored.scene.rods, strict=True):
         assert np.array_equal(whole.position(rod.end), stored.position(same.end))
