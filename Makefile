@@ -18,13 +18,14 @@ export VTK_DEFAULT_OPENGL_WINDOW = vtkEGLRenderWindow
 # A numpy in the user's own site directory would hide the distribution's.
 export PYTHONNOUSERSITE = 1
 
-.PHONY: help setup packages demo animation motion gallery well string whirl recipes test docs tutorials tables figure3 work-precision benchmarks cosseratbench failures rods-in-wells folders tangles truths random random-wells random-strings imperfect mutants sanitizers release clean
+.PHONY: help setup packages demo animation motion heap gallery well string whirl recipes test docs tutorials tables figure3 work-precision benchmarks cosseratbench failures rods-in-wells folders tangles truths random random-wells random-strings imperfect mutants sanitizers release clean
 
 help:
 	@echo "Times are those of two cores and an empty cache of compiled forms, after \`make setup\`."
 	@echo "make demo    solve the eccentric cantilever of the paper on two processes; writes out/ (a quarter of a minute)"
 	@echo "make animation  the animation at the top of the README: the column far past its limit load (a quarter of a minute)"
 	@echo "make motion  seven motions, each a scene file, a picture and a number that must come out; writes out/ (half a minute)"
+	@echo "make heap    thirty rods that fall on each other and come to rest; writes out/ (two minutes)"
 	@echo "make gallery the scene files of demos/, each with a picture and a number that must come out; writes out/ (half a minute)"
 	@echo "make well    strings in wells: torque and drag, each with pictures and a number that must come out; writes out/wells/ (a minute)"
 	@echo "make string  drill-strings in motion: stick-slip, waves, a map of stability, each with pictures and numbers that must come out; writes out/strings/ (half a minute)"
@@ -59,6 +60,9 @@ animation: setup
 
 motion: setup
 	$(PYTHON) demos/motion.py
+
+heap: setup
+	$(PYTHON) demos/heap.py
 
 gallery: setup
 	$(PYTHON) demos/gallery.py

@@ -72,20 +72,27 @@ def test_damping_takes_what_hunt_and_crossley_say():
     assert np.abs(history.balance).max() < 1e-8 * history.kinetic[0]
 
 
-def test_rods_side_by_side_hit_each_other_along_a_line():
-    """They keep momenta and energy, and the first one all but stops."""
-    section = cf.Stiffness((1e7,) * 2, 1e7, (1e3,) * 2, 1e3, mass=1.0, inertia=(1e-6, 1e-6, 2e-6))
+@pytest.mark.parametrize(("friction", "spin"), [(0.0, 0.0), (0.3, 20.0), (0.02, 100.0)], ids=["", "sticks", "slides"])
+def test_rods_side_by_side_hit_each_other_along_a_line(friction, spin):
+    """They keep momenta and energy, and the first one all but stops. The slip r w of a rod that spins ends where
+    friction can take it, J (2/m + 2 r^2/I) with its impulse J; else J is mu times that of the normal force."""
+    m, turning, falls = 1.0, 2e-6, -0.5
+    section = cf.Stiffness((1e7,) * 2, 1e7, (1e3,) * 2, 1e3, mass=m, inertia=(turning / 2, turning / 2, turning))
     upper = cf.Rod(cf.Line((-0.17, 0, 2 * RADIUS + 1e-4), (0.23, 0, 2 * RADIUS + 1e-4)), section, name="upper")
     lower = cf.Rod(cf.Line((-0.2, 0, 0), (0.2, 0, 0)), section, name="lower")
-    touch, falls = cf.RodContact(radius=RADIUS, stiffness=1e7), cf.InitialVelocity(upper, linear=(0, 0, -0.5))
+    touch = cf.RodContact(radius=RADIUS, stiffness=1e7, friction=friction)
+    start = cf.InitialVelocity(upper, linear=(0, 0, falls), angular=(spin, 0, 0))
     history = cf.simulate(
-        cf.Scene([upper, lower], [], [touch], velocities=[falls]), 3e-3, dt=5e-5, elements=4, degree=2
+        cf.Scene([upper, lower], [], [touch], velocities=[start]), 3e-3, dt=5e-5, elements=4, degree=2
     )
     assert np.ptp(history.linear_momentum, axis=0).max() < 2e-11
     assert np.ptp(history.angular_momentum, axis=0).max() < 1e-11
-    assert np.abs(history.balance).max() < 1e-8 * history.kinetic[0] < 0.1 * abs(history.work.min())
+    assert np.abs(history.balance).max() < (1e-7 if spin else 1e-8) * history.kinetic[0] < 0.1 * abs(history.work.min())
     assert history[int(np.argmin(history.work))].contacts(touch).line.any()
-    np.testing.assert_allclose([v[2] for v in middles(history, "velocity")], (0, -0.5), atol=0.02)
+    impulse = min(friction * m * abs(falls), RADIUS * spin / (2 / m + 2 * RADIUS**2 / turning))
+    np.testing.assert_allclose([v[2] for v in middles(history, "velocity")], (0, falls), atol=0.02)
+    np.testing.assert_allclose([w[0] for w in middles(history, "angular_velocity")],
+                               (spin - RADIUS * impulse / turning, -RADIUS * impulse / turning), rtol=0.04)  # fmt: skip
 
 
 def test_what_motions_need():

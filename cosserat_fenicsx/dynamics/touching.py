@@ -65,8 +65,8 @@ class _Pairs:
     the pairs of positions near x, or None."""
 
     def __init__(self, strands, surface, start, x, h, at_end, now, last):
-        self._strands, self._surface, self._start, self._h, self._at_end = strands, surface, start, h, at_end
-        before = start.touches
+        self._strands, self._surface, self._h, self.x = strands, surface, h, x
+        self._at_end, before = at_end, start.touches
         self.which = np.flatnonzero(before.gap < _PAIR * _farthest(x, start.x))
         self.before, self.law = before.of(self.which), tuple(part[self.which] for part in start.law)
         if now is None:
@@ -222,7 +222,9 @@ class RodsTouching(Pointers):
         return self._rubbing[pairs.which] * (pairs.force > 0)[:, None]
 
     def add_forces(self, b):
-        self._now = pairs = self._at(self._x, last=self._now)
+        x, last = self._x, self._now
+        near = last is not None and _farthest(x, last.x) < _AGAIN * self._radius  # else places may be those of others
+        self._now = pairs = self._at(x, last=last if near else None)
         pressed = np.flatnonzero(pairs.force)
         if len(pressed):
             nodes, pulls = pairs.pulls(pressed, self._parts)
@@ -352,8 +354,8 @@ class RodsTouching(Pointers):
             found = in_words(self._scene.rods, self._strands.place_of(look.touches, k, self._length), "overlaps")
             deep = -look.touches.gap[k] * self._length
             return f"{found} by {deep:.3g} m, more than half of both radii: its stiffness is too small"
-        if self._parts > 1 and self._breaks_friction():
-            return "the friction between rods does not follow from the motion"
+        if self._breaks_laws():
+            return "the forces between rods do not follow from the motion"
         return self._polygons.objection(x, look.touches, self._strands)
 
     def _rubbed(self):
@@ -363,8 +365,16 @@ class RodsTouching(Pointers):
         friction = self._friction(pairs)[pressed]
         return pairs.force[pressed], friction, self._slips(*pairs.pulls(pressed, self._parts))
 
-    def _breaks_friction(self):
-        """Whether frictions are beyond their bounds, or do not follow from slips."""
+    def _breaks_laws(self):
+        """Whether normal forces are not those of the last iteration, frictions are beyond their bounds, or do not follow
+        from slips."""
+        pairs, last = self._pairs, self._now
+        if np.array_equal(pairs.which, last.which):
+            off = np.abs(pairs.force - last.force).max(initial=0.0)
+            if off > _BROKEN * pairs.force.max(initial=0.0):
+                return True
+        if self._parts == 1:
+            return False
         normal, friction, slip = self._rubbed()
         bound, size = self._scene.rod_contact.friction * normal, np.linalg.norm(slip, axis=1)
         moved = _STICKS * _farthest(self._x, self._start.x) + _ROUNDING * self._largest
