@@ -138,8 +138,8 @@ def test_a_rod_that_slides_or_spins_begins_to_roll(speed, spin):
     middle = scene.rods[2].at(0.2)
     v, w = (getattr(history, name)(middle) for name in ("velocity", "angular_velocity"))
     rolls = (2 * speed - ROLLER * spin) / 3
-    assert v[-8:, 1].mean() == pytest.approx(rolls, rel=1e-2)
-    assert -ROLLER * w[-8:, 0].mean() == pytest.approx(rolls, rel=1e-2)
+    assert v[-8:, 1].mean() == pytest.approx(rolls, rel=4e-3)
+    assert -ROLLER * w[-8:, 0].mean() == pytest.approx(rolls, rel=4e-3)
     half = int(np.argmin(np.abs(history.times - abs(rolls - speed) / (FRICTION * GRAVITY) / 2)))
     assert v[half, 1] - speed == pytest.approx(math.copysign(FRICTION * GRAVITY, rolls - speed) * history.times[half],
                                                rel=0.02)  # fmt: skip
@@ -167,7 +167,8 @@ def test_a_rod_slides_to_rest(truth):
     scene = on_rails(linear=(0.5, 0, 0))
     history = cf.simulate(scene, 0.2, dt=1e-3, elements=1, degree=2)
     x = history.position(scene.rods[2].at(0.2))[:, 0]
-    truth("a rod that slides to rest on others, its way", x[-1] - x[0], 0.5**2 / (2 * FRICTION * GRAVITY), 1e-2)
+    truth("a rod that slides to rest on others, its way", x[-1] - x[0], 0.5**2 / (2 * FRICTION * GRAVITY), 2e-3)
+    assert history.kinetic[-1] < 1e-5 * history.kinetic[0]  # it rests
 
 
 @pytest.mark.parametrize("scheme", ["momentum", "energy", "generalised-alpha"])

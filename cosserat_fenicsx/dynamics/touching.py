@@ -8,8 +8,10 @@ equal. The force of the step acts there: its size is the mean one between both d
 stored energy, exactly, also where contacts slide; and it has no resultant force and no resultant moment.
 
 Friction acts across it at one point of space between both, on either rod with its moment about the centreline. Its law
-is set-valued: the slip of the surfaces in the step is zero, or else opposite to a friction at its bound. So what sticks
-does not creep, and the work of friction is never positive.
+is set-valued: surfaces stick at the end of the step, or else slip there against a friction at its bound. (With the slip
+in the step instead, that at the end would be the opposite of that at the start where they come to stick, for ever: the
+rule is trapezoidal.) What sticks does not creep. Where the slip turns back in a step, so that such a friction would add
+energy, the law holds for the slip in the step: the work of friction is never positive.
 
 Newton's method has the tangent of the rods without contact, by whose inverse gaps and slips respond linearly to forces.
 With it the forces of all contacts are found before a step is taken (algebra/pairs.c); what is not linear is in the next
@@ -207,7 +209,12 @@ class RodsTouching(Pointers):
         if self._look is None or not np.array_equal(x, self._look.x):
             self._look = self._looked(x)
         self._start, self._q0, self._h, self._columns, self._near = self._look, self._q, h, {}, None
-        self._rubbing = np.zeros((len(self._start.touches), 2))
+        count = len(self._start.touches)
+        self._rubbing, self._of_step = np.zeros((count, 2)), np.full(count, self._at_end)
+        if self._parts > 1:
+            rates = self._problem.model.velocity.x.array[self._nodal]
+            turning = (small_rotations(self._q0) @ rates[:, 3:, None])[..., 0]
+            self._ahead = h / 2 * np.concatenate([rates[:, :3], turning], axis=1)
         self._end = self._pairs = self._now = None
         self._longest = _SHARE * (self._radius + max(self._look.gap, 0.0))
 
@@ -250,7 +257,9 @@ class RodsTouching(Pointers):
         before[:, 0], motion[:, 0] = pairs.force[near], free[near]
         if parts > 1:
             before[:, 1:] = self._friction(pairs)[near]
-            motion[:, 1:] = self._slips(nodes, pulls) - self._changes(change, *self._by_unknowns(nodes, pulls[:, 1:]))
+            motion[:, 1:] = -self._changes(change, *self._by_unknowns(nodes, pulls[:, 1:]))
+            slips, ahead = self._slips(nodes, pulls, pairs.which[near])
+            motion[:, 1:] += slips - ahead
         force, gap, multiplier, law = before.copy(), pairs.now.gap[near], np.zeros(len(near)), self._c
         whole = pairs.now.gap.copy()
         law.count, law.compliance = len(near), self._pointer(A)
@@ -266,6 +275,8 @@ class RodsTouching(Pointers):
         if parts > 1:
             self._rubbing[:] = 0.0
             self._rubbing[pairs.which[near]] = force[:, 1:]
+            adds = np.sum(force[:, 1:] * (motion[:, 1:] + ahead), axis=1) > 0
+            self._of_step[pairs.which[near[adds]]] = True
         change -= columns @ (force - before).ravel()
 
     def _pointer(self, array):
@@ -291,11 +302,13 @@ class RodsTouching(Pointers):
         by = np.concatenate([pulls[..., :3], of_q], axis=3)
         return self._rows[nodes].reshape(len(nodes), 1, -1), by.reshape(*by.shape[:2], 7 * nodes.shape[1])
 
-    def _slips(self, nodes, pulls):
-        """(k, 2) slips in the step across pairs, by the motion between both its ends."""
+    def _slips(self, nodes, pulls, names):
+        """(k, 2) slips in the step across pairs, by the motion between both its ends; and half of those at the rates of
+        its start, by which the law's slip differs, or 0 where that is the slip in the step."""
         turned = small_rotations((self._q0 + self._q) / 2) @ (self._q - self._q0)[:, :, None]
         motion = np.concatenate([self._x - self._start.x, turned[..., 0]], axis=1)
-        return np.einsum("kpni,kni->kp", pulls[:, 1:], motion[nodes])
+        slips, ahead = (np.einsum("kpni,kni->kp", pulls[:, 1:], x[nodes]) for x in (motion, self._ahead))
+        return slips, np.where(self._of_step[names][:, None], 0.0, ahead)
 
     def _compliance(self, pairs, near, nodes, pulls):
         """Motions (k parts, k parts) of contacts, of the gaps and the slips, by unit forces, and of all unknowns
@@ -359,15 +372,16 @@ class RodsTouching(Pointers):
         return self._polygons.objection(x, look.touches, self._strands)
 
     def _rubbed(self):
-        """Normal forces (k,), frictions and slips (k, 2) in the step, of pairs that press."""
+        """Normal forces (k,), frictions, slips in the step and of the law (k, 2), of pairs that press."""
         pairs = self._pairs
         pressed = np.flatnonzero(pairs.force)
         friction = self._friction(pairs)[pressed]
-        return pairs.force[pressed], friction, self._slips(*pairs.pulls(pressed, self._parts))
+        slips, ahead = self._slips(*pairs.pulls(pressed, self._parts), pairs.which[pressed])
+        return pairs.force[pressed], friction, slips, slips - ahead
 
     def _breaks_laws(self):
-        """Whether normal forces are not those of the last iteration, frictions are beyond their bounds, or do not follow
-        from slips."""
+        """Whether normal forces are not those of the last iteration, or frictions are beyond their bounds, do not follow
+        from slips, or add energy."""
         pairs, last = self._pairs, self._now
         if np.array_equal(pairs.which, last.which):
             off = np.abs(pairs.force - last.force).max(initial=0.0)
@@ -375,21 +389,22 @@ class RodsTouching(Pointers):
                 return True
         if self._parts == 1:
             return False
-        normal, friction, slip = self._rubbed()
+        normal, friction, slips, slip = self._rubbed()
         bound, size = self._scene.rod_contact.friction * normal, np.linalg.norm(slip, axis=1)
         moved = _STICKS * _farthest(self._x, self._start.x) + _ROUNDING * self._largest
         rubs = size > moved
         off = np.linalg.norm(friction + bound[:, None] * slip / np.where(rubs, size, 1.0)[:, None], axis=1)
         beyond = np.linalg.norm(friction, axis=1) - bound
-        return bool((np.where(rubs, off, beyond) > _BROKEN * bound.max(initial=0.0)).any())
+        adds = np.sum(friction * slips, axis=1) > moved * _BROKEN * bound.max(initial=0.0)
+        return bool(adds.any() or (np.where(rubs, off, beyond) > _BROKEN * bound.max(initial=0.0)).any())
 
     def books(self):
         """Change of the stored energy in the step, and what was dissipated; dimensionless."""
         pairs = self._pairs
         lost = float(np.sum((pairs.force - pairs.mean) * (pairs.before.gap - pairs.now.gap)))
         if self._parts > 1:
-            _, friction, slip = self._rubbed()
-            lost += float(np.maximum(-np.sum(friction * slip, axis=1), 0.0).sum())
+            _, friction, slips, _ = self._rubbed()
+            lost += float(np.maximum(-np.sum(friction * slips, axis=1), 0.0).sum())
         return self._end.energy - self._start.energy, lost
 
     def accept(self):
