@@ -39,10 +39,10 @@ _DEEPEST, _DEEP = 0.5, 0.02
 _TO_PLACE, _MOST, _SMALL = 6, 40, 1e-13
 # Sweeps over the contacts for forces by a linear law; changes of the motion that end them, over the first one and over
 # the largest radius.
-_SWEEPS, _SHARE_LEFT, _SMALLEST = 500, 1e-8, 1e-15
+_SWEEPS, _SHARE_LEFT, _SMALLEST = 2000, 1e-12, 1e-16
 # Slip over the largest movement in the step, and over the largest radius, below which a contact sticks; error of a
 # friction over the largest bound.
-_STICKS, _ROUNDING, _BROKEN = 1e-6, 1e-9, 1e-3
+_STICKS, _ROUNDING, _BROKEN = 1e-5, 1e-9, 1e-3
 
 
 def _farthest(x, before):
@@ -63,20 +63,14 @@ class _Look:
 class _Pairs:
     """The contacts of a step, from a `_Look` at its start to positions x at its end, with their forces: `force` (m,)
     with its derivative `slope` by the depth at the end, at the places `element`, `place` (m, 2), along `direction`;
-    `apart`: (m,) the distance of these places where forces act. now: `Touches` at x where they are known, or None; last:
-    the pairs of positions near x, or None."""
+    `apart`: (m,) the distance of these places where forces act. now: `Touches` at x where they are known, or None."""
 
-    def __init__(self, strands, surface, start, x, h, at_end, now, last):
-        self._strands, self._surface, self._h, self.x = strands, surface, h, x
+    def __init__(self, strands, surface, start, x, h, at_end, now):
+        self._strands, self._surface, self._h = strands, surface, h
         self._at_end, before = at_end, start.touches
         self.which = np.flatnonzero(before.gap < _PAIR * _farthest(x, start.x))
         self.before, self.law = before.of(self.which), tuple(part[self.which] for part in start.law)
-        if now is None:
-            same = last is not None and np.array_equal(last.which, self.which)
-            now = strands.followed(x, last.now if same else self.before)
-        else:
-            now = now.of(self.which)
-        self.now = now
+        self.now = strands.followed(x, self.before) if now is None else now.of(self.which)
         self.force, self.slope, self.mean = self.forces(-self.now.gap)
         self.element, self.place, self.direction = self.now.element, self.now.place, self.now.normal
         self.apart = self.now.distance
@@ -221,17 +215,15 @@ class RodsTouching(Pointers):
     def give_up(self):
         self._end = None
 
-    def _at(self, x, now=None, last=None):
-        return _Pairs(self._strands, self._surface, self._start, x, self._h, self._at_end, now, last)
+    def _at(self, x, now=None):
+        return _Pairs(self._strands, self._surface, self._start, x, self._h, self._at_end, now)
 
     def _friction(self, pairs):
         """(m, 2) the friction of pairs, at most in proportion to their normal forces."""
         return self._rubbing[pairs.which] * (pairs.force > 0)[:, None]
 
     def add_forces(self, b):
-        x, last = self._x, self._now
-        near = last is not None and _farthest(x, last.x) < _AGAIN * self._radius  # else places may be those of others
-        self._now = pairs = self._at(x, last=last if near else None)
+        self._now = pairs = self._at(self._x)
         pressed = np.flatnonzero(pairs.force)
         if len(pressed):
             nodes, pulls = pairs.pulls(pressed, self._parts)
@@ -368,7 +360,9 @@ class RodsTouching(Pointers):
             deep = -look.touches.gap[k] * self._length
             return f"{found} by {deep:.3g} m, more than half of both radii: its stiffness is too small"
         if self._breaks_laws():
-            return "the forces between rods do not follow from the motion"
+            k = self._pairs.which[np.argmax(self._pairs.force)]
+            found = in_words(self._scene.rods, self._strands.place_of(self._start.touches, k, self._length), "next to")
+            return f"the forces between rods do not follow from the motion, such as those of {found}"
         return self._polygons.objection(x, look.touches, self._strands)
 
     def _rubbed(self):
