@@ -31,12 +31,12 @@ from cosserat_fenicsx.drilling.linear.stability import Stability as Stability
 from cosserat_fenicsx.drilling.linear.stability import stability as stability
 from cosserat_fenicsx.drilling.linear_control import LinearControl as LinearControl
 from cosserat_fenicsx.drilling.linear_control import ZTorque as ZTorque
-from cosserat_fenicsx.drilling.mixed import BitTorque as BitTorque
 from cosserat_fenicsx.drilling.mixed import MixedScene as MixedScene
 from cosserat_fenicsx.drilling.mixed import mixed_scene as mixed_scene
 from cosserat_fenicsx.drilling.motion import simulate as simulate
 from cosserat_fenicsx.drilling.pipe_above import PipeAbove as PipeAbove
 from cosserat_fenicsx.drilling.readings import Readings as Readings
+from cosserat_fenicsx.drilling.rod_bit import BitAtEnd as BitAtEnd
 from cosserat_fenicsx.drilling.scene import Drilling as Drilling
 from cosserat_fenicsx.drilling.scenefile import DrillingScene as DrillingScene
 from cosserat_fenicsx.drilling.segments import Discs as Discs

@@ -1,28 +1,27 @@
 """A drill-string in motion with a rod for its lower part, and waves for the pipe above: `mixed_scene`."""
 
+import math
 from dataclasses import dataclass, field, replace
-from typing import Annotated
 
 import numpy as np
 from mpi4py import MPI
 
 from cosserat_fenicsx.actions.walls import HoleRing, HoleWall, TubeRing, TubeWall, value_at
 from cosserat_fenicsx.checks import instance, number, refuse, whole
-from cosserat_fenicsx.drilling.bit_laws import BitLaw
 from cosserat_fenicsx.drilling.history import COLUMNS, DrillingHistory
 from cosserat_fenicsx.drilling.pipe_above import PipeAbove
+from cosserat_fenicsx.drilling.rod_bit import BitAtEnd
 from cosserat_fenicsx.drilling.scene import Drilling
+from cosserat_fenicsx.drilling.steady_start import follows_the_bit
 from cosserat_fenicsx.drilling.wall_friction import law_of, static_weight
 from cosserat_fenicsx.numerics import directors, small_rotations
-from cosserat_fenicsx.parts import ForceSize, Inertia, at_least
 from cosserat_fenicsx.quantities import Units
 from cosserat_fenicsx.results.history import History
 from cosserat_fenicsx.results.path import Path
 from cosserat_fenicsx.results.screen import InWords
-from cosserat_fenicsx.scene.action import PointAction
 from cosserat_fenicsx.scene.curves import Line
 from cosserat_fenicsx.scene.loads import Force, LineForce
-from cosserat_fenicsx.scene.rod import Damping, Rod, Station, StationOrName, is_known
+from cosserat_fenicsx.scene.rod import Damping, Rod
 from cosserat_fenicsx.scene.scene import Scene
 from cosserat_fenicsx.scene.signals import AlongPieces
 from cosserat_fenicsx.scene.supports import Roller
@@ -46,7 +45,8 @@ class MixedScene(InWords):
     Attributes:
         scene: of the rod, its loads, the wall of the hole, and the pipe above. at_rest: the same rod with a wall
             without friction; `rest` finds its equilibrium.
-        rod: from the top down. above: the `PipeAbove`. depth: measured depth of the rod's upper end, m.
+        rod: from the top down. above: the `PipeAbove`. bit: the `BitAtEnd`, or None. depth: measured depth of the
+            rod's upper end, m.
         why: sentences on approximations. drilling: the `Drilling` that it was made of.
     """
 
@@ -54,6 +54,7 @@ class MixedScene(InWords):
     at_rest: Scene
     rod: Rod
     above: PipeAbove
+    bit: BitAtEnd | None
     depth: float
     why: tuple
     drilling: Drilling
@@ -94,10 +95,9 @@ class MixedScene(InWords):
         """What happens at the surface and at the bit in a motion of `scene`, as of other models of strings: its charts,
         tables, stick-slip, and files. Rows are the saved states but the first.
 
-        Speeds, torque and hook load of the surface are means over the last step before each; speeds of the bit are
-        means between states, in which it must turn by less than a whole turn. The torque on bit is that in the rod's
-        end, with the part that turns the bit's own inertia. There is no ledger of energy, which `history` has for the
-        rod.
+        Speeds, torque and hook load of the surface, and weight and torque on bit, are means over the last step before
+        each; speeds of the bit are means between states, in which it must turn by less than a whole turn. There is no
+        ledger of energy, which `history` has for the rod.
 
         Raises:
             SceneError: a motion of another scene, or with less than two states.
@@ -112,12 +112,13 @@ class MixedScene(InWords):
         about = np.einsum("nij,nj,ni->n", small_rotations(middle), change, directors(middle / size) @ tangent)
         turned, axis = 4 * np.arctan(about / 4), directors(q[1:]) @ tangent
         moved = np.einsum("ni,ni->n", np.diff(history.position(rod.end), axis=0), axis)
+        on_bit = np.zeros((len(dt), 4)) if self.bit is None else history.far_end(self.bit)[1:]
         rows = dict.fromkeys(COLUMNS, np.full(len(dt), np.nan)) | {
             "times": times[1:], "drive_speed": far[:, 2], "drive_angle": np.cumsum(far[:, 2] * dt),
             "surface_torque": far[:, 3], "bit_speed": turned / dt, "bit_angle": np.cumsum(turned),
-            "torque_on_bit": -np.einsum("ni,ni->n", history.moment(rod.end)[1:], axis),
+            "torque_on_bit": on_bit[:, 3],
             "hook_load": self._hook_load - far[:, 1], "bit_velocity": moved / dt, "bit_advance": np.cumsum(moved),
-            "weight_on_bit": np.full(len(dt), static_weight(self.drilling)),
+            "weight_on_bit": on_bit[:, 1],
         }  # fmt: skip
         ends = np.array([0.0, self.depth, self.drilling.bit_depth])
         return DrillingHistory(self.drilling, "rod below pipe", self.why, dt.mean(), ends, np.array([*rows.values()]).T)
@@ -130,7 +131,7 @@ def mixed_scene(drilling: Drilling, depth: float | None = None) -> MixedScene:
     origin. The rod is straight where it is free of stress. Its upper end is held on the axis of the hole, where it may
     turn and move along. With a hole, the rod's nodes touch the wall, and stabilisers and the bit touch it as rings,
     with the friction of the hole; a `BitOnRock` below a string without a `Bit` is centred in the hole. The bit's law
-    acts at the lower end (`BitTorque`), under a constant weight on bit. The pipe above rubs at the wall where its waves
+    acts at the lower end (`BitAtEnd`), its weight along the hole. The pipe above rubs at the wall where its waves
     meet (`PipeAbove.rubs`), and starts with the tension of the equilibrium without friction.
 
     Args:
@@ -142,8 +143,8 @@ def mixed_scene(drilling: Drilling, depth: float | None = None) -> MixedScene:
         MixedScene.
 
     Raises:
-        SceneError: discs, a depth outside the string, a bit that cuts, a bent housing below the depth, drags of torsion
-            and of axial motion that differ, or a start in steady rotation.
+        SceneError: discs, a depth outside the string, a bent housing below the depth, drags of torsion and of axial
+            motion that differ, a start in steady rotation, an autodriller, or what `BitAtEnd` refuses.
     """
     instance("mixed_scene", "drilling", drilling, Drilling, "a Drilling")
     if not hasattr(drilling.string, "components"):
@@ -151,6 +152,8 @@ def mixed_scene(drilling: Drilling, depth: float | None = None) -> MixedScene:
     for joint in drilling.joints:
         refuse("mixed_scene", "drilling.string", joint.tool, "a string without MudMotor and OscillationTool, which "
                "part it: a Collar in its place; drilling.simulate has them")  # fmt: skip
+    if drilling.hook is not None and drilling.hook.autodriller is not None:
+        refuse("mixed_scene", "drilling.hook", drilling.hook, "a Hook without an autodriller, in motions of a rod")
     if drilling.start != "rest":
         refuse("mixed_scene", "drilling.start", drilling.start, "'rest', from which the rod starts")
     top = _depth(drilling, depth)
@@ -176,22 +179,24 @@ def mixed_scene(drilling: Drilling, depth: float | None = None) -> MixedScene:
     hanging = float(weight @ heights[1]) - on_bit
     rough = drilling.hole and (drilling.friction or any(x.friction for x in drilling.hole.sections))
     pipe = PipeAbove(rod.start, tuple(above), drilling.drive, drilling.hook, hanging, drilling.drag,
-                     drilling if rough else None)  # fmt: skip
-    loads = [LineForce(rod, AlongPieces(weights) if len(weights) > 1 else weights[0][1]), pipe]
-    loads += [Force(rod.end, tuple(-on_bit * along))] if on_bit else []
+                     drilling if rough else None, follows_the_bit(drilling))  # fmt: skip
+    resting = replace(pipe, follows=False)
+    weights = LineForce(rod, AlongPieces(weights) if len(weights) > 1 else weights[0][1])
+    thrust = [Force(rod.end, tuple(-on_bit * along))] if on_bit else []
+    bit = None if drilling.bit is None else BitAtEnd(rod.end, drilling.bit, tuple(along))
     held = (rod.start,) if drilling.hole else (rod.start, rod.end)
     supports = [Roller(x, tuple(across)) for x in held for across in np.linalg.svd(t[None])[2][1:]]
     radii = [(float(x), part.body_radius) for x, (_, _, part, _) in zip(ends, below, strict=True)]
-    resting, moving = _walls(drilling, rod, top, radii)
-    at_rest = Scene([rod], supports, [*loads, *resting])
-    scene = Scene([rod], supports, [*loads, *_bit(drilling, rod), *moving])
+    still, moving = _walls(drilling, rod, top, radii)
+    at_rest = Scene([rod], supports, [weights, resting, *thrust, *still])
+    scene = Scene([rod], supports, [weights, pipe, *([bit] if bit else []), *moving])
     string = None
-    if resting:
-        wall, *rings = resting
+    if still:
+        wall, *rings = still
         string = StringScene(drilling.hole.path, at_rest, rod, None, wall, tuple(rings), tuple(sections), ends, weight,
                              -on_bit * along, wall.clearance, 0.0, "at rest without friction", top)  # fmt: skip
     hook_load = float(np.array([x.weight for _, x in parts]) @ heights[0]) - on_bit
-    return MixedScene(scene, at_rest, rod, pipe, top, tuple(_why(drilling, top)), drilling, string, hook_load)
+    return MixedScene(scene, at_rest, rod, pipe, bit, top, tuple(_why(drilling, top)), drilling, string, hook_load)
 
 
 def _section(part, segment):
@@ -232,16 +237,6 @@ def _damping(drilling):
     return Damping(drag=drag.torsion)
 
 
-def _bit(drilling, rod):
-    bit = drilling.bit
-    if bit is None:
-        return []
-    _check_law("mixed_scene", "drilling.bit.law", bit.law)
-    if bit.varies:
-        refuse("mixed_scene", "drilling.bit.weight", bit.weight, "a number (N): it does not change in motions of a rod")
-    return [BitTorque(rod.end, bit.law, bit.weight or 0.0, bit.inertia)]
-
-
 def _walls(drilling, rod, top, radii):
     """The walls and rings for equilibria, and those for motions."""
     hole = drilling.hole
@@ -280,55 +275,10 @@ def _why(drilling, top):
             yield f"the wall has a stiffness of {_WALL:g} N/m^2"
         yield f"the wall has a damping of {_DAMPING:g} s/m"
     yield "mud adds no mass to sideways motions of the rod"
-    if drilling.bit is not None and drilling.bit.weight is not None:
+    bit = drilling.bit
+    if bit is None or bit.weight is None:
+        return
+    if follows_the_bit(drilling):
+        yield "without a Hook its load stays the same: the string follows the bit that drills"
+    elif math.isinf(bit.rock_stiffness) and not bit.law.drills:
         yield "the weight on bit is constant: the bit does not leave the rock"
-    if drilling.bit is not None and drilling.bit.mass > 0:
-        yield f"the mass of the bit, {drilling.bit.mass:g} kg, is left out"
-
-
-@dataclass(frozen=True)
-class BitTorque(PointAction):
-    """A torque about the rod's axis d3 that falls with the speed of rotation; at rest anything up to the static one.
-
-    The law is set-valued: within a step the bit sticks or slips. In `simulate` alone, in the spatial model; at rest it
-    exerts nothing. It is not multiplied by the load factor. Its dissipation is in the energy balance.
-
-    Args:
-        station: where.
-        law: a `Stribeck`, or another `BitLaw` of the torque over the speed alone.
-        weight: on bit, N, constant, for a law by coefficients of friction; the force itself is a load of its own.
-        inertia_of_bit: about the axis, kg m^2. The `Damping.drag` of the rod does not act on it.
-
-    Raises:
-        SceneError: not a station, not such a law, or numbers that are negative.
-    """
-
-    station: StationOrName
-    law: BitLaw
-    weight: Annotated[ForceSize, at_least(0)] = 0.0
-    inertia_of_bit: Inertia = 0.0
-
-    work, scaled = None, False
-    traits = {"dead": True, "known_force": True, "rates": False, "turns": True, "flat": False}
-
-    def validate(self):
-        is_known(self, "station", Station)
-        _check_law(self, "law", self.law)
-
-    def inertia(self, rod):
-        return (0.0, np.array([0.0, 0.0, self.inertia_of_bit])) if self.inertia_of_bit else None
-
-    def resists(self, speed):
-        law = self.law.resistance(self.weight)
-        if speed == 0:
-            return law.still, 0.0
-        damping = self.station.rod.damping
-        drag = self.inertia_of_bit * damping.drag if damping else 0.0
-        return float(law(speed)) - drag * speed, law.slope(speed) - drag
-
-
-def _check_law(owner, field, law):
-    """Refuse a law that is not one of the torque over the speed alone."""
-    if law.lifts:
-        refuse(owner, field, law, f"a Stribeck or another law of the torque over the speed: {law.lifts}, and the rod's "
-               "end knows no depth of cut")  # fmt: skip

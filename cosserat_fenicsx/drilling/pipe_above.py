@@ -59,6 +59,8 @@ class PipeAbove(PointAction):
         rubs: a `Drilling` with a hole, of whose string the pipe is the upper part: it rubs at the wall of the hole, at
             these nodes, with the friction of the `Drilling`, along and around the hole, see `pipe_friction`; None for
             a pipe without a wall. Curvature of the hole does nothing else to its waves.
+        follows: whether the load of the hook stays as at the start, so that the string follows a bit that drills;
+            without a hook.
 
     Raises:
         SceneError: a part of the wrong kind, a station inside the rod, or a number out of range.
@@ -71,6 +73,7 @@ class PipeAbove(PointAction):
     tension: ForceSize = 0.0
     drag: ViscousDrag | None = None
     rubs: Drilling | None = None
+    follows: bool = False
 
     scaled = False
 
@@ -84,6 +87,8 @@ class PipeAbove(PointAction):
             if not isinstance(part, Segment | StringPart):
                 refuse(self, "pipe", part, "parts of the pipe: DrillPipe, HeavyWeight, ..., or Segment")
             positive(part, "length", part.length, "m, of the pipe")
+        if self.follows and self.hook is not None:
+            refuse(self, "hook", self.hook, "None, where the load of the hook stays the same")
         store(self, pipe=tuple(given))
         store(self, _numbers=self._found_numbers())
 
@@ -155,7 +160,7 @@ class _InMotion:
         axial = [(x.axial_impedance, x.length / x.axial_speed) for x in parts]
         torsional = [(x.torsional_impedance, x.length / x.torsional_speed) for x in parts]
         self._lines = (
-            _lines(axial, count, drag.axial, _hook_end(pipe.hook or Hook())),
+            _lines(axial, count, drag.axial, TopEnd(None) if pipe.follows else _hook_end(pipe.hook or Hook())),
             _lines(torsional, count, drag.torsion, _drive_end(pipe.drive, parts[0].torsional_impedance)),
         )
         depths = np.append(0.0, np.cumsum(np.repeat(lengths / count, count)))
@@ -245,13 +250,15 @@ _SPARE = 512
 
 @dataclass(frozen=True)
 class TopEnd:
-    """The upper end: I om' = Kp (Om - om) + Ki phi + M0 - M, phi' = Om - om; or om = Om where stiff.
+    """The upper end: I om' = Kp (Om - om) + Ki phi + M0 - M, phi' = Om - om; or om = Om where stiff; or M = phi, the
+    force of the start.
 
     Args:
-        mean: function (start, end) of times (s) that gives the mean of the speed Om asked for. inertia: I. given: M0.
+        mean: function (start, end) of times (s) that gives the mean of the speed Om asked for; None for the force of
+            the start. inertia: I. given: M0.
     """
 
-    mean: Callable[[float, float], float]
+    mean: Callable[[float, float], float] | None
     stiff: bool = False
     inertia: float = 0.0
     Kp: float = 0.0
@@ -261,6 +268,8 @@ class TopEnd:
     def rest(self, speed, force):
         """(om, phi) at the beginning of a motion, for a speed and a force handed down; phi balances that force without
         a difference of speeds, where there is one."""
+        if self.mean is None:
+            return speed, force
         return speed, (force - self.given) / self.Ki if self.Ki else 0.0
 
     def step(self, state, start, end, impedance, wave):
@@ -269,7 +278,10 @@ class TopEnd:
         Args:
             state: (om, phi). impedance: of the string, with its drag. wave: M - Z om that arrives.
         """
-        asked, h, (om, phi) = self.mean(start, end), end - start, state
+        h, (om, phi) = end - start, state
+        if self.mean is None:
+            return (phi - wave) / impedance, state
+        asked = self.mean(start, end)
         if self.stiff:
             return asked, (asked, 0.0)
         inert, turned = 2 * self.inertia / h, self.Ki * h / 2

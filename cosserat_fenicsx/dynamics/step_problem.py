@@ -7,7 +7,8 @@ from dolfinx import fem
 from cosserat_fenicsx.algebra.equations import COMPLIANCE, CONTACT, NODES, RESIDUAL, STATE, Equations
 from cosserat_fenicsx.algebra.packed import Packed
 from cosserat_fenicsx.algebra.tie_rows import TieRows
-from cosserat_fenicsx.dynamics.contact import NodalContact, SpinLaw
+from cosserat_fenicsx.dynamics.contact import NodalContact
+from cosserat_fenicsx.dynamics.station_law import StationLaw
 from cosserat_fenicsx.dynamics.touching import RodsTouching
 
 
@@ -92,7 +93,7 @@ class StepProblem(Equations):
         self._assemble_loads()
         walls = [action for action in scene.actions if action.touches]
         self.contact = NodalContact(self, walls, at_end=self.acting_share == 1) if walls else None
-        self._laws = [SpinLaw(self, action) for action in scene.actions if action.resists]
+        self._laws = [StationLaw(self, action) for action in scene.actions if action.resists]
         self.rods_touching = RodsTouching(self) if scene.rod_contact else None
         self._laws += [self.rods_touching] if scene.rod_contact else []
         self.touching = [self.contact, *self._laws] if walls else self._laws

@@ -405,11 +405,16 @@ class Delays:
     longest: the longest step that they allow, s."""
 
     def __init__(self, model):
-        self._model, actions = model, [x for x in model.scene.actions if x.delayed is not None]
+        self._model, self._actions = model, [x for x in model.scene.actions if x.delayed is not None]
+        actions = self._actions
         self._all = [(action.delayed(), StationNode(model, action.station)) for action in actions]
         self.longest = min((delayed.longest for delayed, _ in self._all), default=np.inf)
         if actions:
             model.actions.follow({id(x): delayed for x, (delayed, _) in zip(actions, self._all, strict=True)})
+
+    def of(self, action):
+        """The `Action.delayed` of an action."""
+        return next(delayed for (delayed, _), x in zip(self._all, self._actions, strict=True) if x is action)
 
     def begin(self):
         """Begin at the model's state, at the time 0."""

@@ -102,8 +102,11 @@ class Action(Part, family="load or action", homes=("cosserat_fenicsx.scene.loads
             `dynamics.stepper.Stepper`, and `far_end` () -> four numbers on the last step that results keep: velocity
             (m/s), force (N), angular velocity (rad/s) and torque (N m) where it ends. `motion` is a
             `models.action_terms.StationMotion`.
-        resists: None; or a method (speed, rad/s, from 0 on) -> torque (N m) about the axis d3 against the rotation of
-            its `station` in motions, and its derivative: at 0 the largest torque that holds, then a convex function.
+        resists: whether it resists the motion of its `station`, along a direction and about the axis d3, in motions.
+            Its `delayed` then also has `down` and `axis`, unit vectors (3,), inertial: the direction, and the axis at
+            rest; `start` (h) at the begin of a step of the length h (s); and `forces` (free, compliance) -> (2,) force
+            (N) and torque (N m) against the motion in the step, from the motion without them, (2,) m and rad, and what
+            they take off, (2, 2). Those of the last call before `accept` are those of the step.
         touches: whether it is a wall that nodes of rods touch in motions (dynamics/contact.py), in place of a virtual
             work. It then has `stiffness` (N/m^2; N/m at a station), `damping` (s/m), `begins` (m) and a method
             `tube_around` (arc lengths s (n,), points (n, 3) of the rod, measured depths (n,) near them) -> the
@@ -125,7 +128,7 @@ class Action(Part, family="load or action", homes=("cosserat_fenicsx.scene.loads
     """
 
     at_nodes, scaled, permanent, follows, memory, evolve, traits = False, True, False, False, (), None, None
-    delayed, resists, touches, presses, gaps, in_law, is_thread = None, None, False, False, None, False, False
+    delayed, resists, touches, presses, gaps, in_law, is_thread = None, False, False, False, None, False, False
     rods_touch = False
     amplitude = 1.0
 

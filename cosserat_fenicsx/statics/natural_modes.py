@@ -152,7 +152,7 @@ def admit(owner, scene, damped):
     for rod in scene.rods:
         require_inertia(rod, "a motion")
     for action in scene.actions:
-        if action.delayed is not None:
+        if action.delayed is not None and not action.resists:
             raise SceneError(
                 f"{owner}: {describe(action)}: expected no actions whose forces come from earlier motion: rods in "
                 "its place, or the spectrum of a simulated motion, show the modes"
