@@ -97,7 +97,8 @@ class BitAtEnd(PointAction):
 
 class _InMotion:
     """The law of a `BitAtEnd` in a motion, see `Action.delayed` and `Action.resists`, and what an `EndCondition` sees
-    of a string. down, axis: (3,) inertial, of the thrust, and of the rotation at rest."""
+    of a string. down, axis: (3,) inertial, of the thrust, and of the rotation at rest. held: whether it was held along and about them in the last
+    step."""
 
     longest = math.inf
 
@@ -116,7 +117,8 @@ class _InMotion:
         self._before, self._lengths = self._mean.copy(), (0.0, 0.0)
         steady = self._mean if self._mean[0] > 0 else np.zeros(2)
         self._end = self._bit.law.end(self._bit.weight or 0.0, self._place, steady)
-        self._bears, self._held, self._face = np.array([self._bit.weight or 0.0, 0.0]), True, 0.0
+        self._bears, self._face = np.array([self._bit.weight or 0.0, 0.0]), 0.0
+        self.held = False, turning == 0
         self._pending = self._kept = None
 
     # -- what an `EndCondition` sees of a string -----------------------------------------------------------------------
@@ -192,7 +194,7 @@ class _InMotion:
         h, linear = self._h, self._tangent - np.diag(self._drag)
         own = np.linalg.inv(np.eye(2) + compliance @ linear / h)
         x, C = own @ (free - compliance @ self._given), own @ compliance
-        laws, held = np.zeros(2), self._held
+        laws = np.zeros(2)
         for _ in range(_SWEEPS):
             before = laws.copy()
             laws[0] = self._thrust(x[0] - C[0, 1] * laws[1], C[0, 0])
@@ -203,7 +205,7 @@ class _InMotion:
             raise NotConverged(f"BitAtEnd: weight and torque on bit do not agree in a step of {h:.3g} s: a shorter dt")
         moved = x - C @ laws
         force = self._given + linear @ moved / h + laws
-        self._step = moved, force + self._drag * moved / h, held
+        self._step = moved, force + self._drag * moved / h, (self._rock is None and abs(laws[0]) < self._flats, held)
         return force
 
     def _thrust(self, free, C):
@@ -220,7 +222,7 @@ class _InMotion:
             return 0.0, False
         # a torque that drops at once holds by the static one only while the bit has not slipped
         drops = law.decay == 0 and law.function is None
-        if size <= C * (law.still if self._held or not drops else law.slipping):
+        if size <= C * (law.still if self.held[1] or not drops else law.slipping):
             return free / C, True
         if law.steepest * C >= h:
             raise SceneError(
@@ -241,14 +243,14 @@ class _InMotion:
         return math.copysign(float(law(speed)), free), False
 
     def accept(self, t, h, motion):
-        self._kept = (self._place, self._mean, self._before, self._lengths, self._bears, self._held, self._face)
-        moved, self._bears, self._held = self._step
+        self._kept = (self._place, self._mean, self._before, self._lengths, self._bears, self.held, self._face)
+        moved, self._bears, self.held = self._step
         self._place, self._face = self._place + moved, self._next_face
         self._before, self._mean, self._lengths = self._mean, moved / h, (self._lengths[1], h)
         self._pending = self._next
 
     def undo(self):
-        self._place, self._mean, self._before, self._lengths, self._bears, self._held, self._face = self._kept
+        self._place, self._mean, self._before, self._lengths, self._bears, self.held, self._face = self._kept
         self._pending = None
 
     def far_end(self):
@@ -257,7 +259,7 @@ class _InMotion:
     def memory(self):
         self._settle()
         numbers = np.array([*self._place, *self._mean, *self._before, *self._lengths, *self._bears, self._face])
-        found = {"numbers": numbers, "held": bool(self._held)}
+        found = {"numbers": numbers, "held": np.array(self.held)}
         if self._end is not None and (end := self._end.memory()):
             found["end"] = end
         return found
@@ -265,7 +267,7 @@ class _InMotion:
     def recall(self, memory):
         numbers = memory["numbers"]
         self._place, self._mean, self._before, lengths, self._bears = numbers[:10].reshape(5, 2).copy()
-        self._lengths, self._face, self._held = tuple(lengths.tolist()), float(numbers[10]), bool(memory["held"])
+        self._lengths, self._face, self.held = tuple(lengths.tolist()), float(numbers[10]), tuple(memory["held"].tolist())
         self._pending = None
         if "end" in memory:
             self._end.recall(memory["end"])

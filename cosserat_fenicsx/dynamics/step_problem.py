@@ -79,6 +79,7 @@ class StepProblem(Equations):
         self.take_loads((self._known.array, np.ones(1)))
         self._start = model.start.x.array
         self.load_factor, self.fresh, self.contact, self.touching, self._laws = 1.0, True, None, [], []
+        self._at_stations = []
         self.rods_touching = None
         self._hooks = self.c.hooks
         self._pack()
@@ -95,6 +96,7 @@ class StepProblem(Equations):
         self.contact = NodalContact(self, walls, at_end=self.acting_share == 1) if walls else None
         self._laws = [StationLaw(self, action) for action in scene.actions if action.resists]
         self.rods_touching = RodsTouching(self) if scene.rod_contact else None
+        self._at_stations = [*self._laws]
         self._laws += [self.rods_touching] if scene.rod_contact else []
         self.touching = [self.contact, *self._laws] if walls else self._laws
         self.c.contact = self.contact.c if walls else self._ffi.NULL
@@ -160,6 +162,8 @@ class StepProblem(Equations):
         self._of_law = self._work_of_law(t, self._middle)
         self._take_loads(self._loaded_at)
         self._known.set(0.0)
+        for law in self._at_stations:
+            law.settle()
         if self.takes_momentum:
             self._assemble(self._momentum, self._known)
             self._known.scale(1 / self.h)
@@ -254,9 +258,8 @@ class StepProblem(Equations):
         """Accept the step; after its energies are recorded."""
         self.model.accept(self.h)
         self.model.actions.commit()
-        for part in (self.contact, self.rods_touching):
-            if part:
-                part.accept()
+        for part in self.touching:
+            part.accept()
 
     def energies(self):
         """Kinetic and strain energy of the state, dimensionless, over all ranks."""

@@ -106,7 +106,8 @@ class Action(Part, family="load or action", homes=("cosserat_fenicsx.scene.loads
             Its `delayed` then also has `down` and `axis`, unit vectors (3,), inertial: the direction, and the axis at
             rest; `start` (h) at the begin of a step of the length h (s); and `forces` (free, compliance) -> (2,) force
             (N) and torque (N m) against the motion in the step, from the motion without them, (2,) m and rad, and what
-            they take off, (2, 2). Those of the last call before `accept` are those of the step.
+            they take off, (2, 2). Those of the last call before `accept` are those of the step. `held` says whether
+            the station was at rest in the last step, along and about.
         touches: whether it is a wall that nodes of rods touch in motions (dynamics/contact.py), in place of a virtual
             work. It then has `stiffness` (N/m^2; N/m at a station), `damping` (s/m), `begins` (m) and a method
             `tube_around` (arc lengths s (n,), points (n, 3) of the rod, measured depths (n,) near them) -> the
