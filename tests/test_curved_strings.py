@@ -9,6 +9,7 @@ from torsion_scenes import part
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.drilling.pipe_friction import PipeFriction
+from cosserat_fenicsx.models.action_terms import StationMotion
 
 pytestmark = pytest.mark.serial
 MESH = {"elements": 20, "degree": 2}
@@ -53,6 +54,81 @@ def test_at_rest_in_a_bent_hole_nothing_moves(depth):
     assert history.kinetic.max() < 1e-9 * history.strain[0] and imbalance(history) < 1e-10
     pull = history.force(mixed.rod.start) @ mixed.above.down()
     assert pull == pytest.approx(mixed.above.tension, rel=1e-3)
+
+
+CUTTING = cf.drilling.Cutting(0.108, 60e6, 0.6, 4, cf.drilling.Wear(60e6, 1.2e-3, 0.6))
+
+
+@pytest.mark.parametrize(("law", "rock"), [(CUTTING, math.inf), (cf.drilling.Stribeck(0.3, 0.2, 2.0, 0.1), 5e7)])
+def test_at_rest_on_a_bit_nothing_moves(law, rock):
+    """Its weight on bit is that of the equilibrium; wear flats bear what they may."""
+    bit = cf.drilling.BitOnRock(law, weight=20e3, inertia=10.0, rock_stiffness=rock)
+    mixed = cf.drilling.mixed_scene(drilling(0.0, bit=bit), 200.0)
+    history = cf.simulate(mixed.scene, 0.02, dt=2e-3, **MESH, start=mixed.rest(**MESH))
+    for s in (1.0, 60.0, 100.0):
+        place = history.position(mixed.rod.at(s))
+        assert np.abs(place - place[0]).max() < 1e-8
+    assert mixed.as_drilling(history).weight_on_bit == pytest.approx(20e3, rel=1e-4) and imbalance(history) < 1e-10
+
+
+LOBES = cf.drilling.Lobes(3, 2e-3, cf.drilling.Stribeck(1000.0, 600.0, 3.0))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("law", "rock", "weight", "off"),
+    [(cf.drilling.Cutting(0.108, 60e6, 0.6, 4), math.inf, 10e3, 5e-3), (CUTTING, math.inf, 20e3, 2e-2),
+     (cf.drilling.RateLaw(3e6, 1000.0), math.inf, 10e3, 3e-2), (LOBES, 2e7, 20e3, 5e-3)],
+)  # fmt: skip
+def test_bits_at_a_rod_in_a_bend_are_those_of_the_axial_and_torsional_model(law, rock, weight, off):
+    """Where the hole holds the string on its axis: speed of the bit to 1e-3 of its peak, torque and weight in the mean
+    square, the energy that the bit takes, and the books."""
+    parts = (part(30.0, 0.1651, 0.05715, weight=1000.0), part(120.0, 0.127, 0.10861))
+    string = drilling(
+        lambda t: 5.0 * (1 - math.cos(math.pi * min(t / 0.2, 1.0))),
+        friction=0.0, path=well(150.0), parts=parts, hole=0.1652, drag=1.0,
+        bit=cf.drilling.BitOnRock(law, weight=weight, inertia=20.0, rock_stiffness=rock),
+    )  # fmt: skip
+    mixed = cf.drilling.mixed_scene(string, 90.0)
+    history = cf.simulate(mixed.scene, 0.4, dt=1e-3, elements=8, degree=2, start=mixed.rest(8, 2))
+    found = mixed.as_drilling(history)
+    whole = cf.drilling.simulate(string, 0.4, dt=2e-4, elements=300, model="axial and torsional")
+    for name, norm, limit in (("bit_speed", np.max, 1.3e-3), ("surface_torque", _mean_square, 1e-3),
+                              ("weight_on_bit", _mean_square, off)):  # fmt: skip
+        true = np.interp(found.times - found.dt / 2, whole.times - whole.dt / 2, getattr(whole, name))
+        assert norm(np.abs(getattr(found, name) - true)) < limit * np.abs(true).max(), name
+    lost = ((found.weight_on_bit * found.bit_velocity + found.torque_on_bit * found.bit_speed) * found.dt).sum()
+    assert lost == pytest.approx(whole.lost_at_bit[-1], rel=1e-2)
+    assert history.dissipated[-1] > lost > 1000 and imbalance(history) < 1e-4
+
+
+def _mean_square(values):
+    return math.sqrt(np.mean(values**2))
+
+
+def law_at_end(law, **bit):
+    """The law of a bit at the end of a rod, at rest at the start."""
+    rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, -1)), cf.Tube(0.2, 0.1), cf.Material(E=2e11, nu=0.3, density=7850.0))
+    found = cf.drilling.BitAtEnd(rod.end, cf.drilling.BitOnRock(law, **bit)).delayed()
+    still = np.zeros(3)
+    found.begin(StationMotion(still, still, still, still, np.eye(3)))
+    return found
+
+
+def test_the_force_of_a_bit_is_that_of_its_law_on_the_compliance():
+    """A sharp bit: N = K (cut + x_a/2) and a torque by the cut predicted; with wear flats nothing moves within them."""
+    sharp, h, C = cf.drilling.Cutting(0.1, 50e6, 0.6, 4), 1e-3, np.array([[2e-9, 1e-9], [1e-9, 3e-7]])
+    bit = law_at_end(sharp, weight=12e3)
+    bit.start(h)
+    free = np.array([1e-4, 2e-3])
+    forces = bit.forces(free, C)
+    moved = free - C @ forces
+    assert forces[0] == pytest.approx(12e3 + sharp.axial_stiffness * moved[0] / 2, rel=1e-12)
+    assert forces[1] == pytest.approx(sharp.torsional_stiffness * 12e3 / sharp.axial_stiffness, rel=1e-12)
+    bit = law_at_end(cf.drilling.Cutting(0.1, 50e6, 0.6, 4, cf.drilling.Wear(60e6, 2e-3, 0.6)), weight=16e3)
+    bit.start(h)
+    free = C @ [15e3, 500.0]  # flats of 12 kN bear between 4 and 16 kN, friction holds the rotation
+    assert bit.forces(free, C) == pytest.approx([15e3, 500.0], rel=1e-9)
 
 
 def test_torsion_in_a_bend_that_holds_the_string_on_its_axis_is_that_of_the_straight_string():
@@ -128,7 +204,9 @@ def test_friction_at_a_node_is_a_vector_against_its_slip():
 
 
 def test_resume_below_a_pipe_that_rubs_gives_identical_digits(tmp_path, monkeypatch):
-    mixed = cf.drilling.mixed_scene(drilling(lambda t: min(4 * t, 2.0)), 200.0)
+    """With a bit that cuts."""
+    bit = cf.drilling.BitOnRock(CUTTING, weight=20e3, inertia=10.0)
+    mixed = cf.drilling.mixed_scene(drilling(lambda t: min(40 * t, 4.0), bit=bit), 200.0)
     start = mixed.rest(**MESH)
     whole = cf.simulate(mixed.scene, 0.12, dt=2e-3, **MESH, start=start)
     stop_at(monkeypatch, 40, 0.0)
@@ -137,7 +215,8 @@ def test_resume_below_a_pipe_that_rubs_gives_identical_digits(tmp_path, monkeypa
     history = cf.resume(tmp_path / "run", mixed.scene)
     for name in ("times", "energy", "work", "dissipated"):
         assert np.array_equal(getattr(history, name), getattr(whole, name))
-    assert np.array_equal(history.far_end(mixed.above), whole.far_end(mixed.above), equal_nan=True)
+    for action in (mixed.above, mixed.bit):
+        assert np.array_equal(history.far_end(action), whole.far_end(action), equal_nan=True)
 
 
 def test_refusals():

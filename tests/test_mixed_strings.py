@@ -115,13 +115,15 @@ def test_in_an_inclined_hole_it_lies_on_the_wall_and_hangs_in_the_pipe():
 
 def test_refusals():
     string = drilling()
-    cutting = cf.drilling.Cutting(0.108, 60e6, 0.6, 4)
+    lobes = cf.drilling.BitOnRock(cf.drilling.Lobes(3, 5e-3), 2e4)
+    driller = cf.drilling.Hook(autodriller=cf.drilling.Autodriller(weight=1e4, Kp=2e-8, Ki=2e-9, limits=(0, 0.02)))
     for scene, depth, words in (
         (string, None, "depth = None: .*lowest DrillPipe"),
         (string, 3300.0, "depth = 3300.0: expected a depth .m. within the string"),
         (string, 0.0, "depth = 0.0: .*above 0 and below"),
         (replace(string, drag=cf.drilling.ViscousDrag(0.3)), 3000.0, "drag = .*the same rate"),
-        (drilling(cutting, weight=1e4), 3000.0, "law = .*a Stribeck"),
+        (replace(string, bit=lobes), 3000.0, "rock_stiffness = inf: .*no impulses stop the end of a rod"),
+        (replace(string, hook=driller), 3000.0, "hook = .*without an autodriller"),
     ):  # fmt: skip
         with pytest.raises(cf.SceneError, match=words):
             cf.drilling.mixed_scene(scene, depth)

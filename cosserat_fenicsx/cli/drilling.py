@@ -70,7 +70,9 @@ def deliver_motion(computed, options, tables=None):
         return {
             "drilling.csv": partial(history.write, **asked),
             "drilling.png": picture_in_time and partial(history.plot, **asked),
-            "energy.png": picture_in_time and partial(history.plot_energy, **asked),
+            "energy.png": picture_in_time
+            and math.isfinite(history.balance[0])
+            and partial(history.plot_energy, **asked),
             "phase.png": picture_in_time and turns(history) and partial(history.plot_phase, **asked),
             "map.png": picture_in_time and in_depth and partial(history.plot_map, **asked),
             film: film and in_depth and partial(history.animate, speed=options.speed),
@@ -84,6 +86,8 @@ def explain(options, found):
     found = _scene(options, found)
     scene, settings, shown = found.scene, found.settings, Units(units_of(options))
     lines = list(found.sentences(shown))
+    if found.mixed is not None:
+        return "\n".join(lines)
     name, why = chosen(scene, settings.get("model", "auto"))
     lines += [f"Model: {shown.sentence(line)}." for line in why]
     if "duration" in settings:

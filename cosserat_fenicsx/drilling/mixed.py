@@ -33,8 +33,12 @@ from cosserat_fenicsx.well.rod.string_scene import StringScene
 _NOTHING = 1e-9
 # Default stiffness of the wall, N/m^2, and of rings, N/m.
 _WALL = 1e8
-# Damping of the wall in motions, s/m: without it a bit in gauge chatters from step to step.
-_DAMPING = 10.0
+# Default length (m) of elements, and the fewest.
+_ELEMENT, _FEWEST = 6.0, 8
+# Default damping of the wall in motions, s/m.
+DAMPING = 10.0
+# Speed (m/s) for which the rebound from the wall is told.
+_TOUCH = 0.03
 _DOWN = np.array([0.0, 0.0, 1.0])
 
 
@@ -91,6 +95,33 @@ class MixedScene(InWords):
         whole("rest", "elements", elements)
         return at_rest(self._string, elements, degree, comm)
 
+    def run(
+        self,
+        duration: float,
+        *,
+        dt: float = 1e-3,
+        elements: int | None = None,
+        degree: int = 2,
+        save_every: float | None = None,
+        progress: bool | None = None,
+        comm: MPI.Comm | None = None,
+    ) -> DrillingHistory:
+        """The motion from rest, in one call: `rest`, `simulate` and `as_drilling`.
+
+        Args:
+            duration: s. dt: step, s. elements: of the rod; None for one of about 6 m. degree, save_every, progress,
+                comm: as for `simulate`.
+
+        Raises:
+            SceneError, NotConverged: see `rest` and `simulate`.
+        """
+        from cosserat_fenicsx.dynamics.simulate import simulate  # it needs dolfinx
+
+        mesh = {"elements": elements or max(_FEWEST, math.ceil(self.rod.length / _ELEMENT)), "degree": degree}
+        start = 1.0 if self._string is None else self.rest(**mesh, comm=comm)
+        return self.as_drilling(simulate(self.scene, duration, dt=dt, **mesh, start=start, save_every=save_every,
+                                         progress=progress, comm=comm))  # fmt: skip
+
     def as_drilling(self, history: History) -> DrillingHistory:
         """What happens at the surface and at the bit in a motion of `scene`, as of other models of strings: its charts,
         tables, stick-slip, and files. Rows are the saved states but the first.
@@ -124,7 +155,7 @@ class MixedScene(InWords):
         return DrillingHistory(self.drilling, "rod below pipe", self.why, dt.mean(), ends, np.array([*rows.values()]).T)
 
 
-def mixed_scene(drilling: Drilling, depth: float | None = None) -> MixedScene:
+def mixed_scene(drilling: Drilling, depth: float | None = None, *, wall_damping: float = DAMPING) -> MixedScene:
     """A rod for a string's lower part in its hole, which may bend, and waves for the pipe above.
 
     Components of the axes are north, east, down, as in a `WellPath`; without a hole the string is vertical below the
@@ -138,6 +169,9 @@ def mixed_scene(drilling: Drilling, depth: float | None = None) -> MixedScene:
         drilling: a `Drilling` with a `DrillString`.
         depth: measured depth of the rod's upper end, m or text, such as "9800 ft"; None for the lower end of the lowest
             `DrillPipe`. A joint or two of pipe above, such as 30.0, leave a rod for the whole string.
+        wall_damping: of the wall of the hole and its rings, s/m, see `HoleWall`. A body that comes down on the wall
+            with the speed v leaves it with about v (1 - 2 damping v/3). Without damping a bit in gauge chatters from
+            step to step, and the energy balance suffers.
 
     Returns:
         MixedScene.
@@ -157,6 +191,9 @@ def mixed_scene(drilling: Drilling, depth: float | None = None) -> MixedScene:
     if drilling.start != "rest":
         refuse("mixed_scene", "drilling.start", drilling.start, "'rest', from which the rod starts")
     top = _depth(drilling, depth)
+    damping = number(
+        "mixed_scene", "wall_damping", wall_damping, "a number of s/m, not negative", lambda x: 0 <= x < math.inf
+    )
     parts = list(zip(drilling.places, drilling.segments, strict=True))  # from the top down
     below = [
         (max(place.top, top), place.bottom, place.component, x) for place, x in parts if place.bottom > top + _NOTHING
@@ -187,7 +224,7 @@ def mixed_scene(drilling: Drilling, depth: float | None = None) -> MixedScene:
     held = (rod.start,) if drilling.hole else (rod.start, rod.end)
     supports = [Roller(x, tuple(across)) for x in held for across in np.linalg.svd(t[None])[2][1:]]
     radii = [(float(x), part.body_radius) for x, (_, _, part, _) in zip(ends, below, strict=True)]
-    still, moving = _walls(drilling, rod, top, radii)
+    still, moving = _walls(drilling, rod, top, radii, damping)
     at_rest = Scene([rod], supports, [weights, resting, *thrust, *still])
     scene = Scene([rod], supports, [weights, pipe, *([bit] if bit else []), *moving])
     string = None
@@ -196,7 +233,9 @@ def mixed_scene(drilling: Drilling, depth: float | None = None) -> MixedScene:
         string = StringScene(drilling.hole.path, at_rest, rod, None, wall, tuple(rings), tuple(sections), ends, weight,
                              -on_bit * along, wall.clearance, 0.0, "at rest without friction", top)  # fmt: skip
     hook_load = float(np.array([x.weight for _, x in parts]) @ heights[0]) - on_bit
-    return MixedScene(scene, at_rest, rod, pipe, bit, top, tuple(_why(drilling, top)), drilling, string, hook_load)
+    return MixedScene(
+        scene, at_rest, rod, pipe, bit, top, tuple(_why(drilling, top, damping)), drilling, string, hook_load
+    )
 
 
 def _section(part, segment):
@@ -237,7 +276,7 @@ def _damping(drilling):
     return Damping(drag=drag.torsion)
 
 
-def _walls(drilling, rod, top, radii):
+def _walls(drilling, rod, top, radii, damping):
     """The walls and rings for equilibria, and those for motions."""
     hole = drilling.hole
     if hole is None:
@@ -260,11 +299,11 @@ def _walls(drilling, rod, top, radii):
         [along(rod, hole.path, radius, radii, friction=friction, **given, **more),
          *(at(station, hole.path, *sizes, friction=mu, **given, **more)
            for station, (_, *sizes), mu in zip(stations, rings, rubs, strict=True))]
-        for along, at, more in ((TubeWall, TubeRing, {}), (HoleWall, HoleRing, {"damping": _DAMPING}))
+        for along, at, more in ((TubeWall, TubeRing, {}), (HoleWall, HoleRing, {"damping": damping}))
     )  # fmt: skip
 
 
-def _why(drilling, top):
+def _why(drilling, top, damping):
     yield f"rod below {top:g} m, waves of torsion and stretch in the pipe above"
     if drilling.hole is not None:
         yield "bending of the pipe above is left out: friction by the wall force of a soft string, with its tension"
@@ -273,7 +312,10 @@ def _why(drilling, top):
             yield "friction at the rod's wall is the kinetic one, at rest too"
         if drilling.hole.wall_stiffness is None:
             yield f"the wall has a stiffness of {_WALL:g} N/m^2"
-        yield f"the wall has a damping of {_DAMPING:g} s/m"
+        if damping:
+            kept = max(1 - 2 * damping * _TOUCH / 3, 0.0)
+            yield (f"the wall has a damping of {damping:g} s/m (wall_damping): what touches it at {_TOUCH:g} m/s "
+                   f"leaves it with about {kept:.0%} of that")  # fmt: skip
     yield "mud adds no mass to sideways motions of the rod"
     bit = drilling.bit
     if bit is None or bit.weight is None:

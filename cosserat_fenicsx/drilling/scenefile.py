@@ -22,6 +22,9 @@ law = { type = "Stribeck", static = "6 kN m", dynamic = "4 kN m", speed = "3 rad
 [simulate]                       # duration, and what else `simulate` takes
 duration = 60.0
 
+[rod]                            # optional: an exact rod for the lower part in its hole: depth, elements, degree,
+depth = 2800.0                   # wall_damping
+
 [stability]                      # optional: speeds, weights, and what else `stability` takes
 [response]                       # optional: frequencies, and what else `frequency_response` takes
 [fit]                            # optional: readings of a rig, their noise; [[fit.unknowns]]: name, least, largest
@@ -45,6 +48,7 @@ from cosserat_fenicsx.drilling.history import DrillingHistory
 from cosserat_fenicsx.drilling.linear import frequencies
 from cosserat_fenicsx.drilling.linear.response import FrequencyResponse, frequency_response
 from cosserat_fenicsx.drilling.linear.stability import Stability, stability
+from cosserat_fenicsx.drilling.mixed import DAMPING, MixedScene, mixed_scene
 from cosserat_fenicsx.drilling.motion import check_arguments as check_simulation
 from cosserat_fenicsx.drilling.motion import simulate
 from cosserat_fenicsx.drilling.readings import READ, Readings
@@ -109,6 +113,22 @@ class SimulateDrilling(Part):
     profile_every: Time | None = None
 
     called = "simulate"
+
+
+@dataclass(frozen=True)
+class RodBelow(Part):
+    """An exact rod for the lower part of the string, below waves for the pipe above, see `mixed_scene`.
+
+    Args:
+        depth, wall_damping: as for `mixed_scene`. elements, degree: as for `MixedScene.run`.
+    """
+
+    depth: Depth | None = None
+    elements: Annotated[int, Number(limits=at_least(1, "a number of elements"), whole=True)] | None = None
+    degree: Annotated[int, Number(limits=at_least(1, "a degree"), whole=True)] = 2
+    wall_damping: Annotated[float, Number(limits=at_least(0))] = DAMPING
+
+    called = "rod"
 
 
 @dataclass(frozen=True)
@@ -203,12 +223,12 @@ class DrillingScene(InWords, Part):
         drive: the `TopDrive`.
         string: the `DrillString`; or discs: `Discs`.
         bit, hook, mud, drag, depth, start: as for `Drilling`. well: its hole. wall_friction: its friction.
-        simulate: arguments of `simulate`. stability: a map of stability, response: a frequency response, fit: numbers
-            that are to be found from readings; or None.
+        simulate: arguments of `simulate`. rod: a `RodBelow`, for the motion of an exact rod below pipe. stability: a
+            map of stability, response: a frequency response, fit: numbers that are to be found from readings; or None.
         title: for tables and charts.
 
     Attributes:
-        scene: the `Drilling`.
+        scene: the `Drilling`. mixed: the `MixedScene` of [rod], or None.
 
     Raises:
         SceneError: parts that are missing or do not fit each other.
@@ -226,6 +246,7 @@ class DrillingScene(InWords, Part):
     depth: Depth | None = None
     start: Literal["rest", "steady"] = "rest"
     simulate: SimulateDrilling | None = None
+    rod: RodBelow | None = None
     stability: StabilityMap | None = None
     response: ResponseAt | None = None
     fit: FitToReadings | None = None
@@ -247,18 +268,29 @@ class DrillingScene(InWords, Part):
         if "duration" in settings:
             check_simulation(self.scene, **settings)
         chosen(self.scene, model)
+        store(self, mixed=self._mixed(model, settings))
         if self.weights:
             self.scene.with_case(weight=self.weights[0])  # refused where there is no bit
         if self.fit:
             with concerning("fit", "unknowns"):
                 store(self, _ranges=ranges_of(self.scene, self.fit.ranges))
 
+    def _mixed(self, model, settings) -> MixedScene | None:
+        if self.rod is None:
+            return None
+        for name in ("elements", "profile_every"):
+            if name in settings:
+                refuse(self.simulate, name, settings[name], "None beside [rod], which has elements and no profiles")
+        if model != "auto":
+            refuse(self.simulate, "model", model, "'auto' beside [rod], which is a model of its own")
+        return mixed_scene(self.scene, self.rod.depth, wall_damping=self.rod.wall_damping)
+
     def sentences(self, units: Units):
         """On the `Drilling` and on what is asked for, in some units."""
         duration = self.settings.get("duration")
         if self.title:
             yield self.title
-        yield from self.scene.sentences(units, duration)
+        yield from self.scene.sentences(units, duration) if self.mixed is None else self.mixed.sentences(units)
         if duration is not None:
             yield f"Asked for: a motion of {duration:g} s."
         if self.speeds:
@@ -302,15 +334,19 @@ class DrillingScene(InWords, Part):
         return self.stability.weights or () if self.stability else ()
 
     def run(self, **changed) -> DrillingHistory:
-        """The motion by `simulate`; `changed`: arguments other than in the file.
+        """The motion by `simulate`, or with [rod] by `MixedScene.run`; `changed`: arguments other than in the file.
 
         Raises:
-            SceneError: no duration; see `simulate`, whose other exceptions it raises too.
+            SceneError: no duration; a folder beside [rod]; see `simulate`, whose other exceptions it raises too.
         """
         given = {**self.settings, **changed}
         if given.get("duration") is None:
             raise SceneError("simulate.duration = None: expected a positive number (s), in [simulate]")
-        return simulate(self.scene, **given)
+        if self.mixed is None:
+            return simulate(self.scene, **given)
+        if given.pop("folder", None) is not None:
+            raise SceneError("folder: expected none beside [rod]; in Python simulate(found.mixed.scene, folder=...)")
+        return self.mixed.run(**{"elements": self.rod.elements, "degree": self.rod.degree, **given})
 
     def map(self) -> Stability | None:
         """The growth of every mode at the speeds and weights of the file, see `stability`; None where it asks for none.

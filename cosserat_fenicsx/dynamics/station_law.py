@@ -1,5 +1,5 @@
-"""The law of one action with `Action.resists` at a node: of a force along a direction and a torque about the rod's axis,
-set-valued, such as those of a bit on rock.
+"""The law of one action with `Action.resists` at a node: of a force along a direction and a torque about the rod's
+axis, set-valued, such as those of a bit on rock.
 
 As walls do, it acts on the compliance of the moving rods: the motion of the node in a step is a linear function of
 force and torque, by the tangent of Newton's method, and with it the law is solved exactly before Newton's step is
