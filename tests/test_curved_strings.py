@@ -1,6 +1,7 @@
 """Rods of drill-strings in bent holes, in motion from their equilibria, below pipe with friction at the wall."""
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -231,3 +232,25 @@ def test_refusals():
         history.far_end(mixed.scene.loads[0])
     with pytest.raises(cf.SceneError, match="history = .*expected a motion of the `scene`"):
         cf.drilling.mixed_scene(free, 100.0).as_drilling(history)
+
+
+def test_a_scene_file_asks_for_a_rod(tmp_path):
+    """The example of the docs: the same numbers as in Python, without books; refusals."""
+    text = (Path(__file__).parents[1] / "docs" / "pipe_above.md").read_text().split("```toml\n")[1].split("```")[0]
+    file = tmp_path / "rod.toml"
+    file.write_text(text)
+    found = cf.read(file)
+    assert "with about 80% of that" in str(found) and found.mixed.depth == 200.0
+    history = found.run(duration=0.02, progress=False)
+    same = cf.drilling.mixed_scene(found.scene, 200.0).run(0.02, dt=2e-3, elements=16)
+    assert np.array_equal(history.surface_torque, same.surface_torque) and np.isnan(history.balance).all()
+    for old, new, words in (
+        ('dt = "2 ms"', 'model = "torsion"', "simulate.model = 'torsion': expected 'auto' beside"),
+        ('dt = "2 ms"', "elements = 100", "simulate.elements = 100: expected None beside"),
+        ("wall_damping = 10.0", "wall_damping = -1.0", "wall_damping"),
+    ):
+        file.write_text(text.replace(old, new))
+        with pytest.raises(cf.SceneError, match=words):
+            cf.read(file)
+    with pytest.raises(cf.SceneError, match="folder: expected none beside .rod"):
+        found.run(folder=tmp_path / "run")
