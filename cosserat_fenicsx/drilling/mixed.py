@@ -36,7 +36,7 @@ _WALL = 1e8
 # Default length (m) of elements, and the fewest.
 _ELEMENT, _FEWEST = 6.0, 8
 # Default damping of the wall in motions, s/m.
-DAMPING = 10.0
+_DAMPING = 10.0
 # Speed (m/s) for which the rebound from the wall is told.
 _TOUCH = 0.03
 _DOWN = np.array([0.0, 0.0, 1.0])
@@ -155,7 +155,7 @@ class MixedScene(InWords):
         return DrillingHistory(self.drilling, "rod below pipe", self.why, dt.mean(), ends, np.array([*rows.values()]).T)
 
 
-def mixed_scene(drilling: Drilling, depth: float | None = None, *, wall_damping: float = DAMPING) -> MixedScene:
+def mixed_scene(drilling: Drilling, depth: float | None = None, *, wall_damping: float = _DAMPING) -> MixedScene:
     """A rod for a string's lower part in its hole, which may bend, and waves for the pipe above.
 
     Components of the axes are north, east, down, as in a `WellPath`; without a hole the string is vertical below the

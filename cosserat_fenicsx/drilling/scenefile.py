@@ -48,7 +48,6 @@ from cosserat_fenicsx.drilling.history import DrillingHistory
 from cosserat_fenicsx.drilling.linear import frequencies
 from cosserat_fenicsx.drilling.linear.response import FrequencyResponse, frequency_response
 from cosserat_fenicsx.drilling.linear.stability import Stability, stability
-from cosserat_fenicsx.drilling.mixed import DAMPING, MixedScene, mixed_scene
 from cosserat_fenicsx.drilling.motion import check_arguments as check_simulation
 from cosserat_fenicsx.drilling.motion import simulate
 from cosserat_fenicsx.drilling.readings import READ, Readings
@@ -120,13 +119,13 @@ class RodBelow(Part):
     """An exact rod for the lower part of the string, below waves for the pipe above, see `mixed_scene`.
 
     Args:
-        depth, wall_damping: as for `mixed_scene`. elements, degree: as for `MixedScene.run`.
+        depth, wall_damping: as for `mixed_scene`, with its defaults. elements, degree: as for `MixedScene.run`.
     """
 
     depth: Depth | None = None
     elements: Annotated[int, Number(limits=at_least(1, "a number of elements"), whole=True)] | None = None
     degree: Annotated[int, Number(limits=at_least(1, "a degree"), whole=True)] = 2
-    wall_damping: Annotated[float, Number(limits=at_least(0))] = DAMPING
+    wall_damping: Annotated[float, Number(limits=at_least(0))] | None = None
 
     called = "rod"
 
@@ -275,7 +274,7 @@ class DrillingScene(InWords, Part):
             with concerning("fit", "unknowns"):
                 store(self, _ranges=ranges_of(self.scene, self.fit.ranges))
 
-    def _mixed(self, model, settings) -> MixedScene | None:
+    def _mixed(self, model, settings):
         if self.rod is None:
             return None
         for name in ("elements", "profile_every"):
@@ -283,7 +282,11 @@ class DrillingScene(InWords, Part):
                 refuse(self.simulate, name, settings[name], "None beside [rod], which has elements and no profiles")
         if model != "auto":
             refuse(self.simulate, "model", model, "'auto' beside [rod], which is a model of its own")
-        return mixed_scene(self.scene, self.rod.depth, wall_damping=self.rod.wall_damping)
+        # imported here, since it takes long
+        from cosserat_fenicsx.drilling.mixed import mixed_scene
+
+        damping = {} if self.rod.wall_damping is None else {"wall_damping": self.rod.wall_damping}
+        return mixed_scene(self.scene, self.rod.depth, **damping)
 
     def sentences(self, units: Units):
         """On the `Drilling` and on what is asked for, in some units."""
