@@ -7,13 +7,10 @@ tangent stays valid. Where many nodes may touch, the compliance couples neighbou
 the rest.
 """
 
-import math
-
 import numpy as np
 
 from cosserat_fenicsx.algebra.building import Pointers
-from cosserat_fenicsx.errors import SceneError
-from cosserat_fenicsx.numerics import directors, lobatto_weights, small_rotations
+from cosserat_fenicsx.numerics import lobatto_weights, small_rotations
 
 
 class TouchingNodes:
@@ -304,90 +301,3 @@ def _shares(breaks, nodes):
     shares[0, p::p] = weights[:, -1]
     shares[1, :-1] = weights[:, :-1].ravel()
     return shares
-
-
-# Iterations of Newton's method for the speed, and its relative change that ends them.
-_MOST_FOR_SPEED, _SMALL_CHANGE = 60, 1e-14
-
-
-class SpinLaw(Pointers):
-    """The law of one action with `Action.resists`: a torque at a node against its rotation, set-valued, such as that of
-    a bit on rock. Its methods are those of `NodalContact`.
-
-    As walls do, it acts on the compliance of the moving rods: the rotation of the node about its axis d3 in a step is a
-    linear function of the torque, by the tangent of Newton's method, and with it the law is solved exactly before
-    Newton's step is taken. The node sticks as long as a torque up to the static one can keep it.
-    """
-
-    def __init__(self, problem, action):
-        super().__init__()
-        self._problem, self._action, model = problem, action, problem.model
-        self._nodes = TouchingNodes(problem, np.array([model.slot_of(action.station)]))
-        self._at_rest = action.station.rod.curve.frame(action.station.s)[:, 2]
-        self._time, self._moment = model.time, model.scales.force * model.scales.length
-        self._torque, self._axis, self._unit = 0.0, self._at_rest, None
-
-    def begin(self, h):
-        self._before, self._h = self._nodes.of_local(self._problem.state), h
-        self._begun, self._unit = self._torque, None
-
-    def give_up(self):
-        self._torque = self._begun
-
-    def _acting(self, torque):
-        return np.concatenate([np.zeros(3), torque * self._axis])[None]
-
-    def add_forces(self, b):
-        self._nodes.subtract(self._acting(self._torque), b)
-
-    def _motion(self, after):
-        """Rotation about the axis in the step, and the axis in its middle."""
-        middle = (self._before + after)[0, 3:]
-        self._axis = directors(middle[None] / np.linalg.norm(middle))[0] @ self._at_rest
-        return float(motion_between(self._before, after)[0, 3:] @ self._axis)
-
-    def meet(self, x, change):
-        after = self._nodes.unknowns(x, change)
-        turned = self._motion(after)
-        if self._unit is None:
-            self._unit = self._nodes.response(self._acting(1.0)).copy()
-            found = self._nodes.of_vector(self._unit)[0, 3:]
-            self._compliance = float(small_rotations(after[0, 3:]) @ found @ self._axis)
-        before = self._torque
-        self._torque = self._solved(turned - self._compliance * before)
-        change -= self._unit * (self._torque - before)
-
-    def _solved(self, free):
-        """The torque by the law, from the rotation in the step without it; dimensionless."""
-        hold, _ = self._law(0.0)
-        C, h, size = self._compliance, self._h, abs(free)
-        if size <= C * hold:
-            return -free / C
-        torque, slope = self._law(1e-300)
-        if -slope * C >= h:
-            raise SceneError(
-                f"{type(self._action).__name__}: in steps of {h * self._time:.3g} s its torque falls faster with the "
-                "speed than the rod can follow, and several speeds are possible: expected a shorter dt, or an inertia "
-                "there"
-            )
-        speed = size / h  # the law is convex: after the first iteration it falls to the root
-        for _ in range(_MOST_FOR_SPEED):
-            torque, slope = self._law(speed)
-            last, speed = speed, max(speed - (speed * h + C * torque - size) / (h + C * slope), 0.0)
-            if abs(speed - last) <= _SMALL_CHANGE * last:
-                break
-        return -math.copysign(self._law(speed)[0], free)
-
-    def _law(self, speed):
-        """Torque against a speed from 0 on, and its slope; dimensionless."""
-        torque, slope = self._action.resists(speed / self._time)
-        return torque / self._moment, slope / (self._moment * self._time)
-
-    def books(self):
-        return 0.0, -self._torque * self._motion(self._nodes.of_local(self._problem.state))
-
-    def memory(self):
-        return {"torque": self._torque, "axis": np.array(self._axis)}
-
-    def recall(self, memory):
-        self._torque, self._axis = float(memory["torque"]), memory["axis"].copy()

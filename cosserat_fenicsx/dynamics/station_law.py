@@ -17,7 +17,7 @@ from cosserat_fenicsx.numerics import directors, small_rotations
 
 
 class StationLaw:
-    """The law of an action in a loaded `StepProblem`; its methods are those of `NodalContact`."""
+    """The law of an action in a loaded `StepProblem`; its methods are those of `NodalContact`, and `settle`."""
 
     def __init__(self, problem, action):
         self._problem, model = problem, problem.model
