@@ -335,7 +335,7 @@ def _element(element):
 def on_rows(expressions):
     """For `rank_0_first`: compiled functions (numbers, results) that add the values of UFL expressions of the
     components of one ufl.Constant, for every row of `numbers` (m, components), to the rows of `results` (m, ..); both
-    contiguous."""
+    contiguous; address: of the kernel of each, which takes a row in place of a form's constants."""
     found, module, _ = _compiled("expressions", [(a, np.array([[0.5]])) for a in expressions])
     buffer, null = module.ffi.from_buffer, module.ffi.NULL
     others = (null,) * (3 if _VERSION < (0, 10) else 4)
@@ -347,6 +347,7 @@ def on_rows(expressions):
             for i in range(len(numbers)):
                 compiled.tabulate_tensor_float64(into + i * size, null, given + i * step, *others)
 
+        add.address = _address(compiled)
         return add
 
     return [adding(compiled) for compiled in found]

@@ -21,7 +21,8 @@ from cosserat_fenicsx.code_cache import instructions
 from cosserat_fenicsx.compat import compiling
 
 SOURCES = tuple(
-    Path(__file__).with_name(name) for name in ("chain.c", "newton.c", "sweep.c", "compared.c", "contact.c", "pairs.c")
+    Path(__file__).with_name(f"{name}.c")
+    for name in ("chain", "ties", "newton", "sweep", "compared", "contact", "pairs")
 )
 # What -ffast-math would add hides numbers that are not finite, and changes sums. Python's own -fwrapv slows loops down.
 _FLAGS = ("-O3", "-fno-math-errno", "-ffp-contract=fast", "-fno-wrapv", "-fopenmp-simd", "-fvisibility=hidden", "-g0")

@@ -55,6 +55,48 @@ typedef struct {
     double zero_pivot;             /* of `eliminate`, relative to the largest number in the column; smaller ones are zero */
 } chain;
 
+/* A small system of the unknowns that elimination leaves, as a dense matrix. */
+typedef struct {
+    int size, entries, condensed;   /* entries that are added, those of segments first */
+    const int *entry;               /* (entries,) places in the matrix; -1: left out */
+    double *matrix, *factors, *scale, *work; /* (size, size) each, (size,) each */
+    int *row, *column;              /* (size,) */
+} dense;
+
+/* Constraint equations of supports and joints, see ties.c and algebra/tie_rows.py. */
+typedef struct {
+    int count, nodes, pairs, added, turning, block; /* ties; tied nodes; pairs of these; ties that are equations of the
+                                       system; ties whose gradient changes; unknowns of a node */
+    int width, at_load_factor, at_multiplier, plane; /* of the numbers of a tie; whether the unknowns are (r, theta) in a
+                                       plane, else (r, q, ..) */
+    void *value, *changes;          /* FFCx's functions of the numbers: (13,) c and its gradient; (12, 12) */
+    const int *ends, *pair;         /* (ties, 2) nodes, (ties, 2, 2) pairs; -1 for the ground */
+    const int *first, *second, *mirrored, *own; /* (pairs,) nodes of rows and columns, and the exchanged pair; (nodes,) */
+    const int *turns, *equation;    /* (turning,), (added,) ties */
+    const int *rows, *multiplier;   /* (nodes, block), (added,) unknowns of this rank, or -1 */
+    double *numbers;                /* (ties, width) see forms/ties.py */
+    const double *axes, *offset, *at_rest; /* of a plane: (3, 3) rows, (nodes, 3) the constant part of the positions; (nodes,
+                                       block) */
+    double *nodal, *multipliers;    /* (nodes, block), (ties,) of the state */
+    double share;                   /* where in a step reactions act, see TieRows */
+    double *start, *shift;          /* (nodes, block) at the start of a step; (ties,) values that are required of c */
+    double *test, *turned;          /* (nodes, block, 6) rows of forces; (nodes, block, block) their change, or 0 */
+    int known, known_change;        /* whether what follows belongs to the state and the load factor */
+    double known_at, held;          /* the latter: of springs over the stiffness of the elements */
+    double *acting, *found, *amid;  /* (nodes, block); (ties, 13) at the state, and where reactions act */
+    double *change, *forces, *derivatives; /* (pairs, 6, 6), (nodes, 6), see `TieRows.tangent_blocks` */
+    void *self;                     /* for the hook that finds `test` and `turned`, or 0 */
+} ties;
+
+/* What ties add to a part of the second variation. */
+typedef struct {
+    ties *ties;
+    int size;                       /* unknowns of a node */
+    const double *axes;             /* (size, 6) */
+    const int *places;              /* (nodes, size) on the interface, or -1 */
+    double *blocks, *resistance, *stiffness; /* (pairs, size, size), (nodes, size), (ties,) */
+} tied_variation;
+
 /* Contact of nodes with the wall of a tube in a time step, whose nodes move linearly with the forces: see contact.c. All
    vectors are inertial. */
 typedef struct {
@@ -105,6 +147,9 @@ typedef struct {
     double *interface;              /* (interfaces,) */
     const int *of_interface;        /* (interfaces,) this rank's unknowns there, or -1 */
     int interfaces, singular;
+    dense *system;                  /* of the interface, or 0 where Python solves it */
+    ties *ties;                     /* or 0 */
+    const double *tie_load_factor;  /* of prescribed motions */
     contact *contact;               /* nodes that may touch a wall, or 0 */
     void *self;                     /* for the hooks */
 } problem;
@@ -141,6 +186,9 @@ typedef struct {
     int parts, hooked;              /* whether Python completes the counts of the parts */
     kernel *form[2];
     chain *chain[2];
+    dense *system[2];               /* of the interface, or 0 where Python completes the counts */
+    tied_variation *tied[2];        /* or 0 */
+    const double *tie_load_factor;
     int sideways[2];                /* whether a part leaves the plane */
     double logarithm;               /* of the absolute value of the determinant, after a count */
     void *self;                     /* for the hook */
@@ -259,6 +307,20 @@ int number_entries(int size, int count, const int *rows, const int *columns, int
                    int *order);
 void solve_dense(const double *F, int n, const int *row, const int *column, const double *scale, double *b,
                  double *work);
+
+void see_ties(ties *t, const double *x);
+void find_ties(ties *t, double load_factor);
+void react(ties *t, double load_factor, const double *multipliers, double *forces);
+int add_ties(ties *t, double load_factor, double *b);
+int differentiate_ties(ties *t, double load_factor);
+void vary_ties(ties *t, double load_factor, const double *axes, int n, double *out);
+void spring_ties(ties *t, double load_factor, const double *axes, int n, const double *resistance, double *stiffness,
+                 double *out);
+void hold_variation(const tied_variation *v, double load_factor, const double *diagonal);
+void assemble_dense(dense *d, const double *condensed, const double *others);
+int factor_matrix(dense *d, double zero);
+void solve_matrix(const dense *d, double *b);
+int is_positive(dense *d, double *logarithm);
 
 int take_state(problem *p, const double *x);
 int residual(problem *p, const double *x, double *b);

@@ -5,7 +5,6 @@ rods meet other than end to start, and of nodes that several ranks share; and th
 segments of rods, and all ranks solve the whole interface, with the same numbers.
 """
 
-import contextlib
 import functools
 
 import numpy as np
@@ -186,7 +185,8 @@ def condensed(model, numbering, cell_dofs, tied, **options):
 class Interface:
     """The system of the unknowns that `Elimination` leaves, with the constraint equations; tied: see `condensed`;
     pattern: the `TiePattern`; equations: indices of the ties whose multipliers belong to the system; nodes: places in
-    it of the tied nodes' unknowns, -1 where clamped."""
+    it of the tied nodes' unknowns, -1 where clamped; dense: the C structure of a small system of one process, which C
+    assembles and solves, else None."""
 
     def __init__(self, elimination, tied, pattern, equations=()):
         self._elimination, self._size = elimination, elimination.unknowns
@@ -198,9 +198,13 @@ class Interface:
         rows, columns = np.concatenate([elimination.places, of_nodes, *added], axis=1)
         self._here = (rows >= 0) & (columns >= 0)
         self._everywhere = bool(self._here.all())
-        self._dense = self._size <= _DENSE
-        self._solver = _Dense(self._size) if self._dense else _Sparse(self._size)
+        self._solver = _Dense(self._size) if self._size <= _DENSE else _Sparse(self._size)
         self._entry = self._solver.entries(rows[self._here], columns[self._here])
+        self.dense = None
+        if self._size <= _DENSE and elimination.numbering.comm.size == 1:
+            every = np.full(len(rows), -1)
+            every[self._here] = self._entry
+            self.dense = self._solver.adds(every, len(elimination.condensed))
 
     def _values(self, of_nodes, *others):
         """The entries of the sum of all ranks' condensed matrices and of the constraint equations' derivatives, see
@@ -212,8 +216,7 @@ class Interface:
 
     def factor(self, *derivatives):
         """Factors of the system, see `_values`; False where it is singular."""
-        self._kept = self._values(*derivatives)
-        return self._solver.factor(self._kept, self._elimination.c.zero_pivot)
+        return self._solver.factor(self._values(*derivatives), self._elimination.c.zero_pivot)
 
     def begin_with(self, other, maps, count):
         """Let solutions begin with the factors of another interface, which counts signs (count: at the state); only
@@ -221,17 +224,17 @@ class Interface:
         ours, theirs = (x._elimination.numbering.block for x in (self, other))
         known = [x._elimination.interface // x._elimination.numbering.block for x in (self, other)]
         alike = len(known[0]) * theirs == len(known[1]) * ours and np.array_equal(known[0][::ours], known[1][::theirs])
-        if alike and not self._dense and not other._dense and self._size == len(known[0]) and not len(self.nodes):
+        large = isinstance(self._solver, _Sparse) and isinstance(other._solver, _Sparse)
+        if alike and large and self._size == len(known[0]) and not len(self.nodes):
             self._solver.near = _Near(self._solver, other._solver, ours, maps, count)
 
     def memory(self):
         """The entries of the last matrix."""
-        return self._kept
+        return self._solver.kept.copy()
 
     def recall(self, memory):
         """Factorise the matrix whose entries `memory` returned."""
-        self._kept = np.array(memory)
-        self._solver.factor(self._kept, self._elimination.c.zero_pivot)
+        self._solver.factor(np.array(memory), self._elimination.c.zero_pivot)
 
     def solve(self, b):
         """Replace a right-hand side (unknowns,) by the solution, from the last factors."""
@@ -244,39 +247,43 @@ class Interface:
 
 
 class _Dense(Pointers):
-    """A system as a dense matrix, row by row."""
+    """A system as a dense matrix, row by row; kept: (size * size,) the last one."""
 
     def __init__(self, size):
         super().__init__()
         self._size, self.room = size, size * size
-        self._factors, self._scale, self._work = np.zeros(size * size), np.zeros(size), np.zeros(size)
-        self._order = np.zeros((2, size), dtype=np.int32)
-        self._double = [self.doubles(array) for array in (self._factors, self._scale, self._work)]
-        self._int = [self.integers(array) for array in self._order]
+        self.c, self.kept = self._ffi.new("dense *"), np.zeros(size * size)
+        self.c.size, self.c.matrix = size, self.doubles(self.kept)
+        for name, count in (("factors", size * size), ("scale", size), ("work", size)):
+            setattr(self.c, name, self.doubles(np.zeros(count)))
+        self.c.row, self.c.column = (self.integers(np.zeros(size, dtype=np.int32)) for _ in range(2))
+
+    def adds(self, entry, condensed):
+        """The C structure, which adds to these entries of the matrix, -1 for none; condensed: how many of segments."""
+        self.c.entry, self.c.entries, self.c.condensed = self.integers(entry), len(entry), condensed
+        return self.c
 
     def entries(self, rows, columns):
         return rows * self._size + columns
 
     def factor(self, values, zero):
-        self._factors[:] = values
-        return not self._lib.factor_dense(self._double[0], self._size, *self._int, zero, *self._double[1:])
+        self.kept[:] = values
+        return not self._lib.factor_matrix(self.c, zero)
 
     def solve(self, b):
-        factors, scale, work = self._double
-        self._lib.solve_dense(factors, self._size, *self._int, scale, self._ffi.from_buffer("double[]", b), work)
+        self._lib.solve_matrix(self.c, self._ffi.from_buffer("double[]", b))
 
     def signs(self, values):
+        self.kept[:] = values
+        logarithm = self._ffi.new("double *")
+        if self._lib.is_positive(self.c, logarithm):
+            return 0, 0, logarithm[0]
         matrix = values.reshape(self._size, self._size)
         scale = _scale(np.diag(matrix))
         matrix = scale[:, None] * matrix * scale
-        units = 2 * float(np.log(scale).sum())
-        with contextlib.suppress(np.linalg.LinAlgError):
-            # more accurate than eigenvalues in the signs of small ones
-            factor = np.linalg.cholesky(matrix)
-            return 0, 0, 2 * float(np.log(np.diag(factor)).sum()) - units
         values = np.linalg.eigvalsh(matrix)
         zero = np.abs(values) <= _ROUNDING
-        logarithm = float(np.log(np.abs(values[~zero])).sum()) - units
+        logarithm = float(np.log(np.abs(values[~zero])).sum()) - 2 * float(np.log(scale).sum())
         return int((values[~zero] < 0).sum()), int(zero.sum()), logarithm
 
 
@@ -339,6 +346,7 @@ class _Sparse:
         return eigen.RepeatedFactors(self._starts, self._columns, self.near)
 
     def factor(self, values, zero):
+        self.kept = values
         return bool(np.isfinite(values).all()) and self._factors.factor(values)
 
     def solve(self, b):

@@ -10,8 +10,8 @@ from cosserat_fenicsx.algebra.building import Pointers, module
 from cosserat_fenicsx.algebra.elimination import condensed
 
 #: Hooks: requests of C to Python, see newton.c.
-STATE, RESIDUAL, TANGENT, INTERFACE, ADD_UP, SUM, MATRICES, COUNT, CONTACT, COMPLIANCE, NODES = (
-    1 << k for k in range(11)
+STATE, RESIDUAL, TANGENT, INTERFACE, ADD_UP, SUM, MATRICES, COUNT, CONTACT, COMPLIANCE, NODES, MAPS = (
+    1 << k for k in range(12)
 )
 
 
@@ -59,14 +59,14 @@ class Equations(Called):
     tangent_form, the latter None where nothing is left.
     """
 
-    #: the class of `ties`, called with (model, numbering)
+    #: the class of `ties`, called with (model, numbering, handle of hooks)
     ties_class = None
 
     def __init__(self, model, hooks=0):
         super().__init__()
         self.model, self.numbering = model, model.numbering
         numbering = self.numbering
-        self.ties = self.ties_class(model, numbering) if model.signature.connections.ties else None
+        self.ties = self.ties_class(model, numbering, self._handle) if model.signature.connections.ties else None
         tied = self.ties.rows if self.ties else np.empty((0, numbering.block), dtype=np.int64)
         self.elimination, self.interface = condensed(
             model, numbering, model.cell_dofs, tied, delays=model.force_is_unknown
@@ -82,13 +82,16 @@ class Equations(Called):
     def _fill(self, hooks):
         model, numbering, ffi = self.model, self.numbering, self._ffi
         serial = numbering.comm.size == 1
-        hooks |= (STATE | RESIDUAL) * bool(self.ties) | (STATE | ADD_UP | SUM) * (not serial)
-        hooks |= (TANGENT | INTERFACE) * bool(self.interface)
+        hooks |= (STATE | ADD_UP | SUM) * (not serial)
+        system = serial and self.interface and self.interface.dense
+        hooks |= (TANGENT | INTERFACE) * bool(self.interface and not system)
         self.c = problem = ffi.new("problem *")
         problem.self, problem.hooks, problem.serial, problem.chain = self._handle, hooks, serial, self.elimination.c
         problem.size, problem.locals, problem.frees = numbering.size, len(self._local), len(numbering.free)
         problem.free, problem.of_free = self.integers(numbering.free), self.integers(numbering.of_free)
         problem.local = self.doubles(self._local)
+        problem.system, problem.ties = system or ffi.NULL, self.ties.c if self.ties else ffi.NULL
+        problem.tie_load_factor = self.doubles(self.load_factor_array)
         if hooks & MATRICES:
             #: (elements, n, n) where MATRICES is among the hooks
             self.matrices = np.zeros((*model.cell_dofs.shape, model.cell_dofs.shape[1]))
@@ -178,8 +181,8 @@ class Equations(Called):
             if numbering.comm.size > 1:
                 self._vector_of_x.array_w[:] = x
                 numbering.to_local(self._vector_of_x, self._state)
-            if ties:
-                ties.see(x)
+                if ties:
+                    ties.see(x)
             if b:
                 self._refresh()
         elif what == RESIDUAL:
@@ -197,6 +200,10 @@ class Equations(Called):
             self._touch(self._array(a, numbering.size), self._array(b, numbering.size))
         elif what == COMPLIANCE:
             self.contact.find_compliance()
+        elif what == MAPS:
+            shape = ties.nodal.shape
+            forces = self._array(b, 6 * shape[0]).reshape(-1, 6)
+            ties.find_maps(self._array(a, ties.nodal.size).reshape(shape), forces)
         elif what == NODES:
             numbering.comm.Allreduce(MPI.IN_PLACE, self._array(a, 7 * self.contact.count))
         else:
@@ -210,8 +217,6 @@ class Equations(Called):
 
     def _change_residual(self, x, b):
         """Change the residual b at x, arrays of this rank's unknowns."""
-        if self.ties:
-            self.ties.add_residual(b, self.tie_load_factor)
 
     def _touch(self, x, change):
         """Where laws act at nodes: change Newton's step, which is subtracted from x; arrays of this rank's unknowns."""

@@ -32,6 +32,7 @@ static int put_state(problem *p, const double *x, int evaluated)
 {
     if (p->serial)
         for (int i = 0; i < p->frees; i++) p->state[p->free[i]] = x[p->of_free[i]];
+    if (p->serial && p->ties) see_ties(p->ties, x);
     return hook(p, STATE, (double *)x, evaluated ? p->state : 0);
 }
 
@@ -52,6 +53,7 @@ int residual(problem *p, const double *x, double *b)
         for (int i = 0; i < p->frees; i++) b[p->of_free[i]] += p->local[p->free[i]];
     else if (hook(p, ADD_UP, p->local, b))
         return FAILED;
+    if (p->ties && add_ties(p->ties, *p->tie_load_factor, b)) return FAILED;
     if (hook(p, RESIDUAL, (double *)x, b)) return FAILED;
     if (p->contact) add_forces(p->contact, p->contact->force, 0, -1, b);
     for (int k = 0; k < 3 && p->load[k]; k++)
@@ -67,6 +69,11 @@ int tangent(problem *p)
         if (hook(p, MATRICES, p->matrices, 0)) return FAILED;
     }
     p->singular = eliminate(p->chain, p->tangent, p->matrices);
+    if (p->system && !p->singular) {
+        if (p->ties && differentiate_ties(p->ties, *p->tie_load_factor)) return FAILED;
+        assemble_dense(p->system, p->chain->condensed, p->ties ? p->ties->derivatives : 0);
+        p->singular = factor_matrix(p->system, p->chain->zero_pivot);
+    }
     return hook(p, TANGENT, 0, 0);
 }
 
@@ -75,6 +82,7 @@ int solve(problem *p, const double *b, double *x)
 {
     for (int i = 0; i < p->interfaces; i++) p->interface[i] = p->of_interface[i] < 0 ? 0 : b[p->of_interface[i]];
     if (!p->singular) forward(p->chain, b, p->interface);
+    if (p->system && !p->singular) solve_matrix(p->system, p->interface);
     if (hook(p, INTERFACE, p->interface, 0)) return FAILED;
     if (!p->singular) backward(p->chain, p->interface, x);
     for (int i = 0; i < p->interfaces; i++)

@@ -17,6 +17,19 @@ static double now(void)
     return t.tv_sec + 1e-9 * t.tv_nsec;
 }
 
+/* Complete the count of a part with the unknowns of the interface; 0 where these have eigenvalues that are not positive,
+   which Python finds. */
+static int completed(const second_variation *v, int k)
+{
+    double logarithm;
+    if (!v->system[k]) return !v->hooked;
+    if (v->tied[k]) hold_variation(v->tied[k], *v->tie_load_factor, v->chain[k]->diagonal);
+    assemble_dense(v->system[k], v->chain[k]->condensed, v->tied[k] ? v->tied[k]->blocks : 0);
+    if (!is_positive(v->system[k], &logarithm)) return 0;
+    v->chain[k]->logarithm += logarithm;
+    return 1;
+}
+
 /* The number of negative eigenvalues of the second variation at the state; -1 where it is singular to rounding. */
 int negative_modes(second_variation *v, int *sideways)
 {
@@ -25,7 +38,7 @@ int negative_modes(second_variation *v, int *sideways)
     for (int k = 0; k < v->parts; k++) {
         chain *s = v->chain[k];
         count(s, v->form[k]);
-        if (v->hooked && python_hook(v->self, COUNT + k, 0, 0)) return FAILED_COUNT;
+        if (!completed(v, k) && python_hook(v->self, COUNT + k, 0, 0)) return FAILED_COUNT;
         negative += s->negative, zero += s->zero, v->logarithm += s->logarithm;
         if (v->sideways[k]) *sideways += s->negative;
     }

@@ -181,27 +181,23 @@ class EndTies(MovingTies):
 
     def begin(self, ties):
         super().begin(ties)
-        self._shift = 0.0
-        self._reactions_before = self.seen[1]
+        self._shift[:] = 0.0
+        self._reactions_before = self.multipliers.copy()
 
     def forget(self):
         """The current step has failed: restore the reactions before it."""
-        self.seen = self.seen[0], self._reactions_before
+        self.multipliers[:] = self._reactions_before
 
     def shift(self, values):
         """Require these values of the constraints instead of zero in this step; see `values`."""
-        self._shift = values
+        self._shift[:] = values
 
     def values(self, ties, load_factor):
         """Values of the constraints at the current state, for `ties` of another time."""
-        return ties.evaluate(self.model.tied_motion(self.seen[0]), load_factor)[0]
+        return ties.evaluate(self.model.tied_motion(self.nodal), load_factor)[0]
 
-    def _evaluate(self, load_factor):
-        c, gradients = super()._evaluate(load_factor)
-        return c - self._shift, gradients
-
-    def _reactions(self):
-        return (self._reactions_before + self.seen[1]) / 2
+    def _acted(self):
+        return (self._reactions_before + self.multipliers) / 2
 
 
 class CollocationProblem(StepProblem):

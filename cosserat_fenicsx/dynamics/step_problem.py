@@ -15,45 +15,25 @@ from cosserat_fenicsx.dynamics.touching import RodsTouching
 class MovingTies(TieRows):
     """See `TieRows`. Reactions along the directions at mid-step keep order 2, and do no work in a rigid rotation."""
 
-    share, ties = 0.5, None
+    share = 0.5
 
     def begin(self, ties):
         """Start a step at the current state; `ties` are the constraints at its end."""
-        self.ties, self._start = ties, self.seen[0]
-        self._forget()
-
-    def _forget(self):
-        super()._forget()
-        self._amid = (None, None)
-
-    def _acting(self):
-        end = self.seen[0]
-        return end if self.share == 1 else self.share * end + (1 - self.share) * self._start
-
-    def _gradients(self, load_factor):
-        if self.share == 1:
-            return super()._gradients(load_factor)
-        if self._amid[0] != load_factor:
-            _, gradients = self.ties.evaluate(self.model.tied_motion(self._acting()), load_factor)
-            self._amid = load_factor, gradients
-        return self._amid[1]
-
-    def residual_blocks(self, load_factor):
-        """See `TieRows`; `StepNewton` stops before numbers overflow."""
-        return self._blocks(load_factor)
+        self._start[:] = self.nodal
+        self.take(ties)
 
     def work(self, load_factor):
         """Work of the reactions on the structure in the step, dimensionless; on the last rank, else 0."""
         if not self._here:
             return 0.0
-        nodal, reactions = self.seen[0], self.ties.reactions(self._gradients(load_factor), self._reactions())
+        nodal, reactions = self.nodal, self.reactions(load_factor, self._acted())
         trial, _ = self.model.tie_maps((nodal + self._start) / 2)
         passed = trial @ (nodal - self._start)[:, :, None]
         return -float(reactions.ravel() @ passed.ravel())
 
-    def _reactions(self):
+    def _acted(self):
         """The multipliers that `work` takes."""
-        return self.seen[1]
+        return self.multipliers
 
 
 class StepProblem(Equations):
@@ -88,6 +68,8 @@ class StepProblem(Equations):
         """Load the data of a scene; the state becomes its reference configuration, at rest, at the time 0."""
         model = self.model
         model.load(scene, layout)
+        if self.ties:
+            self.ties.load()
         self.load_factor = model.load_factor.value = load_factor
         for packed in self._packed:
             packed.refresh()

@@ -83,7 +83,8 @@ class TiePattern:
     columns of a node); all others are zero.
 
     first, second: (pairs,) the nodes of a pair's rows and columns; every node has a pair with itself: own (nodes,);
-    mirrored: (pairs,) the pair with the two nodes exchanged.
+    mirrored: (pairs,) the pair with the two nodes exchanged; pairs: (ties, 2, 2) that of two ends of a tie, -1 with the
+    ground.
     """
 
     def __init__(self, ends, count):
@@ -95,27 +96,8 @@ class TiePattern:
         self.first, self.second = np.divmod(known, max(count, 1))
         self.own = np.searchsorted(known, own)
         self.mirrored = np.searchsorted(known, self.second * count + self.first)
-        # the pair of two ends of a tie; one more for the ground
-        self._of_ends = np.where(here, np.searchsorted(known, keys), len(known))
-        self._nodes, self._flat = self.ends % (count + 1), {}  # the ground comes last
-
-    def sums(self, blocks, ties=None):
-        """(pairs, n, n) sums over ties, from (ties, 2, n, 2, n) by their ends; ties: the indices of those, or all."""
-        n, pairs = blocks.shape[-1], self._of_ends if ties is None else self._of_ends[ties]
-        key = "pairs", n, None if ties is None else ties.tobytes()
-        return self._summed(key, pairs, blocks.swapaxes(2, 3), len(self.first), n * n).reshape(-1, n, n)
-
-    def by_nodes(self, values):
-        """(nodes, n) sums over ties, from (ties, 2, n) by their ends."""
-        n = values.shape[2]
-        return self._summed(("nodes", n), self._nodes, values, self.count, n)
-
-    def _summed(self, key, places, values, count, size):
-        """(count, size) sums of values (*places.shape, ...), of that size, without those at the place `count`."""
-        if key not in self._flat:
-            self._flat[key] = (places[..., None] * size + np.arange(size)).ravel()
-        found = np.bincount(self._flat[key], values.ravel(), minlength=(count + 1) * size)
-        return found[: count * size].reshape(count, size)
+        self.pairs = np.where(here, np.searchsorted(known, keys), -1)
+        self._nodes = self.ends % (count + 1)  # the ground comes last
 
     def on_nodes(self, values, ties=None):
         """(ties, nodes, n) from values (ties, 2, n) by their ends; ties: the indices of those, or all."""
@@ -166,23 +148,31 @@ def _kernels():
 
 class Ties:
     """The ties of a scene (`scene.supports`), dimensionless, with the `TiePattern` of the tied nodes; reference: (tied
-    nodes, 3) positions at rest; length: unit of length, m; comm: of the ranks that make them together."""
+    nodes, 3) positions at rest; length: unit of length, m; comm: of the ranks that make them together.
+
+    numbers: (ties, n) data of all equations, see forms/ties.py; turning: indices of those whose gradients change;
+    addresses: of the kernels of a row of these (`forms.ties.derivatives`); changing: where in it load factor and
+    multiplier are.
+    """
+
+    changing = eq.PLACES["load_factor"].start, eq.PLACES["multiplier"].start
 
     def __init__(self, ties, pattern, reference, length, comm=MPI.COMM_SELF):
         with compiling():
-            self._add_values, self._add_changes = _kernels(comm)
+            self._add_values, add_changes = _kernels(comm)
+        self.addresses = self._add_values.address, add_changes.address
         self._length, self.pattern = length, pattern
         self._nodes = pattern.ends % (len(reference) + 1)  # the ground last
         rest = np.append(reference, [_GROUND[:3]], axis=0)
-        # what the kernels take, see forms/ties.py; motions, load factor and multipliers are of the last evaluation
-        self._rows, self._motion = np.zeros((len(ties), eq.COUNT)), np.tile(_GROUND, (len(rest), 1))
+        # motions and load factor are of the last evaluation
+        self.numbers, self._motion = np.zeros((len(ties), eq.COUNT)), np.tile(_GROUND, (len(rest), 1))
         self._at_rest = np.subtract(*rest[self._nodes.T])
         self._take(ties)
-        self._turning = np.array([i for i, tie in enumerate(ties) if not isinstance(tie, PositionTie)], dtype=np.intp)
+        self.turning = np.array([i for i, tie in enumerate(ties) if not isinstance(tie, PositionTie)], dtype=np.intp)
 
     def _take(self, ties):
-        self._rows[:, eq.PLACES["place"]] = self._at_rest
-        for row, tie in zip(self._rows, ties, strict=True):
+        self.numbers[:, eq.PLACES["place"]] = self._at_rest
+        for row, tie in zip(self.numbers, ties, strict=True):
             if isinstance(tie, PositionTie):
                 row[eq.PLACES["place"]] += tie.offset / self._length * np.asarray(tie.direction)
             for name, value in _numbers(tie, self._length).items():
@@ -191,35 +181,22 @@ class Ties:
     def with_numbers_of(self, ties):
         """The same equations with other data, those of prescribed motions at another time."""
         other = copy(self)
-        other._rows = self._rows.copy()
+        other._rows = self.numbers.copy()
         other._take(ties)
         return other
 
     def _see(self, rq, load_factor):
         self._motion[:-1] = rq
-        self._rows[:, : eq.MOTION] = self._motion.take(self._nodes, axis=0).reshape(-1, eq.MOTION)
-        self._rows[:, eq.PLACES["load_factor"]] = load_factor
+        self.numbers[:, : eq.MOTION] = self._motion.take(self._nodes, axis=0).reshape(-1, eq.MOTION)
+        self.numbers[:, eq.PLACES["load_factor"]] = load_factor
 
     def evaluate(self, rq, load_factor):
         """(c (ties,); gradients (ties, 2, 6) over (displacement, rotation) of the nodes a and b, or the ground, which
         are also the reactions per unit of multiplier) at (r, q) (tied nodes, 7) and a load factor."""
-        found = np.zeros((len(self._rows), 13))
+        found = np.zeros((len(self.numbers), 13))
         self._see(rq, load_factor)
-        self._add_values(self._rows, found)
+        self._add_values(self.numbers, found)
         return found[:, 0], found[:, 1:].reshape(-1, 2, 6)
-
-    def reactions(self, gradients, multipliers):
-        """(tied nodes, 6) forces and moments, sums over the ties, from gradients (ties, 2, 6)."""
-        return self.pattern.by_nodes(multipliers[:, None, None] * gradients)
-
-    def change(self, rq, load_factor, multipliers):
-        """The tangent of the reactions, (pairs, 6, 6), at (r, q) (tied nodes, 7), a load factor and multipliers
-        (ties,)."""
-        found = np.zeros((len(self._turning), 144))
-        self._see(rq, load_factor)
-        self._rows[:, eq.PLACES["multiplier"]] = multipliers[:, None]
-        self._add_changes(self._rows[self._turning], found)
-        return self.pattern.sums(found.reshape(-1, 2, 6, 2, 6), self._turning)
 
 
 def _numbers(tie, length):

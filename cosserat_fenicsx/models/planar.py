@@ -115,7 +115,7 @@ class PlanarModel(PlaneModel):
 
     def _tie(self):
         super()._tie()
-        self._inside, self._tied_off = self._variation_axes()[0], self._out_of_plane()[self.tied_slots]
+        self._inside, self.tied_off = self._variation_axes()[0], self._out_of_plane()[self.tied_slots]
 
     def positions(self):
         return self.state.x.array[self.nodal[:, :2]] @ self.axes[:2] + self._out_of_plane()[self.slots]
@@ -124,7 +124,7 @@ class PlanarModel(PlaneModel):
         e3, half = self.axes[2], values[:, 2:] / 2
         rq = np.empty((len(values), 7))
         rq[:, :3] = values[:, :2] @ self.axes[:2]
-        rq[:, :3] += self._tied_off
+        rq[:, :3] += self.tied_off
         rq[:, 3:4], rq[:, 4:] = np.cos(half), np.sin(half) * e3
         return rq
 

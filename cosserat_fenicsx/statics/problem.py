@@ -133,6 +133,8 @@ class Problem(Equations):
         if anew:
             self._loaded = None
             model.load(scene, layout)
+            if self.ties:
+                self.ties.load()
             self._residual.refresh()
             self.tangent_form.refresh()
             for packed, vector in ((self._loads, self._dead), (self._permanent_loads, self._permanent)):

@@ -13,6 +13,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from cosserat_fenicsx.algebra import eigen
+from cosserat_fenicsx.algebra.building import Pointers
 from cosserat_fenicsx.algebra.elimination import condensed
 from cosserat_fenicsx.algebra.equations import COUNT, Called
 from cosserat_fenicsx.algebra.packed import Packed
@@ -36,6 +37,9 @@ class NegativeModes(Called):
         for k, part in enumerate(self.parts):
             variation.form[k], variation.chain[k] = part.form.c, part.elimination.c
             variation.sideways[k] = part.variation.sideways
+            variation.system[k] = part.interface and part.interface.dense or self._ffi.NULL
+            variation.tied[k] = part.tied or self._ffi.NULL
+        variation.tie_load_factor = self.doubles(problem.load_factor_array)
         if problem.interface and problem.model.name == "spatial" and not problem.model.rows_turn:
             problem.interface.begin_with(self.whole.interface, problem.model.small_motion_maps, self.count)
 
@@ -69,13 +73,13 @@ class NegativeModes(Called):
 _ALIKE = 1e3
 
 
-class Part:
+class Part(Pointers):
     """A diagonal block of the second variation, decoupled from the others: one of its model's `second_variations`.
 
     Attributes:
         variation: the model's `SecondVariation`; form: its `Packed` form.
         elimination, interface: for counts; the latter None where nothing is to be added.
-        resistance: (tied unknowns,) the last scales of the springs in place of supports and joints.
+        tied: the C structure `tied_variation` of supports and joints that are no clamps, or None.
 
     Eigenvalues and eigenvectors y are those of D K D, with the D of `eigen.balance` at the first state of a scene whose
     sections differ much, else of K: as many of them are negative, and D y is the null vector where one vanishes. Those
@@ -83,20 +87,42 @@ class Part:
     not be found.
     """
 
-    resistance = _scale = None
+    _scale = None
 
     def __init__(self, problem, index):
+        super().__init__()
         self.problem, self.model, self._index = problem, problem.model, index
         self.variation = variation = self.model.second_variations[index]
         self.form = Packed(variation.form, self.model.changing, self.model.constants)
         self.elimination, self.interface = condensed(
             self.model, variation.numbering, variation.cell_dofs, variation.tied, factors=False
         )
+        self.tied = self._tie() if problem.ties else None
+
+    def _tie(self):
+        axes, pattern = self.variation.axes, self.model.signature.connections.pattern
+        size, count = len(axes), pattern.count
+        self._axes, self._blocks = np.array(axes, dtype=float), np.zeros((len(pattern.first), size, size))
+        self._resistance, stiffness = np.zeros(count * size), np.zeros(len(pattern.ends))
+        tied = self._ffi.new("tied_variation *")
+        tied.ties, tied.size, tied.places = self.problem.ties.c, size, self.integers(self.interface.nodes)
+        for name, array in (
+            ("axes", self._axes), ("blocks", self._blocks), ("resistance", self._resistance), ("stiffness", stiffness),
+        ):  # fmt: skip
+            setattr(tied, name, self.doubles(array))
+        return tied
+
+    @property
+    def resistance(self):
+        """(tied unknowns,) the last scales of the springs in place of supports and joints, None without these."""
+        return self._resistance.copy() if self.tied else None
 
     def load(self):
         """Take the numbers of the scene that the model was loaded with."""
         self.variation, self._scale = self.model.second_variations[self._index], None
         self.form.refresh()
+        if self.tied:
+            self._axes[:] = self.variation.axes
 
     @cached_property
     def K(self):
@@ -128,17 +154,16 @@ class Part:
         self.K.assemble()
 
     def _of_ties(self, stress_alone=False):
-        """The part of supports and joints, see `TieRows.second_variation`, after a count of pivots."""
-        problem, comm, interface = self.problem, self.model.comm, self.interface
-        ties, axes, diagonal = problem.ties, self.variation.axes, self.elimination.diagonal
+        """The part of supports and joints, see `TieRows.second_variation`, after a count of pivots, with springs in
+        their place."""
+        problem, comm, diagonal = self.problem, self.model.comm, self.elimination.diagonal
+        if stress_alone:
+            return problem.ties.second_variation(self.variation.axes, problem.tie_load_factor)
         if comm.size > 1:
             diagonal = comm.allreduce(diagonal)
-        found = ties.second_variation(axes, problem.tie_load_factor)
-        if not stress_alone:
-            resistance = np.where(interface.nodes < 0, 0.0, np.append(diagonal, 0.0)[interface.nodes])
-            self.resistance = np.abs(resistance + ties.diagonal(found))
-            found = found + ties.springs(axes, problem.tie_load_factor, self.resistance)
-        return found
+        diagonal = self._ffi.from_buffer("double[]", diagonal)
+        self._lib.hold_variation(self.tied, problem.tie_load_factor, diagonal)
+        return self._blocks
 
     def complete(self):
         """Complete the numbers of negative and zero pivots, which C has counted along this rank's rods."""
