@@ -150,10 +150,10 @@ class Equations(Called):
         self._done(self._lib.take_state(self.c, self._read(x)))
 
     def _read(self, vector):
-        return self._ffi.cast("double *", vector.array_r.ctypes.data)
+        return self._ffi.from_buffer("double[]", vector.array_r)
 
     def _written(self, vector):
-        return self._ffi.cast("double *", vector.array_w.ctypes.data)
+        return self._ffi.from_buffer("double[]", vector.array_w)
 
     def _done(self, failed):
         self.raise_failure()
@@ -253,13 +253,7 @@ class Equations(Called):
     def at_ties(self, x, load_factors):
         """(multipliers (n, ties), `tie_forces` (n, ties, 2, 6)) at unknowns x (n, this rank's part) and load factors
         (n,); the ties stay at the last one."""
-        if not self.ties:
-            return np.empty((len(x), 0)), np.empty((len(x), 0, 2, 6))
-        found = []
-        for here, load_factor in zip(x, load_factors.tolist(), strict=True):
-            self.ties.see(here)
-            found.append((self.ties.everywhere(), self.ties.forces(load_factor)))
-        return [np.array(part) for part in zip(*found, strict=True)]
+        return self.ties.along(x, load_factors) if self.ties else (np.empty((len(x), 0)), np.empty((len(x), 0, 2, 6)))
 
     def multipliers(self):
         """Multipliers (reactions) of the constraint equations, on all ranks."""

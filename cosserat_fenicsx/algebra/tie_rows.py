@@ -125,6 +125,10 @@ class TieRows(Pointers):
         self._lib.find_ties(self.c, load_factor)
         return self._amid[:, 1:].reshape(-1, 2, 6)
 
+    def put_all(self, x, multipliers):
+        """Set the multipliers (k, ties) in unknowns x (k, unknowns) of one process."""
+        x[:, self._multipliers] = multipliers[:, self._added]
+
     def put(self, x, multipliers):
         """Set the multipliers in a vector."""
         if self._here:
@@ -137,9 +141,21 @@ class TieRows(Pointers):
 
     def forces(self, load_factor):
         """See `Equations.tie_forces`; at the last state."""
-        found, added = np.zeros((self._count, 2, 6)), self._added
-        signed = self._signs * self.multipliers[added, None]
-        found[added] = self.model.held_forces(self._gradients(load_factor)[added] * signed[..., None])
+        return self._forces(self.multipliers, self._gradients(load_factor))
+
+    def along(self, x, load_factors):
+        """See `Equations.at_ties`."""
+        multipliers, gradients = np.zeros((len(x), self._count)), np.zeros((len(x), self._count, 2, 6))
+        for k, load_factor in enumerate(load_factors.tolist()):
+            self.see(x[k])
+            multipliers[k], gradients[k] = self.multipliers, self._gradients(load_factor)
+        return multipliers, self._forces(multipliers, gradients)
+
+    def _forces(self, multipliers, gradients):
+        """(.., ties, 2, 6) forces at both ends of multipliers (.., ties) and gradients (.., ties, 2, 6)."""
+        found, added = np.zeros(gradients.shape), self._added
+        signed = self._signs * multipliers[..., added, None]
+        found[..., added, :, :] = self.model.held_forces(gradients[..., added, :, :] * signed[..., None])
         return found
 
     def reactions(self, load_factor, multipliers):

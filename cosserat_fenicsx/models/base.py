@@ -358,6 +358,10 @@ class RodModel:
         """Set the initial guess, in the scene's order: the nodes' unknowns (N, components), and n at the Gauss points
         (elements, points, 3), inertial, used where n is carried or unknown."""
         self.state.x.array[self.nodal] = values[self.slots]
+        self.put_force(n)
+
+    def put_force(self, n):
+        """Take n at the Gauss points, see `set_motion`."""
         self.signature.formulation.force.put(self, n @ self.axes[: self.force_size].T)
 
     # -- for solvers and results -------------------------------------------------------------------------------------

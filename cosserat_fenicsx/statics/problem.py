@@ -214,12 +214,18 @@ class Problem(Equations):
         self.set_state(self.x)
 
     def starts(self, values, n, multipliers):
-        """(k, n) `numbers`, one after another, of several states as of `begin_at`."""
-        found = []
-        for state in zip(values, n, multipliers, strict=True):
-            self.begin_at(*state)
-            found.append(np.concatenate(self.numbers()))
-        return np.array(found)
+        """(k, n) `numbers`, one after another, of several states as of `begin_at`, of one process."""
+        size, state = self.numbering.size, np.zeros((len(values), len(self._state)))
+        found = np.zeros((len(values), size + self.c.carries))
+        for k, force in enumerate(n):  # n may be among the unknowns
+            self.model.put_force(force)
+            found[k, size:] = self._live[0] if self._live else ()
+            state[k] = self._state
+        state[:, self.model.nodal] = values[:, self.model.slots]
+        found[:, self.numbering.of_free] = state[:, self.numbering.free]
+        if self.ties:
+            self.ties.put_all(found, multipliers)
+        return found
 
     def rates(self, slope):
         """The first-order changes of all arrays of `numbers` along a change of the unknowns per unit of load factor
