@@ -98,6 +98,7 @@ static inline int several(const friction *f, double rho)
 /* See `slides`: by Newton's method from the right, kept between slips at which the sum is too small and too large. */
 static __attribute__((noinline, cold)) double slides_by_other(const friction *f, double rho, double F, double *R, double *slope, long long *iterations)
 {
+    const double enough = 1e-14 * F / rho;
     double low = 0, high = F / rho, s = high;
     for (int i = 0; i < MOST; i++) {
         ++*iterations;
@@ -109,10 +110,12 @@ static __attribute__((noinline, cold)) double slides_by_other(const friction *f,
         else
             low = s;
         double next = s - sum / steep;
-        if (!(steep > 0) || next <= low || next >= high) next = (low + high) / 2;
+        /* a change below rounding leaves the bounds, too: it is the end, and no reason to halve */
+        const int close = steep > 0 && fabs(next - s) <= enough;
+        if (!(steep > 0) || ((next <= low || next >= high) && !close)) next = (low + high) / 2;
         const double change = fabs(next - s);
         s = next;
-        if (change <= 1e-14 * F / rho) break;
+        if (change <= enough) break;
     }
     return s > 1e-12 * F / rho ? s : 0;
 }
