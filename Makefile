@@ -44,7 +44,7 @@ help:
 	@echo "make truths  errors against closed forms and numbers of other programs, beside what was asked for (a few minutes)"
 	@echo "make random  200 random scenes against the strong form, at three tolerances (about 5 minutes)"
 	@echo "make random-wells  100 random wells, strings and operations against finer meshes in a stiffer wall (about half an hour)"
-	@echo "make random-strings  200 random drill-strings in motion: energy, torque, small motions, steps, models (half an hour)"
+	@echo "make random-strings  200 random drill-strings in motion: energy, torque, small motions, steps, models (an hour)"
 	@echo "make imperfect  60 symmetric structures with small imperfections against paths in small steps (about 20 minutes)"
 	@echo "make mutants  120 small errors put into the code: how many do the tests find? (two hours)"
 	@echo "make sanitizers  the tests on C that checks its bounds and what it leaves undefined (half an hour)"

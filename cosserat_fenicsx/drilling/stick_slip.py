@@ -167,6 +167,8 @@ def turns(history):
 _BIT, _DRIVE, _TORQUE = (1 + SERIES.index(name) for name in ("bit_speed", "drive_speed", "surface_torque"))
 # Least ratio of a longer step to the step of the motion.
 _LONGER = 1.499
+# A bit below this share of the drive's mean speed is slow, and may start from there.
+_SLOW = 0.1
 
 
 class Cycle(NamedTuple):
@@ -184,18 +186,18 @@ class Cycle(NamedTuple):
     largest_torque: float
 
 
-def cycle_of(rows, since=0.0):
+def cycle_of(rows, since=0.0, slow=_SLOW):
     """The `Cycle` in rows of `StringModel.advance` from a time (s) on; speeds in the sense in which the drive turns.
 
-    A bit starts where it passes half the mean speed of the drive after less than a tenth of it.
+    A bit starts where it passes half the mean speed of the drive after less than the share `slow` of it.
     """
     rows = rows[rows[:, 0] >= since]
     t, speed, torque = rows[:, 0], rows[:, _BIT], rows[:, _TORQUE]
     drive = rows[:, _DRIVE].mean()
     if drive < 0:
         drive, speed = -drive, -speed
-    slow, up = speed < 0.1 * drive, np.flatnonzero((speed[1:] >= 0.5 * drive) & (speed[:-1] < 0.5 * drive))
-    rested = np.diff(np.concatenate([[0], np.cumsum(slow)[up]])) > 0
+    rests, up = speed < slow * drive, np.flatnonzero((speed[1:] >= 0.5 * drive) & (speed[:-1] < 0.5 * drive))
+    rested = np.diff(np.concatenate([[0], np.cumsum(rests)[up]])) > 0
     up = up[rested]
     starts = t[up] + (0.5 * drive - speed[up]) / (speed[up + 1] - speed[up]) * (t[up + 1] - t[up])
     period = float(np.diff(starts).mean()) if len(starts) > 1 else np.nan
@@ -203,26 +205,31 @@ def cycle_of(rows, since=0.0):
 
 
 def step_errors(dt, other_model, rows, since=0.0):
-    """A `Cycle` of errors of a motion by its step, from a run with twice the step, in a quarter to half of the time.
+    """A `Cycle` of errors of a motion by its step, from a run with twice the step and one with half of it.
 
-    The errors are twice the difference of the two runs: twice the error of the finer one where it is of first order in
-    the step, six times where it is of second order. Both torques have the larger one of theirs: one of two differences
-    may be small by chance. A motion that is not periodic, or a bit that barely sticks, may
-    depend on any step. Where a law of friction or the coarsest mesh allows no run with 1.5 times the step, the other
-    run has half of it, and takes two to four times as long. NaN where no other run is possible.
+    The errors are twice the larger one of the two differences: twice the error where it is of first order in the step,
+    six times where it is of second order. Where fronts pass or the bit barely sticks, errors have no order, and of two
+    runs the numbers may agree by chance; three seldom do. For the same reason both torques have the larger error of
+    theirs. The error of the period covers what counts as a start: up to which speed the bit is slow before it. A motion
+    that is not periodic may depend on any step. NaN where no other run is possible; a law of friction or the coarsest
+    mesh may allow none with 1.5 times the step.
 
     Args:
         dt: step of the motion, s. other_model: function of the ratio of steps that returns a `StringModel` at rest.
         rows: of the motion, see `StringModel.advance`. since: see `cycle_of`.
     """
+    here, found = np.array(cycle_of(rows, since)), []
     for factor in (2.0, 0.5):
         try:
             other = other_model(factor)
             if factor > 1 and other.dt < _LONGER * dt:
                 continue
-            found = cycle_of(other.advance(int(np.ceil(rows[-1, 0] / other.dt - 1e-6))), since)
+            there = cycle_of(other.advance(int(np.ceil(rows[-1, 0] / other.dt - 1e-6))), since)
         except (SceneError, NotConverged):  # of that step
             continue
-        period, peak, *torques = (2 * abs(a - b) for a, b in zip(cycle_of(rows, since), found, strict=True))
-        return Cycle(period, peak, *[max(torques)] * 2)  # one of the two may differ little by chance
-    return Cycle(*[np.nan] * 4)
+        found.append(2 * np.abs(here - there))
+    if not found:
+        return Cycle(*[np.nan] * 4)
+    period, peak, *torques = np.max(found, axis=0).tolist()
+    periods = [cycle_of(rows, since, slow)[0] for slow in (0.8 * _SLOW, _SLOW, 1.2 * _SLOW)]
+    return Cycle(max(period, float(np.ptp(periods))), peak, *[max(torques)] * 2)
