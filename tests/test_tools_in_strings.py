@@ -139,6 +139,25 @@ def test_a_motor_that_stalls(model):
 
 
 @pytest.mark.parametrize("model", ["torsion", "axial and torsional"])
+def test_pumps_that_stop_and_start(model):
+    """Without flow friction holds the rotor; where the bit takes more, it turns backwards against friction and leakage.
+    The pumps start again, and all is as before."""
+    flow = cf.signals.Table((0.0, 0.2, 0.4, 1.4, 1.5), (GIVEN["Q"], GIVEN["Q"], 0.0, 0.0, GIVEN["Q"]))
+    tool = motor(flow=flow)
+    for law in (Rising(100.0, 10.0), Rising(GIVEN["T0"], GIVEN["b"])):
+        scene = above(tool, law=law, start="steady")
+        found = cf.drilling.simulate(scene, 3.0, model=model, dt=1e-3, progress=False)
+        off, backwards = np.searchsorted(found.times, 1.39), law.first > GIVEN["Tf"]
+        speed = (tool.slope * GIVEN["Om"] + GIVEN["Tf"] - law.first) / (tool.slope + law.slope) - GIVEN["Om"]
+        assert found.motor_speed[off] == pytest.approx(speed if backwards else 0.0, rel=1e-4, abs=1e-12)
+        assert found.bit_speed[off] == pytest.approx(GIVEN["Om"] + found.motor_speed[off], rel=5e-3)
+        assert found.bit_speed[-1] == pytest.approx(found.bit_speed[0], rel=1e-4) and not found.stalled[off]
+        assert abs(found.balance[-1]) < 1e-6 * found.work_of_drive[-1]
+    torques, speeds = np.array([-400.0, 200.0, 400.0]), np.array([100.0, 0.0, -100.0]) / tool.slope
+    assert tool.speed(torques, 0.0) == pytest.approx(speeds)
+
+
+@pytest.mark.parametrize("model", ["torsion", "axial and torsional"])
 def test_resumed_to_the_same_digits(model, tmp_path):
     flow = cf.signals.Table((0.0, 0.1, 0.2), (0.04, 0.04, 0.03))
     shaker = OscillationTool(2.0, outer_diameter=0.127, spring=5e6, frequency=16.0, stroke=5e-3, start=0.05)
@@ -226,12 +245,13 @@ def test_tool_that_halves_the_pull(truth):
 
 
 @pytest.mark.parametrize(("make", "words"), [
-    (lambda: motor(flow=0.0), "MudMotor.flow = 0.0: expected a flow through the motor"),
-    (lambda: motor(flow=1e-4), "MudMotor.flow = 0.0001: .*stalls without load"),
-    (lambda: motor(flow=cf.signals.Table([0, 5, 10], [(0.04,), (0.0,), (0.04,)])),
-     "^MudMotor.flow = 0.0: expected a flow .* at t = 5 s above .* pumps that stop or start are not computed$"),
-    (lambda: cf.drilling.simulate(above(motor(flow=lambda t: GIVEN["Q"] * (t < 0.3))), 1.0),
-     "^MudMotor.flow = 0.0: expected a flow .* are not computed$"),
+    (lambda: motor(flow=-0.01), "MudMotor.flow = -0.01: expected a flow through the motor"),
+    (lambda: motor(flow=cf.signals.Table([0, 5, 10], [(0.04,), (-0.01,), (0.04,)])),
+     "^MudMotor.flow = -0.01: expected a flow .* at t = 5 s, from 0 on$"),
+    (lambda: cf.drilling.simulate(above(motor(flow=lambda t: GIVEN["Q"] * (1 - t / 0.3))), 1.0),
+     "^MudMotor.flow = -.*: expected a flow .* from 0 on$"),
+    (lambda: cf.drilling.simulate(above(motor(flow=1e-4), start="steady"), 1.0), "mud motor: it stalls"),
+    (lambda: cf.well.power_curve(motor(), ["6 l/min"]), "power_curve.flows = 0.0001: .*turns the motor without load"),
     (lambda: motor(flow=cf.signals.Ramp((2400,))), "MudMotor.flow = 2400.0: .*at most 10 m"),
     (lambda: motor(flow=lambda t: [1.0, 2.0]), r"MudMotor.flow = \[1.0, 2.0\]: expected a flow"),
     (lambda: cf.well.power_curve(motor(), []), r"power_curve.flows = \[\]: expected a flow"),

@@ -72,7 +72,7 @@ def _left_out(scene, name):
 def _stalls(scene):
     """A sentence where a bit at rest holds more than a motor gives."""
     law = scene.motor and scene.bit.law.resistance(scene.bit.most)
-    if not law or law.still < (stall := scene.motor.stall_torque()):
+    if not law or law.still < (stall := max(scene.motor.stall_torque(), 0.0)):
         return []
     return [
         f"{scene.motor.name} gives at most {stall:.5g} N m at the start, and the bit at rest holds {law.still:.5g} N m"

@@ -1,6 +1,8 @@
 /* The equations of a step of the implicit midpoint rule for the mean velocities w:
    (2 M/h + C + h/2 K) w = 2 M/h v - K x - friction - bit + drive. */
 enum { ITERATIONS = 60, PATIENCE = 15, HALVINGS = 12 };
+/* Slip (rad/s, m/s) at which friction between both sides of a joint is the largest: it creeps up to there. */
+#define CREEP 1e-6
 enum { AXIAL = 1, TURN = 2 }; /* bits of masks; of one unknown alone only the second */
 
 static inline int bit_of(const model *m, int d) { return m->dofs == 1 ? TURN : 1 << d; }
@@ -66,6 +68,7 @@ int build(model *m, double h)
     const int n = m->dofs, last = m->nodes - 1;
     if (h == m->h) return 1;
     m->h = h;
+    memset(m->stands, 0, sizeof m->stands);
     for (int i = 0; i <= last; i++)
         for (int d = 0; d < n; d++) {
             const int j = i * n + d;
@@ -139,7 +142,10 @@ static void loads(model *m, double h, const double *signal)
     }
     for (int p = 0; p < m->pairs; p++) {
         const int j = m->pair[p] * n + m->pair_dof[p];
+        const double creep = m->pair_lost[p] / CREEP * (m->w[j + n] - m->w[j]);
         m->b[j] -= signal[n + p], m->b[j + n] += signal[n + p];
+        m->rubbed[p] = fmax(fmin(creep, m->pair_lost[p]), -m->pair_lost[p]);
+        m->rubs[p] = 0;
     }
     for (int d = 0; d < n; d++) m->b[last * n + d] -= m->bit.force[d + 2 - n];
     if (n == 2) m->b[2 * last] += m->bit.hanging; /* the tension at rest contains a part of the weight on bit */
@@ -236,6 +242,36 @@ static double rub(model *m)
     return fabs(m->force[2 * i] - m->c[2 * i]) / m->rho[2 * i];
 }
 
+/* Friction between both sides of joints, as that of a motor's rotor in its housing: where it holds them they creep, by a
+   damper; elsewhere it is a given force. Returns whether one begins to stand or to slip. */
+static int rub_joints(model *m)
+{
+    const int n = m->dofs;
+    int changed = 0;
+    for (int p = 0; p < m->pairs; p++) {
+        const double lost = m->pair_lost[p];
+        if (lost == 0) continue;
+        const int j = m->pair[p] * n + m->pair_dof[p];
+        double *const entry[3] = {m->a + j, m->a + j + n, m->o + j};
+        /* at most the inverse compliance between both sides */
+        const double rho = m->ease * fmin(m->rho[j], m->rho[j + n]) / 4;
+        const double tau = m->rubbed[p] + rho * (m->w[j + n] - m->w[j]);
+        const int stands = fabs(tau) <= lost;
+        const double force = stands ? 0 : copysign(lost, tau), more = force - m->rubs[p];
+        changed |= more != 0 || stands != m->stands[p];
+        m->b[j] += more, m->b[j + n] -= more;
+        m->rubs[p] = force;
+        for (int k = 0; k < 3 && stands != m->stands[p]; k++) {
+            if (stands)
+                m->parted[p][k] = *entry[k], *entry[k] += (k < 2 ? 1 : -1) * lost / CREEP;
+            else
+                *entry[k] = m->parted[p][k];
+        }
+        m->stands[p] = stands;
+    }
+    return changed;
+}
+
 /* The prediction of all laws from the state of the iteration, as masks of held unknowns and as linear laws c + d w.
    Returns the largest difference to its slips, m/s or rad/s; the largest slip into *scale. */
 static double predict(model *m, double h, double *scale)
@@ -286,6 +322,10 @@ static void take_forces(model *m)
                 F[n - 1] = c[n - 1] + (n == 2 ? d[1] / r * w[0] : 0) + d[2] / r * w[n - 1];
             }
         }
+    }
+    for (int p = 0; p < m->pairs; p++) {
+        const int k = m->pair[p] * n + m->pair_dof[p];
+        m->rubbed[p] = m->stands[p] ? m->pair_lost[p] / CREEP * (m->w[k + n] - m->w[k]) : m->rubs[p];
     }
     const int j = last * n + n - 1, mask = m->mask[last];
     if (m->bit.law) m->force[j] = mask & TURN ? missing(m, last, n - 1) : m->c[j] + m->d[3 * last + 2] * m->w[j];

@@ -183,7 +183,9 @@ class AxialTorsional(StringModel):
         m.motor = next((p for p, (_, _, joint) in enumerate(joints) if joint.turns), -1)
         for name, values in (("pair", [x[0] for x in joints]), ("pair_dof", [x[1] for x in joints])):
             self._array(m, name, np.array(values, dtype=np.int32))
-        self._array(m, "pair_slope", np.array([joint.damping for *_, joint in joints], dtype=float))
+        for name in ("damping", "lost"):
+            name_in_c = "pair_slope" if name == "damping" else "pair_lost"
+            self._array(m, name_in_c, np.array([getattr(joint, name) for *_, joint in joints], dtype=float))
         self._signals += [joint.force for *_, joint in joints]
 
     def _set_hook(self, hook):
@@ -247,7 +249,7 @@ class AxialTorsional(StringModel):
     def _set_steady(self, motion):
         """A steady start, see `steady_start`."""
         m, kept, unknowns, chain = self._m, self._kept, slice(2 - self._dofs, 2), self._chain
-        pairs = [(*at, joint.force(0.0)) for *at, joint in chain.joints]
+        pairs = [(*at, joint.force(0.0) - joint.lost) for *at, joint in chain.joints]
         turned = next((end + 1 for end, _, joint in chain.joints if joint.turns), None)
         turning = float(steady_velocities(self.scene)[1])
 

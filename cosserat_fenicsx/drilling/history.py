@@ -7,6 +7,7 @@ import numpy as np
 
 from cosserat_fenicsx.checks import File, number, positive, refuse
 from cosserat_fenicsx.drilling.choose import fastest
+from cosserat_fenicsx.drilling.joints import fastest_rotor
 from cosserat_fenicsx.drilling.linear_control import ZTorque
 from cosserat_fenicsx.drilling.protocol import LEDGER, PROFILE, SERIES
 from cosserat_fenicsx.drilling.scene import Drilling
@@ -186,7 +187,7 @@ class DrillingHistory(Result):
         if not len(self):
             return 0.0, np.inf
         usual = max(_USUAL, fastest(self.scene, float(self.times[-1])))
-        usual += 0.0 if self.scene.motor is None else self.scene.motor.speed(0.0)
+        usual += fastest_rotor(self.scene)
         return max(float(np.abs(x).max()) for x in (self.drive_speed, self.bit_speed)), _BEYOND * usual
 
     @property
@@ -201,13 +202,22 @@ class DrillingHistory(Result):
         motor = self.scene.motor
         if motor is None:
             return np.full(len(self), np.nan)
-        flow = [motor.flow_at(max(t, 0.0)) for t in self.mean_times] if callable(motor.flow) else motor.flow
-        return (np.asarray(flow) - motor.per_radian * self.motor_speed) / motor.leakage
+        return (self._flow - motor.per_radian * self.motor_speed) / motor.leakage
+
+    @property
+    def _flow(self):
+        """(n,) through the motor, m^3/s."""
+        motor = self.scene.motor
+        asked = motor.flow_at if callable(motor.flow) else lambda t: motor.flow
+        return np.array([asked(max(t, 0.0)) for t in self.mean_times])
 
     @property
     def stalled(self) -> np.ndarray:
-        """(n,) bool: the rotor of the motor stands, or is turned backwards."""
-        return (self.motor_speed <= 0) & (self.scene.motor is not None)
+        """(n,) bool: the rotor of the motor stands, or is turned backwards, while its flow would turn it without load."""
+        motor = self.scene.motor
+        if motor is None:
+            return np.zeros(len(self), dtype=bool)
+        return (self.motor_speed <= 0) & (motor.driven(self._flow) > motor.lost_torque)
 
     @property
     def balance(self) -> np.ndarray:
@@ -299,8 +309,7 @@ class DrillingHistory(Result):
         if self.stalled.any():
             first = self.mean_times[self.stalled.argmax()]
             yield (f"THE MOTOR STALLS from t = {max(first, 0.0):.4g} s on, in {100 * self.stalled.mean():.3g} % of the "
-                   "time: the string turns its rotor backwards, by the law of a motor that runs; no motor bears that "
-                   "for long.")  # fmt: skip
+                   "time: the bit holds its rotor, or turns it backwards; no motor bears that for long.")  # fmt: skip
 
     def _more(self, units):
         if len(self) > 5 and not np.isnan(self.balance).all():

@@ -1,8 +1,8 @@
 """Tools that part the string, in torsion or along the axis: two nodes at one place, with a spring, a damper and a pair
 of forces between them.
 
-A `MudMotor` parts it in torsion: the stall torque acts on what is below and against the housing, and a dashpot of its
-slope between them. It is linear; below zero speed the rotor is turned backwards by the same law, and told.
+A `MudMotor` parts it in torsion: the torque that its flow gives it at rest acts on what is below and against the
+housing, and between them a dashpot of its slope, and the friction of its rotor.
 An `OscillationTool` parts axial motion, with its spring and its force.
 """
 
@@ -28,7 +28,7 @@ class Joint:
         tool: the component; the joint is at its lower end. segment: its index from the top down.
         turns: whether it parts torsion, else axial motion.
         spring, damping: N m/rad and N m s/rad, or N/m and N s/m. force: `ScalarSignal` of what drives both sides apart,
-            N m or N.
+            N m or N. lost: the largest friction between them, N m.
     """
 
     tool: MudMotor | OscillationTool
@@ -37,6 +37,7 @@ class Joint:
     spring: float
     damping: float
     force: ScalarSignal
+    lost: float = 0.0
 
 
 def joints_of(laid, bottoms) -> tuple[Joint, ...]:
@@ -50,7 +51,7 @@ def joints_of(laid, bottoms) -> tuple[Joint, ...]:
     for place in reversed(laid):
         tool, k = place.component, bottoms.index(place.bottom)
         if isinstance(tool, MudMotor):
-            found.append(Joint(tool, k, True, 0.0, tool.slope, _stall(tool)))
+            found.append(Joint(tool, k, True, 0.0, tool.slope, _driven(tool), tool.lost_torque))
         if isinstance(tool, OscillationTool):
             if place is laid[0]:
                 refuse("DrillString", "components", tool.name, f"a component below {tool.name}, which it shakes")
@@ -61,23 +62,29 @@ def joints_of(laid, bottoms) -> tuple[Joint, ...]:
     return tuple(found)
 
 
-def _stall(motor):
-    """The stall torque over time."""
+def _driven(motor):
+    """The torque that its flow gives a motor at rest, over time."""
     if not callable(motor.flow):
-        return ScalarSignal(motor, "flow", motor.stall_torque(), "N m")
+        return ScalarSignal(motor, "flow", motor.driven(), "N m")
 
-    return _Stall(motor, "flow", motor.flow, "m^3/s")
+    return _Driven(motor, "flow", motor.flow, "m^3/s")
 
 
-class _Stall(ScalarSignal):
-    """The stall torque of a motor whose flow depends on time, N m."""
+class _Driven(ScalarSignal):
+    """The same of a motor whose flow depends on time, N m."""
 
     def __init__(self, motor, *flow):
         super().__init__(motor, *flow)
         self._motor = motor
 
     def __call__(self, t):
-        return self._motor.stall_torque(self._motor.flow_at(t))
+        return self._motor.driven(self._motor.flow_at(t))
+
+
+def fastest_rotor(scene) -> float:
+    """The largest speed that its flow gives the rotor of a motor against its housing, rad/s; 0 without a motor."""
+    joint = next((x for x in scene.joints if x.turns), None)
+    return 0.0 if joint is None else max(0.0, (joint.force.largest - joint.lost) / joint.damping)
 
 
 def speed_of_bit(scene, turning, down=None):
@@ -113,8 +120,8 @@ def largest_speed(motor, excess, fastest, slowest, tried=_TRIED):
     speeds = np.linspace(fastest, slowest, tried)[:-1]
     values = np.array([excess(om) for om in speeds])
     k, stall = int(np.argmax(values >= 0)), motor.stall_torque()
-    if values[k] < 0:
-        raise SceneError(f"{motor.name}: it stalls: with {motor.flow_at(0.0):.4g} m^3/s it gives less than {stall:.5g} "
+    if stall <= 0 or values[k] < 0:
+        raise SceneError(f"{motor.name}: it stalls: with {motor.flow_at(0.0):.4g} m^3/s it gives less than {max(stall, 0.0):.5g} "
                          "N m, and the bit takes more at every speed: expected less weight on bit, more flow or "
                          "another motor; start='rest' computes how it stalls")  # fmt: skip
     return float(speeds[0] if k == 0 else brentq(excess, speeds[k], speeds[k - 1], xtol=1e-14, rtol=1e-14))

@@ -9,6 +9,7 @@ import numpy as np
 from cosserat_fenicsx.checks import File, instance, number, refuse
 from cosserat_fenicsx.drilling.choose import chosen, fastest, model_of, with_step
 from cosserat_fenicsx.drilling.history import COLUMNS, DrillingHistory
+from cosserat_fenicsx.drilling.joints import fastest_rotor
 from cosserat_fenicsx.drilling.protocol import PROFILE
 from cosserat_fenicsx.drilling.scene import Drilling
 from cosserat_fenicsx.drilling.stick_slip import step_errors
@@ -57,8 +58,8 @@ def simulate(
         profile_every: s between profiles along the string; None for 400 of them.
         folder: to write the motion and checkpoints to during the run: whatever ends it, `resume(folder)` continues
             it to the same digits. It must not hold a motion yet.
-        check: whether the motion is computed once more at twice the step, on a mesh half as fine, for the history's
-            `errors`.
+        check: whether the motion is computed again at twice and at half the step, on meshes half and twice as fine,
+            for the history's `errors`: five times the work.
         progress: True, False, or None for a bar in runs of more than two seconds.
 
     Returns:
@@ -217,7 +218,7 @@ def check_step(scene, dt, duration, save_every=None):
     if duration / max(dt, save_every or 0.0) > MOST_ROWS:
         refuse(where, "save_every", save_every, f"at least {duration / MOST_ROWS:.3g} s: {MOST_ROWS:g} rows in "
                f"{duration:g} s")  # fmt: skip
-    own = scene.motor.speed(0.0) if scene.motor else 0.0
+    own = fastest_rotor(scene)
     most, words = _largest_turn(scene)
     if words:
         what, speed = f"{words} at that speed", speed + own

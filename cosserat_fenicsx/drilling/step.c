@@ -73,7 +73,7 @@ static int solve(model *m, double h, const double *signal)
         double scale;
         if (i && i % PATIENCE == 0) m->ease *= 0.5; /* nodes that flip to and fro settle with smaller factors */
         const double error = predict(m, h, &scale);
-        if (i && error <= 1e-10 * scale + 1e-11) {
+        if (!rub_joints(m) && i && error <= 1e-10 * scale + 1e-11) {
             m->iterations += i;
             if (i > m->most) m->most = i;
             return 1;
@@ -207,8 +207,8 @@ static void commit(model *m, double h, const double *signal)
     for (int p = 0; p < m->pairs; p++) {
         const int j = m->pair[p] * n + m->pair_dof[p];
         const double rate = m->w[j + n] - m->w[j], lost = h * m->pair_slope[p] * rate * rate;
-        m->applied[p] = signal[n + p];
-        sums->tools += h * signal[n + p] * rate - lost;
+        m->applied[p] = signal[n + p] - m->rubbed[p];
+        sums->tools += h * m->applied[p] * rate - lost;
         sums->mud -= lost;
     }
     const double *w = m->w + (size_t)last * n;
@@ -305,7 +305,8 @@ static void write_record(const model *m, double *row)
         const double error = m->top[0].error;
         strain += m->top[0].integral * error * error / 2 - m->hanging_top * error;
     }
-    const double *parted = m->motor < 0 ? NULL : m->w + (size_t)m->pair[m->motor] * n + turn;
+    const double *parted =
+        m->motor < 0 || m->stands[m->motor] ? NULL : m->w + (size_t)m->pair[m->motor] * n + turn;
     const double drive = m->top[turn].force, hook = n == 2 ? m->hanging_top - m->top[0].force : NAN;
     const double weight_on_bit = n == 2 ? m->bit.recorded[0] : m->bit.over_time ? m->bit.weight : NAN;
     const double series[] = {w[turn], x[turn], drive, w[last * n + turn], x[last * n + turn], m->bit.recorded[1], hook,

@@ -70,7 +70,8 @@ typedef struct {
     double drive_inertia, Kp, Ki, given;     /* torque of the drive: given + Kp (Om - om) + Ki integral */
     double bit_inertia;
     double slope, dragged;                   /* of a motor above the bit: torque over speed, 0: none; drag below */
-    const double *stall;                     /* its stall torque in each of the steps asked for */
+    double lost;                             /* largest torque of the friction of its rotor */
+    const double *driven;                    /* torque that its flow gives it at rest, in each of the steps asked for */
     double bit_angle, turned, last_turned;   /* of the bit below a motor; its speed against the housing, see `speed` */
     double tools;                            /* work of the motor since the start, J */
     double drive_speed, integral, bit_speed; /* at the end of the last step; without inertia, its mean */
@@ -136,7 +137,11 @@ typedef struct {
     int pairs, motor;               /* pairs of forces between nodes; which one is a motor's, or -1 */
     const int *pair, *pair_dof;     /* (pairs,) elements, and their unknowns */
     const double *pair_slope;       /* (pairs,) dampers, which count as tools; signals follow those of the top */
-    double applied[6];              /* forces of the last step */
+    const double *pair_lost;        /* (pairs,) largest friction between both sides */
+    double applied[6];              /* forces of the last step, friction included */
+    double rubbed[6], rubs[6];      /* friction between both sides; that which is a given force */
+    int stands[6];                  /* whether it holds them: then the matrix has a damper, */
+    double parted[6][3];            /* without which these were its entries */
     upper top[2];
     lower bit;
     books sums;

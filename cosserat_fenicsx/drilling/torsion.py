@@ -221,7 +221,7 @@ class TorsionWaves(StringModel):
             dt = cells.dt * min(_SET.narrower / factor if factor else 1.0, _SET.narrower)
         self.dt, self.depths = cells.dt, cells.depths
         self._signal = scene.drive.signal()
-        self._stall = next((x.force for x in scene.joints if x.turns), None)
+        self._driven = next((x.force for x in scene.joints if x.turns), None)
         self.why = tuple(self._reasons(asked))
         self._allocate()
         if scene.start == "steady":
@@ -329,7 +329,7 @@ class TorsionWaves(StringModel):
                 self._set_linear(c.control, drive, linear, scene.segments[0].torsional_impedance)
         c.bit_inertia = self._bit_inertia
         if scene.motor is not None:
-            c.slope = scene.motor.slope
+            c.slope, c.lost = scene.motor.slope, scene.motor.lost_torque
             c.dragged = scene.drag_rates[1] * scene.turned_inertia
         self._laws = [InC(self._ffi, self._wall)]
         self._laws[0].fill(c.wall)
@@ -378,9 +378,9 @@ class TorsionWaves(StringModel):
         dt, buffer = self.dt, self._ffi.from_buffer
         signal = self._samplers["drive"] if self.scene.drive.control.sampled and self.c.stiff else self._signal
         speeds = means(signal, self.steps, steps, dt)
-        if self._stall is not None:
-            stall = means(self._stall, self.steps, steps, dt)
-            self.c.stall = buffer("double[]", stall)
+        if self._driven is not None:
+            driven = means(self._driven, self.steps, steps, dt)
+            self.c.driven = buffer("double[]", driven)
         rows = buffer("double[]", rows, require_writable=True)
         self.steps += self._lib.advance_waves(
             self.c, steps, buffer("double[]", speeds), self._weights(self.steps, steps), rows
@@ -392,7 +392,7 @@ class TorsionWaves(StringModel):
         now = self._kept
         speed, torque = ((now[f"last_{name}"] + now[name]) / 2 for name in ("speed", "moment"))
         sticking = (self._hold > 0) & (now["last_speed"] == 0) & (now["speed"] == 0)
-        if self._stall is not None:
+        if self._driven is not None:
             sticking[-1] = self.c.bit_speed == 0
         for name, values in (("angle", now["angle"]), ("speed", speed), ("torque", torque), ("sticking", sticking)):
             found[PROFILE.index(name)] = values

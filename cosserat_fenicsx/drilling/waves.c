@@ -106,14 +106,23 @@ static __attribute__((noinline)) void energies(const waves *w, double *kinetic, 
     *strain = held / 2;
 }
 
-/* The bit below a motor, whose torque is R - c (om_bit - om): the housing om bears it, P - A om = T. So the bit meets
-   the wave (c P + A R)/(A + c) on the impedance c A/(A + c). */
+/* The bit below a motor, whose torque is R - c (om_bit - om) less the friction of its rotor: the housing om bears it,
+   P - A om = T. So the bit meets the wave (c P + A R)/(A + c) on the impedance c A/(A + c), or P on A while friction
+   holds the rotor. It turns forwards, backwards or not at all: one of them is true to its sense. */
 static double below_motor(waves *w, double P, double R)
 {
     const int n = w->cells;
-    const double A = w->above[n] + w->drag[n], c = w->slope, S = c * A / (A + c), F = (c * P + A * R) / (A + c);
-    const double dt = w->dt, bit = turned(w, n, F, S + w->dragged, w->bit_inertia, &w->bit_speed), T = F - S * bit;
-    const double om = (P - T) / A;
+    const double A = w->above[n] + w->drag[n], c = w->slope, dt = w->dt, before = w->bit_speed;
+    double bit, T, om;
+    for (int sense = 1;; sense = sense > 0 ? -1 : 0) {
+        const double S = sense ? c * A / (A + c) : A;
+        const double F = sense ? (c * P + A * (R - sense * w->lost)) / (A + c) : P;
+        w->bit_speed = before;
+        bit = turned(w, n, F, S + w->dragged, w->bit_inertia, &w->bit_speed);
+        T = F - S * bit;
+        om = sense ? (P - T) / A : bit;
+        if (!sense || w->lost == 0 || sense * (bit - om) > 0) break;
+    }
     w->last_turned = w->turned;
     w->turned = bit - om;
     w->bit_angle += dt * bit;
@@ -123,7 +132,7 @@ static double below_motor(waves *w, double P, double R)
     return om;
 }
 
-/* The bit, or the free end; R: stall torque of a motor. */
+/* The bit, or the free end; R: torque that the flow gives a motor at rest. */
 static void end(waves *w, double P, double R)
 {
     int n = w->cells;
@@ -195,7 +204,7 @@ int advance_waves(waves *w, int steps, const double *speeds, const double *weigh
         if (weights) press(w, weights[k]);
         drive(w, speeds[k]);
         w->down[0] = w->up[0] + 2 * w->below[0] * w->speed[0];
-        end(w, between(w, P), w->slope > 0 ? w->stall[k] : 0);
+        end(w, between(w, P), w->slope > 0 ? w->driven[k] : 0);
         for (int f = 0; f < w->filters; f++) {
             int c = w->filtered[f];
             double turn = w->turn[f], root = sqrt((1 - turn) * (1 + turn));

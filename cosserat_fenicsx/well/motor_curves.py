@@ -41,13 +41,12 @@ class PowerCurve(Result):
     @property
     def speed(self) -> np.ndarray:
         """(n,) rad/s."""
-        v, motor = self.motor.per_radian, self.motor
-        return (self.flow - motor.leakage * (self.torque + motor.lost_torque) / v) / v
+        return self.motor.speed(self.torque, self.flow)
 
     @property
     def pressure(self) -> np.ndarray:
         """(n,) Pa."""
-        return (self.torque + self.motor.lost_torque) / self.motor.per_radian
+        return self.motor.pressure(self.torque, self.flow)
 
     @property
     def power(self) -> np.ndarray:
@@ -128,5 +127,9 @@ def power_curve(motor: MudMotor, flows: Any = None, points: int = 41) -> PowerCu
     if not several:
         refuse("power_curve", "flows", flows, "a flow (m^3/s) or several, or None for the motor's own")
     flows = [replace(motor, flow=flow).flow_at(0.0) for flow in several]
+    for flow in flows:
+        if motor.stall_torque(flow) <= 0:
+            refuse("power_curve", "flows", flow, "a flow (m^3/s) that turns the motor without load, above "
+                   f"{motor.lost_torque * motor.leakage / motor.per_radian:.3g}")  # fmt: skip
     torque = np.concatenate([np.linspace(0.0, motor.stall_torque(flow), points) for flow in flows])
     return PowerCurve(motor, np.repeat(flows, points), torque)

@@ -5,8 +5,9 @@ takes the flow Q at the speed om of its rotor against its housing, and hands the
 
     Q = v om + leak p,     T = v p - T_lost,     so     T = v Q/leak - T_lost - c om,     c = v^2/leak.
 
-The housing bears -T. For small motions about any speed the motor is a dashpot c between housing and bit. Where the bit
-takes more than the stall torque, T at om = 0, the string turns the rotor backwards; T_lost keeps its sign there.
+The housing bears -T. For small motions about any speed the motor is a dashpot c between housing and bit. T_lost is the
+friction of the rotor, against its rotation: it changes its sign with that of om, and holds the rotor where T is within
+T_lost of v Q/leak. Above that the string turns the rotor backwards, and the motor pumps; without flow, too.
 """
 
 import math
@@ -85,19 +86,19 @@ class MudMotor(_Tool):
         displacement: V, m^3 a revolution of the rotor against the housing.
         leakage: flow past the seals per pressure over the motor, m^3/(s Pa).
         lost_torque: T_lost, N m, of the torque that the pressure makes.
-        flow: Q, m^3/s: a number, or a function of time, such as a `Table`, for `drilling.simulate`. At every time its
-            stall torque is above 0: pumps that stop or start are not computed.
+        flow: Q, m^3/s: a number, or a function of time, such as a `Table`, for `drilling.simulate`; 0 where the pumps
+            stand: then friction holds the rotor up to T_lost, and beyond it turns and pumps, as without a valve.
         rotor_inertia: kg m^2, of rotor and drive shaft; None for a steel cylinder of half the inner diameter.
 
     Raises:
-        SceneError: as of `Collar`; numbers that are not positive; a flow whose stall torque is not above 0. Sizes that
-            no motor has, such as litres without their unit, are taken with a warning.
+        SceneError: as of `Collar`; numbers that are not positive; a negative flow. Sizes that no motor has, such as
+            litres without their unit, are taken with a warning.
     """
 
     displacement: Annotated[float, Number("volume", positive("a displacement a revolution"))]
     leakage: Annotated[float, Number(limits=positive("a leakage (m^3/(s Pa)), about 1e-8"))]
     lost_torque: Annotated[Torque, at_least(0)] = 0.0
-    flow: InTime[Annotated[float, Number("flow", positive("a flow through the motor"))]]
+    flow: InTime[Annotated[float, Number("flow", at_least(0, "a flow through the motor"))]]
     rotor_inertia: Annotated[Inertia, positive()] | None = None
 
     _called = "mud motor"
@@ -110,10 +111,8 @@ class MudMotor(_Tool):
             density, radius = self.material.density, self.inner_diameter / 4
             store(self, rotor_inertia=density * math.pi / 2 * radius**4 * self.length)
         times = (0.0, *getattr(self.flow, "jumps", ()))
-        flows = [self._flow_asked(t) for t in times]
+        flows = [self.flow_at(t) for t in times]
         _doubt_size(self, "flow", max(flows), _MOST_FLOW, "m^3/s", "2400 l/min")
-        for t in times:
-            self.flow_at(t)
 
     @property
     def per_radian(self) -> float:
@@ -129,43 +128,43 @@ class MudMotor(_Tool):
         """The flow at a time (s), m^3/s.
 
         Raises:
-            SceneError: no number, or one whose stall torque is not above 0.
+            SceneError: no number from 0 on.
         """
-        least = self.lost_torque * self.leakage / self.per_radian
-        over_time = "; pumps that stop or start are not computed" if callable(self.flow) else ""
-        expected = f"a flow (m^3/s) at t = {t:g} s above {least:.3g}, at which the motor stalls without load{over_time}"
-        return number(self, "flow", self._flow_asked(t), expected, lambda x: least < x < math.inf)
-
-    def _flow_asked(self, t):
-        """The flow at a time (s), whatever its torque."""
         flow, where = self.flow, f" at t = {t:g} s"
         if callable(flow):
             flow = np.ravel(call(flow, t, "MudMotor.flow", where)).tolist()
             flow = flow[0] if len(flow) == 1 else flow
-        return number(self, "flow", flow, f"a flow (m^3/s){where}", math.isfinite)
+        return number(self, "flow", flow, f"a flow (m^3/s){where}, from 0 on", lambda x: 0 <= x < math.inf)
 
     def sentence(self, units: Units) -> str:
         """On its flow, speed and torque at the start, in some units."""
         flow = units.told(self.flow_at(0.0), "m^3/s", form=".4g", shown="l/min")
         speed = units.told(self.speed(0.0), "rad/s", form=".4g", shown="rpm")
         torque = units.told(self.stall_torque(), "N m", form=".4g", shown="kN m")
+        if self.stall_torque() <= 0:
+            return f"Tool, {self.name}: it stands at the start, with {flow}."
         return f"Tool, {self.name}: {flow} turn it at {speed} without load, it stalls at {torque}."
 
     def _flow(self, flow):
-        return self.flow_at(0.0) if flow is None else number(self, "flow", flow, "a flow (m^3/s)", lambda x: x > 0)
+        return self.flow_at(0.0) if flow is None else flow
+
+    def driven(self, flow: Any = None) -> Any:
+        """The torque of the pressure on a rotor at rest, v Q/leak, N m; `flow` as of `stall_torque`."""
+        return self.per_radian * self._flow(flow) / self.leakage
 
     def stall_torque(self, flow: float | None = None) -> float:
-        """The torque at which the motor stands, N m.
+        """The largest torque at which the motor turns, N m; below 0 where its flow does not turn it without load.
 
         Args:
             flow: m^3/s; None for its own, at the start.
         """
-        return self.per_radian * self._flow(flow) / self.leakage - self.lost_torque
+        return self.driven(flow) - self.lost_torque
 
     def speed(self, torque: Any, flow: float | None = None) -> Any:
-        """Speed of the rotor against the housing, rad/s, under torques on the bit (N m, a number or an array); below 0
-        beyond the stall torque. `flow` as of `stall_torque`."""
-        return (self.stall_torque(flow) - torque) / self.slope
+        """Speed of the rotor against the housing, rad/s, under torques on the bit (N m, a number or an array); from the
+        stall torque on 0 while friction holds it, and below 0 beyond. `flow` as of `stall_torque`."""
+        turns = self.driven(flow) - torque
+        return (turns - np.clip(turns, -self.lost_torque, self.lost_torque)) / self.slope
 
     def pressure(self, torque: Any, flow: float | None = None) -> Any:
         """Pressure over the motor, Pa, see `speed`."""
