@@ -87,13 +87,14 @@ def fastest_rotor(scene) -> float:
     return 0.0 if joint is None else max(0.0, (joint.force.largest - joint.lost) / joint.damping)
 
 
-def speed_of_bit(scene, turning, down=None):
+def speed_of_bit(scene, turning, down=None, rubbed=None):
     """The speed of the bit in steady rotation of a string (rad/s): its own, or below a motor the largest one at which
     the torque on bit is the motor's.
 
     Args:
         scene: a `Drilling`. turning: of the string, rad/s.
         down: velocity of a bit that drills, m/s; None for that by its weight.
+        rubbed: function of the speed that gives the torque of the wall on what turns with the bit, N m, or None.
 
     Raises:
         SceneError: the motor stalls.
@@ -106,6 +107,7 @@ def speed_of_bit(scene, turning, down=None):
     def excess(om):
         velocity = bit.law.rate(bit.resting, om) if down is None and bit.law.drills else down or 0.0
         torque = float(bit.law.steady_forces(bit.resting or 0.0, np.array([velocity, om]))[1])
+        torque += rubbed(om) if rubbed else 0.0
         return stall - motor.slope * (om - turning) - torque - drag * om
 
     return largest_speed(motor, excess, turning + stall / motor.slope, turning)

@@ -300,7 +300,8 @@ class Steady:
             SceneError: the motor stalls.
         """
         scene = self.scene if weight is None else self.scene.with_case(weight=weight)
-        return speed_of_bit(scene, speed, self._penetration(speed, None) if self.cuts and weight is None else None)
+        down, walls = self._penetration(speed, None) if self.cuts and weight is None else None, self.walls(weight)
+        return speed_of_bit(scene, speed, down, walls and walls.torque_below)
 
     def _penetration(self, speed, weight):
         """V from the weight on bit less the load of wear flats; or from the speed of the hook."""

@@ -9,7 +9,6 @@ from scipy.optimize import brentq
 
 from cosserat_fenicsx.checks import File, Numbers, number, positive, refuse
 from cosserat_fenicsx.drilling.bit_laws import Lobes
-from cosserat_fenicsx.drilling.joints import speed_of_bit
 from cosserat_fenicsx.drilling.linear.characteristic import Steady, speeds_and_weights
 from cosserat_fenicsx.drilling.linear.frequencies import natural_frequencies
 from cosserat_fenicsx.drilling.scene import Drilling
@@ -233,7 +232,8 @@ def bit_bounce(scene: Drilling, speeds: Numbers) -> BitBounce:
 
 
 def _of_bit(scene, speeds):
-    return np.array([speed_of_bit(scene, float(speed)) for speed in speeds])
+    steady = Steady(scene, "axial")
+    return np.array([steady.speed_of_bit(float(speed), None) for speed in speeds])
 
 
 def _amplitude(scene, speeds):

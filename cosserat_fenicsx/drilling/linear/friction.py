@@ -10,6 +10,7 @@ length
 mu' = dmu/dv, which is negative where the friction falls. Over the inertia they are drag rates, constant in pieces.
 """
 
+import itertools
 from functools import cached_property
 
 import numpy as np
@@ -65,6 +66,13 @@ class WallDashpots:
                 around, along = self._dashpots(law, turning, abs(sliding), radius) if load else (0.0, 0.0)
                 row.append((length, load * around / segment.rhoJ, load * along / segment.rhoA))
             found.append(row)
+        return found
+
+    def torque_below(self, speed: float) -> float:
+        """On what turns with the bit below a motor, at a speed of rotation above 0 (rad/s), N m."""
+        found, above = 0.0, len(self.scene.segments) - len(self.scene.turned)
+        for length, load, radius in itertools.chain.from_iterable(self.pieces[above:]):
+            found += length * load * radius * float(self._law(speed if self._of_rotation else radius * speed))
         return found
 
     def _dashpots(self, law, speed, sliding, radius):
