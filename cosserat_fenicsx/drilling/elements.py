@@ -415,6 +415,12 @@ class AxialTorsional(StringModel):
             yield ("APPROXIMATE: a drive that has its speed at once sends a jump down the string, which oscillates "
                    "over some elements: peaks of torque may be a fifth too large, beyond `errors`; a Ramp of the "
                    "speed or an inertia of the drive avoids it")  # fmt: skip
+        law = bit and bit.law.resistance(bit.most)
+        if law is not None and law.steepest > 0 and scene.bit_inertia == 0 and not self._m.top[-1 + self._dofs].rigid:
+            if drive.inertia == 0 and not scene.discs:
+                yield ("APPROXIMATE: a torque that falls with the speed of a bit without inertia amplifies waves, and "
+                       "those as short as an element are not absorbed by the drive, which absorbs longer ones: they "
+                       "may grow, beyond `errors`; BitOnRock.inertia (kg m^2), or model='torsion'")  # fmt: skip
         if not self._axial:
             if wall:
                 yield "friction at the wall by the tension at rest"

@@ -25,7 +25,7 @@ PIPES, COLLARS = ("2 7/8 in 10.40 lb/ft", "4 in 14.00 lb/ft", "5 in 19.50 lb/ft"
 LIMITS = {
     "energy is created": 1e-6,  # over all work
     "the scheme loses energy": 0.1,  # over all work
-    "torque does not balance": 2e-4,  # impulse over that of the sizes of the torques
+    "torque does not balance": 2e-3,  # impulse over that of the sizes of the torques
     "steady start moves": 1e-6,  # change of the bit's speed over it, before a wave has come back
     "growth differs from stability": 0.05,  # over the growth, or 0.1/s
     "response at low frequency": 1e-3,  # over the slope of the torque that turns the string
@@ -104,6 +104,11 @@ def cycle(motion):
     return found, np.array([*np.abs(found[:2]), *[np.abs(found[2:]).max()] * 2])
 
 
+def says(motion):
+    """Whether a motion says that its numbers depend on the step, or by more than its estimate of errors."""
+    return motion.stick_slip().irregular or any("beyond `errors`" in x for x in motion.why)
+
+
 def off_in(motion):
     """{what: how far a motion is off}: energy, torque, resumed, with a third of the step, which its estimate of errors
     by twice and half the step has not seen."""
@@ -114,7 +119,7 @@ def off_in(motion):
     fine = moved(scene, model=motion.model, dt=motion.dt / 3)
     (here, size), (there, _) = cycle(motion), cycle(fine)
     off = np.abs(here - there) / (np.array(motion.errors) + 1e-3 * size + 1e-6)
-    if not motion.stick_slip().irregular:  # it says so
+    if not says(motion):
         yield "step's error above its estimate", np.nanmax(off, initial=0.0)
     with tempfile.TemporaryDirectory() as place:
         moved(scene, DURATION / 2, model=motion.model, folder=f"{place}/m")
@@ -180,9 +185,7 @@ def tried(seed):
             motions.append(moved(scene, model=BOTH, check=True))
             (a, size), (b, _) = map(cycle, motions)
             told = sum(np.array(x.errors) for x in motions) + 0.02 * size
-            if not (
-                motions[0].stick_slip().irregular or any("sends a jump" in x for x in motions[1].why)
-            ):  # it says so
+            if not any(map(says, motions)):
                 yield "models differ", np.nanmax(np.abs(a - b) / told, initial=0.0)
 
     motions = []
