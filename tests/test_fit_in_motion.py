@@ -28,6 +28,7 @@ def test_a_stribeck_bit_as_another_program_fits_it(truth):
     truth("fit of a Stribeck bit, standard errors", fit.standard_error, BOUNDS, 0.1)
     assert np.abs(fit.values - OWN).max() < 1e-2 and fit.misfit == pytest.approx(0.99, abs=0.01)
     assert fit.correlation[0, 2] == pytest.approx(-0.9948, abs=2e-3) and not fit.doubts
+    assert (fit.derivative_error > 0).all() and (fit.derivative_error < 1e-2).all()
     assert fit.scene.bit.law.static == fit.values[0] and "bit.law.speed and bit.law.static (-0.99" in str(fit)
 
 
