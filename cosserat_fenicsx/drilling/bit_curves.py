@@ -181,17 +181,24 @@ class RateLaw(BitLaw):
 
 
 class _RateEnd(EndCondition):
-    """The `EndCondition` of `RateLaw`; it has no memory. A bit that moves up is free."""
+    """The `EndCondition` of `RateLaw`. A bit that moved up in the last step is free: by its mean velocity in that step,
+    since the one at the end swings around it where the rock resists much."""
 
     def __init__(self, law):
-        self._law = law
+        self._law, self._down, self._at = law, 0.0, 0.0
 
     def begin(self, model, h):
-        (_, _), (down, _) = model.bit_state()
-        if down < 0:
+        self._at = float(model.bit_state()[0, 0])
+        if self._down < 0:
             return EndForce(np.zeros(2), np.zeros((2, 2)))
         tangent = np.array([[self._law.resistance_to_rate, 0.0], [0.0, 0.0]])
         return EndForce(np.zeros(2), tangent, self._law.friction_torque)
 
+    def commit(self, model, h):
+        self._down = (float(model.bit_state()[0, 0]) - self._at) / h
+
     def memory(self):
-        return {}
+        return {"down": self._down}
+
+    def recall(self, memory):
+        self._down = float(memory["down"])
