@@ -141,6 +141,18 @@ def test_autodriller(truth):
     truth("autodriller on waves, weight over that asked for", told, rows[:, 1], 1e-3, of=given["Ws"])
 
 
+@pytest.mark.parametrize("dt", [8e-3, 5e-4])
+def test_a_bit_on_hard_rock_bears_its_weight_in_steps_of_any_length(dt):
+    """Velocities at the ends of steps swing around the mean one: it once bore twice the weight in every other step."""
+    scene = Drilling(
+        pipe(500.0), TopDrive(6.0, inertia=2e3, control=cf.drilling.PI(1e3, 1e4)), BitOnRock(RateLaw(14e6, 2e3), 4e4)
+    )
+    found = cf.drilling.simulate(scene, 4.0, dt=dt, progress=False)
+    late = found.times > 3.0
+    assert found.weight_on_bit[late].min() > 3.5e4 and found.weight_on_bit[late].max() < 4.5e4
+    assert found.bit_velocity[late].mean() == pytest.approx(4e4 / 14e6, rel=0.02)
+
+
 @pytest.mark.parametrize(("law", "on_bit", "driller"), [
     (RateLaw(18e6), None, Autodriller("2 MN", 1e-8)),
     (RateLaw(18e6), None, Autodriller(cf.signals.Ramp((2e6,), end=5.0), 1e-8)),
