@@ -63,7 +63,8 @@ class TieRows(Pointers):
             ("nodal", self.nodal), ("multipliers", self.multipliers), ("start", self._start), ("shift", self._shift),
             ("at_rest", self._at_rest), ("offset", self._offset), ("axes", self._axes),
             ("test", self._test), ("found", self._found), ("amid", self._amid), ("derivatives", self._derivatives),
-            ("acting", np.zeros(self.rows.shape)), ("change", np.zeros((pairs, 6, 6))), ("forces", np.zeros((nodes, 6))),
+            ("acting", np.zeros(self.rows.shape)), ("change", np.zeros((pairs, 6, 6))),
+            ("forces", np.zeros((nodes, 6))),
         ):  # fmt: skip
             setattr(ties, name, self.doubles(array))
         if model.rows_turn:

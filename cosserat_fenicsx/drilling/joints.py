@@ -123,7 +123,7 @@ def largest_speed(motor, excess, fastest, slowest, tried=_TRIED):
     values = np.array([excess(om) for om in speeds])
     k, stall = int(np.argmax(values >= 0)), motor.stall_torque()
     if stall <= 0 or values[k] < 0:
-        raise SceneError(f"{motor.name}: it stalls: with {motor.flow_at(0.0):.4g} m^3/s it gives less than {max(stall, 0.0):.5g} "
-                         "N m, and the bit takes more at every speed: expected less weight on bit, more flow or "
-                         "another motor; start='rest' computes how it stalls")  # fmt: skip
+        raise SceneError(f"{motor.name}: it stalls: with {motor.flow_at(0.0):.4g} m^3/s it gives less than "
+                         f"{max(stall, 0.0):.5g} N m, and the bit takes more at every speed: expected less weight on "
+                         "bit, more flow or another motor; start='rest' computes how it stalls")  # fmt: skip
     return float(speeds[0] if k == 0 else brentq(excess, speeds[k], speeds[k - 1], xtol=1e-14, rtol=1e-14))
