@@ -181,7 +181,7 @@ class Ties:
     def with_numbers_of(self, ties):
         """The same equations with other data, those of prescribed motions at another time."""
         other = copy(self)
-        other._rows = self.numbers.copy()
+        other.numbers = self.numbers.copy()
         other._take(ties)
         return other
 
