@@ -213,7 +213,7 @@ class DrillingHistory(Result):
 
     @property
     def stalled(self) -> np.ndarray:
-        """(n,) bool: the rotor of the motor stands, or is turned backwards, while its flow would turn it without load."""
+        """(n,) bool: the rotor of the motor stands or turns backwards, while its flow would turn it without load."""
         motor = self.scene.motor
         if motor is None:
             return np.zeros(len(self), dtype=bool)

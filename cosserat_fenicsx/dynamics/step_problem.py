@@ -76,10 +76,9 @@ class StepProblem(Equations):
         self._assemble_loads()
         walls = [action for action in scene.actions if action.touches]
         self.contact = NodalContact(self, walls, at_end=self.acting_share == 1) if walls else None
-        self._laws = [StationLaw(self, action) for action in scene.actions if action.resists]
+        self._at_stations = [StationLaw(self, action) for action in scene.actions if action.resists]
         self.rods_touching = RodsTouching(self) if scene.rod_contact else None
-        self._at_stations = [*self._laws]
-        self._laws += [self.rods_touching] if scene.rod_contact else []
+        self._laws = [*self._at_stations, *([self.rods_touching] if scene.rod_contact else [])]
         self.touching = [self.contact, *self._laws] if walls else self._laws
         self.c.contact = self.contact.c if walls else self._ffi.NULL
         of_contact = (COMPLIANCE | NODES * (model.comm.size > 1)) * bool(walls)

@@ -152,7 +152,7 @@ class _Pairs:
 
 
 class RodsTouching(Pointers):
-    """The contacts of a scene's rods in the steps of a loaded `StepProblem`; its methods are those of `SpinLaw`."""
+    """The contacts of a scene's rods in the steps of a loaded `StepProblem`; methods as of `NodalContact`."""
 
     def __init__(self, problem):
         super().__init__()
@@ -374,8 +374,8 @@ class RodsTouching(Pointers):
         return pairs.force[pressed], friction, slips, slips - ahead
 
     def _breaks_laws(self):
-        """Whether normal forces are not those of the last iteration, or frictions are beyond their bounds, do not follow
-        from slips, or add energy."""
+        """Whether normal forces are not those of the last iteration, or frictions are beyond their bounds, do not
+        follow from slips, or add energy."""
         pairs, last = self._pairs, self._now
         if np.array_equal(pairs.which, last.which):
             off = np.abs(pairs.force - last.force).max(initial=0.0)
