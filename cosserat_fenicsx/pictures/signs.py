@@ -163,7 +163,7 @@ def without_sign(scene, tubes, threads=True):
 
     def drawn(load):
         shaped = tubes and (load.tube() is not None or load.drawn(corner, corner + 1) is not None)
-        return shaped or (threads and load.is_thread) or has_sign(load, scene)
+        return shaped or load.rods_touch or (threads and load.is_thread) or has_sign(load, scene)
 
     kinds = {}
     for load in scene.all_loads:

@@ -53,7 +53,7 @@ _QUANTITIES = by_name(
     Quantity("neutral_point", unit="m", axes=()),
     Quantity("bit_side_force", unit="N", parts=("build", "turn"), frame="across the hole", axes=()),
     Quantity("bit_tilt", unit="rad", parts=("build", "turn"), frame="across the hole", axes=()),
-    Quantity("md", unit="m", axes=_ALONG),
+    Quantity("md", "measured depth", unit="m", axes=_ALONG, short="md"),
     Quantity("north", unit="m", axes=_ALONG, getter=_axis_of_hole(0)),
     Quantity("east", unit="m", axes=_ALONG, getter=_axis_of_hole(1)),
     Quantity("down", unit="m", axes=_ALONG, getter=_axis_of_hole(2)),

@@ -74,7 +74,7 @@ class Utilisation(Result):
     _quantities = by_name(
         Quantity("largest", "largest utilisation, von Mises", axes=()),
         Quantity("worst_at", "its measured depth", "m", axes=()),
-        Quantity("md", unit="m", axes=_ALONG),
+        Quantity("md", "measured depth", unit="m", axes=_ALONG, short="md"),
         Quantity("component_name", "component", axes=_ALONG),
         Quantity("von_mises", "von Mises", axes=_ALONG, digits=3),
         Quantity("worst_surface", axes=_ALONG),
