@@ -21,23 +21,42 @@ it is a member under its own name, in scene files, in stored data and in the ref
 """
 
 import dataclasses
+import functools
 import importlib
 import inspect
 import numbers
 import typing
+import weakref
 from collections.abc import Callable
 from os import PathLike
 from typing import Annotated, Any, TypeVar
 
 from cosserat_fenicsx.checks import Numbers, direction, store
 from cosserat_fenicsx.errors import SceneError
-from cosserat_fenicsx.kinds import FAMILIES, Writing, fields_of, table_schema
 from cosserat_fenicsx.kinds import (
-    FileName as FileName, Items as Items, Kind as Kind, Limits as Limits, NotData as NotData, Number as Number,
-    Object as Object, Reading as Reading, Several as Several, Text as Text, Values as Values,
-    arguments_of as arguments_of, between as between, concerning as concerning, made as made, members as members,
-    misplaced as misplaced, spoken as spoken,
-)  # fmt: skip
+    FAMILIES,
+    FileName as FileName,
+    Items as Items,
+    Kind as Kind,
+    Limits as Limits,
+    NotData as NotData,
+    Number as Number,
+    Object as Object,
+    Reading as Reading,
+    Several as Several,
+    Text as Text,
+    Values as Values,
+    Writing,
+    arguments_of as arguments_of,
+    between as between,
+    concerning as concerning,
+    fields_of,
+    made as made,
+    members as members,
+    misplaced as misplaced,
+    spoken as spoken,
+    table_schema,
+)
 
 
 class _Readable(type):
@@ -119,7 +138,7 @@ class Part(metaclass=_Readable):
 class FunctionOfTime(
     Part,
     family="function of time",
-    homes=("cosserat_fenicsx.scene.signals", "cosserat_fenicsx.scene.body_motion"),
+    homes=("cosserat_fenicsx.scene.signals", "cosserat_fenicsx.scene.supports"),
 ):
     """Base of functions of time (s), with the attribute `jumps`, times where they are not smooth.
 
@@ -251,3 +270,30 @@ Vector = Annotated[Numbers, Several()]
 UnitVector = Annotated[Numbers, Direction()]
 #: The name of a file.
 File = Annotated[str | PathLike[str], FileName()]
+
+
+# Results of one function that are kept for a scene.
+_MOST = 64
+
+
+def per_scene(function):
+    """Decorator of a function (scene, ...) whose results depend on its arguments alone and are never changed. Arguments
+    that cannot be hashed are passed on; so are exceptions, which are not remembered."""
+    known = weakref.WeakKeyDictionary()
+
+    @functools.wraps(function)
+    def remembered(scene, *args, **named):
+        key = (*args, *named.items())
+        key += (*map(type, args), *map(type, named.values()))  # True is not 1 where a number is expected
+        try:
+            results = known.setdefault(scene, {})
+            if key in results:
+                return results[key]
+        except TypeError:
+            return function(scene, *args, **named)
+        if len(results) >= _MOST:
+            results.clear()
+        results[key] = function(scene, *args, **named)
+        return results[key]
+
+    return remembered

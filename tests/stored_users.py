@@ -96,7 +96,7 @@ USERS = {
 def use(monkeypatch, apart=0.0):
     """The pendulum in place of strings, and checkpoints as often as can be."""
     fake_string.use(monkeypatch)
-    monkeypatch.setattr("cosserat_fenicsx.drilling.time_loop.CHUNK", 37)
+    monkeypatch.setattr("cosserat_fenicsx.drilling.motion.CHUNK", 37)
     monkeypatch.setattr(Store, "APART", apart)
     monkeypatch.setattr(Store, "SELDOM", 0)
 

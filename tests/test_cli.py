@@ -475,7 +475,7 @@ def test_a_run_up():
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
-@pytest.mark.parametrize("module", ["cosserat_fenicsx.cli.options", "dolfinx"])
+@pytest.mark.parametrize("module", ["cosserat_fenicsx.cli.main", "dolfinx"])
 def test_while_modules_are_imported(number, module):
     code = f"""
 import os, sys

@@ -1,4 +1,4 @@
-"""Studies by executors: new processes, threads, dask, mpi4py.futures; equal results, failures, workers that are killed."""
+"""Studies by executors: new processes, threads, dask, mpi4py.futures; equal results, failures, killed workers."""
 
 import os
 import shutil
@@ -128,7 +128,7 @@ def test_threads_of_a_case_compute_alone():
 
 def test_cases_are_handed_out_while_others_run(monkeypatch):
     """Of many cases only some are given to the executor ahead."""
-    from cosserat_fenicsx.studies import executors
+    from cosserat_fenicsx.studies import study as executors
 
     monkeypatch.setattr(executors, "_AHEAD", 3)
     with ThreadPoolExecutor(1) as executor:

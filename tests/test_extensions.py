@@ -23,8 +23,7 @@ from extensions.stribeck_wall import StribeckCurve
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.cli.main import main
 from cosserat_fenicsx.drilling import BitLaw, FrictionLaw, SampledControl
-from cosserat_fenicsx.files.read import from_tables, schema_of_files
-from cosserat_fenicsx.files.toml import place_of, places
+from cosserat_fenicsx.files.read import from_tables, place_of, places, schema_of_files
 from cosserat_fenicsx.parts import from_data, to_data
 from cosserat_fenicsx.results import compared
 

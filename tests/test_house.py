@@ -41,7 +41,7 @@ def test_forms_know_ufl_alone():
 #: Modules that all subpackages may import; and the other subpackages that each subpackage may import.
 SHARED = set(
     "analytic checks code_cache compat dimensions errors interrupts kinds names new_files numerics parts progress "
-    "quantities ranks remember strands units".split()
+    "quantities ranks strands units".split()
 )
 ROOMS = {
     "scene": {"pictures"},
@@ -63,7 +63,7 @@ ROOMS = {
 #: Files that combine scenes, models, solvers and results; all other solver files import none of scene, models and
 #: results.
 FITTERS = {
-    "statics": "critical meshes legs linear_buckling natural_modes small_motions refinement sensitivity solve problem "
+    "statics": "critical meshes linear_buckling natural_modes small_motions refinement sensitivity solve problem "
                "cases pair path/recorder".split(),
     "dynamics": "time_loop resuming simulate start pace".split(),
 }  # fmt: skip

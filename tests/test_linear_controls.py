@@ -21,7 +21,7 @@ from cosserat_fenicsx.drilling import (
     simulate,
     stability,
 )
-from cosserat_fenicsx.drilling.linear.reflections import fed_waves
+from cosserat_fenicsx.drilling.linear.limits import fed_waves
 
 pytestmark = [pytest.mark.serial, pytest.mark.once]
 TRUTH = json.loads((Path(__file__).parent / "reference" / "controls.json").read_text())["drive reflection"]

@@ -14,7 +14,7 @@ import cosserat_fenicsx as cf
 from cosserat_fenicsx.models.choose import choose
 from cosserat_fenicsx.models.rodmesh import Layout
 from cosserat_fenicsx.models.signature import Signature
-from cosserat_fenicsx.remember import per_scene
+from cosserat_fenicsx.parts import per_scene
 from cosserat_fenicsx.scene import action, statical
 from cosserat_fenicsx.scene.statical import check_no_mechanism, free_motions
 

@@ -14,7 +14,7 @@ import cosserat_fenicsx as cf
 from cosserat_fenicsx.quantities import Units
 from cosserat_fenicsx.results.screen import LINES, ROWS, SHORT, WIDTH
 from cosserat_fenicsx.results.whirl import whirl_of
-from cosserat_fenicsx.scene.describe import actions_in_words
+from cosserat_fenicsx.scene.action import actions_in_words
 
 pytestmark = pytest.mark.serial
 WELL = cf.well.WellPath.from_survey([0, 500, 1500, 2500], [0, 0, 60, 85], [0, 0, 0, 0])

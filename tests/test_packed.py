@@ -5,7 +5,7 @@ import pytest
 from conftest import COMM, column
 from dolfinx.fem import petsc as fem_petsc
 
-from cosserat_fenicsx.algebra.packed import Packed
+from cosserat_fenicsx.algebra.building import Packed
 from cosserat_fenicsx.models.rodmesh import Layout
 from cosserat_fenicsx.statics.problem import solvers_of
 

@@ -19,10 +19,10 @@ from test_drilling import FILE as WHOLE
 import cosserat_fenicsx as cf
 from cosserat_fenicsx import parts, units
 from cosserat_fenicsx.cli import drilling, well
-from cosserat_fenicsx.cli.options import parser
+from cosserat_fenicsx.cli.main import parser
 from cosserat_fenicsx.dimensions import DIMENSIONS, MOST, in_si
 from cosserat_fenicsx.drilling.bit_laws import BitLaw
-from cosserat_fenicsx.files import toml
+from cosserat_fenicsx.files import read
 from cosserat_fenicsx.parts import NotData, Part, from_data, members, to_data
 from cosserat_fenicsx.scene import action
 
@@ -319,7 +319,7 @@ def test_damaged_files(seed, monkeypatch):
     for _ in range(300):
         file = chance.choice(chance.choice(groups))
         table = damaged(tables[file], chance)
-        monkeypatch.setattr(toml.tomllib, "loads", lambda stream, table=table: copy.deepcopy(table))
+        monkeypatch.setattr(read.tomllib, "loads", lambda stream, table=table: copy.deepcopy(table))
         options = commands.parse_args(["explain", str(file)])
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", cf.SceneWarning)

@@ -20,7 +20,7 @@ from stored_users import USERS, at_write, copy, die, full, in_a_child, interrupt
 from test_schemes import everything
 
 import cosserat_fenicsx as cf
-from cosserat_fenicsx.drilling import time_loop as drilling_loop
+from cosserat_fenicsx.drilling import motion as drilling_loop
 from cosserat_fenicsx.dynamics import time_loop
 from cosserat_fenicsx.dynamics.schemes import SCHEMES
 from cosserat_fenicsx.results.records import Instant

@@ -95,7 +95,8 @@ def of_hfto():
     half = -7.0 * equivalent_slope(found.scene.bit.law.resistance(None), 14.0, 7.0)
     bits = truth["amplitude of the bit's speed by balance of power (rad/s), over the mean speed"]
     return (
-        [answer.growth[0, 0, 0], *found.amplitude, *found.value("over_mean"), half, drilling.limit_speed(one_mode(), up_to=500)],
+        [answer.growth[0, 0, 0], *found.amplitude, *found.value("over_mean"), half,
+         drilling.limit_speed(one_mode(), up_to=500)],
         [truth["growth of small motions (1/s)"], *bits,
          truth["below a = Om: -I/pi = 2 (Ts - Td) exp(-Om/speed) I1(a/speed), at a = Om/2"],
          truth["rotation above which it decays"]],
@@ -121,7 +122,8 @@ def of_reflection():
     (of_limit_at_wall, 1e-9),
     (of_hfto, 1e-9),
     (of_reflection, 1e-12),
-], ids=["impedance", "drive", "bit", "torque", "wall torsion", "wall axial", "wall limit", "hfto", "reflection"])  # fmt: skip
+], ids=["impedance", "drive", "bit", "torque", "wall torsion", "wall axial", "wall limit", "hfto",
+        "reflection"])  # fmt: skip
 def test_truths(row, tolerance, truth, request):
     truth(f"small motions of a string: {request.node.callspec.id}", *map(np.atleast_1d, row()), tolerance)
 
@@ -222,7 +224,8 @@ def test_friction_of_a_string_that_slides():
     for scene, told in (
         (lying(turns=0.0), "at rest friction holds it"),
         (lying(hook=drilling.Hook(speed=-V)), "friction couples torsion and axial motion"),
-        (lying(hook=drilling.Hook(speed=-V), turns=0.0, friction=drilling.WallFriction(0.3, 0.2, 1.0, of_rotation=True)),
+        (lying(hook=drilling.Hook(speed=-V), turns=0.0,
+               friction=drilling.WallFriction(0.3, 0.2, 1.0, of_rotation=True)),
          "of_rotation=False"),
     ):  # fmt: skip
         with pytest.raises(cf.SceneError, match=told):
@@ -238,8 +241,9 @@ def test_the_wall_force_is_that_of_the_well():
     string = well.DrillString([well.Collar(200.0, "NC46-65"), well.DrillPipe(size="5 in 19.50 lb/ft")])
     bit = drilling.BitOnRock(drilling.Stribeck(0.7, 0.5, 3.0, radius=0.1), 80e3, inertia=20.0)
     scene = drilling.Drilling(string, drilling.TopDrive(8.0), bit, hole=hole, mud=well.Mud(1200.0),
-                              friction=drilling.WallFriction(0.3, 0.2, 0.3), drag=drilling.ViscousDrag(0.8))  # fmt: skip
-    from cosserat_fenicsx.drilling.linear import friction as pieces
+                              friction=drilling.WallFriction(0.3, 0.2, 0.3),
+                              drag=drilling.ViscousDrag(0.8))  # fmt: skip
+    from cosserat_fenicsx.drilling.linear import characteristic as pieces
 
     roots = drilling.stability(scene, [8.0], up_to=1.5).roots[0, 0]
     with pytest.MonkeyPatch.context() as patch:
@@ -309,7 +313,10 @@ def test_a_file_that_asks_for_a_response(tmp_path, capsys):
     pytest.importorskip("matplotlib")
     (tmp_path / "scene.toml").write_text("""
 [string]
-components = [{ type = "Collar", size = "NC46-65", length = 200.0, damping_time = 2e-5 }, { type = "DrillPipe", size = "5 in 19.50 lb/ft", length = 1000.0 }]
+components = [
+    { type = "Collar", size = "NC46-65", length = 200.0, damping_time = 2e-5 },
+    { type = "DrillPipe", size = "5 in 19.50 lb/ft", length = 1000.0 },
+]
 [drive]
 speed = "100 rpm"
 [bit]

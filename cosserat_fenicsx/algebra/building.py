@@ -1,4 +1,5 @@
-"""The C code of this folder: compiled once a machine, at first use, and kept beside dolfinx's compiled forms.
+"""The C code of this folder: compiled once a machine, at first use, and kept beside dolfinx's compiled forms. Forms and
+expressions for C are kernels whose coefficients are packed once, and then only those that change.
 
 Only a C compiler and Python's headers are needed, which dolfinx needs as well.
 """
@@ -15,10 +16,12 @@ from pathlib import Path
 
 import cffi
 import numpy as np
+from dolfinx import cpp
 
 from cosserat_fenicsx import code_cache, compat
 from cosserat_fenicsx.code_cache import instructions
 from cosserat_fenicsx.compat import compiling
+
 
 SOURCES = tuple(
     Path(__file__).with_name(f"{name}.c")
@@ -130,3 +133,128 @@ class Pointers:
         array = np.ascontiguousarray(array, dtype=np.int32)
         self._arrays.append(array)
         return self._ffi.cast("int *", array.ctypes.data)
+
+
+_MARK = 0.8765432198765432
+
+
+class _Kernel(Pointers):
+    """The C structure `kernel` and the arrays that it points to."""
+
+    def __init__(self, compiled, address, mesh, elements, size):
+        super().__init__()
+        self._compiled = compiled  # keeps the machine code
+        self.size, self.elements, ffi = size, elements, self._ffi
+        self.c = kernel = ffi.new("kernel *")
+        kernel.tabulate, kernel.elements, kernel.size = ffi.cast("void *", address), elements, size
+        corners = compat.geometry_dofs(mesh)[:elements]
+        kernel.x, kernel.corners = self.doubles(mesh.geometry.x), self.integers(corners)
+        kernel.A = self.doubles(np.zeros(size))
+
+    def _set(self, w, c, sources, constants):
+        """Give C the packed coefficients w (elements, width) and constants c; sources: (values, indices (elements,
+        count), first column) of those that change; constants: (array of one value, place in c)."""
+        kernel, ffi = self.c, self._ffi
+        kernel.w, kernel.width, kernel.c = self.doubles(w), w.shape[1], self.doubles(c)
+        self._sources = ffi.new("source[]", max(1, len(sources)))
+        for to, (values, which, column) in zip(self._sources, sources, strict=False):
+            to.values, to.which = self.doubles(values), self.integers(which)
+            to.count, to.column = which.shape[1], column
+        self._constants = ffi.new("double *[]", [self.doubles(value) for value, _ in constants] or 1)
+        kernel.source, kernel.sources = self._sources, len(sources)
+        kernel.constant = ffi.cast("double **", self._constants)
+        kernel.slot = self.integers([slot for _, slot in constants])
+        kernel.constants = len(constants)
+
+
+class Packed(_Kernel):
+    """A compiled form, linear or bilinear, integrated over this rank's elements; or several as a tuple, for their sum;
+    moving, constants: the Functions and Constants whose values change; all others are read by `refresh`. dofs_c: C's
+    pointer to the local degrees of freedom (elements, size) of the vector, of a linear form."""
+
+    def __init__(self, form, moving, constants):
+        form, *others = form if isinstance(form, tuple) else (form,)
+        self._others = Packed(tuple(others), moving, constants) if others else None
+        self._form = compat.kernel(form)
+        spaces, elements = self._form.function_spaces, self._form.mesh.topology.index_map(1).size_local
+        of_spaces = [compat.cell_dofs(space)[:elements] for space in spaces]
+        self._shape = [dofs.shape[1] for dofs in of_spaces]
+        size = int(np.prod(self._shape))
+        super().__init__(form, compat.kernel_address(form), self._form.mesh, elements, size)
+        self.dofs_c = self.integers(of_spaces[0])
+        packed = self._pack()
+        self._key = next(iter(packed), None)
+        self._w = packed[self._key] if packed else np.zeros((elements, 0))
+        self._c = np.array(cpp.fem.pack_constants(self._form), dtype=float)
+        sources = [place for function in moving for place in self._places(function.x.array)]
+        self._set(self._w, self._c, sources, [slot for constant in constants for slot in self._slots(constant.value)])
+        if self._others:
+            self.c.next = self._others.c
+
+    def _pack(self):
+        """{key of the integral: coefficients (elements, n)}."""
+        return {key: np.ascontiguousarray(w) for key, w in cpp.fem.pack_coefficients(self._form).items()}
+
+    def _places(self, numbers):
+        """Where a Function's values are packed, found by packing indices in place of values, twice."""
+        kept, index = numbers.copy(), np.arange(len(numbers), dtype=float)
+        numbers[:] = index
+        first = self._pack()
+        numbers[:] = index + 1
+        second = self._pack()
+        numbers[:] = kept
+        for key, array in first.items():
+            columns = np.flatnonzero((array != second[key]).any(axis=0))
+            for run in np.split(columns, np.flatnonzero(np.diff(columns) > 1) + 1):
+                if len(run):
+                    yield numbers, array[:, run], run[0]
+
+    def _slots(self, value):
+        """The places of a Constant among the packed ones, found in the same way."""
+        kept = value.copy()
+        value[...] = _MARK
+        found = np.flatnonzero(cpp.fem.pack_constants(self._form) == _MARK)
+        value[...] = kept
+        return [(value, int(slot)) for slot in found]
+
+    def refresh(self):
+        """Pack all coefficients and constants again; to be called after a scene is loaded."""
+        for packed in self._pack().values():
+            self._w[:] = packed
+        self._c[:] = cpp.fem.pack_constants(self._form)
+        if self._others:
+            self._others.refresh()
+
+    def add_to_vector(self, array):
+        """Add a linear form to an array of local degrees of freedom, ghosts included."""
+        self._lib.add_vector(self.c, self.dofs_c, self._ffi.from_buffer("double[]", array))
+
+    def matrices(self):
+        """(elements, n, n) matrices of the elements, of a bilinear form."""
+        found = np.empty((self.elements, self.size))
+        self._lib.tabulate_all(self.c, self._ffi.cast("double *", found.ctypes.data))
+        return found.reshape(self.elements, *self._shape)
+
+    def add_to_matrix(self, A):
+        """Add a bilinear form to a PETSc matrix by the matrix's local-to-global map; -1 there means to skip."""
+        self._lib.pack(self.c)
+        part = self
+        while part:
+            cpp.fem.petsc.assemble_matrix(A, part._form, part._c, {part._key: part._w} if part._key else {}, [])
+            part = part._others
+
+
+class PackedExpression(_Kernel):
+    """A compiled expression at points of all local elements, ghosts included, or of this rank's own; all of its
+    coefficients and constants are read at every evaluation; size: numbers of an element, (points, components)."""
+
+    def __init__(self, expression, mesh, elements, size):
+        address, functions, constants = compat.expression_address(expression)
+        super().__init__(expression, address, mesh, elements, size)
+        sources, column = [], 0
+        for function in functions:
+            which = compat.cell_dofs(function.function_space)[:elements]
+            sources.append((function.x.array, which, column))
+            column += which.shape[1]
+        slots = [(constant.value, slot) for slot, constant in enumerate(constants)]
+        self._set(np.zeros((elements, column)), np.zeros(len(constants)), sources, slots)

@@ -13,7 +13,7 @@ from cosserat_fenicsx.models.signature import Signature
 from cosserat_fenicsx.results.accuracy import FEW
 from cosserat_fenicsx.results.compared import NAMES, words_of
 from cosserat_fenicsx.scene.curves import Line, Spline
-from cosserat_fenicsx.scene.describe import actions_in_words, describe, some_of
+from cosserat_fenicsx.scene.action import actions_in_words, describe, some_of
 from cosserat_fenicsx.scene.rolled import Profile
 from cosserat_fenicsx.scene.scene import check_magnitudes
 from cosserat_fenicsx.scene.sections import Rectangle, Stiffness

@@ -39,7 +39,7 @@ from cosserat_fenicsx.drilling.readings import Readings as Readings
 from cosserat_fenicsx.drilling.rod_bit import BitAtEnd as BitAtEnd
 from cosserat_fenicsx.drilling.scene import Drilling as Drilling
 from cosserat_fenicsx.drilling.scenefile import DrillingScene as DrillingScene
-from cosserat_fenicsx.drilling.segments import Discs as Discs
+from cosserat_fenicsx.drilling.scene import Discs as Discs
 from cosserat_fenicsx.drilling.stick_slip import StickSlip as StickSlip
 from cosserat_fenicsx.drilling.top_drive import PI as PI
 from cosserat_fenicsx.drilling.top_drive import Autodriller as Autodriller

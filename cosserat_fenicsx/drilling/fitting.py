@@ -32,7 +32,7 @@ from cosserat_fenicsx.quantities import Quantity
 from cosserat_fenicsx.ranks import world
 from cosserat_fenicsx.results.result import Result, by_name
 from cosserat_fenicsx.scene.parameters import parameter_of, scene_with
-from cosserat_fenicsx.well.estimation import estimated
+from cosserat_fenicsx.well.calibrate import estimated
 
 # Change of an unknown for its derivative, over its range; shares of the readings that are fitted one after the other.
 _STEP, _SHARES = 1e-5, (0.12, 0.25, 0.5)

@@ -20,8 +20,7 @@ import ufl
 
 from cosserat_fenicsx.checks import positive, refuse, store
 from cosserat_fenicsx.drilling.pipe_friction import PipeFriction
-from cosserat_fenicsx.drilling.scene import Drilling
-from cosserat_fenicsx.drilling.segments import Segment, segment_of
+from cosserat_fenicsx.drilling.scene import Drilling, Segment, segment_of
 from cosserat_fenicsx.drilling.top_drive import Hook, TopDrive
 from cosserat_fenicsx.drilling.wall_friction import ViscousDrag
 from cosserat_fenicsx.parts import ForceSize

@@ -51,8 +51,7 @@ from cosserat_fenicsx.drilling.linear.stability import Stability, stability
 from cosserat_fenicsx.drilling.motion import check_arguments as check_simulation
 from cosserat_fenicsx.drilling.motion import simulate
 from cosserat_fenicsx.drilling.readings import READ, Readings
-from cosserat_fenicsx.drilling.scene import Drilling
-from cosserat_fenicsx.drilling.segments import Discs
+from cosserat_fenicsx.drilling.scene import Discs, Drilling
 from cosserat_fenicsx.drilling.top_drive import DriveControl, Hook, TopDrive
 from cosserat_fenicsx.drilling.wall_friction import FrictionLaw, ViscousDrag, WallFriction
 from cosserat_fenicsx.errors import SceneError

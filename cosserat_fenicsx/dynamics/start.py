@@ -9,8 +9,7 @@ from cosserat_fenicsx.checks import instance, number, refuse
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.models.choose import not_flat
 from cosserat_fenicsx.results.path import Path
-from cosserat_fenicsx.scene.action import has_permanent
-from cosserat_fenicsx.scene.describe import describe
+from cosserat_fenicsx.scene.action import describe, has_permanent
 from cosserat_fenicsx.scene.scene import Scene
 from cosserat_fenicsx.scene.signals import at
 from cosserat_fenicsx.statics.solve import solve

@@ -5,7 +5,7 @@ import numpy as np
 from dolfinx import fem
 
 from cosserat_fenicsx.algebra.equations import COMPLIANCE, CONTACT, NODES, RESIDUAL, STATE, Equations
-from cosserat_fenicsx.algebra.packed import Packed
+from cosserat_fenicsx.algebra.building import Packed
 from cosserat_fenicsx.algebra.tie_rows import TieRows
 from cosserat_fenicsx.dynamics.contact import NodalContact
 from cosserat_fenicsx.dynamics.station_law import StationLaw

@@ -5,8 +5,8 @@ from dataclasses import dataclass, field
 
 from cosserat_fenicsx.errors import SceneError, nearest
 from cosserat_fenicsx.models.traits import traits_of
-from cosserat_fenicsx.remember import per_scene
-from cosserat_fenicsx.scene.describe import describe
+from cosserat_fenicsx.parts import per_scene
+from cosserat_fenicsx.scene.action import describe
 
 #: The models from the cheapest to the most general.
 RUNGS = ("determinate", "planar", "spatial")

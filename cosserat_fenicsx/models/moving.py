@@ -30,7 +30,7 @@ from cosserat_fenicsx.models.compiled import (
     section_of,
 )
 from cosserat_fenicsx.models.connections import ties_of
-from cosserat_fenicsx.models.damped import Damped
+from cosserat_fenicsx.models.spatial import Damped, SpatialModel
 from cosserat_fenicsx.models.planar import PlanarModel
 from cosserat_fenicsx.models.rod_data import (
     check_inertia,
@@ -38,10 +38,8 @@ from cosserat_fenicsx.models.rod_data import (
     law_of,
     nodal_inertia,
 )
-from cosserat_fenicsx.models.spatial import SpatialModel
 from cosserat_fenicsx.numerics import cross, small_rotations, spun
-from cosserat_fenicsx.scene.action import is_axial
-from cosserat_fenicsx.scene.describe import describe
+from cosserat_fenicsx.scene.action import describe, is_axial
 from cosserat_fenicsx.scene.signals import signals_of
 
 

@@ -21,7 +21,7 @@ from petsc4py import PETSc
 from cosserat_fenicsx import compat
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.numerics import once_each
-from cosserat_fenicsx.remember import per_scene
+from cosserat_fenicsx.parts import per_scene
 from cosserat_fenicsx.scene.curves import positions_along
 
 #: Largest number of elements of all rods together.

@@ -10,7 +10,7 @@ from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.models.connections import Connections
 from cosserat_fenicsx.models.formulation import KNOWN, Formulation, formulation_of
 from cosserat_fenicsx.models.traits import traits_of, work_of
-from cosserat_fenicsx.remember import per_scene
+from cosserat_fenicsx.parts import per_scene
 from cosserat_fenicsx.scene.signals import at
 
 #: (unknowns of a node, components of the contact force) by the model's name and whether it is planar.

@@ -12,7 +12,7 @@ import numpy as np
 from cosserat_fenicsx.pictures.drawing import quantity
 from cosserat_fenicsx.pictures.symbols import Pose, Symbols
 from cosserat_fenicsx.pictures.view import view_of
-from cosserat_fenicsx.scene.describe import describe
+from cosserat_fenicsx.scene.action import describe
 from cosserat_fenicsx.scene.signals import at, sample_times, signals_of
 from cosserat_fenicsx.scene.supports import Hinge, Prescribed, Roller
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from cosserat_fenicsx.errors import SceneError, nearest
 from cosserat_fenicsx.numerics import once_each
-from cosserat_fenicsx.remember import per_scene
+from cosserat_fenicsx.parts import per_scene
 
 
 def in_turn(sizes):

@@ -9,7 +9,7 @@ from cosserat_fenicsx.checks import refuse
 from cosserat_fenicsx.errors import NotConverged, SceneError
 from cosserat_fenicsx.quantities import Quantity, Units
 from cosserat_fenicsx.results import screen
-from cosserat_fenicsx.scene.describe import describe
+from cosserat_fenicsx.scene.action import describe
 
 # Least number of places in an interval between two nodes where a rod may pass through an obstacle.
 _BETWEEN = 3

@@ -11,7 +11,7 @@ from cosserat_fenicsx.quantities import Quantity
 from cosserat_fenicsx.results.result import Result, by_name
 from cosserat_fenicsx.results.sensitivity import Sensitivity, Uncertainty
 from cosserat_fenicsx.results.shapes import Shapes, in_words, largest_error
-from cosserat_fenicsx.scene.describe import actions_in_words
+from cosserat_fenicsx.scene.action import actions_in_words
 from cosserat_fenicsx.scene.parameters import Parameter, check_once
 
 

@@ -21,8 +21,7 @@ from cosserat_fenicsx.results.rod_contacts import ROD_FORCE, RodContacts, rod_co
 from cosserat_fenicsx.results.rods import RodResult
 from cosserat_fenicsx.results.sensitivity import Sensitivity, Uncertainty
 from cosserat_fenicsx.results.threads import Threads
-from cosserat_fenicsx.scene.action import Action
-from cosserat_fenicsx.scene.describe import actions_in_words
+from cosserat_fenicsx.scene.action import Action, actions_in_words
 from cosserat_fenicsx.scene.parameters import Parameter, check_once
 from cosserat_fenicsx.scene.rod import RodOrName
 

@@ -9,7 +9,7 @@ from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.numerics import directors
 from cosserat_fenicsx.results.compared import cell_nodes, in_turn
 from cosserat_fenicsx.results.result import OnNodes
-from cosserat_fenicsx.scene.describe import describe, some_of
+from cosserat_fenicsx.scene.action import describe, some_of
 from cosserat_fenicsx.scene.rod import Station, StationOrName
 from cosserat_fenicsx.scene.stresses import Stress
 from cosserat_fenicsx.scene.supports import Support

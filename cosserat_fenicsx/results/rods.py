@@ -12,7 +12,7 @@ from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.numerics import directors
 from cosserat_fenicsx.quantities import Quantity, Units
 from cosserat_fenicsx.ranks import on_first
-from cosserat_fenicsx.remember import per_scene
+from cosserat_fenicsx.parts import per_scene
 from cosserat_fenicsx.results import screen
 from cosserat_fenicsx.results.compared import cells_of, located
 from cosserat_fenicsx.results.queries import Extremes, Reactions, Stresses, largest_in_words, reactions_in_words
@@ -31,8 +31,7 @@ from cosserat_fenicsx.results.result import (
 )
 from cosserat_fenicsx.results.states import States
 from cosserat_fenicsx.results.threads import TendonState, Threads
-from cosserat_fenicsx.scene.action import without_stress
-from cosserat_fenicsx.scene.describe import describe
+from cosserat_fenicsx.scene.action import describe, without_stress
 from cosserat_fenicsx.scene.rod import RodOrName, Station, StationOrName
 
 # How far beyond a jump its right side is taken, over the rod's length.

@@ -13,7 +13,7 @@ from mpi4py import MPI
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.results.records import Records
 from cosserat_fenicsx.results.result import OnNodes
-from cosserat_fenicsx.scene.describe import unpicklable
+from cosserat_fenicsx.scene.action import unpicklable
 
 
 class States(OnNodes):

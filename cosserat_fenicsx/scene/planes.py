@@ -8,9 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cosserat_fenicsx.scene.action import is_axial
+from cosserat_fenicsx.scene.action import describe, is_axial
 from cosserat_fenicsx.scene.curves import Line
-from cosserat_fenicsx.scene.describe import describe
 from cosserat_fenicsx.scene.rod import mass_arm
 from cosserat_fenicsx.scene.signals import at, sample_times
 from cosserat_fenicsx.scene.statical import rows_of

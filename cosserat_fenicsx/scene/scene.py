@@ -15,8 +15,7 @@ import numpy as np
 from cosserat_fenicsx.checks import instance, store, warn
 from cosserat_fenicsx.errors import SceneError, nearest
 from cosserat_fenicsx.parts import Items, Object, Part, concerning
-from cosserat_fenicsx.scene.action import Action, powers
-from cosserat_fenicsx.scene.describe import describe, some_of
+from cosserat_fenicsx.scene.action import Action, describe, powers, some_of
 from cosserat_fenicsx.scene.planes import find_plane
 from cosserat_fenicsx.scene.profiles import Stiffnesses
 from cosserat_fenicsx.scene.rod import Rod, Station, StationOrName, station_named, with_names

@@ -19,8 +19,7 @@ from cosserat_fenicsx.checks import instance, refuse, store
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.numerics import directors
 from cosserat_fenicsx.parts import Part
-from cosserat_fenicsx.scene.action import Action
-from cosserat_fenicsx.scene.describe import describe
+from cosserat_fenicsx.scene.action import Action, describe
 from cosserat_fenicsx.scene.loads import Force, Moment
 from cosserat_fenicsx.scene.rod import Station, station_named, with_names
 from cosserat_fenicsx.scene.supports import (

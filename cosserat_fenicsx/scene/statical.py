@@ -9,7 +9,7 @@ import numpy as np
 
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.scene.curves import Line
-from cosserat_fenicsx.scene.describe import some_of
+from cosserat_fenicsx.scene.action import some_of
 from cosserat_fenicsx.scene.supports import Clamp, Joint, PositionTie, TurnTie
 
 # Free motions that a message names; parts of a motion that are rounding.

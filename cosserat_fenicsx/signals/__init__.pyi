@@ -1,7 +1,7 @@
 """The public names and their modules: read by type checkers and editors, and by the package itself."""
 
-from cosserat_fenicsx.scene.body_motion import BodyDisplacement as BodyDisplacement
-from cosserat_fenicsx.scene.body_motion import BodyRotation as BodyRotation
+from cosserat_fenicsx.scene.supports import BodyDisplacement as BodyDisplacement
+from cosserat_fenicsx.scene.supports import BodyRotation as BodyRotation
 from cosserat_fenicsx.scene.signals import Along as Along
 from cosserat_fenicsx.scene.signals import AlongPieces as AlongPieces
 from cosserat_fenicsx.scene.signals import AlongTable as AlongTable

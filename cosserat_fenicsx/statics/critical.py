@@ -25,7 +25,7 @@ from functools import partial
 import numpy as np
 
 from cosserat_fenicsx.errors import NotConverged, SceneError
-from cosserat_fenicsx.models.data_derivative import EnergyOfMotion, made_once
+from cosserat_fenicsx.models.compiled import EnergyOfMotion, made_once
 from cosserat_fenicsx.numerics import PLACES, derivative
 from cosserat_fenicsx.results.records import Event
 from cosserat_fenicsx.results.sensitivity import Sensitivity, called

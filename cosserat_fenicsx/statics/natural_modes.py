@@ -23,8 +23,7 @@ from cosserat_fenicsx.results.contacts import refuse_grazing
 from cosserat_fenicsx.results.modes import Modes, ModesAlong
 from cosserat_fenicsx.results.records import Event
 from cosserat_fenicsx.results.shapes import Equilibrium
-from cosserat_fenicsx.scene.action import has_permanent
-from cosserat_fenicsx.scene.describe import describe
+from cosserat_fenicsx.scene.action import describe, has_permanent
 from cosserat_fenicsx.scene.loads import Load
 from cosserat_fenicsx.scene.rod import require_inertia
 from cosserat_fenicsx.scene.scene import Scene, check_magnitudes, check_tensions

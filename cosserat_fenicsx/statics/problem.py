@@ -8,7 +8,7 @@ import numpy as np
 from cosserat_fenicsx.algebra.elimination import ZERO_PIVOT
 from cosserat_fenicsx.algebra.equations import RESIDUAL, STATE, Equations
 from cosserat_fenicsx.algebra.newton import Newton
-from cosserat_fenicsx.algebra.packed import Packed, PackedExpression
+from cosserat_fenicsx.algebra.building import Packed, PackedExpression
 from cosserat_fenicsx.algebra.pool import PROBLEMS
 from cosserat_fenicsx.algebra.tie_rows import TieRows
 from cosserat_fenicsx.checks import tolerance, whole
@@ -18,7 +18,7 @@ from cosserat_fenicsx.models.planar import PlanarModel
 from cosserat_fenicsx.models.signature import Signature
 from cosserat_fenicsx.models.spatial import SpatialModel
 from cosserat_fenicsx.ranks import communicator
-from cosserat_fenicsx.remember import per_scene
+from cosserat_fenicsx.parts import per_scene
 from cosserat_fenicsx.results.compared import NAMES, criteria_of
 from cosserat_fenicsx.results.records import Record
 from cosserat_fenicsx.scene.scene import Scene

@@ -18,7 +18,7 @@ import dataclasses
 import numpy as np
 
 from cosserat_fenicsx.errors import NotConverged, SceneError
-from cosserat_fenicsx.models.data_derivative import DataDerivative, made_once
+from cosserat_fenicsx.models.compiled import DataDerivative, made_once
 from cosserat_fenicsx.models.rodmesh import same_places
 from cosserat_fenicsx.models.signature import Signature
 from cosserat_fenicsx.numerics import PLACES, STEP, derivative, is_smooth

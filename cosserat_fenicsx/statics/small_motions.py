@@ -14,14 +14,13 @@ from petsc4py import PETSc
 from scipy import sparse
 
 from cosserat_fenicsx.algebra import eigen
-from cosserat_fenicsx.algebra.packed import Packed
+from cosserat_fenicsx.algebra.building import Packed
 from cosserat_fenicsx.algebra.pencil import constraint_rows, on_every_rank
 from cosserat_fenicsx.algebra.pool import PROBLEMS
 from cosserat_fenicsx.errors import NotConverged, SceneError
-from cosserat_fenicsx.models.damped import ResistingModel
+from cosserat_fenicsx.models.spatial import CirculatoryModel, ResistingModel
 from cosserat_fenicsx.models.rod_data import nodal_inertia
 from cosserat_fenicsx.models.signature import Signature
-from cosserat_fenicsx.models.spatial import CirculatoryModel
 from cosserat_fenicsx.numerics import directors, lobatto_weights
 
 # Share of a first-order change of an eigenvalue that is assumed to remain as error: at most this, or this times the

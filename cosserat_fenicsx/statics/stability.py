@@ -13,10 +13,9 @@ import numpy as np
 from petsc4py import PETSc
 
 from cosserat_fenicsx.algebra import eigen
-from cosserat_fenicsx.algebra.building import Pointers
+from cosserat_fenicsx.algebra.building import Packed, Pointers
 from cosserat_fenicsx.algebra.elimination import condensed
 from cosserat_fenicsx.algebra.equations import COUNT, Called
-from cosserat_fenicsx.algebra.packed import Packed
 
 _ROUNDING = np.finfo(float).eps
 _LARGEST_ROW = PETSc.NormType.NORM_INFINITY

@@ -21,8 +21,8 @@ from cosserat_fenicsx.well.components import Stabiliser as Stabiliser
 from cosserat_fenicsx.well.hole import Borehole as Borehole
 from cosserat_fenicsx.well.hole import HoleSection as HoleSection
 from cosserat_fenicsx.well.hole import Mud as Mud
-from cosserat_fenicsx.well.motor_curves import PowerCurve as PowerCurve
-from cosserat_fenicsx.well.motor_curves import power_curve as power_curve
+from cosserat_fenicsx.well.tools import PowerCurve as PowerCurve
+from cosserat_fenicsx.well.tools import power_curve as power_curve
 from cosserat_fenicsx.well.operations import BackReam as BackReam
 from cosserat_fenicsx.well.operations import Ream as Ream
 from cosserat_fenicsx.well.operations import RotaryDrilling as RotaryDrilling
@@ -43,5 +43,5 @@ from cosserat_fenicsx.well.sweep import DepthSweep as DepthSweep
 from cosserat_fenicsx.well.sweep import depth_sweep as depth_sweep
 from cosserat_fenicsx.well.tools import MudMotor as MudMotor
 from cosserat_fenicsx.well.tools import OscillationTool as OscillationTool
-from cosserat_fenicsx.well.crooked import tortuosity as tortuosity
+from cosserat_fenicsx.well.path import tortuosity as tortuosity
 from cosserat_fenicsx.well.utilisation import Utilisation as Utilisation

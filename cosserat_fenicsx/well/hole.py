@@ -21,9 +21,7 @@ from cosserat_fenicsx.results.screen import InWords
 from cosserat_fenicsx.scene.rod import Rod
 from cosserat_fenicsx.scene.sections import Circle, Tube
 from cosserat_fenicsx.well.components import standard_size
-from cosserat_fenicsx.well.crooked import Tortuosity
-from cosserat_fenicsx.well.crooked import tortuosity as made_crooked
-from cosserat_fenicsx.well.path import WellPath
+from cosserat_fenicsx.well.path import Tortuosity, WellPath, tortuosity as made_crooked
 
 # Pa, standard.
 _ATMOSPHERE = 101325.0

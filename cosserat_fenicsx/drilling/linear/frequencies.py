@@ -26,8 +26,7 @@ from scipy.optimize import brentq
 from cosserat_fenicsx.checks import instance, number, positive, refuse
 from cosserat_fenicsx.drilling.bit_laws import BitOnRock, Stribeck
 from cosserat_fenicsx.drilling.linear.impedances import Guide, axial, torsional
-from cosserat_fenicsx.drilling.scene import Drilling
-from cosserat_fenicsx.drilling.segments import Discs
+from cosserat_fenicsx.drilling.scene import Discs, Drilling
 from cosserat_fenicsx.drilling.top_drive import PI, RULES, Hook, TopDrive
 from cosserat_fenicsx.well.components import DrillString
 

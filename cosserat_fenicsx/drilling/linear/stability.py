@@ -19,14 +19,14 @@ from cosserat_fenicsx.drilling.linear.characteristic import (
 from cosserat_fenicsx.drilling.linear.frequencies import SoftSpeed, SoftTorque, natural_frequencies, own_rule, with_rule
 from cosserat_fenicsx.drilling.linear.hfto import Hfto, oscillations
 from cosserat_fenicsx.drilling.linear.impedances import Disc
-from cosserat_fenicsx.drilling.linear.reflections import fed_waves
+from cosserat_fenicsx.drilling.linear.limits import fed_waves
 from cosserat_fenicsx.drilling.linear.roots import all_roots, follow
 from cosserat_fenicsx.drilling.scene import Drilling
 from cosserat_fenicsx.drilling.stick_slip import SPEED, WEIGHT
 from cosserat_fenicsx.drilling.top_drive import Matched, Stiff, TopDrive
 from cosserat_fenicsx.errors import NotConverged, SceneError
 from cosserat_fenicsx.quantities import Quantity
-from cosserat_fenicsx.remember import per_scene
+from cosserat_fenicsx.parts import per_scene
 from cosserat_fenicsx.results.result import Result, by_name
 
 # Growth below this share of the root is rounding: a mode without losses.
