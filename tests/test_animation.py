@@ -12,7 +12,7 @@ from moving_scenes import flying_in_space
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.pictures import animation
 from cosserat_fenicsx.pictures.animation import Between
-from cosserat_fenicsx.pictures.colours import EVERY
+from cosserat_fenicsx.pictures.drawing import EVERY
 
 pytestmark = pytest.mark.serial
 SMALL = {"size": (320, 240), "fps": 4, "speed": 1}

@@ -16,8 +16,7 @@ import cosserat_fenicsx as cf
 from cosserat_fenicsx import interrupts, progress
 from cosserat_fenicsx.cli import main as cli
 from cosserat_fenicsx.pictures.charts import asked
-from cosserat_fenicsx.pictures.colours import colour_of, default_colour, known, peak_of, seen
-from cosserat_fenicsx.pictures.drawing import quantity
+from cosserat_fenicsx.pictures.drawing import colour_of, default_colour, known, peak_of, quantity, seen
 from cosserat_fenicsx.pictures.plot import tangled
 from cosserat_fenicsx.pictures.shapes import Drawn
 from cosserat_fenicsx.pictures.signs import Resting, has_sign, loads_of, signs_of, without_sign

@@ -5,7 +5,7 @@ import pytest
 from torsion_scenes import string
 
 import cosserat_fenicsx as cf
-from cosserat_fenicsx.drilling.linear.lumped import LumpedCutting
+from cosserat_fenicsx.drilling.linear.roots import LumpedCutting
 
 pytestmark = [pytest.mark.serial, pytest.mark.once]
 

@@ -11,7 +11,7 @@ import pytest
 import cosserat_fenicsx as cf
 from cosserat_fenicsx import drilling, well
 from cosserat_fenicsx.cli.main import main
-from cosserat_fenicsx.drilling.linear.hfto import equivalent_slope
+from cosserat_fenicsx.drilling.linear.excitation import equivalent_slope
 
 pytestmark = [pytest.mark.serial, pytest.mark.once]
 TRUTHS = json.loads((Path(__file__).parent / "reference" / "string_response.json").read_text(encoding="utf-8"))

@@ -188,7 +188,7 @@ def test_what_is_refused_in_words(collar):
 def test_a_film_enlarges_the_clearance(collar, tmp_path):
     pytest.importorskip("pyvista")
     from cosserat_fenicsx.pictures.animation import Between, Enlarged
-    from cosserat_fenicsx.pictures.colours import EVERY
+    from cosserat_fenicsx.pictures.drawing import EVERY
 
     rod, _, history = collar
     x = np.array([0.0, 0.5, 1.0])

@@ -102,7 +102,7 @@ def eigenvalues(options, found, tables):
 def deliver_rods(computed, options, moving, tables=None):
     """Deliver a `Path`, or a `History` of a motion, see `deliver`."""
     from cosserat_fenicsx.checks import positive
-    from cosserat_fenicsx.pictures.colours import colour_of
+    from cosserat_fenicsx.pictures.drawing import colour_of
 
     _refuse_units(options)
     at, color, picture = _numbers(options.at), options.color, not options.no_picture

@@ -20,11 +20,11 @@ from cosserat_fenicsx.drilling.linear.excitation import campbell as campbell
 from cosserat_fenicsx.drilling.linear.frequencies import SoftSpeed as SoftSpeed
 from cosserat_fenicsx.drilling.linear.frequencies import SoftTorque as SoftTorque
 from cosserat_fenicsx.drilling.linear.frequencies import natural_frequencies as natural_frequencies
-from cosserat_fenicsx.drilling.linear.hfto import Hfto as Hfto
+from cosserat_fenicsx.drilling.linear.excitation import Hfto as Hfto
 from cosserat_fenicsx.drilling.linear.limits import critical_slopes as critical_slopes
 from cosserat_fenicsx.drilling.linear.limits import limit_speed as limit_speed
 from cosserat_fenicsx.drilling.linear.limits import limit_weight as limit_weight
-from cosserat_fenicsx.drilling.linear.lumped import LumpedCutting as LumpedCutting
+from cosserat_fenicsx.drilling.linear.roots import LumpedCutting as LumpedCutting
 from cosserat_fenicsx.drilling.linear.response import FrequencyResponse as FrequencyResponse
 from cosserat_fenicsx.drilling.linear.response import frequency_response as frequency_response
 from cosserat_fenicsx.drilling.linear.stability import Stability as Stability

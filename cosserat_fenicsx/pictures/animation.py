@@ -18,16 +18,20 @@ from cosserat_fenicsx.errors import LibraryMissing, SceneError
 from cosserat_fenicsx.interrupts import obey
 from cosserat_fenicsx.new_files import replaced
 from cosserat_fenicsx.numerics import spun
-from cosserat_fenicsx.pictures.colours import colour_of, default_colour, known, peak_of, seen
 from cosserat_fenicsx.pictures.drawing import (
     add_bodies,
     add_lines,
     add_tubes,
     at_rest,
     body_of,
+    colour_of,
+    default_colour,
     frame,
+    known,
     load_pyvista,
     move,
+    peak_of,
+    seen,
     stage,
     suited,
     thickening,

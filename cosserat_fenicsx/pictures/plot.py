@@ -13,7 +13,6 @@ from cosserat_fenicsx.checks import positive
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.new_files import replaced
 from cosserat_fenicsx.pictures.charts import asked
-from cosserat_fenicsx.pictures.colours import colour_of, default_colour, known, peak_of, seen
 from cosserat_fenicsx.pictures.drawing import (
     VISIBLE,
     add_bodies,
@@ -21,10 +20,15 @@ from cosserat_fenicsx.pictures.drawing import (
     add_tubes,
     at_rest,
     body_of,
+    colour_of,
+    default_colour,
     frame,
+    known,
     letters,
     load_pyvista,
+    peak_of,
     places,
+    seen,
     stage,
     surface_of,
     swept,

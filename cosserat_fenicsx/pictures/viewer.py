@@ -11,8 +11,18 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from cosserat_fenicsx.new_files import replaced
-from cosserat_fenicsx.pictures.colours import MAPS, default_colour, known, peak_of, seen
-from cosserat_fenicsx.pictures.drawing import VISIBLE, at_rest, outlines, thickening, thicker
+from cosserat_fenicsx.pictures.drawing import (
+    MAPS,
+    VISIBLE,
+    at_rest,
+    default_colour,
+    known,
+    outlines,
+    peak_of,
+    seen,
+    thickening,
+    thicker,
+)
 from cosserat_fenicsx.pictures.signs import (
     Deformed,
     joints_of,

@@ -12,8 +12,7 @@ import numpy as np
 from mpi4py import MPI
 from scipy.optimize import linear_sum_assignment
 
-from cosserat_fenicsx.algebra.pencil import Pencil, on_every_rank
-from cosserat_fenicsx.algebra.quadratic import QuadraticPencil
+from cosserat_fenicsx.algebra.pencil import Pencil, QuadraticPencil, on_every_rank
 from cosserat_fenicsx.checks import instance, number, refuse, tolerance, whole
 from cosserat_fenicsx.errors import NotConverged, SceneError
 from cosserat_fenicsx.interrupts import obey

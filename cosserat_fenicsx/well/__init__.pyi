@@ -5,8 +5,8 @@ from cosserat_fenicsx.actions.walls import HoleWall as HoleWall
 from cosserat_fenicsx.actions.walls import TubeRing as TubeRing
 from cosserat_fenicsx.actions.walls import TubeWall as TubeWall
 from cosserat_fenicsx.well.answer import TorqueAndDrag as TorqueAndDrag
-from cosserat_fenicsx.well.between_joints import PipeBetweenJoints as PipeBetweenJoints
-from cosserat_fenicsx.well.between_joints import bending_between_joints as bending_between_joints
+from cosserat_fenicsx.well.strength import PipeBetweenJoints as PipeBetweenJoints
+from cosserat_fenicsx.well.strength import bending_between_joints as bending_between_joints
 from cosserat_fenicsx.well.calibrate import FrictionFit as FrictionFit
 from cosserat_fenicsx.well.calibrate import RigMeasurement as RigMeasurement
 from cosserat_fenicsx.well.calibrate import calibrate_friction as calibrate_friction
@@ -36,8 +36,8 @@ from cosserat_fenicsx.well.reserves import MarginOfOverpull as MarginOfOverpull
 from cosserat_fenicsx.well.reserves import MostWeightOnBit as MostWeightOnBit
 from cosserat_fenicsx.well.scenefile import WellScene as WellScene
 from cosserat_fenicsx.well.solve import torque_and_drag as torque_and_drag
-from cosserat_fenicsx.well.steering import BuildRate as BuildRate
-from cosserat_fenicsx.well.steering import build_rate as build_rate
+from cosserat_fenicsx.well.assembly import BuildRate as BuildRate
+from cosserat_fenicsx.well.assembly import build_rate as build_rate
 from cosserat_fenicsx.well.strength import PipeStrength as PipeStrength
 from cosserat_fenicsx.well.sweep import DepthSweep as DepthSweep
 from cosserat_fenicsx.well.sweep import depth_sweep as depth_sweep

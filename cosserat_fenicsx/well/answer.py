@@ -15,12 +15,11 @@ from cosserat_fenicsx.results.result import Result, by_name
 from cosserat_fenicsx.well import criteria, tables
 from cosserat_fenicsx.well.components import DrillString
 from cosserat_fenicsx.well.contacts import WallContact, contacts_of, high_side, side_force_up_to, sides_of
-from cosserat_fenicsx.well.differentiated import Differentiated
+from cosserat_fenicsx.well.softstring import UP_TO, Differentiated
 from cosserat_fenicsx.well.hole import Borehole, Mud
 from cosserat_fenicsx.well.operations import Operation
 from cosserat_fenicsx.well.pieces import Sections, down_along, sections_of, stretch, true_tension, von_mises
 from cosserat_fenicsx.well.reserves import MarginOfOverpull, MostWeightOnBit, most_weight_of, overpull_of
-from cosserat_fenicsx.well.softstring import UP_TO
 from cosserat_fenicsx.well.utilisation import Utilisation, strengths_of
 
 # A torque below this share of the largest tension times the contact radius is nothing that errors are compared with.

@@ -60,14 +60,13 @@ from cosserat_fenicsx.quantities import Units
 from cosserat_fenicsx.results.result import Result
 from cosserat_fenicsx.results.screen import InWords
 from cosserat_fenicsx.well.answer import TorqueAndDrag
-from cosserat_fenicsx.well.assembly import assembly_of
+from cosserat_fenicsx.well.assembly import LENGTH, BuildRate, assembly_of, build_rate
 from cosserat_fenicsx.well.components import DrillString, in_columns
 from cosserat_fenicsx.well.hole import Borehole, Mud
 from cosserat_fenicsx.well.operations import Operation
 from cosserat_fenicsx.well.pieces import pieces_of
 from cosserat_fenicsx.well.rod.rod_answer import check_rod
 from cosserat_fenicsx.well.solve import CONVENTIONS, ROD, check_settings, torque_and_drag
-from cosserat_fenicsx.well.steering import LENGTH, BuildRate, build_rate
 from cosserat_fenicsx.well.sweep import DepthSweep, depth_sweep
 from cosserat_fenicsx.well.utilisation import strengths_of
 

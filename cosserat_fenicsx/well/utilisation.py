@@ -12,11 +12,10 @@ from cosserat_fenicsx.errors import SceneError, nearest
 from cosserat_fenicsx.quantities import Quantity, Units
 from cosserat_fenicsx.results import screen
 from cosserat_fenicsx.results.result import Result, by_name
-from cosserat_fenicsx.well.between_joints import MODES, UNKNOWN, bent, span_of
+from cosserat_fenicsx.well.strength import GRADES, MODES, UNKNOWN, PipeStrength, bent, span_of, usual_yield
 from cosserat_fenicsx.well.components import DrillPipe
 from cosserat_fenicsx.well.contacts import stretches
 from cosserat_fenicsx.well.pieces import von_mises
-from cosserat_fenicsx.well.strength import GRADES, PipeStrength, usual_yield
 from cosserat_fenicsx.well.tables import shown_rows
 
 #: Distance of tool joints (m) where it is not given: of pipe of range 2.
@@ -127,7 +126,9 @@ class Utilisation(Result):
 
         return self._of(factor), mode
 
-    joint_factor = property(lambda self: self._bent[0], doc="Of tool joints on the curvature; see `between_joints`.")
+    joint_factor = property(
+        lambda self: self._bent[0], doc="Of tool joints on the curvature; see `bending_between_joints`."
+    )
 
     @property
     def contact_mode(self) -> np.ndarray:

@@ -17,7 +17,7 @@ from cosserat_fenicsx.drilling.linear.characteristic import (
     without_autodriller,
 )
 from cosserat_fenicsx.drilling.linear.frequencies import SoftSpeed, SoftTorque, natural_frequencies, own_rule, with_rule
-from cosserat_fenicsx.drilling.linear.hfto import Hfto, oscillations
+from cosserat_fenicsx.drilling.linear.excitation import Hfto, oscillations
 from cosserat_fenicsx.drilling.linear.impedances import Disc
 from cosserat_fenicsx.drilling.linear.limits import fed_waves
 from cosserat_fenicsx.drilling.linear.roots import all_roots, follow
