@@ -179,6 +179,7 @@ typedef struct {
     double *x, *start, *b, *change; /* (unknowns,) each; x from the guess to the solution, start: before the step */
     int fresh, served, iterations, verdict;
     double spent, enough;
+    double noise, of_noise;         /* rounding of the increments, from earlier steps; allowed errors over it */
 } stepping;
 
 /* The second variation, in parts that are decoupled. */

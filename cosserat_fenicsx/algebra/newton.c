@@ -8,6 +8,8 @@
 enum { STATE = 1, RESIDUAL = 2, TANGENT = 4, INTERFACE = 8, ADD_UP = 16, SUM = 32, MATRICES = 64, CONTACT = 256, COMPLIANCE = 512,
        NODES = 1024 };
 enum { FAILED = 1 };
+/* Increments that no longer shrink, by rounding, are measured anew after some steps without them. */
+static const double FADES = 0.9;
 
 static int python_hook(void *self, int what, double *a, double *b);
 
@@ -221,9 +223,9 @@ static void judge_increment(stepping *s, double step, double before)
     const int complete = !c || c->omitted <= s->enough * s->root;
     if (!isfinite(step)) s->verdict = NOT_A_NUMBER;
     else if (step > s->diverged) s->verdict = GROWN;
-    else if ((complete && (step <= s->enough || (s->iterations > 1 && error_is_small(step, before, 0, s->enough))))
-             || (step <= s->rounding && rate > 0.5 && s->iterations > 1))
-        s->verdict = CONVERGED;
+    else if (complete && (step <= s->enough || (s->iterations > 1 && error_is_small(step, before, 0, s->enough))))
+        s->verdict = CONVERGED, s->noise *= FADES;
+    else if (step <= s->rounding && rate > 0.5 && s->iterations > 1) s->verdict = CONVERGED, s->noise = step;
     else if (s->iterations >= s->most) s->verdict = RAN_OUT;
     else if (s->iterations > 1) {
         const double left = log(s->enough / step);
@@ -238,7 +240,7 @@ int iterate(stepping *s)
     problem *p = s->problem;
     double step = 0, before;
     if (motion_in(s, s->x, s->start, &s->enough)) return FAILED;
-    s->enough = fmax(s->smallest, s->increment * s->enough);
+    s->enough = fmax(fmax(s->smallest, s->increment * s->enough), s->of_noise * s->noise);
     s->iterations = 0, s->verdict = ITERATING;
     while (s->verdict == ITERATING) {
         if (residual(p, s->x, s->b)) return FAILED;

@@ -215,6 +215,7 @@ class Iteration:
     increment: float = 1e-12
     smallest: float = 2e-16
     rounding: float = 1e-10  # increments below it that no longer shrink have converged, too: rounding of a stiff rod
+    of_noise: float = 0.1  # errors below this share of such increments in earlier steps are allowed
     rate: float = 3e-4  # contraction of increments with a new tangent, as measured
     # Cost of a new tangent, in iterations: as measured, 1.3 in a plane, 5 in space, 8 with constraint equations. From 1
     # to 8 the time of a motion varies by a few per cent.
@@ -255,7 +256,7 @@ class StepNewton:
         """Discard the tangent and the statistics of its reuse, as before the first step."""
         self.problem.fresh = True
         # cost of the tangent and its iterations; steps it has served; steps left that start with a new tangent
-        self._spent, self._served, self._anew = 0.0, 0, 0
+        self._spent, self._served, self._anew, self._c.noise = 0.0, 0, 0, 0.0
 
     def solve(self, guesses):
         """Newton's method from the first guess with the current tangent; where that fails, from every guess with a new
@@ -293,8 +294,9 @@ class StepNewton:
         return Solved(converged, iterations, found)
 
     def memory(self):
-        """The statistics that decide when the tangent is renewed, see `Stepper.memory`."""
-        return {"spent": self._spent, "served": self._served, "anew": self._anew}
+        """The statistics that decide when iterations stop and when the tangent is renewed, see `Stepper.memory`."""
+        return {"spent": self._spent, "served": self._served, "anew": self._anew, "noise": self._c.noise}
 
     def recall(self, memory):
         self._spent, self._served, self._anew = memory["spent"], memory["served"], memory["anew"]
+        self._c.noise = memory["noise"]
