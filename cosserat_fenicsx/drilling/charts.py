@@ -220,8 +220,7 @@ def draw_over_time(history, between=None):
     return figure
 
 
-@_drawn
-def draw_fit(fit):
+def fit_figure(fit):
     """See `DrillingFit.plot`."""
     readings, quantities = fit.readings, fit.history.quantities
     times = np.linspace(readings.times[0], readings.times[-1], _SOME)
@@ -416,8 +415,7 @@ def _lines(answer, modes):
     return figure
 
 
-@_drawn
-def draw_campbell(answer):
+def campbell_figure(answer):
     """See `Campbell.plot`."""
     figure = empty_figure(7.0, 5.0)
     panel = figure.subplots()
@@ -440,8 +438,7 @@ def draw_campbell(answer):
     return figure
 
 
-@_drawn
-def draw_bounce(answer):
+def bounce_figure(answer):
     """See `BitBounce.plot`."""
     figure = empty_figure(7.0, 4.2)
     panel = figure.subplots()
@@ -461,8 +458,7 @@ def draw_bounce(answer):
 _DECADES = 20
 
 
-@_drawn
-def draw_response(answer):
+def response_figure(answer):
     """See `FrequencyResponse.plot`."""
     above, surface, moved, source = answer.ends
     figure, panels = stacked(8, [2.1, 1.5, 2.1, 2.1])
@@ -500,8 +496,7 @@ def draw_response(answer):
     return figure
 
 
-@_drawn
-def draw_hfto(answer):
+def hfto_figure(answer):
     """See `Hfto.plot`."""
     if not len(answer):
         raise SceneError("plot: expected at least one oscillation, this state keeps up none")

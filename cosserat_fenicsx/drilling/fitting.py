@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from scipy.stats import qmc
 
-from cosserat_fenicsx.checks import File, instance, number, refuse, warn
+from cosserat_fenicsx.checks import instance, number, refuse, warn
 from cosserat_fenicsx.dimensions import BY_UNIT, in_si
 from cosserat_fenicsx.drilling.choose import chosen, model_of
 from cosserat_fenicsx.drilling.history import DrillingHistory
@@ -30,7 +30,7 @@ from cosserat_fenicsx.errors import NotConverged, SceneError
 from cosserat_fenicsx.progress import StageProgress
 from cosserat_fenicsx.quantities import Quantity
 from cosserat_fenicsx.ranks import world
-from cosserat_fenicsx.results.result import Result, by_name
+from cosserat_fenicsx.results.result import Charted, by_name
 from cosserat_fenicsx.scene.parameters import parameter_of, scene_with
 from cosserat_fenicsx.well.calibrate import estimated
 
@@ -47,8 +47,9 @@ _BAD, _ALIKE, _SILENT, _NONE = 3.0, 0.95, 1e-3, 1e4
 
 
 @dataclass(frozen=True, eq=False)
-class DrillingFit(Result):
-    """Numbers of a drill-string in motion that fit readings best, from `fit`.
+class DrillingFit(Charted):
+    """Numbers of a drill-string in motion that fit readings best, from `fit`; `plot` draws the readings, and the motion
+    with these numbers, over time.
 
     Attributes:
         scene: the `Drilling` with these numbers. history: its `DrillingHistory` over the readings.
@@ -85,7 +86,7 @@ class DrillingFit(Result):
     readings: Readings
     derivative_error: np.ndarray
 
-    _rows_axis = "unknown"
+    _rows_axis, _chart = "unknown", "drilling.charts.fit_figure"
     _quantities = by_name(
         Quantity("unknown", axes=("unknown",), getter=lambda x: np.array(x.names)),
         Quantity("value", axes=("unknown",), digits=6, getter="values"),
@@ -120,21 +121,6 @@ class DrillingFit(Result):
         ]  # fmt: skip
         if alike:
             yield f"Hardly told apart, which change together (correlation): {', '.join(alike)}."
-
-    def plot(self, file: File | None = None, *, units: Any = "SI", width: int | None = None):
-        """Draw the readings, and the motion with the numbers found, over time.
-
-        Args:
-            file: .png, .pdf or another format of matplotlib (rank 0 writes); None returns the Figure.
-            units: "SI", "field", or a dict of units by dimensions, such as {"force": "klbf"}.
-            width: of the picture, pixels, which its fonts and legends are arranged for; None for 150 to the inch.
-
-        Raises:
-            SceneError: matplotlib is missing, or the ending is unknown.
-        """
-        from cosserat_fenicsx.drilling.charts import draw_fit
-
-        return draw_fit(self, file, units=units, width=width)
 
 
 def fit(

@@ -4,6 +4,7 @@ tables on the screen and in notebooks follow from them."""
 import csv
 from collections import namedtuple
 from collections.abc import Callable, Iterable, Mapping
+from importlib import import_module
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -277,6 +278,31 @@ class Result:
         pandas = import_library("pandas", "to_dataframe")
         self._refuse_empty("to_dataframe")
         return pandas.DataFrame(columns).rename_axis(axis)
+
+
+class Charted(Result):
+    """A result with one chart."""
+
+    # The function of the result that makes the Figure, with its module below the package.
+    _chart: ClassVar[str] = ""
+
+    def plot(self, file: File | None = None, *, units: Any = "SI", width: int | None = None):
+        """Draw the chart that the class describes.
+
+        Args:
+            file: .png, .pdf or another format of matplotlib (rank 0 writes); None returns the Figure.
+            units: "SI", "field", or a dict of units by dimensions, such as {"force": "klbf"}.
+            width: of the picture, pixels, which its fonts and legends are arranged for; None for 150 to the inch.
+
+        Raises:
+            SceneError: matplotlib is missing, the ending is unknown, or there is nothing to draw.
+            OSError: the file cannot be written.
+        """
+        from cosserat_fenicsx.pictures.charts import draw_chart
+
+        module, _, name = self._chart.rpartition(".")
+        make = getattr(import_module(f"cosserat_fenicsx.{module}"), name)
+        return draw_chart(lambda: make(self), file, self._ranks, units=units, width=width)
 
 
 # Most rods whose numbers of elements are listed one by one.

@@ -16,16 +16,15 @@ with shear (J. S. Przemieniecki, Theory of Matrix Structural Analysis, 1968, sec
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from scipy.linalg import solve_banded
 from scipy.optimize import brentq
 
-from cosserat_fenicsx.checks import File, instance, number, refuse
+from cosserat_fenicsx.checks import instance, number, refuse
 from cosserat_fenicsx.errors import NotConverged, SceneError
 from cosserat_fenicsx.quantities import Quantity
-from cosserat_fenicsx.results.result import Result, by_name
+from cosserat_fenicsx.results.result import Charted, by_name
 from cosserat_fenicsx.well.components import DrillString, in_columns
 from cosserat_fenicsx.well.hole import Borehole, Mud
 from cosserat_fenicsx.well.operations import Operation
@@ -319,9 +318,9 @@ LENGTH, _LOOKED_FOR = 60.0, np.linspace(-0.012, 0.012, 25)
 
 
 @dataclass(frozen=True, eq=False)
-class BuildRate(Result):
+class BuildRate(Charted):
     """Rates of build of an assembly, from `build_rate`. Rows are criteria: curvatures of a hole, > 0 where it builds,
-    in which
+    in which (`plot` draws side force and tilt of the bit over the curvature, with the rates)
 
     - "side force": the bit presses to no side;
     - "tilt": the bit's axis is that of the hole;
@@ -350,7 +349,7 @@ class BuildRate(Result):
     tilt: np.ndarray
     assembly: Assembly
 
-    _rows_axis, _beside = "criterion", {"_holes": "hole"}
+    _rows_axis, _beside, _chart = "criterion", {"_holes": "hole"}, "well.charts.build_figure"
     _quantities = by_name(
         Quantity("criterion", axes=("criterion",)),
         Quantity("rate", "rate of build", "rad/m", axes=("criterion",), shown="deg/30m", dimension="angle per length",
@@ -397,21 +396,6 @@ class BuildRate(Result):
     def __repr__(self):
         rates = ", ".join(f"{name} {rate:.4g}" for name, rate in zip(CRITERIA, self.rate, strict=True))
         return f"BuildRate({rates} rad/m)"
-
-    def plot(self, file: File | None = None, *, units: Any = "SI", width: int | None = None):
-        """Draw side force and tilt of the bit over the curvature of the hole, with the rates of build.
-
-        Args:
-            file: .png, .pdf or another format of matplotlib (rank 0 writes); None returns the Figure.
-            units: "SI", "field", or a dict of units by dimensions, such as {"force": "klbf"}.
-            width: of the picture, pixels, which its fonts and legends are arranged for; None for 150 to the inch.
-
-        Raises:
-            SceneError: matplotlib is missing, or the ending is unknown.
-        """
-        from cosserat_fenicsx.well import charts
-
-        return charts.drawn(self, charts.build_figure, file, units=units, width=width)
 
 
 def build_rate(

@@ -11,17 +11,17 @@ from collections import namedtuple
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache, partial
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 from scipy.optimize import least_squares
 from scipy.stats import t as student
 
-from cosserat_fenicsx.checks import File, instance, number, refuse, warn
+from cosserat_fenicsx.checks import instance, number, refuse, warn
 from cosserat_fenicsx.errors import SceneError, SceneWarning
 from cosserat_fenicsx.parts import Depth, ForceSize, Part, Torque, positive
 from cosserat_fenicsx.quantities import Quantity
-from cosserat_fenicsx.results.result import Result, by_name
+from cosserat_fenicsx.results.result import Charted, by_name
 from cosserat_fenicsx.well.components import DrillString
 from cosserat_fenicsx.well.hole import Borehole, Mud
 from cosserat_fenicsx.well.operations import Operation
@@ -172,8 +172,9 @@ def _readings_of(measurements):
 
 
 @dataclass(frozen=True, eq=False)
-class FrictionFit(Result):
-    """Coefficients of friction by least squares, from `calibrate_friction`.
+class FrictionFit(Charted):
+    """Coefficients of friction by least squares, from `calibrate_friction`; `plot` draws measured loads and those
+    computed with these coefficients, over the depth of the bit.
 
     Attributes:
         hole: the `Borehole` with these coefficients.
@@ -207,22 +208,7 @@ class FrictionFit(Result):
     doubts: tuple[str, ...] = ()
     measurements: tuple[RigMeasurement, ...] = ()
 
-    def plot(self, file: File | None = None, *, units: Any = "SI", width: int | None = None):
-        """Draw measured loads and those computed with the coefficients found, over the depth of the bit.
-
-        Args:
-            file: .png, .pdf or another format of matplotlib (rank 0 writes); None returns the Figure.
-            units: "SI", "field", or a dict of units by dimensions, such as {"force": "klbf"}.
-            width: of the picture, pixels, which its fonts and legends are arranged for; None for 150 to the inch.
-
-        Raises:
-            SceneError: matplotlib is missing, or the ending is unknown.
-        """
-        from cosserat_fenicsx.well import charts
-
-        return charts.drawn(self, charts.fit_figure, file, units=units, width=width)
-
-    _rows_axis = "section"
+    _rows_axis, _chart = "section", "well.charts.fit_figure"
     _quantities = by_name(
         Quantity("section", axes=("section",),
                  getter=lambda x: np.array([one.name or str(i) for i, one in enumerate(x.hole.sections, start=1)])),

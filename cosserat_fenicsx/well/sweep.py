@@ -9,7 +9,6 @@ the mesh touch the wall. On the first mesh they were 21 to 23, and one start of 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
-from typing import Any
 
 import numpy as np
 
@@ -19,7 +18,7 @@ from cosserat_fenicsx.parts import from_data, members, to_data, use
 from cosserat_fenicsx.progress import Progress
 from cosserat_fenicsx.quantities import Quantity, Units
 from cosserat_fenicsx.ranks import world
-from cosserat_fenicsx.results.result import Result, by_name
+from cosserat_fenicsx.results.result import Charted, by_name
 from cosserat_fenicsx.storage.mark import NotMarked, mark_of
 from cosserat_fenicsx.storage.store import Kind, Nowhere, Store
 from cosserat_fenicsx.well import tables
@@ -43,8 +42,9 @@ _CASES = ("operation", "friction", "depth")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class DepthSweep(Result):
-    """Surface loads over the depth of the bit, from `depth_sweep`.
+class DepthSweep(Charted):
+    """Surface loads over the depth of the bit, from `depth_sweep`; `plot` draws hook load and surface torque over it,
+    downwards ("broomstick").
 
     Attributes:
         operations, depths (m), friction: as asked for; friction is (None,) for the hole's own.
@@ -63,7 +63,7 @@ class DepthSweep(Result):
     notes: dict[tuple[int, int, int], str] = field(default_factory=dict)
 
     #: For messages.
-    axis, _rows_axis = "answer", "depth"
+    axis, _rows_axis, _chart = "answer", "depth", "well.charts.sweep_figure"
     _quantities = by_name(
         Quantity("operation", axes=("operation",), getter=lambda x: np.array([one.name for one in x.operations])),
         Quantity("friction", axes=("friction",), getter=lambda x: np.array([_as_text(one) for one in x.friction])),
@@ -136,21 +136,6 @@ class DepthSweep(Result):
 
     def _table(self, units, rows):
         return tables.over_depths(self, units, rows)
-
-    def plot(self, file: File | None = None, *, units: Any = "SI", width: int | None = None):
-        """Draw hook load and surface torque over the depth of the bit, the depth downwards ("broomstick").
-
-        Args:
-            file: .png, .pdf or another format of matplotlib (rank 0 writes); None returns the Figure.
-            units: "SI", "field", or a dict of units by dimensions, such as {"force": "klbf"}.
-            width: of the picture, pixels, which its fonts and legends are arranged for; None for 150 to the inch.
-
-        Raises:
-            SceneError: matplotlib is missing, or the ending is unknown.
-        """
-        from cosserat_fenicsx.well import charts
-
-        return charts.drawn(self, charts.sweep_figure, file, units=units, width=width)
 
     def __repr__(self):
         names = ", ".join(operation.name for operation in self.operations)

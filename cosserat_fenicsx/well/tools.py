@@ -16,7 +16,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from cosserat_fenicsx.checks import File, call, instance, number, refuse, store, warn
+from cosserat_fenicsx.checks import call, instance, number, refuse, store, warn
 from cosserat_fenicsx.parts import (
     ForceSize,
     Frequency,
@@ -29,10 +29,9 @@ from cosserat_fenicsx.parts import (
     at_least,
     positive,
 )
-from cosserat_fenicsx.pictures.charts import COLOURS, draw_chart, legend, scale, stacked, unit_of
+from cosserat_fenicsx.pictures.charts import COLOURS, legend, scale, stacked, unit_of
 from cosserat_fenicsx.quantities import Quantity, Units
-from cosserat_fenicsx.ranks import world
-from cosserat_fenicsx.results.result import Result, by_name
+from cosserat_fenicsx.results.result import Charted, by_name
 from cosserat_fenicsx.results.screen import InWords
 from cosserat_fenicsx.well.components import Collar, DrillString
 
@@ -247,8 +246,9 @@ _FLOW = Quantity("flow", unit="m^3/s", axes=_AXES, shown="l/min")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class PowerCurve(Result):
-    """Result of `power_curve`.
+class PowerCurve(Charted):
+    """Result of `power_curve`; `plot` draws speed, pressure and power over the torque on bit, a line for each flow, and
+    where the motor stalls.
 
     Attributes:
         motor: the `MudMotor`. flow: (n,) m^3/s, of curves one after another. torque: (n,) on bit, N m, in each from 0
@@ -261,7 +261,7 @@ class PowerCurve(Result):
     torque: np.ndarray
 
     axis = _rows_axis = "point"
-    _over = "torque"
+    _over, _chart = "torque", "well.tools.power_figure"
     _quantities = by_name(_FLOW, _TORQUE, _SPEED, _PRESSURE, _POWER, Quantity("efficiency", axes=_AXES))
 
     @property
@@ -301,41 +301,30 @@ class PowerCurve(Result):
                 f"{said['flow']}: {said['speed']} without load, stalls at {said['torque']}; most power {said['power']}."
             )
 
-    def plot(self, file: File | None = None, *, units: Any = "SI", width: int | None = None):
-        """Draw speed, pressure and power over the torque on bit, a line for each flow, and where the motor stalls. With
-        a file it is written, otherwise the Figure is returned.
-
-        Args:
-            file: .png, .pdf or another format of matplotlib (rank 0 writes).
-            units: "SI", "field" or a dict of units by dimensions. width: of the picture, pixels, or None.
-
-        Raises:
-            SceneError: matplotlib is missing, or the file's ending is unknown.
-        """
-        return draw_chart(self._figure, file, world(), units=units, width=width)
-
-    def _figure(self):
-        figure, axes = stacked(8, [2.2] * 3)
-        heading, across = scale(_TORQUE, self.torque)
-        unit, size = unit_of(_FLOW)
-        for panel, quantity in zip(axes, (_SPEED, _PRESSURE, _POWER), strict=True):
-            values = getattr(self, quantity.name)
-            label, high = scale(quantity, values)
-            for k, flow in enumerate(np.unique(self.flow)):
-                at, look = self.flow == flow, {"color": COLOURS[k % len(COLOURS)]}
-                panel.plot(self.torque[at] / across, values[at] / high, label=f"{flow / size:.4g} {unit}", **look)
-                panel.plot(
-                    self.torque[at][-1] / across, values[at][-1] / high, "x", markersize=7, markeredgewidth=2, **look
-                )
-            panel.plot([], [], "x", color="black", label="stalls")
-            panel.set(ylabel=label, ylim=(0, None), xlim=(0, 1.03 * self.torque.max() / across))
-        legend(*axes)
-        axes[-1].set_xlabel(heading)
-        figure.suptitle(f"{self.motor.name}: the bit's torque slows it down, and stalls it")
-        return figure
-
     def __repr__(self):
         return f"<PowerCurve: {self.motor.name}, {len(np.unique(self.flow))} flows>"
+
+
+def power_figure(curve):
+    """Speed, pressure and power over the torque on bit; see `PowerCurve`."""
+    figure, axes = stacked(8, [2.2] * 3)
+    heading, across = scale(_TORQUE, curve.torque)
+    unit, size = unit_of(_FLOW)
+    for panel, quantity in zip(axes, (_SPEED, _PRESSURE, _POWER), strict=True):
+        values = getattr(curve, quantity.name)
+        label, high = scale(quantity, values)
+        for k, flow in enumerate(np.unique(curve.flow)):
+            at, look = curve.flow == flow, {"color": COLOURS[k % len(COLOURS)]}
+            panel.plot(curve.torque[at] / across, values[at] / high, label=f"{flow / size:.4g} {unit}", **look)
+            panel.plot(
+                curve.torque[at][-1] / across, values[at][-1] / high, "x", markersize=7, markeredgewidth=2, **look
+            )
+        panel.plot([], [], "x", color="black", label="stalls")
+        panel.set(ylabel=label, ylim=(0, None), xlim=(0, 1.03 * curve.torque.max() / across))
+    legend(*axes)
+    axes[-1].set_xlabel(heading)
+    figure.suptitle(f"{curve.motor.name}: the bit's torque slows it down, and stalls it")
+    return figure
 
 
 def power_curve(motor: MudMotor, flows: Any = None, points: int = 41) -> PowerCurve:

@@ -11,12 +11,11 @@ and the motion goes on where string and drive take the power that the bit gives:
 
 import math
 from dataclasses import dataclass, fields, replace
-from typing import Any
 
 import numpy as np
 from scipy.optimize import brentq
 
-from cosserat_fenicsx.checks import File, Numbers, number, positive, refuse
+from cosserat_fenicsx.checks import Numbers, number, positive, refuse
 from cosserat_fenicsx.drilling.bit_laws import Lobes
 from cosserat_fenicsx.drilling.linear.characteristic import Steady, speeds_and_weights
 from cosserat_fenicsx.drilling.linear.frequencies import natural_frequencies
@@ -26,36 +25,12 @@ from cosserat_fenicsx.drilling.scene import Drilling
 from cosserat_fenicsx.drilling.stick_slip import SPEED, TORQUE, WEIGHT
 from cosserat_fenicsx.numerics import gauss
 from cosserat_fenicsx.quantities import Quantity, Units
-from cosserat_fenicsx.results.result import Result, by_name
-
-
-class Drawn(Result):
-    """A result with one chart, drawn by the function of `drilling.charts` of the name `_chart`."""
-
-    _chart = ""
-
-    def plot(self, file: File | None = None, *, units: Any = "SI", width: int | None = None):
-        """Draw the chart: of `Campbell` natural frequencies as lines and excitations as rays, of `BitBounce` the
-        amplitude over speed beside the static weight, of `FrequencyResponse` a Bode chart of what surface and bit
-        feel of a load on bit, with the impedances of string and drive, which absorb each other's waves where both are
-        equal; of `Hfto` amplitudes over the frequency. With a file it is written, otherwise the Figure is returned.
-
-        Args:
-            file: .png, .pdf or another format of matplotlib (rank 0 writes).
-            units: "SI", "field" or a dict of units by dimensions. width: of the picture, pixels, or None.
-
-        Raises:
-            SceneError: matplotlib is missing, or the file's ending is unknown.
-            OSError: the file cannot be written.
-        """
-        from cosserat_fenicsx.drilling import charts
-
-        return getattr(charts, self._chart)(self, file, units=units, width=width)
+from cosserat_fenicsx.results.result import Charted, by_name
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Campbell(Drawn):
-    """Result of `campbell`.
+class Campbell(Charted):
+    """Result of `campbell`; `plot` draws natural frequencies as lines and excitations as rays.
 
     Attributes:
         fastest: highest speed of rotation, rad/s. frequencies: {"torsion": (n,), "axial": (m,)} Hz, without what
@@ -82,7 +57,7 @@ class Campbell(Drawn):
         found = ", ".join(f"{len(x)} {kind}" for kind, x in self.frequencies.items())
         return f"<Campbell: {found} frequencies up to {self.up_to:.4g} Hz; {', '.join(self.excitations)}>"
 
-    _chart = "draw_campbell"
+    _chart = "drilling.charts.campbell_figure"
     axis = _rows_axis = "critical speed"
     _quantities = by_name(
         Quantity("motion", "kind", axes=("critical speed",), getter=lambda x: x._column(0)),
@@ -160,8 +135,8 @@ def _up_to(scene, kind, end, up_to):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class BitBounce(Drawn):
-    """Result of `bit_bounce`.
+class BitBounce(Charted):
+    """Result of `bit_bounce`; `plot` draws the amplitude over speed beside the static weight.
 
     Attributes:
         scene: the `Drilling`. speeds: (n,) rad/s. frequency: (n,) Hz, lobes times rotation. amplitude: (n,) N, of the
@@ -203,7 +178,7 @@ class BitBounce(Drawn):
         text = f"the bit lifts off at {len(lifted)} of {len(self.speeds)} speeds"
         return text + (f", from {lifted.min():.4g} to {lifted.max():.4g} {rpm}" if len(lifted) else "")
 
-    _chart = "draw_bounce"
+    _chart = "drilling.charts.bounce_figure"
     axis = _rows_axis = "speed"
     _quantities = by_name(
         Quantity("speed", unit="rad/s", axes=("speed",), getter="speeds", shown="rpm"),
@@ -266,8 +241,8 @@ _PLACES, _LISTED = 16, 12
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Hfto(Drawn):
-    """Result of `Stability.hfto`: oscillations of one frequency each, by frequency.
+class Hfto(Charted):
+    """Result of `Stability.hfto`: oscillations of one frequency each, by frequency; `plot` draws amplitudes over it.
 
     Attributes:
         scene: the `Drilling` at the speed and weight. speed: of the bit, rad/s. unbounded: how many more modes grow,
@@ -288,7 +263,7 @@ class Hfto(Drawn):
     torque: np.ndarray
     torque_depth: np.ndarray
 
-    _chart = "draw_hfto"
+    _chart = "drilling.charts.hfto_figure"
     axis = _rows_axis = "oscillation"
     _may_be_empty = True
     _quantities = by_name(

@@ -18,7 +18,6 @@ from cosserat_fenicsx.drilling.linear.characteristic import (
     speed_of,
     without_autodriller,
 )
-from cosserat_fenicsx.drilling.linear.excitation import Drawn
 from cosserat_fenicsx.drilling.linear.impedances import Parted, State
 from cosserat_fenicsx.drilling.linear.roots import all_roots
 from cosserat_fenicsx.drilling.linear.stability import ModeShape, shape_of, steady_of
@@ -27,6 +26,7 @@ from cosserat_fenicsx.drilling.stick_slip import SPEED, WEIGHT
 from cosserat_fenicsx.errors import SceneError, nearest
 from cosserat_fenicsx.parts import Number, positive
 from cosserat_fenicsx.quantities import Quantities, Quantity
+from cosserat_fenicsx.results.result import Charted
 
 # Names of speed and load at the surface and at the bit, by kind; units of a speed and a load.
 _ENDS = {
@@ -47,8 +47,9 @@ _MANY, _HIGHEST, _PEAKS, _NEUTRAL = 2000, 10.0, 12, 1e-9
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class FrequencyResponse(Drawn):
-    """Result of `frequency_response`.
+class FrequencyResponse(Charted):
+    """Result of `frequency_response`; `plot` draws a Bode chart of what surface and bit feel of a load on bit, with the
+    impedances of string and drive, which absorb each other's waves where both are equal.
 
     Attributes:
         scene: the `Drilling`. kind: "torsion" or "axial". speed: of the steady rotation, rad/s.
@@ -69,7 +70,7 @@ class FrequencyResponse(Drawn):
     equation: Characteristic
     _ratios: dict[str, dict[str, np.ndarray]]
 
-    _chart = "draw_response"
+    _chart = "drilling.charts.response_figure"
     axis = _rows_axis = "frequency"
 
     @property
