@@ -11,9 +11,8 @@ from frame_scenes import SECTION, grid_shell, random_frame
 from plane_scenes import STEEL, Drawn, hinged_arch, lee_frame, thin_cantilever
 
 import cosserat_fenicsx as cf
-from cosserat_fenicsx.models.choose import choose
+from cosserat_fenicsx.models.signature import Signature, choose
 from cosserat_fenicsx.models.rodmesh import Layout
-from cosserat_fenicsx.models.signature import Signature
 from cosserat_fenicsx.parts import per_scene
 from cosserat_fenicsx.scene import action, statical
 from cosserat_fenicsx.scene.statical import check_no_mechanism, free_motions

@@ -214,7 +214,7 @@ def test_what_the_first_rank_raises_for_all_is_raised_by_all(problem, other):
 
 
 def test_a_writer_that_fails_for_any_reason_fails_on_all_ranks(tmp_path_all, monkeypatch):
-    from cosserat_fenicsx.results.export import xdmf
+    from cosserat_fenicsx.results import xdmf
 
     def fails(*given):
         raise ValueError("odd")

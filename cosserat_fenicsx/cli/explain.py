@@ -5,11 +5,10 @@ import numpy as np
 from cosserat_fenicsx.dynamics.schemes import SCHEMES
 from cosserat_fenicsx.dynamics.simulate import DEGREE, ELEMENTS, TOL, chosen_model, pace_of
 from cosserat_fenicsx.dynamics.start import before
-from cosserat_fenicsx.models.choose import choose, fitting
+from cosserat_fenicsx.models.signature import Signature, choose, fitting
 from cosserat_fenicsx.models.formulation import formulation_of
 from cosserat_fenicsx.models.rod_data import check_inertia
 from cosserat_fenicsx.models.rodmesh import Layout
-from cosserat_fenicsx.models.signature import Signature
 from cosserat_fenicsx.results.accuracy import FEW
 from cosserat_fenicsx.results.compared import NAMES, words_of
 from cosserat_fenicsx.scene.curves import Line, Spline

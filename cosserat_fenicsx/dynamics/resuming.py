@@ -18,7 +18,7 @@ from cosserat_fenicsx.models.connections import Connections
 from cosserat_fenicsx.models.rodmesh import Layout
 from cosserat_fenicsx.models.base import Scales
 from cosserat_fenicsx.ranks import Alone, communicator
-from cosserat_fenicsx.results.export import saved
+from cosserat_fenicsx.results import saved
 from cosserat_fenicsx.results.history import History
 from cosserat_fenicsx.scene.scene import Scene
 from cosserat_fenicsx.statics.path.recorder import assembled

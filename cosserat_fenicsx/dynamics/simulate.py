@@ -15,13 +15,12 @@ from cosserat_fenicsx.dynamics.schemes import SCHEMES
 from cosserat_fenicsx.dynamics.start import equilibrium, put_start, starts_in
 from cosserat_fenicsx.dynamics.time_loop import TimeLoop, marks_of
 from cosserat_fenicsx.errors import NotConverged, SceneError, nearest
-from cosserat_fenicsx.models.choose import not_flat
+from cosserat_fenicsx.models.signature import Signature, not_flat
 from cosserat_fenicsx.models.collocated import CollocatedPlanar, CollocatedSpatial
 from cosserat_fenicsx.models.directors import ConservingSpatial, EccentricSpatial
 from cosserat_fenicsx.models.moving import MovingSpatial
 from cosserat_fenicsx.models.moving import MovingPlanar
 from cosserat_fenicsx.models.rodmesh import Layout
-from cosserat_fenicsx.models.signature import Signature
 from cosserat_fenicsx.ranks import communicator
 from cosserat_fenicsx.results.history import History
 from cosserat_fenicsx.results.path import Path

@@ -7,7 +7,7 @@ import numpy as np
 
 from cosserat_fenicsx.checks import instance, number, refuse
 from cosserat_fenicsx.errors import SceneError
-from cosserat_fenicsx.models.choose import not_flat
+from cosserat_fenicsx.models.signature import not_flat
 from cosserat_fenicsx.results.path import Path
 from cosserat_fenicsx.scene.action import describe, has_permanent
 from cosserat_fenicsx.scene.scene import Scene

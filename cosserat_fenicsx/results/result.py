@@ -175,7 +175,7 @@ class Result:
             OSError: the file cannot be written; an old one stays.
             SceneError: an empty result.
         """
-        from cosserat_fenicsx.results.export import saved
+        from cosserat_fenicsx.results import saved
 
         self._refuse_empty("save")
         on_first(self._ranks, lambda: saved.save_quantities(self, file))

@@ -519,7 +519,7 @@ class RodResult(Result, Extremes, Reactions, Stresses, States):
         """Write all of the result to one HDF5 file, from which `read_result` makes it again.
 
         Every query then gives the same digits. Other programs find, with units, what belongs to every state in the
-        root, and fields along each rod in rods/<name>, see `results.export.saved`. An old file is replaced once the new
+        root, and fields along each rod in rods/<name>, see `results.saved`. An old file is replaced once the new
         one is complete.
 
         Raises:
@@ -527,7 +527,7 @@ class RodResult(Result, Extremes, Reactions, Stresses, States):
             SceneError: an empty result, or a scene with functions written in Python, or with actions of your own,
                 which are code: no file holds any.
         """
-        from cosserat_fenicsx.results.export import saved
+        from cosserat_fenicsx.results import saved
 
         self._refuse_empty("save")
         on_first(self.comm, lambda: saved.save(self, file))
@@ -562,7 +562,7 @@ class RodResult(Result, Extremes, Reactions, Stresses, States):
             OSError: the file cannot be written.
             SceneError: an unknown format, or an option that it does not have.
         """
-        from cosserat_fenicsx.results.export import xdmf
+        from cosserat_fenicsx.results import xdmf
 
         file = Path(file)
         if len(self) == 0:

@@ -220,7 +220,7 @@ class Shapes(Result, OnNodes):
             OSError: the file cannot be written.
             SceneError: an unknown format, or no mode.
         """
-        from cosserat_fenicsx.results.export import xdmf
+        from cosserat_fenicsx.results import xdmf
 
         if Path(file).suffix in (".csv", ".nc"):
             super().write(file, units=units)

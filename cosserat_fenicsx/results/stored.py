@@ -9,7 +9,7 @@ from mpi4py import MPI
 
 from cosserat_fenicsx.checks import File
 from cosserat_fenicsx.quantities import Quantities, Quantity
-from cosserat_fenicsx.results.export import saved
+from cosserat_fenicsx.results import saved
 from cosserat_fenicsx.results.history import History
 from cosserat_fenicsx.results.path import Path
 from cosserat_fenicsx.results.result import Result

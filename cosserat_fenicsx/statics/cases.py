@@ -21,9 +21,8 @@ from cosserat_fenicsx.algebra.pool import release
 from cosserat_fenicsx.checks import number
 from cosserat_fenicsx.errors import NotConverged, SceneError, nearest
 from cosserat_fenicsx.models.base import Scales
-from cosserat_fenicsx.models.choose import choose
+from cosserat_fenicsx.models.signature import Signature, choose
 from cosserat_fenicsx.models.formulation import formulation_of
-from cosserat_fenicsx.models.signature import Signature
 from cosserat_fenicsx.ranks import communicator
 from cosserat_fenicsx.results.compared import NAMES
 from cosserat_fenicsx.scene.action import path_dependent

@@ -20,7 +20,7 @@ from mpi4py import MPI
 from cosserat_fenicsx.algebra.eigen import reference_blas
 from cosserat_fenicsx.checks import instance, warn
 from cosserat_fenicsx.errors import Interrupted, NotConverged, SceneError, nearest
-from cosserat_fenicsx.models.choose import Choice, choose
+from cosserat_fenicsx.models.signature import Choice, choose
 from cosserat_fenicsx.models.formulation import formulation_of
 from cosserat_fenicsx.models.rodmesh import Layout
 from cosserat_fenicsx.parts import per_scene

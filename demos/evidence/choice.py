@@ -17,7 +17,7 @@ from harness import HEADS, command, in_turns, judged, table, timed, write
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx import compat
-from cosserat_fenicsx.models.choose import fitting
+from cosserat_fenicsx.models.signature import fitting
 
 SCENES = ("eccentric_cantilever", "bend_45", "lees_frame", "helical_spring", "riser", "tripod")
 ASKED = 1.7  # at most, the time of "auto" over that of the best by hand

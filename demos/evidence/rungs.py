@@ -17,7 +17,7 @@ from harness import HEADS, command, in_turns, judged, share, table, write
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx import compat
-from cosserat_fenicsx.models.choose import fitting
+from cosserat_fenicsx.models.signature import fitting
 
 STEEL = cf.Material(E=210e9, nu=0.3, density=7850.0)
 SWEEP = np.linspace(0.05, 1.5, 31)

@@ -17,7 +17,7 @@ from cosserat_fenicsx.models.rodmesh import Layout
 from cosserat_fenicsx.ranks import communicator
 from cosserat_fenicsx.results.accuracy import on_mesh
 from cosserat_fenicsx.results.contacts import check_passes
-from cosserat_fenicsx.results.export import saved
+from cosserat_fenicsx.results import saved
 from cosserat_fenicsx.results.path import Path
 from cosserat_fenicsx.results.records import Event, Record, Records, lost_at
 from cosserat_fenicsx.results.rod_contacts import check_apart

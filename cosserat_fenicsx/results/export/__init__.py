@@ -1,1 +1,0 @@
-"""Results leave the program: files, tables, dictionaries, other libraries, notebooks."""
