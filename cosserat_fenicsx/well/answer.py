@@ -508,11 +508,11 @@ class TorqueAndDrag(Differentiated, Result):
         Raises:
             SceneError: see `plot`; no mud.
         """
-        from cosserat_fenicsx.well import charts, strength_charts
+        from cosserat_fenicsx.well import charts
 
         if self.mud is None:
             raise SceneError("plot_pressures: mud = None: expected the answer of a string in Mud(density)")
-        return charts.drawn(self, strength_charts.pressures_figure, file, between, units=units, width=width)
+        return charts.drawn(self, charts.pressures_figure, file, between, units=units, width=width)
 
     def plot_from_side(
         self,

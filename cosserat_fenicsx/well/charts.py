@@ -522,3 +522,51 @@ def _draw_forces(axes, answer, top, width):
             tail = wall + sign * _ARROW * width * max(force / most, 0.3)
             axes.annotate("", (at, wall), (at, tail), arrowprops={"arrowstyle": "-|>", "color": _FORCE, "lw": 2})
             axes.text(at, tail + sign * 0.02 * width, f"{told:.2f} {unit}", **note)
+
+
+_PRESSURE = Quantity("pressure", unit="Pa", shown="MPa")
+_DENSITY = Quantity("density", unit="kg/m^3")
+
+
+def pressures_figure(answer, between=None):
+    """Fluids, pressures and tensions along a string; see `TorqueAndDrag.plot_pressures`."""
+    top, bottom = depths_between("plot_pressures", between, answer.depth)
+    figure, panels, _, length = over_depth([2.4, 2.7, 2.7], DEPTH)
+    rows, room = rows_between(answer.md, top, bottom), 0.01 * (bottom - top)
+    panels[0].set_ylim((bottom + room) / length, (top - room) / length)
+    ends = np.array([top, *(x for x in answer.mud.interfaces if top < x < bottom), bottom])
+    densities = answer.mud.densities((ends[1:] + ends[:-1]) / 2)
+    _fluids(panels[0], ends / length, densities)
+    for panel, quantity, lines in (
+        (panels[1], _PRESSURE, {"in the string": answer.pressure_inside, "around it": answer.pressure_outside}),
+        (panels[2], _TENSION, {"effective tension": answer.tension, "true tension": answer.true_tension}),
+    ):
+        heading, size = scale(quantity)
+        # the second one is dashed, so that both are seen where they are equal
+        styles = {"color": "black"}, {"color": "tab:blue", "linestyle": (0, (4, 4)), "linewidth": 2.2}
+        for (name, values), style in zip(lines.items(), styles, strict=True):
+            panel.plot(values[rows] / size, answer.md[rows] / length, label=name, **style)
+        for end in ends[1:-1] / length:
+            panel.axhline(end, color=GREY, linewidth=0.6, linestyle=(0, (6, 3)))
+        panel.set_xlabel(heading)
+    panels[2].axvline(0.0, color="black", linewidth=0.6)
+    legend(*panels)
+    figure.suptitle(f"Fluids: {title_of(answer, top, bottom)}")
+    return figure
+
+
+def _fluids(panel, ends, densities):
+    """Columns of fluid: around the string at both sides of those in it, darker the heavier, with their densities."""
+    unit, size = unit_of(_DENSITY)
+    low, high = densities.min(), densities.max()
+    for (left, right), column in (((0, 1), densities[0]), ((1, 2), densities[1])):
+        starts = np.flatnonzero(np.diff(column, prepend=np.nan) != 0)
+        for i, j in zip(starts, [*starts[1:], len(column)], strict=True):
+            shade = 0.15 + 0.5 * (column[i] - low) / (high - low or 1.0)
+            panel.fill_between([left, right], ends[i], ends[j], color=COLOURS[0], alpha=shade, linewidth=0)
+            panel.text((left + right) / 2, (ends[i] + ends[j]) / 2, f"{column[i] / size:.4g}", ha="center", va="center")
+    panel.axvline(1.0, color="black", linewidth=2.0)
+    panel.set_xlim(0, 2)
+    panel.set_xticks([0.5, 1.5], ["around", "inside"])
+    panel.set_xlabel(f"density of the fluid ({unit})")
+    panel.grid(visible=False)

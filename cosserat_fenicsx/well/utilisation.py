@@ -1,4 +1,4 @@
-"""How much of a string's strength its loads take, along the string: `TorqueAndDrag.utilisation`."""
+"""How much of a string's strength its loads take, along the string: `TorqueAndDrag.utilisation`; and its chart."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -9,10 +9,20 @@ import numpy as np
 
 from cosserat_fenicsx.checks import File, refuse
 from cosserat_fenicsx.errors import SceneError, nearest
+from cosserat_fenicsx.pictures.charts import COLOURS, GREY, legend, scale, unit_of
 from cosserat_fenicsx.quantities import Quantity, Units
 from cosserat_fenicsx.results import screen
 from cosserat_fenicsx.results.result import Result, by_name
 from cosserat_fenicsx.well.strength import GRADES, MODES, UNKNOWN, PipeStrength, bent, span_of, usual_yield
+from cosserat_fenicsx.well.charts import (
+    DEPTH,
+    depths_between,
+    drawn,
+    over_depth,
+    rows_between,
+    string_in_hole,
+    title_of,
+)
 from cosserat_fenicsx.well.components import DrillPipe
 from cosserat_fenicsx.well.contacts import stretches
 from cosserat_fenicsx.well.pieces import von_mises
@@ -333,9 +343,7 @@ class Utilisation(Result):
         Raises:
             SceneError: see `TorqueAndDrag.plot`.
         """
-        from cosserat_fenicsx.well import charts, strength_charts
-
-        return charts.drawn(self, strength_charts.utilisation_figure, file, between, units=units, width=width)
+        return drawn(self, utilisation_figure, file, between, units=units, width=width)
 
     def __repr__(self):
         return f"Utilisation({self.answer.operation.name}: largest {self.largest:.4g} at md = {self.worst_at:g} m)"
@@ -345,3 +353,76 @@ def _over(load, limit):
     """Their ratio; infinite where a load has no limit left."""
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.where(load > 0, load / limit, 0.0 * load * limit)  # NaN where one of them is not known
+
+
+_SHARE = Quantity("share of the limit", unit="1")
+_TENSION = Quantity("effective tension", unit="N", shown="kN")
+_DOGLEG = Quantity("dogleg", unit="rad/m", shown="deg/30m")
+_BENDING = Quantity("bending stress", unit="Pa", shown="MPa")
+# The shares that are drawn, the first in black.
+_SHARES = ("von_mises", "tension", "torsion", "collapse", "burst")
+# Doglegs are shown up to this many times the hole's largest.
+_FAR = 3.0
+
+
+def utilisation_figure(use, between=None):
+    """The string in its hole, shares of limits, tension, bending stress and doglegs; see `Utilisation.plot`."""
+    answer = use.answer
+    top, bottom = depths_between("plot", between, answer.depth)
+    rotating = np.isfinite(use.allowed_dogleg).any()
+    draws = [_shares, _tension, _bending, *([_doglegs] if rotating else [])]
+    figure, panels, _, length = over_depth([2.0, 2.9, 2.4, 2.4, 2.4][: 1 + len(draws)], DEPTH)
+    rows, room = rows_between(use.md, top, bottom), 0.01 * (bottom - top)
+    depth = use.md[rows] / length
+    panels[0].set_ylim((bottom + room) / length, (top - room) / length)
+    string_in_hole(panels[0], answer, rows, depth)
+    for panel, draw in zip(panels[1:], draws, strict=True):
+        draw(panel, use, rows, depth)
+    legend(*panels)
+    unit, size = unit_of(DEPTH)
+    told = f"largest utilisation {use.largest:.3g} (von Mises), at {use.worst_at / size:.5g} {unit}"
+    figure.suptitle(f"Strength: {title_of(answer, top, bottom)}\n{told}")
+    return figure
+
+
+def _shares(panel, use, rows, depth):
+    for i, name in enumerate(_SHARES):
+        values = getattr(use, name)[rows]
+        if np.nanmax(values, initial=0.0) > 1e-3:
+            look = {"color": "black", "linewidth": 2.0} if i == 0 else {"color": COLOURS[i - 1]}
+            panel.plot(values, depth, label=_KINDS[name], **look)
+    most = max(1.15, 1.1 * min(np.nanmax(use.von_mises[rows], initial=0.0), 3.0))
+    panel.axvspan(1.0, most, color="tab:red", alpha=0.15, linewidth=0, label="beyond the limit")
+    panel.set_xlim(0.0, most)
+    panel.set_xlabel(_SHARE.heading())
+
+
+def _tension(panel, use, rows, depth):
+    heading, size = scale(_TENSION)
+    tension, torque = use.answer.tension[rows], use.answer.torque
+    limit = use._of(lambda strength, here: strength.tension_at(torque[here]))[rows]
+    panel.plot(tension / size, depth, color="black", label="effective tension")
+    panel.plot(limit / size, depth, color="tab:red", label="at yield, with the torque")
+    panel.axvline(0.0, color="black", linewidth=0.6)
+    panel.set_xlim(right=1.15 * max(np.nanmin(limit), tension.max()) / size)
+    panel.set_xlabel(heading)
+
+
+def _bending(panel, use, rows, depth):
+    heading, size = scale(_BENDING)
+    fatigue = use._of(lambda strength, here: strength.fatigue_stress(use.answer.tension[here]))[rows]
+    panel.plot(use.bending_stress[rows] / size, depth, color="black", label="bending stress")
+    if np.isfinite(fatigue).any():
+        panel.plot(fatigue / size, depth, color="tab:orange", label="fatigue limit of drill pipe that rotates")
+    panel.set_xlim(left=0.0)
+    panel.set_xlabel(heading)
+
+
+def _doglegs(panel, use, rows, depth):
+    heading, size = scale(_DOGLEG)
+    hole, allowed = use.dogleg_severity[rows] / size, use.allowed_dogleg[rows] / size
+    panel.plot(hole, depth, color=GREY, linewidth=1.5, label="dogleg of the hole")
+    panel.plot(allowed, depth, color="tab:orange", linestyle="--", label="allowed dogleg (fatigue)")
+    most = max(np.nanmax(hole, initial=0.0), np.nanmin(allowed) if np.isfinite(allowed).any() else 0.0)
+    panel.set_xlim(0.0, _FAR * most if most > 0 else None)
+    panel.set_xlabel(heading)
