@@ -189,8 +189,7 @@ _STYLES = {"work": "--", "lost": ":"}
 _SWINGS = 80
 
 
-@_drawn
-def draw_over_time(history, between=None):
+def over_time_figure(history, between=None):
     """See `DrillingHistory.plot`."""
     rows = times_between("plot", history.times, between)
     t = history.times[rows]

@@ -15,7 +15,7 @@ from cosserat_fenicsx.drilling.stick_slip import SPEED, TORQUE, StickSlip, alias
 from cosserat_fenicsx.errors import SceneError, nearest
 from cosserat_fenicsx.quantities import Quantity, as_text
 from cosserat_fenicsx.results import screen
-from cosserat_fenicsx.results.result import Result, by_name
+from cosserat_fenicsx.results.result import ChartedBetween, by_name
 
 #: Columns of the rows of a `StringModel`.
 COLUMNS = ("times", *SERIES, *LEDGER)
@@ -76,7 +76,7 @@ def _without_torque(scene):
             'expected torque= (N m), that of the steady rotation, or start="steady".')  # fmt: skip
 
 
-class DrillingHistory(Result):
+class DrillingHistory(ChartedBetween):
     """The motion of a drill-string, from `drilling.simulate`.
 
     SI units, angles in rad. Angles, speeds and torques are positive in the sense of drilling; displacements, velocities
@@ -86,6 +86,9 @@ class DrillingHistory(Result):
     A row holds for the end of a step. Forces, torques and speeds along the string are means over the last step, in a
     string with torsion alone over the last two, there except the speeds of a drive or a bit with inertia. Means hold
     for `mean_times`, to second order in the step; as values at `times` they are late by half a step, or by one.
+
+    `plot` draws the speeds of drive and bit and the torques over time; of a model with motion along the axis also hook
+    load, weight on bit, and the velocities of block and bit.
 
     Arrays (n,) over `times`:
 
@@ -113,6 +116,7 @@ class DrillingHistory(Result):
 
     #: For messages.
     axis = _rows_axis = "time"
+    _chart = "drilling.charts.over_time_figure"
     _quantities = _QUANTITIES
 
     def __init__(self, scene, model, why, dt, depths, rows=None, profiles=None, counts=None, folder=None):
@@ -344,30 +348,6 @@ class DrillingHistory(Result):
                             _CAPTION if rows == screen.ROWS else None)  # fmt: skip
 
     # -- pictures ----------------------------------------------------------------------------------------------------
-
-    def plot(
-        self,
-        file: File | None = None,
-        between: tuple[float, float] | None = None,
-        *,
-        units: Any = "SI",
-        width: int | None = None,
-    ):
-        """Draw the speeds of drive and bit and the torques over time; of a model with motion along the axis also hook
-        load, weight on bit, and the velocities of block and bit.
-
-        Args:
-            file: .png, .pdf or another format of matplotlib (rank 0 writes); None returns the Figure.
-            between: times (s) from which to which; None for all.
-            units: "SI", "field", or a dict of units by dimensions, such as {"force": "klbf"}.
-            width: of the picture, pixels, which its fonts and legends are arranged for; None for 150 to the inch.
-
-        Raises:
-            SceneError: matplotlib is missing, an unknown ending, or fewer than two times.
-        """
-        from cosserat_fenicsx.drilling.charts import draw_over_time
-
-        return draw_over_time(self, file, between, units=units, width=width)
 
     def plot_map(
         self,

@@ -298,11 +298,36 @@ class Charted(Result):
             SceneError: matplotlib is missing, the ending is unknown, or there is nothing to draw.
             OSError: the file cannot be written.
         """
+        return self._drawn(file, units, width)
+
+    def _drawn(self, file, units, width, *given):
         from cosserat_fenicsx.pictures.charts import draw_chart
 
         module, _, name = self._chart.rpartition(".")
         make = getattr(import_module(f"cosserat_fenicsx.{module}"), name)
-        return draw_chart(lambda: make(self), file, self._ranks, units=units, width=width)
+        return draw_chart(lambda: make(self, *given), file, self._ranks, units=units, width=width)
+
+
+class ChartedBetween(Charted):
+    """A result with one chart over measured depths or times, of which a part can be drawn."""
+
+    def plot(self, file: File | None = None, between: tuple[float, float] | None = None, *, units: Any = "SI",
+             width: int | None = None):  # fmt: skip
+        """Draw the chart that the class describes.
+
+        Args:
+            file: .png, .pdf or another format of matplotlib (rank 0 writes); None returns the Figure.
+            between: measured depths (m), such as those of the bottom-hole assembly, or times (s), from which to which;
+                None for all.
+            units: "SI", "field", or a dict of units by dimensions, such as {"force": "klbf"}.
+            width: of the picture, pixels, which its fonts and legends are arranged for; None for 150 to the inch.
+
+        Raises:
+            SceneError: matplotlib is missing, the ending is unknown, depths that the string has not, or fewer than two
+                times.
+            OSError: the file cannot be written.
+        """
+        return self._drawn(file, units, width, between)
 
 
 # Most rods whose numbers of elements are listed one by one.

@@ -11,7 +11,7 @@ import numpy as np
 from cosserat_fenicsx.checks import File, positive
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.quantities import Quantity
-from cosserat_fenicsx.results.result import Result, by_name
+from cosserat_fenicsx.results.result import ChartedBetween, by_name
 from cosserat_fenicsx.well import criteria, tables
 from cosserat_fenicsx.well.components import DrillString
 from cosserat_fenicsx.well.contacts import WallContact, contacts_of, high_side, side_force_up_to, sides_of
@@ -85,11 +85,14 @@ _QUANTITIES = by_name(
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class TorqueAndDrag(Differentiated, Result):
+class TorqueAndDrag(Differentiated, ChartedBetween):
     """Loads of a string in its hole, from `torque_and_drag`. SI units; depths are measured depths.
 
     Arrays run down the hole along `md`, which repeats a depth where something jumps: the value above it, then that
     below. A string of components that are given by numbers has no true tension and no von Mises stress (NaN).
+
+    `plot` draws the string in its hole, tension with the loads of buckling, torque, side force per length and at
+    points, and bending moment along the string, depth downwards.
 
     Attributes:
         model: what was solved: "soft", "buckled" or "rod".
@@ -111,6 +114,7 @@ class TorqueAndDrag(Differentiated, Result):
     distributed_force = property(lambda self: self.side_force, doc="`side_force` (N/m) without forces at points.")
     # For the tables: how the bending moment was found, and effects that no error estimate includes.
     _quantities, _rows_axis, _beside = _QUANTITIES, "place", MappingProxyType({"_contacts": "contact"})
+    _chart = "well.charts.answer_figure"
     _on_screen = ("md", "component_name", "inclination", "tension", "torque", "distributed_force", "bending_moment",
                   "von_mises", "state")  # fmt: skip
     _moment_words: ClassVar[str] = "EI times the hole's curvature"
@@ -467,30 +471,6 @@ class TorqueAndDrag(Differentiated, Result):
 
     def _table(self, units, rows):
         return tables.along(self, units, rows)
-
-    def plot(
-        self,
-        file: File | None = None,
-        between: tuple[float, float] | None = None,
-        *,
-        units: Any = "SI",
-        width: int | None = None,
-    ):
-        """Draw the string in its hole, tension with the loads of buckling, torque, side force per length and at points,
-        and bending moment along the string, depth downwards.
-
-        Args:
-            file: .png, .pdf or another format of matplotlib (rank 0 writes); None returns the Figure.
-            between: measured depths (m) from which to which it shows them, such as those of the bottom-hole assembly.
-            units: "SI", "field", or a dict of units by dimensions, such as {"force": "klbf"}.
-            width: of the picture, pixels, which its fonts and legends are arranged for; None for 150 to the inch.
-
-        Raises:
-            SceneError: matplotlib is missing, or the ending is unknown; depths that the string has not.
-        """
-        from cosserat_fenicsx.well import charts
-
-        return charts.drawn(self, charts.answer_figure, file, between, units=units, width=width)
 
     def plot_pressures(
         self,

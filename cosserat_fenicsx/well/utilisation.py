@@ -7,17 +7,16 @@ from typing import Any
 
 import numpy as np
 
-from cosserat_fenicsx.checks import File, refuse
+from cosserat_fenicsx.checks import refuse
 from cosserat_fenicsx.errors import SceneError, nearest
 from cosserat_fenicsx.pictures.charts import COLOURS, GREY, legend, scale, unit_of
 from cosserat_fenicsx.quantities import Quantity, Units
 from cosserat_fenicsx.results import screen
-from cosserat_fenicsx.results.result import Result, by_name
+from cosserat_fenicsx.results.result import ChartedBetween, by_name
 from cosserat_fenicsx.well.strength import GRADES, MODES, UNKNOWN, PipeStrength, bent, span_of, usual_yield
 from cosserat_fenicsx.well.charts import (
     DEPTH,
     depths_between,
-    drawn,
     over_depth,
     rows_between,
     string_in_hole,
@@ -67,10 +66,12 @@ def _strength(owner, part, grade, wear):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Utilisation(Result):
+class Utilisation(ChartedBetween):
     """Loads over what the body of the string bears, from `TorqueAndDrag.utilisation`: 1 is the limit.
 
     Arrays run along `md` as those of the answer; NaN of the bit, and where something is not known, which `notes` say.
+    `plot` draws the string in its hole, its utilisation, tension with what it may be, and the dogleg of the hole with
+    what is allowed, depth downwards.
 
     Attributes:
         answer: the `TorqueAndDrag`. strengths: [`PipeStrength`] from the bit up, None of a bit.
@@ -79,7 +80,7 @@ class Utilisation(Result):
     answer: Any
     strengths: list
 
-    _rows_axis = "place"
+    _rows_axis, _chart = "place", "well.utilisation.utilisation_figure"
     _quantities = by_name(
         Quantity("largest", "largest utilisation, von Mises", axes=()),
         Quantity("worst_at", "its measured depth", "m", axes=()),
@@ -331,19 +332,6 @@ class Utilisation(Result):
                             "loads over limits of the pipe body",
                             "von Mises over yield strength; each other load over its limit alone; fatigue and allowed "
                             "dogleg: of drill pipe that rotates")  # fmt: skip
-
-    def plot(self, file: File | None = None, between: tuple[float, float] | None = None, *, units: Any = "SI",
-             width: int | None = None):  # fmt: skip
-        """Draw the string in its hole, its utilisation, tension with what it may be, and the dogleg of the hole with
-        what is allowed, depth downwards.
-
-        Args:
-            file, between, units, width: see `TorqueAndDrag.plot`.
-
-        Raises:
-            SceneError: see `TorqueAndDrag.plot`.
-        """
-        return drawn(self, utilisation_figure, file, between, units=units, width=width)
 
     def __repr__(self):
         return f"Utilisation({self.answer.operation.name}: largest {self.largest:.4g} at md = {self.worst_at:g} m)"
