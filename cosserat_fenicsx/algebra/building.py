@@ -25,7 +25,7 @@ from cosserat_fenicsx.compat import compiling
 
 SOURCES = tuple(
     Path(__file__).with_name(f"{name}.c")
-    for name in ("chain", "ties", "newton", "sweep", "compared", "contact", "pairs")
+    for name in ("chain", "ties", "newton", "lanes", "sweep", "compared", "contact", "pairs")
 )
 # What -ffast-math would add hides numbers that are not finite, and changes sums. Python's own -fwrapv slows loops down.
 _FLAGS = ("-O3", "-fno-math-errno", "-ffp-contract=fast", "-fno-wrapv", "-fopenmp-simd", "-fvisibility=hidden", "-g0")
@@ -144,7 +144,7 @@ class _Kernel(Pointers):
     def __init__(self, compiled, address, mesh, elements, size):
         super().__init__()
         self._compiled = compiled  # keeps the machine code
-        self.size, self.elements, ffi = size, elements, self._ffi
+        self.address, self.size, self.elements, ffi = address, size, elements, self._ffi
         self.c = kernel = ffi.new("kernel *")
         kernel.tabulate, kernel.elements, kernel.size = ffi.cast("void *", address), elements, size
         corners = compat.geometry_dofs(mesh)[:elements]
@@ -190,6 +190,13 @@ class Packed(_Kernel):
         self._set(self._w, self._c, sources, [slot for constant in constants for slot in self._slots(constant.value)])
         if self._others:
             self.c.next = self._others.c
+
+    def parts(self):
+        """This form and those that are added to it."""
+        part = self
+        while part:
+            yield part
+            part = part._others
 
     def _pack(self):
         """{key of the integral: coefficients (elements, n)}."""
@@ -238,10 +245,8 @@ class Packed(_Kernel):
     def add_to_matrix(self, A):
         """Add a bilinear form to a PETSc matrix by the matrix's local-to-global map; -1 there means to skip."""
         self._lib.pack(self.c)
-        part = self
-        while part:
+        for part in self.parts():
             cpp.fem.petsc.assemble_matrix(A, part._form, part._c, {part._key: part._w} if part._key else {}, [])
-            part = part._others
 
 
 class PackedExpression(_Kernel):

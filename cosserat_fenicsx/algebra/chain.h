@@ -4,6 +4,8 @@
 #ifndef CHAIN_H
 #define CHAIN_H
 
+enum { LANES = 4 }; /* problems that are solved at once */
+
 /* Values of a Function that change, and the first column of an element's packed coefficients that takes them. */
 typedef struct {
     const double *values;
@@ -207,7 +209,7 @@ typedef struct {
 
 /* What to do with a step (the last three reject it), and why a sweep returned. */
 enum { ACCEPTED, UNSURE, REJECTED, TOO_FAR, OPPOSITE };
-enum { DONE, LEFT, LATER, FULL };
+enum { DONE, LEFT, LATER, FULL, GOING };
 
 /* A continuation in the load factor, see statics/path/load_control.py. */
 typedef struct {
@@ -227,6 +229,28 @@ typedef struct {
     int *recorded_iterations, *recorded_steps;
     double *work;                   /* (6, numbers) */
 } sweep;
+
+/* A kernel of LANES problems at once, see lanes.c; numbers of the lanes are next to each other. */
+typedef struct lane_kernel {
+    void *tabulate;                 /* FFCx's function for one element of each lane */
+    int constants;
+    double *w, *c;                  /* coefficients (elements, width, LANES), constants (constants, LANES) */
+    struct lane_kernel *next;
+} lane_kernel;
+
+/* Those of problems without an interface, and work space: of an element; (elements, room, room + 1) fronts;
+   (unknowns,); all of them times LANES. */
+typedef struct {
+    lane_kernel *residual, *tangent, *second[2];
+    double *A, *front, *x;
+} lock_step;
+
+/* Sweeps that go on in lock step, each for itself where `together` is 0. */
+typedef struct {
+    int count;
+    sweep *sweep[LANES];
+    lock_step *together;
+} group;
 
 /* Numbers that differ from case to case: to[place[j]] = values[which[j]] of the case. */
 typedef struct {
@@ -285,9 +309,10 @@ typedef struct {
 
 /* Many cases, see compared.c. */
 typedef struct {
-    comparison *meshes;
-    written *written;
-    int parts, count, next, width;
+    comparison *meshes[LANES];
+    written *written[LANES];
+    group coarse, fine;
+    int lanes, parts, count, next, width; /* cases that are solved at once; of `written`; cases; .. */
     const double *values;           /* (cases, width) */
     double first, near, patience;   /* first step; largest motion of a correction; seconds after which to return */
     double *found, *errors;         /* (cases, queries) */
@@ -328,7 +353,9 @@ int residual(problem *p, const double *x, double *b);
 int tangent(problem *p);
 int solve(problem *p, const double *b, double *x);
 void advance(problem *p);
-int equilibrate(newton *n, double *x);
+int begin_residual(problem *p, const double *x);
+int end_residual(problem *p, const double *x, double *b);
+void equilibrate(const group *g, int *in);
 void begin_newton(newton *n);
 int judge_residual(newton *n, const double *b, const double *change);
 int iterate(stepping *s);
@@ -349,6 +376,11 @@ void accept_step(step_control *c, double taken, double growth);
 int reject_step(step_control *c, double taken);
 
 int negative_modes(second_variation *v, int *sideways);
+void take_lanes(const group *g);
+void residuals(const group *g, int *in, double *const *x, double *const *b);
+void directions(const group *g, int *in, double *const *b, double *const *x);
+void count_negative(const group *g, const int *in, int *negative);
+void run_all(const group *g, int *why);
 int run(sweep *s);
 int correct(sweep *s, const double *starts, const int *expected, double near);
 int run_cases(cases *c);

@@ -1,5 +1,5 @@
-/* Many cases of one scene: the numbers of each are written in turn on two meshes; it is swept from rest on the first,
-   corrected on the second, and judged by both. A case that is not decided here is left to Python.
+/* Many cases of one scene: the numbers of a few are written at a time, each on two meshes of its own; they are swept
+   from rest on the first, corrected on the second, and judged by both. What is not decided here is left to Python.
 
    Two meshes of a case: the state of the finer one from that of the coarser, the error estimate of both, and queries. What
    is compared, and with what margins, is said in results/compared.py and results/accuracy.py, contact forces at nodes in
@@ -316,55 +316,80 @@ static int answer(const comparison *p, double *values, double *errors)
 
 /* ---- many cases --------------------------------------------------------------------------------------------------- */
 
-/* The whole sweep to its load factor, from rest; 0 where all steps were decided and the rest state is stable. */
-static int sweep_case(const cases *c, const mesh *m)
+/* The whole sweeps to their load factor, from rest; those leave where a step was not decided or the rest state is not
+   stable. */
+static void sweep_cases(const cases *c, const group *g, int *in)
 {
-    sweep *s = m->sweep;
-    int sideways;
-    s->known = 1, s->known_load_factors[0] = 0;
-    memcpy(s->points, m->at_rest, s->numbers * sizeof *s->points);
-    s->control->step = c->first, s->control->rejections = s->control->accepted = 0;
-    s->next = s->records = s->iterations = s->steps = 0;
-    if (put(s, s->points, 0)) return 1;
-    s->negative = negative_modes(s->stability, &sideways);
-    return s->negative || run(s) != DONE;
+    int negative[LANES], why[LANES];
+    for (int k = 0; k < g->count; k++) {
+        sweep *s = g->sweep[k];
+        s->known = 1, s->known_load_factors[0] = 0;
+        memcpy(s->points, c->meshes[k]->coarse->at_rest, s->numbers * sizeof *s->points);
+        s->control->step = c->first, s->control->rejections = s->control->accepted = 0;
+        s->next = s->records = s->iterations = s->steps = 0;
+        in[k] = !put(s, s->points, 0);
+    }
+    count_negative(g, in, negative);
+    for (int k = 0; k < g->count; k++) {
+        why[k] = in[k] && !negative[k] ? GOING : LEFT;
+        g->sweep[k]->negative = 0;
+    }
+    run_all(g, why);
+    for (int k = 0; k < g->count; k++) in[k] = why[k] == DONE;
 }
 
-/* Newton's method at the load factor from a start; 0 where it finds a stable state near it. */
-static int correct_case(const cases *c, const mesh *m)
+/* Newton's method at the load factor from the states of the coarse mesh; those leave where it finds no stable state
+   near them. */
+static void correct_cases(const cases *c, const group *g, int *in)
 {
-    sweep *s = m->sweep;
-    double *start = s->points;
-    transfer(c->meshes, start);
-    s->iterations = 0;
-    if (strays(s, start, *s->load_factors, 0, c->near)) return 1;
-    memcpy(s->recorded, s->work, s->newton->problem->size * sizeof *start);
-    if (s->fields) tabulate_all(s->fields, s->recorded_fields);
-    return 0;
+    double *start[LANES], load_factor[LANES];
+    for (int k = 0; k < g->count; k++) {
+        sweep *s = g->sweep[k];
+        start[k] = s->points, load_factor[k] = *s->load_factors, s->iterations = 0;
+        if (in[k]) transfer(c->meshes[k], start[k]);
+    }
+    stay_near(g, in, start, load_factor, 0, c->near);
+    EACH(k, g, in) {
+        sweep *s = g->sweep[k];
+        memcpy(s->recorded, s->work, s->newton->problem->size * sizeof *s->work);
+        if (s->fields) tabulate_all(s->fields, s->recorded_fields);
+    }
 }
 
-static int decide(const cases *c, double *values, double *errors)
+static void expand_recorded(const mesh *m)
 {
-    const comparison *p = c->meshes;
-    const mesh *coarse = p->coarse, *fine = p->fine;
-    if (sweep_case(c, coarse)) return 1;
-    expand(coarse, coarse->sweep->recorded, coarse->sweep->recorded_fields, *coarse->sweep->load_factors);
-    if (correct_case(c, fine)) return 1;
-    expand(fine, fine->sweep->recorded, fine->sweep->recorded_fields, *fine->sweep->load_factors);
-    return answer(p, values, errors);
+    expand(m, m->sweep->recorded, m->sweep->recorded_fields, *m->sweep->load_factors);
+}
+
+/* Solve `count` cases from the next one on, each with meshes of its own. */
+static void decide(cases *c, int count)
+{
+    const int queries = c->meshes[0]->queries;
+    int in[LANES];
+    c->coarse.count = c->fine.count = count;
+    for (int k = 0; k < count; k++) {
+        const double *values = c->values + (size_t)(c->next + k) * c->width;
+        for (const written *w = c->written[k]; w < c->written[k] + c->parts; w++)
+            for (int j = 0; j < w->count; j++) w->to[w->place[j]] = values[w->which[j]];
+    }
+    take_lanes(&c->coarse), take_lanes(&c->fine);
+    sweep_cases(c, &c->coarse, in);
+    EACH(k, &c->coarse, in) expand_recorded(c->meshes[k]->coarse);
+    correct_cases(c, &c->fine, in);
+    for (int k = 0; k < count; k++, c->next++) {
+        const size_t at = (size_t)c->next * queries;
+        if (in[k]) expand_recorded(c->meshes[k]->fine);
+        c->undecided[c->next] = !in[k] || answer(c->meshes[k], c->found + at, c->errors + at);
+    }
 }
 
 /* The next cases; LATER where some are left after `patience`, so that Python can obey Ctrl-C. */
 int run_cases(cases *c)
 {
     const double began = now();
-    const int queries = c->meshes->queries;
     while (c->next < c->count) {
-        const int k = c->next++;
-        const double *values = c->values + (size_t)k * c->width;
-        for (const written *w = c->written; w < c->written + c->parts; w++)
-            for (int j = 0; j < w->count; j++) w->to[w->place[j]] = values[w->which[j]];
-        c->undecided[k] = decide(c, c->found + (size_t)k * queries, c->errors + (size_t)k * queries);
+        const int left = c->count - c->next;
+        decide(c, left < c->lanes ? left : c->lanes);
         if (now() - began > c->patience) return c->next < c->count ? LATER : DONE;
     }
     return DONE;

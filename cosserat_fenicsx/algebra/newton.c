@@ -44,12 +44,16 @@ int take_state(problem *p, const double *x)
     return put_state(p, x, 0);
 }
 
-/* The residual b at x; the state follows x. */
-int residual(problem *p, const double *x, double *b)
+/* The state follows x, before the elements' residuals are added to `local`. */
+int begin_residual(problem *p, const double *x)
 {
-    if (put_state(p, x, 1)) return FAILED;
     memset(p->local, 0, p->locals * sizeof *p->local);
-    add_vector(p->residual, p->dofs, p->local);
+    return put_state(p, x, 1);
+}
+
+/* The residual b at x, after that. */
+int end_residual(problem *p, const double *x, double *b)
+{
     memset(b, 0, p->size * sizeof *b);
     if (p->serial)
         for (int i = 0; i < p->frees; i++) b[p->of_free[i]] += p->local[p->free[i]];
@@ -61,6 +65,14 @@ int residual(problem *p, const double *x, double *b)
     for (int k = 0; k < 3 && p->load[k]; k++)
         for (int i = 0; i < p->size; i++) b[i] -= *p->factor[k] * p->load[k][i];
     return 0;
+}
+
+/* The residual b at x; the state follows x. */
+int residual(problem *p, const double *x, double *b)
+{
+    if (begin_residual(p, x)) return FAILED;
+    add_vector(p->residual, p->dofs, p->local);
+    return end_residual(p, x, b);
 }
 
 /* Factors of the tangent at the state. */
@@ -321,24 +333,37 @@ void begin_newton(newton *n)
     if (p->advance) memcpy(p->before, p->state, p->locals * sizeof *p->state);
 }
 
-/* Newton's method with full steps from the state, whose unknowns are x; these, the state and the carried contact force
-   follow. It takes the steps that SNES takes (algebra/newton.py), without the time that SNES takes for its options. */
-int equilibrate(newton *n, double *x)
+/* Newton's method with full steps from the states of the sweeps that take part, whose unknowns are x; these, the
+   states and the carried contact forces follow; who fails leaves. It takes the steps that SNES takes
+   (algebra/newton.py), without the time that SNES takes for its options. */
+void equilibrate(const group *g, int *in)
 {
-    problem *p = n->problem;
-    begin_newton(n);
-    if (residual(p, x, n->b) || judge_residual(n, n->b, 0)) return FAILED;
-    while (n->verdict == ITERATING) {
-        if (n->iterations > 0) advance(p);
-        if (tangent(p)) return FAILED;
-        if (solve(p, n->b, n->change)) return FAILED;
-        if (p->singular) {
-            n->verdict = SINGULAR;
-            return 0;
-        }
-        for (int i = 0; i < p->size; i++) x[i] -= n->change[i];
-        if (residual(p, x, n->b) || judge_residual(n, n->b, n->change)) return FAILED;
+    double *x[LANES], *b[LANES], *change[LANES];
+    int going[LANES], asked[LANES], first = 1;
+    for (int k = 0; k < g->count; k++) {
+        newton *n = g->sweep[k]->newton;
+        x[k] = g->sweep[k]->x, b[k] = n->b, change[k] = n->change, going[k] = in[k];
+        if (in[k]) begin_newton(n);
     }
-    if (n->verdict == CONVERGED) advance(p);
-    return 0;
+    for (;; first = 0) {
+        memcpy(asked, going, sizeof asked);
+        residuals(g, going, x, b);
+        int any = 0;
+        for (int k = 0; k < g->count; k++) {
+            newton *n = g->sweep[k]->newton;
+            if (!asked[k]) continue;
+            in[k] = going[k] && !judge_residual(n, b[k], first ? 0 : change[k]);
+            going[k] = in[k] && n->verdict == ITERATING;
+            if (in[k] && (n->verdict == CONVERGED || (going[k] && !first))) advance(n->problem);
+            any |= asked[k] = going[k];
+        }
+        if (!any) return;
+        directions(g, going, b, change);
+        for (int k = 0; k < g->count; k++) {
+            newton *n = g->sweep[k]->newton;
+            if (asked[k] && !going[k]) in[k] = 0;
+            if (going[k] && n->problem->singular) n->verdict = SINGULAR, going[k] = 0;
+            for (int i = 0; going[k] && i < n->problem->size; i++) x[k][i] -= change[k][i];
+        }
+    }
 }

@@ -8,6 +8,8 @@
 
 enum { COUNT = 128, FAILED_COUNT = -100 };
 
+#define EACH(k, g, in) for (int k = 0; k < (g)->count; k++) if ((in)[k])
+
 static int python_hook(void *self, int what, double *a, double *b);
 
 static double now(void)
@@ -163,36 +165,58 @@ static void take(const sweep *s, double *numbers)
     memcpy(numbers + p->size, p->carried, p->carries * sizeof *numbers);
 }
 
-/* The derivative of x by the load factor at the state, whose unknowns are x; see `Problem.load_derivative`. */
-static int slope(const sweep *s, const double *x, double *out)
+/* The derivatives of x by the load factor at the states, whose unknowns are x; see `Problem.load_derivative`. Who fails
+   leaves. */
+static void slopes(const group *g, int *in, double *const *x, double *const *out)
 {
-    problem *p = s->newton->problem;
-    double *ahead = s->work + 4 * s->numbers, *behind = ahead + s->numbers;
-    const double load_factor = *s->load_factor, change = s->change * fmax(1, fabs(load_factor));
-    *s->load_factor = load_factor + change;
-    int failed = residual(p, x, ahead);
-    *s->load_factor = load_factor - change;
-    failed |= residual(p, x, behind);
-    *s->load_factor = load_factor;
-    for (int i = 0; i < p->size; i++) ahead[i] = (behind[i] - ahead[i]) * 0.5 / change;
-    return failed || residual(p, x, behind) || tangent(p) || solve(p, ahead, out) || p->singular;
+    double *ahead[LANES], *behind[LANES], load_factor[LANES], change[LANES];
+    for (int k = 0; k < g->count; k++) {
+        const sweep *s = g->sweep[k];
+        ahead[k] = s->work + 4 * s->numbers, behind[k] = ahead[k] + s->numbers;
+        load_factor[k] = *s->load_factor, change[k] = s->change * fmax(1, fabs(load_factor[k]));
+        if (in[k]) *s->load_factor = load_factor[k] + change[k];
+    }
+    residuals(g, in, x, ahead);
+    EACH(k, g, in) *g->sweep[k]->load_factor = load_factor[k] - change[k];
+    residuals(g, in, x, behind);
+    for (int k = 0; k < g->count; k++) {
+        const sweep *s = g->sweep[k];
+        *s->load_factor = load_factor[k];
+        for (int i = 0; in[k] && i < s->newton->problem->size; i++)
+            ahead[k][i] = (behind[k][i] - ahead[k][i]) * 0.5 / change[k];
+    }
+    residuals(g, in, x, behind);
+    directions(g, in, ahead, out);
+    EACH(k, g, in) in[k] = !g->sweep[k]->newton->problem->singular;
 }
 
-/* Whether a step is longer than twice the mean slope of its two ends allows, see `Continuation._jumped`. */
-static int jumped(const sweep *s, const double *here, const double *found, double goal)
+/* Whether steps are longer than twice the mean slope of their ends allows, see `Continuation._jumped`; judged: those
+   that are UNSURE, on return what they are. */
+static void jumped(const group *g, int *judged, double *const *here, double *const *found, const double *goal)
 {
-    const newton *n = s->newton;
-    double *at_end = s->work + 2 * s->numbers, *at_start = at_end + s->numbers, slopes = 0, moves = 0;
-    const double load_factor = s->known_load_factors[s->known - 1];
-    if (slope(s, found, at_end) || put(s, here, load_factor) || slope(s, here, at_start) || put(s, found, goal))
-        return UNSURE;
-    for (int i = 0; i < n->nodes; i++)
-        for (int j = i * n->block; j < i * n->block + n->motion; j++) {
-            const double both = at_end[j] + at_start[j], move = found[j] - here[j];
-            slopes += both * both, moves += move * move;
-        }
-    const double change = goal - load_factor;
-    return slopes * change * change >= moves ? ACCEPTED : REJECTED; /* also what is not a number */
+    double *at_end[LANES], *at_start[LANES];
+    int in[LANES], asked[LANES];
+    for (int k = 0; k < g->count; k++) {
+        const sweep *s = g->sweep[k];
+        at_end[k] = s->work + 2 * s->numbers, at_start[k] = at_end[k] + s->numbers;
+        in[k] = asked[k] = judged[k] == UNSURE;
+    }
+    slopes(g, in, found, at_end);
+    EACH(k, g, in) in[k] = !put(g->sweep[k], here[k], g->sweep[k]->known_load_factors[g->sweep[k]->known - 1]);
+    slopes(g, in, here, at_start);
+    for (int k = 0; k < g->count; k++) {
+        const sweep *s = g->sweep[k];
+        const newton *n = s->newton;
+        double both = 0, moves = 0;
+        if (!asked[k] || !in[k] || put(s, found[k], goal[k])) continue;
+        for (int i = 0; i < n->nodes; i++)
+            for (int j = i * n->block; j < i * n->block + n->motion; j++) {
+                const double sum = at_end[k][j] + at_start[k][j], move = found[k][j] - here[k][j];
+                both += sum * sum, moves += move * move;
+            }
+        const double change = goal[k] - s->known_load_factors[s->known - 1];
+        judged[k] = both * change * change >= moves ? ACCEPTED : REJECTED; /* also what is not a number */
+    }
 }
 
 /* Record a point whose state is the present one. */
@@ -212,43 +236,45 @@ static int record_here(sweep *s)
     return record(s, s->points + (size_t)(s->known - 1) * s->numbers, s->known_load_factors[s->known - 1]);
 }
 
-/* Newton's method at a load factor from a start; where it is ACCEPTED, it has converged, to `found`. */
-static int reach(sweep *s, const double *start, double load_factor, double *found)
+/* Newton's method at load factors from starts; where it is ACCEPTED, it has converged, to `found`. judged: GOING where
+   a sweep takes part. */
+static void reach(const group *g, int *judged, double *const *start, const double *load_factor, double *const *found)
 {
-    newton *n = s->newton;
-    n->loads = fabs(load_factor) * s->loads;
-    if (put(s, start, load_factor) || equilibrate(n, s->x)) return UNSURE;
-    s->iterations += n->iterations;
-    if (n->verdict != CONVERGED) return REJECTED;
-    take(s, found);
-    return ACCEPTED;
+    int in[LANES];
+    for (int k = 0; k < g->count; k++) {
+        const sweep *s = g->sweep[k];
+        in[k] = judged[k] == GOING;
+        if (!in[k]) continue;
+        s->newton->loads = fabs(load_factor[k]) * s->loads;
+        judged[k] = UNSURE, in[k] = !put(s, start[k], load_factor[k]);
+    }
+    equilibrate(g, in);
+    EACH(k, g, in) {
+        sweep *s = g->sweep[k];
+        s->iterations += s->newton->iterations;
+        judged[k] = s->newton->verdict == CONVERGED ? ACCEPTED : REJECTED;
+        if (judged[k] == ACCEPTED) take(s, found[k]);
+    }
 }
 
-/* The same; whether it does not end within `near` of the start, with as many negative modes as expected. */
-static int strays(sweep *s, const double *start, double load_factor, int expected, double near)
+/* The same; those leave that do not end within `near` of the start, with as many negative modes as expected. */
+static void stay_near(const group *g, int *in, double *const *start, const double *load_factor, int expected,
+                      double near)
 {
-    int sideways;
-    return reach(s, start, load_factor, s->work) != ACCEPTED || !(largest(s, s->work, start) <= near)
-           || negative_modes(s->stability, &sideways) != expected;
+    double *found[LANES];
+    int judged[LANES], negative[LANES];
+    for (int k = 0; k < g->count; k++) judged[k] = in[k] ? GOING : REJECTED, found[k] = g->sweep[k]->work;
+    reach(g, judged, start, load_factor, found);
+    EACH(k, g, in) in[k] = judged[k] == ACCEPTED && largest(g->sweep[k], found[k], start[k]) <= near;
+    count_negative(g, in, negative);
+    EACH(k, g, in) in[k] = negative[k] == expected;
 }
 
-/* A step to a load factor. */
-static int attempt(sweep *s, double goal)
+/* The end of a step of one sweep becomes its last point. */
+static void take_step(sweep *s, const double *found, double goal, double off)
 {
-    double *guess = s->work, *found = s->work + s->numbers, *factors = s->known_load_factors;
-    const double *here = s->points + (size_t)(s->known - 1) * s->numbers;
+    double *factors = s->known_load_factors;
     const double taken = fabs(goal - factors[s->known - 1]);
-    int sideways;
-    s->control->shrink = 0.5;
-    if (!predict(s, goal, guess)) return UNSURE;
-    int judged = reach(s, guess, goal, found);
-    if (judged != ACCEPTED) return judged;
-    const double off = largest(s, found, guess);
-    if (!isfinite(off)) return REJECTED;
-    judged = judge(s, here, guess, found, off);
-    if (judged == UNSURE) judged = jumped(s, here, found, goal);
-    if (judged != ACCEPTED) return judged;
-    if (negative_modes(s->stability, &sideways) != s->negative) return UNSURE;
     const int order = s->known < 2 ? 1 : 2;
     if (s->known == 3) {
         memmove(s->points, s->points + s->numbers, 2 * (size_t)s->numbers * sizeof *found);
@@ -260,35 +286,102 @@ static int attempt(sweep *s, double goal)
     factors[s->known - 1] = goal;
     s->steps++;
     accept_step(s->control, taken, step_growth(s->control, off, order, s->newton->iterations));
-    return ACCEPTED;
 }
 
-/* Advance to the load factors in turn. Returns why it stopped. */
-int run(sweep *s)
+/* A step of each sweep that is GOING to its load factor. */
+static void attempt(const group *g, int *judged, const double *goal)
 {
-    const double began = now();
+    double *guess[LANES], *found[LANES], *here[LANES], off[LANES];
+    int in[LANES], unsure[LANES], negative[LANES];
+    for (int k = 0; k < g->count; k++) {
+        sweep *s = g->sweep[k];
+        guess[k] = s->work, found[k] = s->work + s->numbers, here[k] = s->points + (size_t)(s->known - 1) * s->numbers;
+        if (judged[k] != GOING) continue;
+        s->control->shrink = 0.5;
+        if (!predict(s, goal[k], guess[k])) judged[k] = UNSURE;
+    }
+    for (int k = 0; k < g->count; k++) in[k] = judged[k] == GOING;
+    reach(g, judged, guess, goal, found);
+    for (int k = 0; k < g->count; k++) {
+        const sweep *s = g->sweep[k];
+        in[k] = in[k] && judged[k] == ACCEPTED;
+        if (!in[k]) continue;
+        off[k] = largest(s, found[k], guess[k]);
+        judged[k] = isfinite(off[k]) ? judge(s, here[k], guess[k], found[k], off[k]) : REJECTED;
+    }
+    for (int k = 0; k < g->count; k++) unsure[k] = in[k] ? judged[k] : REJECTED; /* not where others fail */
+    jumped(g, unsure, here, found, goal);
+    for (int k = 0; k < g->count; k++) {
+        if (in[k]) judged[k] = unsure[k];
+        in[k] = in[k] && judged[k] == ACCEPTED;
+    }
+    count_negative(g, in, negative);
+    EACH(k, g, in) {
+        if (negative[k] == g->sweep[k]->negative) take_step(g->sweep[k], found[k], goal[k], off[k]);
+        else judged[k] = UNSURE;
+    }
+}
+
+/* Record the load factors that a sweep has reached. Returns whether it goes on, to `goal`; else `why` not. */
+static int find_goal(sweep *s, double *goal, int *why)
+{
     while (s->next < s->count) {
         const double here = s->known_load_factors[s->known - 1], wanted = s->load_factors[s->next];
-        if (here == wanted) {
-            s->next++, s->control->rejections = s->control->accepted = 0;
-            if (!s->every && record_here(s)) return FULL;
-            continue;
+        if (here != wanted) {
+            *goal = step_goal(s->control, here, wanted);
+            return 1;
         }
-        const double goal = step_goal(s->control, here, wanted);
-        const int before = s->iterations, judged = attempt(s, goal);
-        if (judged != ACCEPTED) {
-            put(s, s->points + (size_t)(s->known - 1) * s->numbers, here);
-            if (judged == UNSURE) {
-                s->iterations = before; /* Python counts them when it repeats the step */
-                return LEFT;
-            }
-            if (reject_step(s->control, fabs(goal - here))) return LEFT;
-            continue;
+        s->next++, s->control->rejections = s->control->accepted = 0;
+        if (!s->every && record_here(s)) {
+            *why = FULL;
+            return 0;
         }
-        if (s->every && record_here(s)) return FULL;
-        if (now() - began > s->patience) return LATER;
     }
-    return DONE;
+    *why = DONE;
+    return 0;
+}
+
+/* What follows a step that was accepted or not: GOING, or why the sweep stops; before: its iterations so far. */
+static int conclude(sweep *s, int judged, double goal, int before, double began)
+{
+    const double here = s->known_load_factors[s->known - 1];
+    if (judged == ACCEPTED) {
+        if (s->every && record_here(s)) return FULL;
+        return now() - began > s->patience ? LATER : GOING;
+    }
+    put(s, s->points + (size_t)(s->known - 1) * s->numbers, here);
+    if (judged == UNSURE) {
+        s->iterations = before; /* Python counts them when it repeats the step */
+        return LEFT;
+    }
+    return reject_step(s->control, fabs(goal - here)) ? LEFT : GOING;
+}
+
+/* Advance to the load factors in turn those that are GOING; on return why they stopped. */
+void run_all(const group *g, int *why)
+{
+    const double began = now();
+    double goal[LANES];
+    int judged[LANES], before[LANES], asked[LANES], any = 1;
+    while (any) {
+        any = 0;
+        for (int k = 0; k < g->count; k++) {
+            asked[k] = why[k] == GOING && find_goal(g->sweep[k], goal + k, why + k);
+            judged[k] = asked[k] ? GOING : LEFT, before[k] = g->sweep[k]->iterations, any |= asked[k];
+        }
+        if (any) attempt(g, judged, goal);
+        for (int k = 0; k < g->count; k++)
+            if (asked[k]) why[k] = conclude(g->sweep[k], judged[k], goal[k], before[k], began);
+    }
+}
+
+/* Advance one sweep. Returns why it stopped. */
+int run(sweep *s)
+{
+    const group g = {1, {s}, 0};
+    int why = GOING;
+    run_all(&g, &why);
+    return why;
 }
 
 /* Newton's method at the load factors in turn, each from its start (count, numbers). DONE; LATER or FULL where some are
@@ -297,9 +390,13 @@ int run(sweep *s)
 int correct(sweep *s, const double *starts, const int *expected, double near)
 {
     const double began = now();
+    const group g = {1, {s}, 0};
     while (s->next < s->count) {
         const int k = s->next;
-        if (strays(s, starts + (size_t)k * s->numbers, s->load_factors[k], expected[k], near)) return LEFT;
+        double *start = (double *)starts + (size_t)k * s->numbers;
+        int in = 1;
+        stay_near(&g, &in, &start, s->load_factors + k, expected[k], near);
+        if (!in) return LEFT;
         s->next++, s->steps++;
         if (record(s, s->work, s->load_factors[k])) return FULL;
         if (now() - began > s->patience) return LATER;

@@ -41,6 +41,7 @@ _DEGREE = 4  # the default of `solve`
 # Changes of the parameters, over their sizes, of the scenes by which the dependence of the data is found and checked.
 _BESIDE, _APART, _CHECK = 0.043, 0.25, -0.117
 _BLOCK = 256  # cases that are solved at once
+_SERVED = 1000  # cases after which several are solved in lock step, whose kernels take seconds to compile once
 # Most numbers of sections and materials of which all corners of a box are looked at, and largest relative difference of
 # stiffnesses by formulas for many cases.
 _MOST_CORNERS, _SAME = 6, 1e-14
@@ -211,7 +212,7 @@ class CompiledScene:
     def __init__(self, scene, names, queries, load_factor, tol):
         self.names, self.why, self.model = tuple(names), [], ""
         self._scene, self._queries, self._load_factor, self._tol = scene, queries, load_factor, tol
-        self._pair, self._linear = None, False
+        self._pair, self._linear, self._served = None, False, 0
         self._comm, self._lock = communicator(), threading.Lock()
         self._begin("there are several ranks" if self._comm.size > 1 else self._prepare())
 
@@ -285,17 +286,11 @@ class CompiledScene:
         layout, usual, turning, choice, signatures = self._kind
         if turning is not None:
             return "prescribed rotations or moments turn a rod by many radians"
-        self.model, EI = choice.model, Scales.of(scene).moment * Scales.of(scene).length
-        iterations = [10 if signatures[0].formulation.force.of_motion is False else 30, CORRECTIONS]
-        meshes = [
-            Loaded(make_solvers(self._comm, signature), reference, mesh, EI, self._load_factor, iterations=most)
-            for signature, mesh, most in zip(signatures, (layout, layout.finer(reference, 2)), iterations, strict=True)
-        ]
-        for mesh in meshes:
-            weakref.finalize(self, release, mesh.solvers).atexit = False
+        self.model = choice.model
+        meshes = self._load(reference)
         if meshes[0].problem.begins or any(kind.scaled == "full" for kind in signatures[0].terms):
             return "loads act that the load factor does not scale"
-        self._pair = Pair(meshes, reference, self._queries, self._tol, self._load_factor, near=NEAR)
+        self._pair = self._paired(meshes, reference)
         self._reference, self._layout, self._of_law = reference, layout, np.zeros(len(base), dtype=bool)
         self._box = self._at, self._at
         if all(x.profile.constant for x in scene.rods) and not signatures[0].coupled:
@@ -304,6 +299,23 @@ class CompiledScene:
         self.why += [f"the {self.model} model, on {' and '.join(str(sum(x.layout.counts)) for x in meshes)} elements",
                      f"data by {how}"]  # fmt: skip
         return ""
+
+    def _load(self, scene):
+        """A scene on both meshes, loaded in problems of their own, which end with this object."""
+        layout, *_, signatures = self._kind
+        scales, of_motion = Scales.of(self._scene), signatures[0].formulation.force.of_motion
+        layouts, iterations = (layout, layout.finer(scene, 2)), (10 if of_motion is False else 30, CORRECTIONS)
+        meshes = [
+            Loaded(make_solvers(self._comm, signature), scene, mesh, scales.moment * scales.length, self._load_factor,
+                   iterations=most)
+            for signature, mesh, most in zip(signatures, layouts, iterations, strict=True)
+        ]  # fmt: skip
+        for mesh in meshes:
+            weakref.finalize(self, release, mesh.solvers).atexit = False
+        return meshes
+
+    def _paired(self, meshes, scene):
+        return Pair(meshes, scene, self._queries, self._tol, self._load_factor, near=NEAR)
 
     def _find_dependence(self, parameters, steps, changes, checked, other):
         """Find how the numbers that C reads depend on the parameters."""
@@ -405,6 +417,9 @@ class CompiledScene:
         if not admitted.all():  # others stand for cases that are refused
             which = np.where(admitted, np.arange(len(array)), np.argmax(admitted))
             array, laws = array[which], [x[which] for x in laws]
+        self._served += len(array)
+        if self._served - len(array) < _SERVED <= self._served:
+            self._pair.in_lock_step(lambda: self._paired(self._load(self._reference), self._reference))
         decided, values, errors = self._pair.run(len(array), self._pair.numbers(array, *laws))
         return decided & admitted, values, errors
 

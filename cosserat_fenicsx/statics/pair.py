@@ -12,6 +12,7 @@ import numpy as np
 from dolfinx import fem
 
 from cosserat_fenicsx.algebra.building import Pointers
+from cosserat_fenicsx.algebra.lanes import LockStep, allowed
 from cosserat_fenicsx.interrupts import obey
 from cosserat_fenicsx.models.rod_data import bending_lengths, bounded, field_values
 from cosserat_fenicsx.results import accuracy, compared
@@ -38,7 +39,7 @@ class Pair(Pointers):
     def __init__(self, meshes, scene, queries, tol, load_factor, *, near):
         super().__init__()
         self.meshes, self._queries, self._load_factor = meshes, queries, load_factor
-        self._linear = None
+        self._linear, self._lock_step = None, ()
         coarse, fine = meshes
         p = self._compared = self._ffi.new("comparison *")
         p.coarse, p.fine, p.tol, p.resolved, p.in_layer = coarse.c, fine.c, tol, RESOLVED, LONGEST_IN_LAYER
@@ -62,9 +63,9 @@ class Pair(Pointers):
             told.place = _PLACES[query.name] + (query.component or 0)
             told.cell, told.weights = cells_of(fine.layout)[query.rod].start + cell, self.doubles(np.array(weights))
         c = self._cases = self._ffi.new("cases *")
-        c.meshes, c.first, c.near, c.patience = p, abs(load_factor) / 10, near, _SECONDS
-        self._written = self._ffi.new("written[]", 1)
-        c.written, self._empty = self._written, np.zeros((1, 1))
+        c.first, c.near, c.patience, self._empty = abs(load_factor) / 10, near, _SECONDS, np.zeros((1, 1))
+        self._written, self._all = self._ffi.new("written[]", 1), []
+        self._join(self)
         self._take(scene)
 
     def _transfer(self, rule):
@@ -230,8 +231,32 @@ class Pair(Pointers):
         self._written = self._ffi.new("written[]", max(1, len(parts)))
         for part, (to, places, which) in zip(self._written, parts, strict=False):
             part.to, part.place, part.which, part.count = to, self.integers(places), self.integers(which), len(which)
-        self._cases.written, self._cases.parts = self._written, len(parts)
+        self._known, self._cases.written[0], self._cases.parts = (linear, laws), self._written, len(parts)
         return True
+
+    def _join(self, pair):
+        """Let C solve cases by another pair too."""
+        c, k = self._cases, len(self._all)
+        c.meshes[k], c.written[k], c.lanes = pair._compared, pair._written, k + 1
+        for group, mesh in zip((c.coarse, c.fine), pair.meshes, strict=True):
+            group.sweep[k] = mesh.c.sweep
+        self._all.append(pair)
+
+    def in_lock_step(self, more):
+        """Solve cases from now on in lock step, by this pair and by others like it; more: a function that gives one,
+        with the scene of `depend`. Nothing changes where the compiler, or an interface, does not allow it."""
+        meshes = self.meshes
+        if not all(allowed(mesh.problem, mesh.stability) for mesh in meshes):
+            return
+        found = [LockStep(mesh.problem, mesh.stability) for mesh in meshes]
+        if not all(x.c for x in found):
+            return
+        self._lock_step = found
+        for _ in range(self._lib.LANES - 1):
+            pair = more()
+            pair._write(*self._known)
+            self._join(pair)
+        self._cases.coarse.together, self._cases.fine.together = (x.c for x in found)
 
     # -- cases -------------------------------------------------------------------------------------------------------
 
@@ -258,19 +283,20 @@ class Pair(Pointers):
         c.values, c.width = from_buffer("double[]", numbers), numbers.shape[1]
         c.found, c.errors = from_buffer("double[]", found), from_buffer("double[]", errors)
         c.undecided, c.count, c.next = from_buffer("int[]", undecided), count, 0
-        for mesh in self.meshes:
+        meshes = [mesh for pair in self._all for mesh in pair.meshes]
+        for mesh in meshes:
             mesh.ready()
         try:
             while self._lib.run_cases(c) == self._lib.LATER:
-                self._done()
-            self._done()
+                self._done(meshes)
+            self._done(meshes)
         finally:
-            for mesh in self.meshes:
+            for mesh in meshes:
                 mesh.c.sweep.load_factor[0] = 0.0
         return undecided == 0, found, errors
 
-    def _done(self):
-        for mesh in self.meshes:
+    def _done(self, meshes):
+        for mesh in meshes:
             mesh.done()
         obey()
 
@@ -406,9 +432,7 @@ class Loaded(Pointers):
         """All `Packed` forms of the problem and its second variation."""
         forms = [self.problem._residual, self.problem.tangent_form, *(part.form for part in self.stability.parts)]
         for form in forms:
-            while form:
-                yield form
-                form = form._others
+            yield from form.parts()
 
     @cached_property
     def read(self):
