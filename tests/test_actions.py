@@ -105,6 +105,7 @@ def test_a_body_that_turns():
     assert np.abs(omega / math.sqrt(0.8 / J) - 1).min() < 1e-6
 
 
+@pytest.mark.serial
 @pytest.mark.parametrize("scheme", ["momentum", "energy", "generalised-alpha"])
 def test_a_falling_rod_reaches_its_terminal_speed(scheme):
     """A level rod that falls through a fluid: v' = g - (c/rho) v^2, so v = v_t tanh(g t/v_t), v_t = sqrt(rho g/c)."""
@@ -120,6 +121,7 @@ def test_a_falling_rod_reaches_its_terminal_speed(scheme):
     assert np.abs(history.balance).max() < 1e-3 * history.work.max() or scheme == "generalised-alpha"
 
 
+@pytest.mark.serial
 @pytest.mark.parametrize("scheme", ["momentum", "generalised-alpha"])
 @pytest.mark.parametrize("model", ["planar", "spatial"])
 def test_a_dashpot_stops_a_free_rod(scheme, model):

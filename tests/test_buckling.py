@@ -381,6 +381,7 @@ def critical_below(force, guided):
     return 2 * np.count_nonzero(roots < x)
 
 
+@pytest.mark.serial
 @pytest.mark.parametrize("elements, degree", [(8, 4), (64, 2), (512, 1)])
 @pytest.mark.parametrize("model, guided", RUNGS)
 def test_tension_makes_no_negative_modes(model, guided, elements, degree):
@@ -413,7 +414,8 @@ COUNTED = {
                            [critical_below(1e3, True), 0, 0]),
     "displacement": (("spatial",), straight(1.0, direction=(0, 0, 1.0)), [-10.0, 1.0, 1e3, 1e6],
                      {"formulation": "displacement", "elements": 512}, [2, 0, 0, 0]),
-    "soft": (("determinate", *BOTH), straight(1.0, K=1e6, shear=1e5), [0.9 * LIMIT, 1.1 * LIMIT], {"elements": 8}, None),
+    "soft": (("determinate", *BOTH), straight(1.0, K=1e6, shear=1e5), [0.9 * LIMIT, 1.1 * LIMIT], {"elements": 8},
+             None),
 }  # fmt: skip
 
 
@@ -426,6 +428,7 @@ def test_negative_modes_of_many_kinds(case):
         assert found == expected if expected else found[0] == 0 < found[1], model
 
 
+@pytest.mark.serial
 @pytest.mark.parametrize("tension", [10.0, 1e6])
 def test_a_column_between_taut_wires(tension):
     """The wires support its top rigidly in their plane, and out of it with 2 T/L and the bending of their ends."""

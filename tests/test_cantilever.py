@@ -50,6 +50,7 @@ def test_contact_force_and_moment_are_those_of_statics():
     np.testing.assert_allclose(path.moment(rod.end)[:, 1], P * 0.2, rtol=1e-9)
 
 
+@pytest.mark.serial
 @pytest.mark.parametrize("formulation", ["mixed", "displacement"])
 @pytest.mark.parametrize("eta", [1.1, 1.5, 2.0, 4.0])
 def test_one_jump_is_refused_or_called_unstable(eta, formulation):
@@ -66,6 +67,7 @@ def test_one_jump_is_refused_or_called_unstable(eta, formulation):
         assert delta / 20 == pytest.approx(-0.15125, abs=1e-4) and path.negative_modes[0] == 2
 
 
+@pytest.mark.serial
 @pytest.mark.parametrize("far, most", [(1.1, 40), (2.0, 60), (4.0, 80), (9.0, 120)])
 def test_newton_work(far, most, reference):
     """Of a path, and of its end alone, which is on the same branch: the steps in between count."""
@@ -162,6 +164,7 @@ def inextensible(axial=np.inf, shear=np.inf):
     return column(section=cf.Stiffness(shear=(shear, shear), axial=axial, bending=k.bending, torsion=k.torsion))
 
 
+@pytest.mark.serial
 @pytest.mark.parametrize("degree, elements, formulation", [(2, 8, "mixed"), (3, 8, "mixed"), (2, 8, "multiplier")])
 def test_same_error_at_every_slenderness(degree, elements, formulation):
     """L/d from 1e2 to 1e5 and infinite EA, GA: relative errors of delta within a factor of 2 of each other."""
@@ -175,6 +178,7 @@ def test_same_error_at_every_slenderness(degree, elements, formulation):
     assert (errors.max(axis=0) <= 2 * errors.min(axis=0)).all(), errors
 
 
+@pytest.mark.serial
 @pytest.mark.parametrize("finite", ["axial", "shear"])
 def test_one_infinite_stiffness_beside_a_finite_one(finite):
     k = column()[0].stiffness
@@ -194,6 +198,7 @@ def random_rotation(seed):
     return q if np.linalg.det(q) > 0 else -q
 
 
+@pytest.mark.serial
 @pytest.mark.parametrize("arm", [False, True])
 @pytest.mark.parametrize("seed", [1, 2])
 def test_rotating_the_scene_turns_the_answer(seed, arm):
@@ -320,6 +325,7 @@ def test_self_weight_column():
     assert path.negative_modes.tolist() == [0, 0, 1, 1]
 
 
+@pytest.mark.serial
 @pytest.mark.parametrize("weak", [(1.0, 1.5), (1.0, 10.0), (1.0, 1.0)])
 @pytest.mark.parametrize("tilt", [1e-3, 1e-4])
 def test_nearly_perfect_columns_stay_on_the_branch_of_their_tilt(weak, tilt):
@@ -333,7 +339,7 @@ def test_nearly_perfect_columns_stay_on_the_branch_of_their_tilt(weak, tilt):
         assert path.stable[0] and path.displacement(rod.end)[0, 1] > 0.1, load
 
 
-@pytest.mark.parametrize("loads", [0, 7])
+@pytest.mark.parametrize("loads", [pytest.param(0, marks=pytest.mark.serial), 7])
 @pytest.mark.parametrize("degree, tol", [(2, 1e-5), (3, 1e-6), (4, 1e-6)])
 def test_the_estimate_covers_the_error_everywhere(degree, tol, loads):
     """At nodes and between them, and where many stations fix the element ends of the first meshes."""
@@ -362,6 +368,7 @@ def test_every_formulation_recovers_the_force_in_equilibrium(formulation):
     np.testing.assert_allclose(path.force(rod.at(6.5))[0], [0, F, -2 * F], atol=1e-6 * F)
 
 
+@pytest.mark.serial
 @pytest.mark.parametrize("kind", ["torsion", "axial, inextensible", "zero force"])
 def test_where_hardly_anything_moves(kind):
     curve, k = cf.Line((0, 0, 0), (1.0, 0, 0)), cf.Circle(0.02).stiffness(STEEL)
@@ -383,6 +390,7 @@ def wire(diameter, move, length=110.0):
     return rod, cf.Scene([rod], supports, [cf.Weight()])
 
 
+@pytest.mark.serial
 @pytest.mark.parametrize(("diameter", "move"), [(0.005, 10.0), (0.005, 1.0), (0.001, 10.0)])
 def test_a_wire_drawn_straight(diameter, move):
     """Its sag is that of an elastic catenary, up to the effect of EI, with the default steps."""

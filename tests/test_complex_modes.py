@@ -52,6 +52,7 @@ BECK = {
 }
 
 
+@pytest.mark.serial
 @pytest.mark.parametrize("load", BECK)
 def test_a_column_under_a_follower_load_flutters(load, truth):
     rod, clamp = cantilever(stiff=1e6, J=1e-7)
@@ -73,6 +74,7 @@ def test_a_column_under_a_follower_load_flutters(load, truth):
          [-0.0248853921108 + 3.74295004637j, -0.0248849191573 + 4.79703169747j, -0.970623415118 + 23.1013819027j]),
     ],
 )  # fmt: skip
+@pytest.mark.serial
 def test_a_rotating_blade(EI, hub, rate, tau, exact, truth):
     """About a hub; flap and lag, damped or not."""
     rod, clamp = cantilever(EI, start=(hub, 0, 0), damping=cf.Damping(time=tau))

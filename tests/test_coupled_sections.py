@@ -114,6 +114,7 @@ def offset_and_shifted(P):
 @pytest.mark.parametrize(
     ("model", "formulation"), [("determinate", "mixed"), ("spatial", "mixed"), ("spatial", "displacement")]
 )
+@pytest.mark.serial
 def test_a_line_off_the_centroid_is_a_shifted_rod(model, formulation):
     """Also at large displacements; Newton's method with n carried takes the same iterations."""
     (rod, scene), (shifted, other) = offset_and_shifted((0.4, 0.2, -2.2))

@@ -34,7 +34,7 @@ def same(found, truth, tolerance):
                 )
 
 
-@pytest.mark.parametrize("seed", [None, 1])
+@pytest.mark.parametrize("seed", [None, pytest.param(1, marks=pytest.mark.serial)])
 @pytest.mark.parametrize("name", SCENES)
 def test_rungs_agree(name, seed):
     draw, known = SCENES[name]
@@ -53,6 +53,7 @@ def test_rungs_agree(name, seed):
             cf.solve(scene, [1.0], model="determinate")
 
 
+@pytest.mark.serial
 @pytest.mark.parametrize("model", ["determinate", "planar", "spatial"])
 @pytest.mark.parametrize("slenderness", [1e2, 1e4, 1e5])
 def test_against_the_exact_rod(model, slenderness):
@@ -65,6 +66,7 @@ def test_against_the_exact_rod(model, slenderness):
         assert path.stable.all() and path.iterations.sum() < 100
 
 
+@pytest.mark.serial
 @pytest.mark.parametrize("model", ["determinate", "planar", "spatial"])
 def test_full_turns(model):
     """M = 2 pi EI/L per turn: the sign of q is continuous along rod and path, although the ring closes twice."""
@@ -79,6 +81,7 @@ def test_full_turns(model):
     np.testing.assert_allclose(path.position(rod.end)[[2, 4]], 0, atol=1e-9)
 
 
+@pytest.mark.serial
 @pytest.mark.parametrize("model", ["determinate", "planar", "spatial"])
 def test_units_change_nothing(model):
     rod, scene = column(arm=True)
@@ -111,6 +114,7 @@ def test_a_perfect_round_column_loses_two_motions_at_once(model):
     assert path.negative_modes.tolist() == [0, 0, 2, 2, 4]
 
 
+@pytest.mark.serial
 @pytest.mark.parametrize("model", ["determinate", "planar", "spatial"])
 @pytest.mark.parametrize("rigid", [False, True])
 def test_lateral_buckling_is_seen_in_the_plane(model, rigid):
