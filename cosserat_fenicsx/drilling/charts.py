@@ -1,6 +1,5 @@
 """Charts and maps of a drill-string in motion, and charts of its stability, by matplotlib."""
 
-import functools
 import math
 from dataclasses import replace
 
@@ -14,8 +13,8 @@ from cosserat_fenicsx.errors import SceneError, nearest
 from cosserat_fenicsx.pictures.charts import (
     COLOURS,
     STYLES,
+    chart,
     chosen_unit,
-    draw_chart,
     empty_figure,
     ledger,
     legend,
@@ -25,7 +24,6 @@ from cosserat_fenicsx.pictures.charts import (
     unit_of,
 )
 from cosserat_fenicsx.quantities import Quantity
-from cosserat_fenicsx.ranks import world
 
 _FORCE = Quantity("force", unit="N", shown="kN")
 _DEPTH = Quantity("measured depth", unit="m", shown="m", dimension="length")
@@ -41,16 +39,6 @@ MAPPED = {
 DRIVE, BIT = "tab:blue", "tab:red"
 # Bands of a chart of a long run; about the most times at which the motion of the block is looked at.
 _BANDS, _SOME = 400, 2000
-
-
-def _drawn(figure):
-    """Turn a function (answer, ...) that returns a Figure into one (answer, file, ..., **look), see `draw_chart`."""
-
-    @functools.wraps(figure)
-    def draw(answer, file, *arguments, **look):
-        return draw_chart(lambda: figure(answer, *arguments), file, world(), **look)
-
-    return draw
 
 
 def times_between(where, times, between):
@@ -253,7 +241,7 @@ def _shade(panel, t, where, label, colour, alpha=1.0):
                        zorder=0, label=label, alpha=alpha)  # fmt: skip
 
 
-@_drawn
+@chart()
 def draw_phase(history, since=None):
     """See `DrillingHistory.plot_phase`."""
     times_between("plot_phase", history.times, None)
@@ -275,7 +263,7 @@ def draw_phase(history, since=None):
     return figure
 
 
-@_drawn
+@chart()
 def draw_energy(history):
     """See `DrillingHistory.plot_energy`."""
     times_between("plot_energy", history.times, None)
@@ -294,7 +282,7 @@ _DEPTHS, _STICKS = 500, "0.8"
 _BIT = 0.03
 
 
-@_drawn
+@chart()
 def draw_map(history, what=None, between=None):
     """See `DrillingHistory.plot_map`."""
     if what is None:
@@ -345,7 +333,7 @@ def draw_map(history, what=None, between=None):
 _MAPS, _LINES = 6, 8
 
 
-@_drawn
+@chart()
 def draw_stability(answer, mode=None):
     """See `Stability.plot`."""
     grid = len(answer.weights) > 1 and len(answer.speeds) > 1

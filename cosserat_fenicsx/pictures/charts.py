@@ -69,16 +69,15 @@ def draw_chart(make, file=None, comm=Alone, *, width=None, units="SI"):
     return None
 
 
-def chart(check):
-    """Decorator: a function that makes the Figure of a result becomes a function of the result, a file (None returns
-    the Figure; rank 0 writes) and the `width` and `units` of `draw_chart`; `check(result)` refuses what has no chart.
-    """
+def chart(check=lambda result: None):
+    """Decorator: a function (result, ...) that makes a Figure becomes a function (result, file, ..., **look), see
+    `draw_chart`; `check(result)` refuses what has no chart."""
 
     def decorate(make):
         @wraps(make)
-        def draw(result, file=None, **look):
+        def draw(result, file=None, *given, **look):
             check(result)
-            return draw_chart(lambda: make(result), file, result._ranks, **look)
+            return draw_chart(lambda: make(result, *given), file, result._ranks, **look)
 
         return draw
 
