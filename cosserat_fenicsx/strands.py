@@ -11,6 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cosserat_fenicsx.numerics import cross
+
 #: Sine of the angle of two strands above which they touch in a point; below, along a line.
 CROSSING = 0.2
 # Places of an element where strands are compared first; Newton steps to the nearest points; their largest size, in
@@ -365,6 +367,22 @@ class Strands:
         first, second = self.bases(element, place)
         return np.concatenate([-first, second], axis=1)[..., None] * direction[:, None, :]
 
+    def surface_pulls(self, element, place, direction, apart, across=None):
+        """Forces and moments (m, parts, n, 6) at `movers` of unit forces along directions (m, 3) and, of three parts,
+        along `across` (m, 2, 3) on the surfaces, midway between centrelines that are `apart` (m,)."""
+        first, second = self.bases(element, place)
+        moves = np.concatenate([-first, second], axis=1)
+        found = np.zeros((len(moves), 1 if across is None else 3, moves.shape[1], 6))
+        found[:, 0, :, :3] = moves[..., None] * direction[:, None]
+        if across is not None:
+            radii = self.radii[element]
+            deep = (radii.sum(axis=1) - apart) / 2
+            arms = np.concatenate([(radii[:, k] - deep)[:, None] * basis for k, basis in ((0, first), (1, second))], 1)
+            found[:, 1:, :, :3] = moves[:, None, :, None] * across[:, :, None]
+            turned = np.stack([across[:, 1], -across[:, 0]], axis=1)  # n x t
+            found[:, 1:, :, 3:] = -arms[:, None, :, None] * turned[:, :, None]
+        return found
+
     def bases(self, element, place):
         """(2, m, 3 (p + 1)) `basis` at both points of pairs of places (m, 2)."""
         return np.stack(np.split(self.basis(element.T.ravel(), place.T.ravel()), 2))
@@ -407,6 +425,14 @@ class Strands:
         columns[:, 2:] = np.einsum("mka,mknx->manx", turned, A * free[:, :, None, None])
         factors = np.concatenate([np.ones((m, 2)), -1 / sizes], axis=1) / touches.distance[:, None]
         return columns.reshape(m, 4, 6 * p), factors
+
+
+def across(direction, normal=None):
+    """(m, 2, 3) two unit vectors across directions (m, 3), next to an axis that normals (m, 3) choose."""
+    n = direction / np.linalg.norm(direction, axis=1)[:, None]
+    first = cross(n, np.eye(3)[np.abs(n if normal is None else normal).argmin(axis=1)])
+    first /= np.linalg.norm(first, axis=1)[:, None]
+    return np.stack([first, cross(n, first)], axis=1)
 
 
 def _sine(t, u):

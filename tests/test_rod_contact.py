@@ -119,8 +119,8 @@ def closest(path, radius):
 
 
 def test_no_rod_passes_through_another(tangle):
-    """Two to five rods at random angles, whose ends are moved through each other by many diameters: each path ends with
-    rods that hold each other, or with the contact by name; none is crossed."""
+    """Two to five rods at random angles, whose ends are moved through each other by many diameters, some with friction:
+    each path ends with rods that hold each other, or with the contact by name; none is crossed."""
     random, radius, count = np.random.default_rng(tangle), 0.02, 2 + tangle % 4
     section = cf.Stiffness((1e4, 1e4), 1e4, (1.0, 1.0), 0.8)
     rods, supports = [], []
@@ -132,7 +132,7 @@ def test_no_rod_passes_through_another(tangle):
         rods.append(rod)
         moved = {"displacement": (0, 0, -0.12 * k), "rotation": (0, 0, 0)}
         supports += [cf.Prescribed(end, **moved) if k else cf.Clamp(end) for end in (rod.start, rod.end)]
-    scene = cf.Scene(rods, supports, [cf.RodContact(radius=radius)])
+    scene = cf.Scene(rods, supports, [cf.RodContact(radius=radius, friction=0.4 * (tangle % 2))])
     try:
         path = cf.solve(scene, np.linspace(0.1, 1, 4), elements=10)
     except cf.NotConverged as failure:
@@ -147,3 +147,35 @@ def test_no_rod_passes_through_another(tangle):
             apart = np.linalg.norm(p[:, None, :2] - q[:, :2], axis=2)
             i, j = np.unravel_index(apart.argmin(), apart.shape)
             assert apart[i, j] > 2.5e-3 or p[i, 2] > q[j, 2]
+
+
+def test_friction_holds_and_slips(tmp_path, truth):
+    """A rod on another one is pulled to and fro against a spring k: it sticks with the compliance of the lower rod in
+    bending, shear and, since friction has an arm, twist, and slips at the friction mu N, N known from the balance."""
+    r, L, EI, GA, GJ, k, pressed, friction = 0.01, 1.0, 1e3, 1e6, 5.0, 1e3, 10.0, 0.5
+    lower = cf.Rod(cf.Line((-L / 2, 0, 0), (L / 2, 0, 0)), cf.Stiffness((GA, GA), 1e7, (EI, EI), GJ), name="lower")
+    upper = cf.Rod(
+        cf.Line((0, -0.3, 2 * r), (0, 0.3, 2 * r)), cf.Stiffness((GA, GA), 1e7, (1e4, 1e4), 1e4), name="upper"
+    )
+    end, touch = upper.start, cf.RodContact(radius=r, friction=friction)
+    supports = [cf.Clamp(lower.start), cf.Clamp(lower.end), cf.Prescribed(end, rotation=(0, 0, 0)),
+                cf.Roller(end, (1, 0, 0))]  # fmt: skip
+    loads = [touch, cf.Spring(end, k, direction=(0, 1, 0)), cf.Spring(end, 10.0, direction=(0, 0, 1)),
+             cf.Force(upper.at(0.3), (0, 0, -pressed), permanent=True), cf.Force(end, (0, 10.0, 0))]  # fmt: skip
+    path = cf.solve(cf.Scene([lower, upper], supports, loads), [0.25, 0.75, 1.0, 0.25, -0.5, -1.0], elements=4)
+    u, w = path.displacement(end)[:, 1], path.displacement(end)[:, 2]
+    below = L**3 / (192 * EI) + L / (4 * GA) + r**2 * L / (4 * GJ)
+    stiffness, slid = (k + 1 / (below + s * (r**2 / 1e4 + 1e-7)) for s in (0.3, 0.3 - u[2]))
+    bound = friction * (pressed + 10.0 * w)
+    truth("rod that sticks to another one, displacement", u[0], 2.5 / stiffness, 2e-5)
+    truth("rod that turns back and sticks", u[2] - u[3], 7.5 / slid, 2e-5)
+    slips = k * u[[1, 2, 4, 5]] - 10 * np.array([0.75, 1.0, -0.5, -1.0])
+    truth("rod that slips on another one, friction", slips, bound[[1, 2, 4, 5]] * [-1, -1, 1, 1], 2e-5)
+    held = [path[i].contacts(touch) for i in range(len(path))]
+    assert [bool(found.sticks[0]) for found in held] == [True, False, False, True, False, False]
+    path.save(tmp_path / "rubs.h5")
+    again = cf.read_path(tmp_path / "rubs.h5")
+    for found in (held[2], again[2].contacts(again.scene.loads[0])):
+        assert np.linalg.norm(found.friction[0]) == pytest.approx(friction * found.force[0], rel=1e-6)
+        assert found.friction[0, 1] == pytest.approx(slips[1], rel=1e-4)
+    assert any("friction" in why for why in path.why)

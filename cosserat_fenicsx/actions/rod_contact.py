@@ -64,17 +64,20 @@ class Surface:
 
 @dataclass(frozen=True)
 class RodContact(LineAction):
-    """Rods that do not pass through each other or themselves; in motions with Coulomb friction.
+    """Rods that do not pass through each other or themselves, with Coulomb friction.
 
     It stands among the loads, once in a scene, and is not multiplied by the load factor. Where strands cross at more
     than 11.5 degrees they touch in one point, between the nearest points of both centrelines; otherwise along a line,
     at the nodes of the strand with the shorter elements. Ends of rods are hemispheres.
 
-    In `solve` surfaces are hard, without `stiffness`. In `simulate` they have a `stiffness` k: the force of surfaces
-    that overlap by a depth p is ``k p`` per length along a line, and in a point ``(4/3) k sqrt(2 (r1 + r2)) p^1.5``,
-    which the line's law gives for straight rods that cross at a right angle. Both are multiplied by ``1 + damping p'``,
-    and are never adhesion (Hunt & Crossley 1975, doi:10.1115/1.3423596). Friction acts on the surfaces, with a moment
-    about the centrelines.
+    In `solve` surfaces are hard, without `stiffness`. Friction depends on the path there: load factors are taken in
+    their order, and a contact does not slip from one accepted state to the next, or friction is at its bound and
+    against the slip between them; a contact that is new in a state has friction from the next one on.
+
+    In `simulate` they have a `stiffness` k: the force of surfaces that overlap by a depth p is ``k p`` per length along
+    a line, and in a point ``(4/3) k sqrt(2 (r1 + r2)) p^1.5``, which the line's law gives for straight rods that cross
+    at a right angle. Both are multiplied by ``1 + damping p'``, and are never adhesion (Hunt & Crossley 1975,
+    doi:10.1115/1.3423596). Friction acts on the surfaces, with a moment about the centrelines.
 
     Args:
         radius: of the rods' surfaces, m; None for that of their sections, which are `Circle` or `Tube`.
@@ -84,7 +87,7 @@ class RodContact(LineAction):
             radius: on less, a rod cannot bend back onto itself without folding its surface.
         stiffness: N/m^2, in motions; None for the hard surfaces of equilibria.
         damping: s/m, over the speed at which surfaces approach.
-        friction: coefficient of Coulomb friction, in motions; surfaces that stick do not slip at all.
+        friction: coefficient of Coulomb friction; surfaces that stick do not slip at all.
 
     Raises:
         SceneError: no radius known, or none that is the same all along a rod; one above the radius of curvature at
@@ -109,9 +112,8 @@ class RodContact(LineAction):
         for pair in self.pairs or ():
             if len(pair) != 2:
                 refuse(self, "pairs", self.pairs, "two names of rods each")
-        for name in ("damping", "friction"):
-            if getattr(self, name) and self.stiffness is None:
-                refuse(self, name, getattr(self, name), "0 without a stiffness, since hard surfaces have none")
+        if self.damping and self.stiffness is None:
+            refuse(self, "damping", self.damping, "0 without a stiffness, since hard surfaces have none")
 
     def acts_on(self, rod):
         return self.pairs is None or any(rod.name in pair for pair in self.pairs)

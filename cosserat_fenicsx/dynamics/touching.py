@@ -22,8 +22,8 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from cosserat_fenicsx.algebra.building import Pointers
-from cosserat_fenicsx.numerics import cross, small_rotations
-from cosserat_fenicsx.strands import Strands, closest_segments, in_words, overlap
+from cosserat_fenicsx.numerics import small_rotations
+from cosserat_fenicsx.strands import Strands, across, closest_segments, in_words, overlap
 
 # Gaps of contacts that are looked for, over the largest radius; movement of a node, over the smallest radius, after
 # which they are looked for again where there are some, and the least gap, over the largest, where there are none.
@@ -125,29 +125,12 @@ class _Pairs:
         self.direction[pressed] = mean / (now.distance + before.distance)[:, None]
         self.apart[pressed] = np.linalg.norm(mean, axis=1) / 2
 
-    def across(self, which):
-        """(k, 2, 3) two unit vectors across the forces of some pairs, which turn with them in the step."""
-        n, first = self.direction[which], np.eye(3)[np.abs(self.before.normal[which]).argmin(axis=1)]
-        n = n / np.linalg.norm(n, axis=1)[:, None]
-        first = cross(n, first)
-        first /= np.linalg.norm(first, axis=1)[:, None]
-        return np.stack([first, cross(n, first)], axis=1)
-
     def pulls(self, which, parts):
         """Nodes (k, n) that move the places of some pairs, and forces and moments there, (k, parts, n, 6), of unit
-        forces along `direction` and, of three parts, `across` it on the surfaces."""
-        strands, element, place = self._strands, self.element[which], self.place[which]
-        first, second = strands.bases(element, place)
-        moves = np.concatenate([-first, second], axis=1)
-        found = np.zeros((len(moves), parts, moves.shape[1], 6))
-        found[:, 0, :, :3] = moves[..., None] * self.direction[which][:, None]
-        if parts > 1:
-            radii, across = strands.radii[element], self.across(which)
-            deep = (radii.sum(axis=1) - self.apart[which]) / 2
-            arms = np.concatenate([(radii[:, k] - deep)[:, None] * basis for k, basis in ((0, first), (1, second))], 1)
-            found[:, 1:, :, :3] = moves[:, None, :, None] * across[:, :, None]
-            turned = np.stack([across[:, 1], -across[:, 0]], axis=1)  # n x t
-            found[:, 1:, :, 3:] = -arms[:, None, :, None] * turned[:, :, None]
+        forces along `direction` and, of three parts, across it on the surfaces, which turn with it in the step."""
+        strands, element, direction = self._strands, self.element[which], self.direction[which]
+        sides = across(direction, self.before.normal[which]) if parts > 1 else None
+        found = strands.surface_pulls(element, self.place[which], direction, self.apart[which], sides)
         return strands.movers(element), found
 
 

@@ -7,10 +7,12 @@ import numpy as np
 from cosserat_fenicsx.errors import NotConverged
 from cosserat_fenicsx.quantities import Quantity, Units
 from cosserat_fenicsx.results import screen
-from cosserat_fenicsx.strands import CROSSING, Strands, closest_segments, overlap
+from cosserat_fenicsx.strands import CROSSING, Strands, across, closest_segments, overlap
 
 # Gaps over the radius up to which rods may touch; forces over the largest that are rounding.
 _TOUCHES, _NOTHING = 1e-5, 1e-9
+# Friction that is at its bound, but for this share.
+_AT_BOUND = 1e-6
 # Depth over the radius that is allowed between the places where rods touch.
 _DEEP = 0.02
 
@@ -26,6 +28,9 @@ class RodContacts:
         force: (m,) along the normal, N; line: (m,) whether it is one of a line of contact, at a node of the mesh.
         pressure: (m,) force per length along a line of contact, N/m; NaN at a point.
         normal: (m, 3) unit vectors from the rod to the other one, inertial.
+        friction: (m, 3) force on the other rod, N, inertial; its opposite acts on the rod. NaN in motions, where
+            friction belongs to a step.
+        sticks: (m,) whether friction is below its bound; False without friction.
     """
 
     rod: np.ndarray
@@ -38,6 +43,8 @@ class RodContacts:
     line: np.ndarray
     pressure: np.ndarray
     normal: np.ndarray
+    friction: np.ndarray
+    sticks: np.ndarray
     _title: str = field(default="", repr=False)
 
     def __len__(self):
@@ -68,13 +75,15 @@ def _strands(path):
 
 
 def _pressed(path, k, strands):
-    """The `Touches` of state k that press, with their forces (m,), and the positions (N, 3) there; dimensionless."""
+    """The `Touches` of state k that press, with their forces (m, 3) on the second rod, and the positions (N, 3) there;
+    dimensionless. In motions forces are normal."""
     record, elastic = path._records[k], path.scene.rod_contact.stiffness is not None
     counts = [n * path.degree + 1 for n in path.layout.counts]
     x = record.rq[:, :3] + np.repeat(path.scene.origins / path.scales.length, counts, axis=0)
     found, _ = strands.near(x, 0.0 if elastic else _TOUCHES * strands.radii.max())
     forces = (_by_law if elastic else _by_balance)(path, record, strands, found)
-    held = forces > _NOTHING * np.abs(forces).max(initial=0.0)
+    normal = np.sum(forces * found.normal, axis=1)
+    held = normal > _NOTHING * np.abs(normal).max(initial=0.0)
     return found.of(held), forces[held], x
 
 
@@ -84,26 +93,36 @@ def _by_law(history, record, strands, found):
     speeds = record.rates[strands.nodes_of(found), :3]
     approach = -np.einsum("mni,mni->m", strands.gradients(found), speeds)
     force, _ = surface.force(surface.law(found), -found.gap)
-    return force * np.maximum(1 + surface.damping * approach, 0.0)
+    return (force * np.maximum(1 + surface.damping * approach, 0.0))[:, None] * found.normal
 
 
 def _by_balance(path, record, strands, found):
     """Those of hard surfaces, whose sum at every node is known."""
     if not len(found):
-        return np.zeros(0)
-    nodes, gradients = strands.nodes_of(found), strands.gradients(found)
-    matrix, total = np.zeros((len(record.rq), 3, len(found))), np.zeros((len(record.rq), 3))
-    for i in range(len(found)):
-        np.add.at(matrix[..., i], nodes[i], gradients[i])
+        return np.zeros((0, 3))
+    ways = found.normal[:, None]
+    if path.scene.rod_contact.friction:
+        ways = np.concatenate([ways, across(found.normal)], axis=1)
+    m, parts, _ = ways.shape
+    moves = np.sum(strands.gradients(found) * found.normal[:, None], axis=2)
+    nodes, matrix, total = strands.nodes_of(found), np.zeros((len(record.rq), m)), np.zeros((len(record.rq), 3))
+    np.add.at(matrix, (nodes, np.arange(m)[:, None]), moves)
     np.add.at(total, strands.cells, record.rod_forces)
-    return np.linalg.lstsq(matrix.reshape(-1, len(found)), total.ravel(), rcond=None)[0]
+    matrix = np.einsum("nm,mpi->nimp", matrix, ways).reshape(-1, m * parts)
+    sizes = np.linalg.lstsq(matrix, total.ravel(), rcond=None)[0].reshape(m, parts)
+    return np.einsum("mp,mpi->mi", sizes, ways)
 
 
 def rod_contacts_of(path, k):
     """See `Path.contacts`."""
     length, strands = path.scales.length, _strands(path)
     found, forces, x = _pressed(path, k, strands)
-    forces = forces * path.scales.force
+    forces, action = forces * path.scales.force, path.scene.rod_contact
+    total, forces = forces, np.sum(forces * found.normal, axis=1)
+    friction = total - forces[:, None] * found.normal
+    if action.stiffness is not None:
+        friction = np.full_like(friction, np.nan)
+    sticks = np.linalg.norm(friction, axis=1) < (1 - _AT_BOUND) * action.friction * forces
     names = np.array([rod.name for rod in path.scene.rods])
     (rod, s, place), (other, other_s, _) = (
         (names[strands.rods[e]], strands.s(e, a) * length, strands.at(x, e, a) * length)
@@ -116,7 +135,7 @@ def rod_contacts_of(path, k):
     pressure = np.where(line, forces / share[np.maximum(found.node, 0)], np.nan)
     title = f"Contacts of rods at the {path.place_of(k)}"
     return RodContacts(rod, s, other, other_s, place + radius[:, None] * found.normal, found.gap * length, forces, line,
-                       pressure, found.normal, title)  # fmt: skip
+                       pressure, found.normal, friction, sticks, title)  # fmt: skip
 
 
 def nodal_forces(path, rod):
@@ -140,7 +159,8 @@ def _at_nodes(history, k, strands):
     """(N, 3) the sums of the forces of elastic surfaces at nodes, N."""
     found, forces, x = _pressed(history, k, strands)
     total = np.zeros_like(x)
-    np.add.at(total, strands.nodes_of(found), strands.gradients(found) * forces[:, None, None])
+    moves = np.sum(strands.gradients(found) * found.normal[:, None], axis=2)
+    np.add.at(total, strands.nodes_of(found), moves[..., None] * forces[:, None])
     return total * history.scales.force
 
 

@@ -353,6 +353,11 @@ def solve(
         path.why.extend(told)
         for words in told if comm.rank == 0 else ():
             warn(words)
+    if scene.rod_contact and scene.rod_contact.friction:
+        path.why.append(
+            "friction of rods that touch depends on the path: slip is counted from step to step, and stability takes "
+            "contacts that stick as joined"
+        )
     if oscillates:
         path.why.append(
             "with more Gauss points than the degree, contact forces and moments oscillate inside elements: tol bounds "

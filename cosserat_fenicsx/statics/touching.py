@@ -8,6 +8,11 @@ with the rods' tangent K and residual r without contact, the gaps g, their deriv
 d2g, in which the nearest points slide. K is never assembled: the columns of G^T and of the few eigenvectors of d2g are
 solved with its factors, and what is left is a small complementarity problem.
 
+With friction, contacts that touched in the last accepted state have two more forces across the normal, on the surfaces
+and so with moments about the centrelines. Coulomb's law is exact: such a contact does not slip since that state, or
+friction is at its bound and against the slip. The response of slips to forces is found like that of the gaps, and the
+laws of all contacts are solved together (`rubbing`); how friction turns with the contact is in the next residual.
+
 No rod passes through another: a step moves points by so little that two strands, which are never nearer than half the
 sum of their radii, cannot cross in it.
 """
@@ -16,7 +21,8 @@ import numpy as np
 
 from cosserat_fenicsx.algebra.newton import LimitedNewton, Solved
 from cosserat_fenicsx.interrupts import obey
-from cosserat_fenicsx.strands import Strands, in_words
+from cosserat_fenicsx.numerics import small_rotations
+from cosserat_fenicsx.strands import Strands, across, in_words
 
 # Largest movement of a node in a step over the smallest radius and the gap (a point between nodes moves up to 1.3 times
 # as far, so that two strands approach each other by less than the sum of their radii); largest rotation, rad.
@@ -37,6 +43,11 @@ _AT_END = 1e-6
 # A contact of the iteration before is the same up to this sliding, over the radius; added to the diagonal of the
 # compliance, over its mean.
 _SAME, _REGULAR = 4.0, 1e-12
+# Gap at which rods touch, over the largest radius; unknowns and rows of a node: of forces and moments.
+_TOUCHES, _FORCES = 1e-5, [0, 1, 2, 4, 5, 6]
+# Laws of friction: iterations; error that ends them; least share of a step; error that is none, and what is not at its
+# bound.
+_MOST_LAWS, _LAWS, _LEAST, _LAWS_MET, _AT_BOUND = 60, 1e-13, 1e-3, 1e-8, 1e-6
 # First stiffness of springs that keep the tangent stable, over that of the rods at a contact; factor of the next one;
 # the largest; eigenvalues of the compliance that need none, over its mean: out of equilibrium it is not symmetric.
 _SPRING, _STIFFER, _STIFFEST, _NOTHING = 1e-3, 10.0, 1e6, 1e-6
@@ -50,6 +61,61 @@ def complementary(A, b):
     L = np.linalg.cholesky(A / size / size[:, None])
     found, _ = nnls(L.T, -np.linalg.solve(L, b / size), maxiter=50 * len(b) + 100)
     return found / size
+
+
+def rubbing(A, b, friction, start):
+    """Forces (m, 3) of contacts, normal and across it, by which motions A f + b obey Signorini's and Coulomb's laws.
+
+    By Newton's method for the nonsmooth equations of Alart & Curnier (Comput. Methods Appl. Mech. Engrg. 92 (1991)
+    353), with shares of steps until their residual falls, from given forces and from those without friction.
+
+    Args:
+        A: (3 m, 3 m), positive definite, not necessarily symmetric; b: (3 m,); friction: (m,) coefficients.
+        start: (m, 3) forces.
+
+    Returns:
+        (m, 3) forces, and the largest error of a force by its law over the largest force.
+    """
+    m, normal = len(friction), np.arange(len(friction)) * 3
+    across = normal[:, None] + (1, 2)
+    stiff = 1 / np.diag(A)
+    r = np.repeat(stiff[normal], 3)
+    r[across] = (2 / (1 / stiff[across]).sum(axis=1))[:, None]
+
+    def off(f):
+        """The equations, their derivatives by the forces and by the motion, as blocks of a contact (m, 3, 3)."""
+        z = (f - r * (A @ f + b)).reshape(m, 3)
+        pressed, bound, size = z[:, 0] > 0, friction * np.maximum(z[:, 0], 0), np.linalg.norm(z[:, 1:], axis=1)
+        slips = size > bound
+        safe = np.where(slips, size, 1.0)
+        way, share = z[:, 1:] / safe[:, None], np.where(slips, bound / safe, 1.0)
+        by = np.zeros((m, 3, 3))  # of the projection of z
+        by[:, 0, 0] = pressed
+        by[:, 1:, 1:] = share[:, None, None] * (np.eye(2) - np.where(slips, 1.0, 0.0)[:, None, None]
+                                                * way[:, :, None] * way[:, None])  # fmt: skip
+        by[:, 1:, 0] = np.where(slips & pressed, friction, 0.0)[:, None] * way
+        projected = np.c_[np.maximum(z[:, 0], 0), share[:, None] * z[:, 1:]].ravel()
+        return f - projected, by
+
+    best, least = None, np.inf
+    pressing = np.zeros((m, 3))
+    pressing[:, 0] = complementary((A[np.ix_(normal, normal)] + A[np.ix_(normal, normal)].T) / 2, b[normal])
+    for f in (start.ravel().copy(), pressing.ravel()):
+        error, by = off(f)
+        for _ in range(_MOST_LAWS):
+            size, scale = np.linalg.norm(error), np.abs(f).max()
+            if size < least:
+                best, least = f, size
+            if size <= _LAWS * scale:
+                return f.reshape(m, 3), size / scale if scale else 0.0
+            J = np.eye(3 * m) - (by @ (np.eye(3 * m) - r[:, None] * A).reshape(m, 3, -1)).reshape(3 * m, -1)
+            step, share = np.linalg.lstsq(J, error, rcond=None)[0], 1.0
+            error, by = off(f - step)
+            while share > _LEAST and not np.linalg.norm(error) < (1 - 1e-3 * share) * size:
+                share /= 2
+                error, by = off(f - share * step)
+            f = f - share * step
+    return best.reshape(m, 3), least / max(np.abs(best).max(), np.finfo(float).tiny)
 
 
 class _Steps(LimitedNewton):
@@ -81,8 +147,10 @@ class RodContacts:
         model = problem.model
         scene, layout, length = model.scene, model.layout, model.scales.length
         self._problem, self._model, self._length = problem, model, length
-        self._nodal = model.nodal[np.argsort(model.slots)][:, :3]
+        self._nodal = model.nodal[np.argsort(model.slots)]
         self._rows = model.numbering.rows[self._nodal]
+        self._friction = scene.rod_contact.friction
+        self._parts = 3 if self._friction else 1
         self.strands = Strands.of(scene, layout, model.rule, length)
         counts = np.multiply(layout.counts, model.signature.degree) + 1
         self._origins = np.repeat(scene.origins / length, counts, axis=0)
@@ -91,18 +159,32 @@ class RodContacts:
         self._newton = _Steps(problem, self)
         self._vectors = problem.numbering.vector(), problem.numbering.vector()
         self.force = np.zeros(problem.numbering.size)
-        self._take(self.strands.near(self._x, 0.0)[0], None, 0)
+        found = self.strands.near(self._x, _TOUCHES * self._largest)[0]
+        self._take(found, np.zeros((len(found), self._parts)), 0)
 
     def _take(self, touches, forces, removed):
-        self._touches, self._forces = touches, np.zeros(len(touches)) if forces is None else forces
-        self.removed = removed
+        self._touches, self._forces, self.removed = touches, forces, removed
         self.force[:] = 0.0
-        rows, gradients = self._gradients(touches)
-        np.add.at(self.force, np.maximum(rows, 0), np.where(rows < 0, 0.0, -gradients * self._forces[:, None]))
+        rows, total = self._at_nodes(touches, forces)
+        np.subtract.at(self.force, np.maximum(rows, 0), np.where(rows < 0, 0.0, total))
+
+    def _pulls(self, touches):
+        """Nodes (m, n) that contacts act on; forces and moments there of unit forces, (m, parts, n, 6)."""
+        strands, sides = self.strands, self._sides(touches)
+        pulls = strands.surface_pulls(touches.element, touches.place, touches.normal, touches.distance, sides)
+        return strands.nodes_of(touches), pulls
+
+    def _sides(self, touches):
+        return across(touches.normal) if self._parts > 1 else None
+
+    def _at_nodes(self, touches, forces):
+        """Rows of the unknowns (m, n, 6), -1 where clamped, and forces and moments of contacts there."""
+        nodes, pulls = self._pulls(touches)
+        return self._rows[nodes][..., _FORCES], np.einsum("mp,mpni->mni", forces, pulls)
 
     @property
     def memory(self):
-        """What `recall` takes: the contacts and their forces."""
+        """What `recall` takes: the contacts and their forces (m, parts): normal and, with friction, `across` it."""
         return self._touches, self._forces, self.removed
 
     def recall(self, memory):
@@ -111,13 +193,11 @@ class RodContacts:
 
     @property
     def _x(self):
-        return self._model.state.x.array[self._nodal] + self._origins
+        return self._model.state.x.array[self._nodal[:, :3]] + self._origins
 
-    def _gradients(self, touches):
-        """Rows of the unknowns (m, n), -1 where clamped, and derivatives of the gaps by them."""
-        nodes = self.strands.nodes_of(touches)
-        shape = len(touches), 3 * nodes.shape[1]
-        return self._rows[nodes].reshape(shape), self.strands.gradients(touches).reshape(shape)
+    @property
+    def _q(self):
+        return self._model.state.x.array[self._nodal[:, 3:7]]
 
     # -- equilibrium -------------------------------------------------------------------------------------------------
 
@@ -135,6 +215,7 @@ class RodContacts:
         problem.set_load_factor(load_factor)
         newton.iterations, spring, sizes, why = 0, 0.0, [], ""
         problem.put(accepted)
+        self._accepted = self._x, self._q, self._touches.of(self._touches.gap < _TOUCHES * self._largest)
         found, closest = self._look()
         moved, _ = problem.model.sizes(numbers[0] - accepted[0])
         if moved <= self._allowed(found):
@@ -178,11 +259,16 @@ class RodContacts:
 
     def _confirmed(self, iterations):
         """`Solved`, where the contacts of the last step are those of the state, with its negative modes."""
-        problem, (A, removed), active = self._problem, self._last, self._forces > 0
-        allowed = _BALANCED * (problem.load_norm + self._forces.max(initial=0.0)) + self._model.round_off
+        problem, (A, removed), (normal, *friction) = self._problem, self._last, self._forces.T
+        held = np.linalg.norm(friction, axis=0) < (1 - _AT_BOUND) * self._friction * normal if friction else ()
+        active = np.stack([normal > 0, *[held for _ in friction]], axis=1).ravel()
+        allowed = _BALANCED * (problem.load_norm + normal.max(initial=0.0)) + self._model.round_off
         if not self._newton.imbalance() <= allowed:
             return Solved(False, iterations, f"forces are left over at a node, {self._in_words(self._touches)}")
-        self.removed = removed - np.count_nonzero(np.linalg.eigvalsh(A[np.ix_(active, active)]) < 0)
+        if self._broken > _LAWS_MET:
+            return Solved(False, iterations, f"no forces obey the law of friction, {self._in_words(self._touches)}")
+        A = A[np.ix_(active, active)]
+        self.removed = removed - np.count_nonzero(np.linalg.eigvalsh((A + A.T) / 2) < 0)
         return Solved(True, iterations, "converged")
 
     def _look(self):
@@ -199,80 +285,120 @@ class RodContacts:
         found = in_words(self._model.scene.rods, self.strands.place_of(touches, k, self._length), "next to")
         return f"with {found}, at a gap of {touches.gap[k] * self._length:.3g} m"
 
-    def _known_forces(self, touches):
-        """The forces of the iteration before at the same contacts; 0 at new ones."""
-        forces, old = np.zeros(len(touches)), self._touches
+    def _same(self, touches, old):
+        """Which (m,) of other `Touches` each contact is the same as; -1 for a new one."""
         if not len(old) or not len(touches):
-            return forces
+            return np.full(len(touches), -1)
         (rods, s), (old_rods, old_s) = ((self.strands.rods[x.element], self._s(x)) for x in (touches, old))
         off = np.abs(s[:, None] - old_s).max(axis=2)
         same = (rods[:, None] == old_rods).all(axis=2) & (touches.node[:, None] == old.node)
         off = np.where(same & (off < _SAME * self._largest), off, np.inf)
         nearest = off.argmin(axis=1)
-        here = np.isfinite(off[np.arange(len(touches)), nearest])
-        forces[here] = self._forces[nearest[here]]
+        return np.where(np.isfinite(off[np.arange(len(touches)), nearest]), nearest, -1)
+
+    def _known_forces(self, touches):
+        """The forces of the iteration before at the same contacts; 0 at new ones."""
+        old, same, forces = self._touches, self._same(touches, self._touches), np.zeros((len(touches), self._parts))
+        here, old_one = same >= 0, same[same >= 0]
+        forces[here, 0] = self._forces[old_one, 0]
+        if self._parts > 1:
+            sides, old_sides = self._sides(touches)[here], self._sides(old.of(old_one))
+            forces[here, 1:] = np.einsum("mp,mpi,mqi->mq", self._forces[old_one, 1:], old_sides, sides)
         return forces
 
     def _s(self, touches):
         return np.column_stack([self.strands.s(touches.element[:, k], touches.place[:, k]) for k in (0, 1)])
 
+    def _slips(self, nodes, pulls):
+        """Rows of the unknowns (m, 2, 7 n), derivatives of slips across contacts by them, and (m, 2) the slips since
+        the accepted state."""
+        (x, q, _), parts = self._accepted, pulls[:, 1:]
+        turning = small_rotations((q + self._q) / 2)
+        by = np.concatenate([parts[..., :3], np.einsum("kpni,knij->kpnj", parts[..., 3:], turning[nodes])], axis=3)
+        moved = np.concatenate([self._x - x, self._q - q], axis=1)
+        rows = np.broadcast_to(self._rows[nodes][:, None], by.shape)
+        return *(z.reshape(*by.shape[:2], -1) for z in (rows, by)), np.einsum("kpnj,knj->kp", by, moved[nodes])
+
     def complete(self, change):
         """Complete Newton's change without contact, K^-1 r, by the contacts; False where the tangent is singular."""
-        touches, largest = self._touches_now, self._newton._longest
+        touches, largest, parts = self._touches_now, self._newton._longest, self._parts
         near = touches.gap < 2.7 * max(largest, self._radius)
-        self._found = np.zeros(len(touches))
+        self._found, self._broken = np.zeros((len(touches), parts)), 0.0
         if not near.any():
-            self._last = np.zeros((len(touches),) * 2), 0
+            self._last = np.zeros((self._found.size,) * 2), 0
             return True
         touches = touches.of(near)
         known = self._known_forces(touches)
-        rows, gradients = self._gradients(touches)
-        pressed = np.flatnonzero(known > 0)
+        nodes, pulls = self._pulls(touches)
+        pressed, m = np.flatnonzero(known[:, 0] > 0), len(touches)
         columns, factors = self.strands.curvatures(self._x, touches.of(pressed))
-        factors = (known[pressed][:, None] * factors).ravel()
-        kept = columns.reshape(len(factors), -1).any(axis=1) if len(factors) else np.zeros(0, dtype=bool)
-        factors, m = factors[kept], len(touches)
-        q = len(factors)
-        values = np.concatenate([columns.reshape(-1, gradients.shape[1])[kept], gradients])
-        at = np.concatenate([np.repeat(rows[pressed], 4, axis=0)[kept], rows])
-        values, at = np.where(at < 0, 0.0, values), np.maximum(at, 0)
-        solved = np.empty((len(change.array_r), len(values)))
+        factors = (known[pressed, :1] * factors).ravel()
+        columns = columns.reshape(len(factors), -1) if len(factors) else np.zeros((0, pulls.shape[2] * 3))
+        kept = columns.any(axis=1)
+        factors, columns, q = factors[kept], columns[kept], np.count_nonzero(kept)
+        rows = self._rows[nodes]
+        places, forces = rows[..., :3].reshape(m, -1), rows[..., _FORCES].reshape(m, -1)
+        bent = np.repeat(places[pressed], 4, axis=0)[kept]
+        loads = [*zip(bent, columns, strict=True),
+                 *zip(np.repeat(forces, parts, axis=0), pulls.reshape(m * parts, -1), strict=True)]  # fmt: skip
+        solved = np.empty((len(change.array_r), q + m * parts))
         load, answer = self._vectors
-        for k in range(len(values)):
+        for k, (at, values) in enumerate(loads):
             load.array_w[:] = 0.0
-            np.add.at(load.array_w, at[k], values[k])
+            np.add.at(load.array_w, np.maximum(at, 0), np.where(at < 0, 0.0, values))
             if not self._problem.solve(load, answer):
                 return False
             solved[:, k] = answer.array_r
-        S = np.einsum("kj,kjl->kl", values, solved[at])
-        d = -np.einsum("kj,kj->k", values, change.array_r[at])
-        S = (S + S.T) / 2
-        D = np.concatenate([factors, np.zeros(m)])
-        typical = np.abs(np.diag(S))[q:].mean()
+        motions = np.c_[solved, -change.array_r]
+
+        def moved(at, by):
+            return np.einsum("...n,...nk->...k", np.where(at < 0, 0.0, by), motions[np.maximum(at, 0)])
+
+        of_contacts = np.empty((m, parts, motions.shape[1]))
+        of_contacts[:, 0] = moved(places, pulls[:, 0, :, :3].reshape(m, -1))
+        start = touches.gap[:, None]
+        if parts > 1:
+            *slipping, slips = self._slips(nodes, pulls)
+            of_contacts[:, 1:], start = moved(*slipping), np.c_[start, slips]
+        S = np.concatenate([moved(bent, columns), of_contacts.reshape(m * parts, -1)])
+        S, d = S[:, :-1], S[:, -1]
+        if parts == 1:
+            S = (S + S.T) / 2
+        normal = q + parts * np.arange(m)
+        D, springs = np.r_[factors, np.zeros(m * parts)], np.r_[np.ones(q), np.zeros(m * parts)]
+        springs[normal] = 1.0
+        typical = np.abs(np.diag(S))[normal].mean()
         while True:
-            E = D - self._spring / typical
-            M = np.linalg.solve(np.eye(q + m) - E[:, None] * S, np.diag(E)) if self._spring or q else np.zeros_like(S)
+            E = D - self._spring / typical * springs
+            M = np.linalg.solve(np.eye(len(E)) - E[:, None] * S, np.diag(E)) if self._spring or q else np.zeros_like(S)
             A = S[q:, q:] + S[q:] @ M @ S[:, q:]
-            A = (A + A.T) / 2
-            lowest = np.linalg.eigvalsh(A)[0]
+            lowest = np.linalg.eigvalsh((A + A.T)[::parts, ::parts] / 2)[0]
             if lowest > -_NOTHING * typical:
                 break
             if self._spring > _STIFFEST:
                 return False
             self._spring = max(self._spring * _STIFFER, _SPRING)
-        A += (_REGULAR * typical + 2 * max(-lowest, 0.0)) * np.eye(m)
-        forces = complementary(A, touches.gap + d[q:] + S[q:] @ M @ d)
-        spread = M @ (d + S[:, q:] @ forces)
-        spread[q:] += forces
+        A = (A + A.T) / 2 if parts == 1 else A
+        if parts > 1:
+            lowest = np.linalg.eigvalsh((A + A.T) / 2)[0]
+        A += (_REGULAR * typical + 2 * max(-lowest, 0.0)) * np.eye(m * parts)
+        free = start.ravel() + d[q:] + S[q:] @ M @ d
+        if parts == 1:
+            forces = complementary(A, free)[:, None]
+        else:
+            rubs = np.where(self._same(touches, self._accepted[2]) >= 0, self._friction, 0.0)
+            forces, self._broken = rubbing(A, free, rubs, known)
+        spread = M @ (d + S[:, q:] @ forces.ravel())
+        spread[q:] += forces.ravel()
         change.array_w[:] -= solved @ spread
         self._found[near] = forces
         removed = 0
         if q:
             inner = np.diag(1 / factors) - S[:q, :q]
             removed = np.count_nonzero(np.linalg.eigvalsh(inner) < 0) - np.count_nonzero(factors < 0)
-        whole = np.zeros((len(near),) * 2)
+        whole, there = np.zeros((self._found.size,) * 2), np.repeat(near, parts)
         M = np.linalg.solve(np.eye(q) - factors[:, None] * S[:q, :q], np.diag(factors)) if q else np.zeros((0, 0))
-        whole[np.ix_(near, near)] = S[q:, q:] + S[q:, :q] @ M @ S[:q, q:]
+        whole[np.ix_(there, there)] = S[q:, q:] + S[q:, :q] @ M @ S[:q, q:]
         self._last = whole, removed
         return True
 
@@ -280,7 +406,7 @@ class RodContacts:
 
     def nodal_forces(self):
         """(elements, p + 1, 3) forces of the contacts at the nodes of the elements that touch, inertial."""
-        return self._nodal_forces(np.ones((len(self._touches), 2), dtype=bool))
+        return self._nodal_forces(np.ones((len(self._touches), 2), dtype=bool))[..., :3]
 
     def densities(self):
         """(elements, p + 1, 6) the same per length, for the contact forces of elements: without forces at points where
@@ -294,17 +420,15 @@ class RodContacts:
         total = found[before, -1] + found[after, 0]
         for element, node in ((before, -1), (after, 0)):
             found[element, node] = total * (h[element] / both)[:, None]
-        found /= (h[:, None] * weights)[..., None]
-        return np.concatenate([found, np.zeros_like(found)], axis=2)
+        return found / (h[:, None] * weights)[..., None]
 
     def _nodal_forces(self, which):
-        """The forces of those points of contacts (m, 2) alone."""
+        """(elements, p + 1, 6) forces and moments of those points of contacts (m, 2) alone."""
         strands, touches = self.strands, self._touches
-        found = np.zeros((*strands.cells.shape, 3))
-        for k, sign in ((0, -1.0), (1, 1.0)):
-            element = touches.element[:, k]
-            basis = strands.basis(element, touches.place[:, k])
-            push = (sign * self._forces * which[:, k])[:, None] * touches.normal
-            for neighbour, part in zip(strands.neighbours, np.split(basis, 3, axis=1), strict=True):
-                np.add.at(found, neighbour[element], part[..., None] * push[:, None, :])
+        found = np.zeros((*strands.cells.shape, 6))
+        _, total = self._at_nodes(touches, self._forces)
+        total = total.reshape(len(touches), 2, 3, strands.cells.shape[1], 6) * which[:, :, None, None, None]
+        for k in (0, 1):
+            for j, neighbour in enumerate(strands.neighbours):
+                np.add.at(found, neighbour[touches.element[:, k]], total[:, k, j])
         return found
