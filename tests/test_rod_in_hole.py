@@ -96,6 +96,7 @@ def test_an_assembly_touches_the_low_side_at_its_tangency(case):
     assert answer.hook_load == pytest.approx(case["w"] * length * math.cos(inc) - case["WOB"], rel=1e-8)
 
 
+@pytest.mark.serial
 @pytest.mark.parametrize("case", KNOWN["capstan"], ids=lambda case: f"EI {case['EI']:g}, mu {case['mu']:g}")
 def test_a_string_slips_round_an_arc(case):
     """The hole is wide but for the arc; its axis has the radius R plus the clearance, and the string leaves the arc at
@@ -116,6 +117,7 @@ def test_a_string_slips_round_an_arc(case):
     assert size * math.exp(mu * missed) == pytest.approx(case["T2"], rel=2e-5)
 
 
+@pytest.mark.serial
 def test_the_pressure_of_a_turning_string_is_smaller_than_its_weight():
     """Friction carries a part of it: |q|/sqrt(1 + mu^2), and the torque is that pressure times mu and the radius."""
     path, mu = cf.well.WellPath.from_survey([0, 500], [60, 60], [30, 30]), 0.4
@@ -136,6 +138,7 @@ def test_the_pressure_of_a_turning_string_is_smaller_than_its_weight():
 FOUND = {("P", "out"): 907306.0, ("P", "in"): 379920.4, ("P", "turning"): 598622.0, ("F-12", "out"): 938745.5}
 
 
+@pytest.mark.serial
 @pytest.mark.parametrize("name, way", FOUND)
 def test_whole_wells(name, way):
     stations = np.transpose(WELLS[name]["stations_md_inc_azi"])
@@ -148,6 +151,7 @@ def test_whole_wells(name, way):
         assert answer.surface_torque == pytest.approx(15290.84, rel=6e-3)
 
 
+@pytest.mark.serial
 def test_slender_strings_are_solved():
     """Beside the wall their pivots are zero to rounding; with less bending stiffness the hook load tends to a limit."""
     path = cf.well.WellPath.from_survey([0, 100, 300, 500], [0, 0, 40, 40], [20] * 4)

@@ -46,6 +46,7 @@ def test_a_stage_has_events_and_is_followed_in_arc_length(truth):
     assert path.load_factors[-1] == 1 and path.stage[-1] == 0
 
 
+@pytest.mark.serial
 def test_a_ring_that_is_bent_and_then_twisted(truth):
     """A straight rod becomes a ring that a twist of 2 pi sqrt(3) EI/GJ makes unstable (Michell, Zajac)."""
     EI, GJ, most = 0.02, 0.016, 14.5
@@ -74,6 +75,7 @@ SOFT = cf.Stiffness((40.0, 60.0), 200.0, (4.0, 1.0), 2.0)
 HEAVY = dataclasses.replace(SOFT, mass=0.2, inertia=(1e-3, 1e-3, 1e-3))
 
 
+@pytest.mark.serial
 @pytest.mark.parametrize("how", [cf.Clamp, cf.Pin, lambda x: cf.Prescribed(x, displacement=(0, 0, 0))])
 def test_a_support_holds_what_it_finds_and_leaves_as_its_reaction(how):
     push, hold = cf.Force("rod.end", (0.8, 0.3, -0.5)), how("rod.end")
