@@ -304,6 +304,23 @@ def test_signs_of_a_large_system_without_a_pivot_on_its_diagonal(zeros):
     np.testing.assert_allclose(logarithm, product, rtol=1e-10)
 
 
+def test_signs_of_large_systems_in_turn():
+    """Positive definite ones, whose factors need no exchange of pivots; one that is singular beside rounding; and one
+    with a negative eigenvalue, after which others still count right."""
+    size = 3000
+    i, diagonal = np.arange(size), np.full(size, 2.0)
+    system = elimination._Sparse(size)
+    entry = system.entries(np.concatenate([i, i[1:], i[:-1]]), np.concatenate([i, i[:-1], i[1:]]))
+    least = 2 * np.cos(np.pi / (size + 1)) - 2  # minus the least of the eigenvalues 2 - 2 cos(k pi/(n + 1))
+    for shift, expected in ((0.01, (0, 0)), (0.0, (0, 0)), (least - 5e-7, (1, 0)), (-1.0, (1000, 0)), (0.01, (0, 0))):
+        values = np.zeros(system.room)
+        np.add.at(values, entry, np.concatenate([diagonal + shift, np.full(2 * size - 2, -1.0)]))
+        *found, logarithm = system.signs(values)
+        eigenvalues = eigvalsh_tridiagonal(diagonal + shift, np.full(size - 1, -1.0))
+        assert tuple(found) == expected == (int((eigenvalues < 0).sum()), 0)
+        np.testing.assert_allclose(logarithm, np.log(np.abs(eigenvalues)).sum(), rtol=1e-8, atol=1e-9)
+
+
 def sparse_system(seed, change):
     """(starts, columns, values, dense matrix) of a diagonally heavy unsymmetric matrix; `change` of its entries."""
     rng = np.random.default_rng(seed)

@@ -21,6 +21,9 @@ _COARSE = 1e-9
 # Fewest unknowns of a matrix whose factors are kept for later ones; the relative residual of a solution with factors of
 # an earlier matrix, and the iterations that cost less than new factors.
 _KEPT, _REUSED, _MOST_REUSES = 2000, 1e-12, 12
+# % extra memory for fill-in, too little of which fails without a message, where pivots are exchanged and where not; and
+# the smallest pivot of a matrix with a diagonal of ones that is positive definite beyond doubt.
+_EXCHANGE, _NO_EXCHANGE, _SURELY = 200, 20, 1e-9
 # MUMPS's errors of matrices that are singular, by their pattern or by their numbers.
 _SINGULAR = (-6, -10)
 
@@ -246,19 +249,34 @@ def reference_blas():
 
 
 class RepeatedInertia:
-    """Eigenvalues' signs of symmetric matrices of one pattern on this rank, by factors with pivots of two rows too; the
-    symbolic analysis is made once. Arguments: see `RepeatedFactors` and `constrained_factors`. regular: whether there
-    are factors, of a matrix without null pivots."""
+    """Eigenvalues' signs of symmetric matrices of one pattern on this rank, with a diagonal of ones or zeros; the
+    symbolic analysis is made once. Factors with pivots of two rows too are made from the first matrix on that is not
+    surely positive definite. Arguments: see `RepeatedFactors` and `constrained_factors`. regular: whether there are
+    factors, of a matrix without null pivots."""
 
     def __init__(self, starts, columns, null):
-        self.regular = False
+        self.regular, self._definite, self._null = False, True, null
         self._pattern = starts.astype(PETSc.IntType), columns.astype(PETSc.IntType)
         size, entries = len(starts) - 1, np.ones(len(columns))
         self._matrix = PETSc.Mat().createAIJ((size, size), csr=(*self._pattern, entries), comm=PETSc.COMM_SELF)
         self._b, self._x = self._matrix.createVecs()
         self._matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
+        self._begin()
+
+    def _begin(self):
+        """Factors to be, of a matrix that is positive definite or not."""
+        self._matrix.setOption(PETSc.Mat.Option.SPD, self._definite)
         self._pc = PETSc.PC().create(PETSc.COMM_SELF)
-        _factor_constrained(self._pc, self._matrix, null)
+        if self._definite:
+            _factor_symmetric(self._pc, self._matrix, _NO_EXCHANGE)
+        else:
+            _factor_constrained(self._pc, self._matrix, self._null)
+
+    def _factored(self):
+        self._pc.setOperators(self._matrix)
+        self._pc.setUp()
+        factor = self._pc.getFactorMatrix()
+        return factor, factor.getMumpsInfog(12), factor.getMumpsInfog(28)
 
     def of(self, values, scale):
         """(negative, zero) numbers of eigenvalues of the matrix of these entries, and the logarithm of the absolute
@@ -267,10 +285,12 @@ class RepeatedInertia:
         self.regular, self._scale = False, scale
         self._matrix.setValuesCSR(*self._pattern, values)
         self._matrix.assemble()
-        self._pc.setOperators(self._matrix)
-        self._pc.setUp()
-        factor = self._pc.getFactorMatrix()
-        negative, zero, _ = factor.getInertia()
+        factor, negative, zero = self._factored()
+        if self._definite and (factor.getMumpsInfog(1) < 0 or negative or factor.getMumpsRinfog(19) < _SURELY):
+            self._definite = False
+            self._pc.destroy()
+            self._begin()
+            factor, negative, zero = self._factored()
         self.regular = factor.getMumpsInfog(1) >= 0 and not zero
         part, power = abs(factor.getMumpsRinfog(12)), factor.getMumpsInfog(34)  # the determinant: part times 2^power
         return negative, zero, math.log(part) + power * math.log(2) if part and not zero else math.nan
@@ -366,20 +386,25 @@ class RepeatedFactors:
         return self._x.array_r
 
 
-def _factor_constrained(pc, K, null=0.0):
+def _factor_symmetric(pc, K, more=_EXCHANGE):
     pc.setType("cholesky")
-    factor = _mumps(pc, K)
+    factor = _mumps(pc, K, more)
     factor.setMumpsIcntl(13, 1)  # root front not distributed: otherwise some negative pivots are not counted
     factor.setMumpsIcntl(6, 0)  # no search for a large diagonal, which fails where a row is zero
-    factor.setMumpsIcntl(24, 1)  # null pivots are counted separately
     factor.setMumpsIcntl(33, 1)  # the determinant
+    return factor
+
+
+def _factor_constrained(pc, K, null=0.0):
+    factor = _factor_symmetric(pc, K)
+    factor.setMumpsIcntl(24, 1)  # null pivots are counted separately
     factor.setMumpsCntl(3, -null)
 
 
-def _mumps(pc, A):
+def _mumps(pc, A, more=_EXCHANGE):
     pc.setOperators(A)
     pc.setFactorSolverType("mumps")
     pc.setFactorSetUpSolverType()
     factor = pc.getFactorMatrix()
-    factor.setMumpsIcntl(14, 200)  # % extra memory for fill-in: too little fails without a message
+    factor.setMumpsIcntl(14, more)
     return factor
