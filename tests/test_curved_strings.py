@@ -209,10 +209,11 @@ def test_resume_below_a_pipe_that_rubs_gives_identical_digits(tmp_path, monkeypa
     bit = cf.drilling.BitOnRock(CUTTING, weight=20e3, inertia=10.0)
     mixed = cf.drilling.mixed_scene(drilling(lambda t: min(40 * t, 4.0), bit=bit), 200.0)
     start = mixed.rest(**MESH)
-    whole = cf.simulate(mixed.scene, 0.12, dt=2e-3, **MESH, start=start)
+    given = MESH | {"dt": 2e-3, "start": start, "save_every": 6e-3}
+    whole = cf.simulate(mixed.scene, 0.12, **given)
     stop_at(monkeypatch, 40, 0.0)
     with pytest.raises(Stopped):
-        cf.simulate(mixed.scene, 0.12, dt=2e-3, folder=tmp_path / "run", **MESH, start=start)
+        cf.simulate(mixed.scene, 0.12, folder=tmp_path / "run", **given)
     history = cf.resume(tmp_path / "run", mixed.scene)
     for name in ("times", "energy", "work", "dissipated"):
         assert np.array_equal(getattr(history, name), getattr(whole, name))

@@ -66,6 +66,26 @@ def test_other_schemes_agree():
     np.testing.assert_allclose(other, one, atol=0.02)
 
 
+def test_the_rows_of_a_string_are_means_between_saved_states_and_of_order_2():
+    """Angles of drive and bit by the step, also where steps are halved and where few states are saved."""
+    drive = cf.drilling.TopDrive(
+        lambda t: 3 * (1 - math.cos(math.pi * min(t / 0.4, 1))), 100.0, cf.drilling.PI(800, 500)
+    )
+    bit = cf.drilling.BitOnRock(cf.drilling.Stribeck(1500.0, 1000.0, 3.0), inertia=50.0)
+    pieces = part(50.0, *COLLARS[1:]), part(250.0, *PIPE[1:])
+    mixed, found = cf.drilling.mixed_scene(cf.drilling.Drilling(cf.well.DrillString(pieces), drive, bit), 250.0), []
+    for dt in (8e-3, 4e-3, 2e-3):
+        history = cf.simulate(mixed.scene, 0.64, dt=dt, elements=2, degree=2, start=1.0, save_every=16e-3)
+        found.append(mixed.as_drilling(history))
+    for name, order in (("drive_angle", 3.9), ("bit_angle", 3.9)):
+        one, two, three = (getattr(x, name) for x in found)
+        assert np.abs(one - two).max() > order * np.abs(two - three).max(), name
+        assert np.abs(two - three).max() < 1e-4 * three.max(), name
+    assert found[2].bit_speed.max() > 4
+    taken = np.diff(found[2].bit_angle, prepend=0.0) @ found[2].torque_on_bit
+    assert taken == pytest.approx(history.dissipated[-1], rel=1e-3)
+
+
 def test_a_torque_that_drops_at_once():
     """Coulomb: nothing moves until the static torque is reached; then Z om = 2 M_in - T_d."""
     law = cf.drilling.Stribeck(2000.0, 1000.0)

@@ -126,9 +126,8 @@ class MixedScene(InWords):
         """What happens at the surface and at the bit in a motion of `scene`, as of other models of strings: its charts,
         tables, stick-slip, and files. Rows are the saved states but the first.
 
-        Speeds, torque and hook load of the surface, and weight and torque on bit, are means over the last step before
-        each; speeds of the bit are means between states, in which it must turn by less than a whole turn. There is no
-        ledger of energy, which `history` has for the rod.
+        Speeds, torques, hook load and weight on bit are means between states, in which the bit must turn by less than a
+        whole turn. There is no ledger of energy, which `history` has for the rod.
 
         Raises:
             SceneError: a motion of another scene, or with less than two states.

@@ -409,6 +409,7 @@ class Delays:
         actions = self._actions
         self._all = [(action.delayed(), StationNode(model, action.station)) for action in actions]
         self.longest = min((delayed.longest for delayed, _ in self._all), default=np.inf)
+        self._forget()
         if actions:
             model.actions.follow({id(x): delayed for x, (delayed, _) in zip(actions, self._all, strict=True)})
 
@@ -418,28 +419,41 @@ class Delays:
 
     def begin(self):
         """Begin at the model's state, at the time 0."""
+        self._forget()
         for delayed, node in self._all:
             delayed.begin(node.now())
 
+    def _forget(self):
+        #: (actions, 5) since the last saved state: the time (s), and the integrals of the numbers of their far ends
+        self._passed = self._before = np.zeros((len(self._all), 5))
+
     def accept(self, t, h):
         """Accept the step from t to t + h (s) to the model's state."""
-        for delayed, node in self._all:
+        self._before, self._passed = self._passed, self._passed.copy()
+        for (delayed, node), passed in zip(self._all, self._passed, strict=True):
             delayed.accept(t, h, node.of_step(h / self._model.time))
+            passed += h * np.append(1.0, delayed.far_end())
 
     def undo(self):
         """Take back the last step."""
+        self._passed = self._before
         for delayed, _ in self._all:
             delayed.undo()
 
     def far_ends(self, stepped):
-        """(actions, 4) numbers of their far ends in the last step; NaN where none was made."""
-        found = [delayed.far_end() if stepped else np.full(4, np.nan) for delayed, _ in self._all]
-        return np.reshape(found, (-1, 4))
+        """(actions, 4) numbers of their far ends, means over the steps since this was last called; NaN where the state
+        is not that after a step."""
+        passed = self._passed
+        self._forget()
+        return passed[:, 1:] / passed[:, :1] if stepped else np.full((len(passed), 4), np.nan)
 
     def memory(self):
-        return {str(i): delayed.memory() for i, (delayed, _) in enumerate(self._all)}
+        kept = {str(i): delayed.memory() for i, (delayed, _) in enumerate(self._all)}
+        return kept | {"passed": np.array(self._passed)} if kept else {}
 
     def recall(self, memory):
         """Restore what `memory` returned."""
         for i, (delayed, _) in enumerate(self._all):
             delayed.recall(memory[str(i)])
+        if self._all:
+            self._passed = self._before = memory["passed"].copy()

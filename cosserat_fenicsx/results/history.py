@@ -280,8 +280,8 @@ class History(RodResult):
 
     def far_end(self, action: Action) -> np.ndarray:
         """(n, 4) velocity (m/s), force (N), angular velocity (rad/s) and torque (N m) at the far end of an action that
-        depends on earlier motion, such as the upper end of a `PipeAbove`: means over the step that led to every state;
-        NaN where no step did.
+        depends on earlier motion, such as the upper end of a `PipeAbove`: means over the time from the state saved
+        before; NaN where no step led to a state.
 
         Args:
             action: of the scene.
