@@ -6,6 +6,8 @@
 #include <string.h>
 
 enum { MOST_LOCAL = 60 };
+/* Compliance times stiffness below which an iteration needs no help. */
+static const double LITTLE = 0.1;
 
 /* The normal force of a node, and its derivative by the distance R from the axis at the end of the step; R0: at its
    start. By the discrete gradient of k <R - clearance>^2/2, so that its work is the change of this energy (Gonzalez, J.
@@ -88,7 +90,7 @@ static void cross3(const double *a, const double *b, double *c)
 
 /* Directions at a node: x from the axis to the rod at the end, e and its size where the force acts, tau round it. */
 typedef struct {
-    double x[3], R0, R, e[3], share, tau[3];
+    double x[3], R0, R, both, e[3], share, tau[3];
 } place;
 
 static place place_of(const contact *c, int i)
@@ -102,8 +104,8 @@ static place place_of(const contact *c, int i)
         m[k] = c->at_end ? p.x[k] : x0[k] + p.x[k];
     }
     p.R0 = sqrt(dot3(x0, x0)), p.R = sqrt(dot3(p.x, p.x));
-    const double size = sqrt(dot3(m, m)), both = c->at_end ? p.R : p.R0 + p.R;
-    p.share = both > 0 ? size / both : 0;
+    const double size = sqrt(dot3(m, m));
+    p.both = c->at_end ? p.R : p.R0 + p.R, p.share = p.both > 0 ? size / p.both : 0;
     for (int k = 0; k < 3; k++) p.e[k] = size > 0 ? m[k] / size : 0;
     cross3(t, p.e, p.tau);
     return p;
@@ -178,6 +180,20 @@ void slips(const contact *c, double *size)
     }
 }
 
+/* Foretell how the normal force N of a node turns as the node moves round the axis by a change of its force: near the
+   axis directions found one after the other would grow apart. Nothing is left of this where the change is none. */
+static void foretell_turning(const contact *c, int i, const place *p, double N, double *change)
+{
+    const size_t width = 6 * (2 * (size_t)c->reach + 1);
+    const float *W = c->compliance + i * 6 * width + 6 * c->reach;
+    const double stiffness = p->both > 0 ? N / p->both : 0;
+    if (!(stiffness * (W[0] + W[width + 1] + W[2 * width + 2]) > LITTLE)) return;
+    double round[6] = {p->tau[0], p->tau[1], p->tau[2]}, by[6], moving[6];
+    respond(c, i, round, by), respond(c, i, change, moving);
+    const double more = -stiffness * dot3(round, moving) / (1 + stiffness * dot3(round, by));
+    for (int k = 0; k < 3; k++) change[k] += more * round[k];
+}
+
 /* Solve a node with the forces of all others; returns the size of the change of its motion by its own. */
 static double settle_node(contact *c, int i)
 {
@@ -199,10 +215,9 @@ static double settle_node(contact *c, int i)
         settle_friction(A, b, c->friction[i] * N, c->multiplier + i, T);
     }
     law[0] = N, law[1] = T[0], law[2] = T[1];
-    for (int k = 0; k < 6; k++) {
-        const double now = N * inward[k] + T[0] * across[k] + T[1] * along[k];
-        change[k] = now - force[k], force[k] = now;
-    }
+    for (int k = 0; k < 6; k++) change[k] = N * inward[k] + T[0] * across[k] + T[1] * along[k] - force[k];
+    foretell_turning(c, i, &p, N, change);
+    for (int k = 0; k < 6; k++) force[k] += change[k];
     double moving[6], size = 0;
     respond(c, i, change, moving);
     for (int k = 0; k < 6; k++) size = fmax(size, fabs(moving[k]) * (k < 3 ? 1 : c->arm[i]));
