@@ -403,6 +403,8 @@ def test_tortuosity(well):
             W.tortuosity(path, *wrong)
     with pytest.warns(cf.SceneWarning, match="period = 1 m turn the hole by 94.2 degrees per 30 m"):
         W.tortuosity(path, "0.5 deg", 1.0)
+    with pytest.warns(cf.SceneWarning, match="period = 250 m is hardly one .*: 250 feet are '250 ft' or 76.2"):
+        W.tortuosity(path, 0.5, 250.0)
 
 
 def test_tortuosity_in_a_scene_file(tmp_path):

@@ -19,7 +19,7 @@ from scipy.interpolate import CubicSpline
 from cosserat_fenicsx.checks import File, Numbers, finite_array, instance, refuse, store, warn
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.parts import Length, Number, Part, at_least, between
-from cosserat_fenicsx.units import deg_per_30m
+from cosserat_fenicsx.units import deg_per_30m, foot
 from cosserat_fenicsx.well.survey import read_columns
 
 
@@ -348,8 +348,9 @@ def _doubt_degrees(inc, azi, degrees):
         )
 
 
-# Stations a period, and nodes a period of random numbers; most stations; degrees per 30 m above which is warned.
-_STATIONS, _NODES, _MOST, _STEEP = 12, 2, 200_000, 20.0
+# Stations a period, and nodes a period of random numbers; most stations; degrees per 30 m, and period (m), above which
+# is warned.
+_STATIONS, _NODES, _MOST, _STEEP, _LONG = 12, 2, 200_000, 20.0, 200.0
 
 
 @dataclass(frozen=True)
@@ -383,7 +384,7 @@ def tortuosity(path: WellPath, amplitude: float | str, period: float | str, seed
 
     Raises:
         SceneError: a number outside its range; so short a period that there were more than 200 000 stations. A hole
-            that turns by more than 20 degrees per 30 m gives a `SceneWarning`.
+            that turns by more than 20 degrees per 30 m, or a period above 200 m, gives a `SceneWarning`.
     """
     given = Tortuosity(amplitude, period, seed)
     instance(given, "path", path, WellPath, "a WellPath")
@@ -398,6 +399,9 @@ def tortuosity(path: WellPath, amplitude: float | str, period: float | str, seed
         warn(f"tortuosity: amplitude = {given.amplitude:g} degrees and period = {period:g} m turn the hole by "
              f"{turn / deg_per_30m:.3g} degrees per 30 m; drilled ones are crooked by a few: 300 feet are '300 ft' or "
              "91.44")  # fmt: skip
+    if period > _LONG:
+        warn(f"tortuosity: period = {period:g} m is hardly one of a drilled hole, which swerves within a few stands, "
+             f"at most {_LONG:g} m: {period:g} feet are '{period:g} ft' or {period * foot:g}")  # fmt: skip
     md = np.linspace(0.0, path.length, math.ceil(path.length / period * _STATIONS) + 1)
     high, right = _deviations(md, path.length, amplitude, period, seed)
     tangent, across, aside = _frames(path, md)
