@@ -29,6 +29,13 @@ def drilling(law=LAW, *, drag=0.3, inertia=50.0, weight=None, **more):
     return cf.drilling.Drilling(string, drive, bit, drag=cf.drilling.ViscousDrag(drag, drag), **more)
 
 
+def under(control, inertia):
+    """A string of 300 m with a bit that slips, under a control of the drive."""
+    drive = cf.drilling.TopDrive(lambda t: 3 * (1 - math.cos(math.pi * min(t / 0.4, 1))), inertia, control)
+    bit = cf.drilling.BitOnRock(cf.drilling.Stribeck(1500.0, 1000.0, 3.0), inertia=50.0)
+    return cf.drilling.Drilling(cf.well.DrillString((part(50.0, *COLLARS[1:]), part(250.0, *PIPE[1:]))), drive, bit)
+
+
 def mean_speeds(history, rod):
     """Times in the middle of steps, and the mean speeds over them of a vertical rod's lower end."""
     q = history.rotation(rod.end)
@@ -84,6 +91,35 @@ def test_the_rows_of_a_string_are_means_between_saved_states_and_of_order_2():
     assert found[2].bit_speed.max() > 4
     taken = np.diff(found[2].bit_angle, prepend=0.0) @ found[2].torque_on_bit
     assert taken == pytest.approx(history.dissipated[-1], rel=1e-3)
+
+
+def test_linear_controls_above_a_rod():
+    """A PI control as a `LinearControl` is that one; `ZTorque` is that of the string; which are refused."""
+
+    def moved(control, inertia, dt=4e-3):
+        mixed = cf.drilling.mixed_scene(under(control, inertia), 250.0)
+        return mixed.as_drilling(cf.simulate(mixed.scene, 0.64, dt=dt, elements=2, degree=2, start=1.0))
+
+    linear = cf.drilling.LinearControl(((0.0,),), ((1.0, 0.0),), (500.0,), (800.0, 0.0))
+    one, same = moved(cf.drilling.PI(800, 500), 100.0), moved(linear, 100.0)
+    for name in ("drive_speed", "surface_torque", "bit_speed"):
+        np.testing.assert_allclose(
+            getattr(same, name), getattr(one, name), atol=1e-9 * np.abs(getattr(one, name)).max()
+        )
+    for filtered in (0.02, 0.0):
+        control = cf.drilling.ZTorque(filter=filtered)
+        found, whole = moved(control, 0.0, 2e-3), cf.drilling.simulate(under(control, 0.0), 0.64, dt=1e-4)
+        for name in ("drive_speed", "surface_torque"):
+            true = np.interp(found.mean_times, whole.mean_times, getattr(whole, name))
+            assert np.abs(getattr(found, name) - true).max() < 1e-3 * np.abs(true).max(), (name, filtered)
+    table = cf.drilling.TorqueOverTime(cf.signals.Ramp(1e3, 0.0, 1.0))
+    for control, speed, words in (
+        (cf.drilling.ZTorque(delay=0.02), 1.0, "delay = 0.02: expected 0 .s. above a rod; drilling.simulate has"),
+        (table, None, "control = .*expected one of continuous time above a rod, such as PI, .*drilling.simulate has"),
+    ):
+        drive = cf.drilling.TopDrive(speed, 100.0, control)
+        with pytest.raises(cf.SceneError, match=words):
+            cf.drilling.mixed_scene(replace(under(cf.drilling.Stiff(), 0.0), drive=drive), 250.0)
 
 
 def test_a_torque_that_drops_at_once():

@@ -19,9 +19,10 @@ import numpy as np
 import ufl
 
 from cosserat_fenicsx.checks import positive, refuse, store
+from cosserat_fenicsx.drilling.linear_control import arrays_of, check_answer
 from cosserat_fenicsx.drilling.pipe_friction import PipeFriction
 from cosserat_fenicsx.drilling.scene import Drilling, Segment, segment_of
-from cosserat_fenicsx.drilling.top_drive import Hook, TopDrive
+from cosserat_fenicsx.drilling.top_drive import DriveControl, Hook, StateSpace, TopDrive
 from cosserat_fenicsx.drilling.wall_friction import ViscousDrag
 from cosserat_fenicsx.parts import ForceSize
 from cosserat_fenicsx.scene.action import PointAction, scalar, vector
@@ -94,11 +95,14 @@ class PipeAbove(PointAction):
     def _found_numbers(self):
         """Further numbers that the motion depends on, for the fingerprint of a scene; functions of time by samples."""
         hook, drag = self.hook or Hook(), self.drag or ViscousDrag()
+        gains = _gains(self.drive, self.segments[0].torsional_impedance)
         found = [x for part in self.segments for x in (part.length, part.GJ, part.rhoJ, part.EA, part.rhoA)]
         found += [
-            drag.torsion, drag.axial, hook.stiffness, self.drive.inertia,
-            *map(float, _gains(self.drive, self.segments[0].torsional_impedance)),
+            drag.torsion, drag.axial, hook.stiffness, self.drive.inertia, *map(float, gains[:-1]),
         ]  # fmt: skip
+        if gains.linear is not None:
+            found += [*np.concatenate([x.ravel() for x in arrays_of(gains.linear)]), gains.linear.of_speed]
+            found.append(gains.linear.level or 0.0)
         for signal in (self.drive.signal(), hook.signal()):
             found += [signal(t) for t in (0.0, 1.0, 10.0)]
         return tuple(found)
@@ -229,15 +233,19 @@ def _hook_end(hook):
 
 
 def _gains(drive, impedance):
-    *gains, linear = drive.control.gains(impedance)
-    if linear is not None:
-        refuse("TopDrive", "control", drive.control, "Stiff(), PI(Kp, Ki), Matched() or Motor(torque) above a rod")
-    return gains
+    control = drive.control
+    if control.sampled:
+        refuse("TopDrive", "control", control, "one of continuous time above a rod, such as PI, Matched, ZTorque or "
+               "LinearControl; drilling.simulate has those that are called once a sample")  # fmt: skip
+    if control.late:
+        refuse(control, "delay", control.late, "0 (s) above a rod; drilling.simulate has controls that act late")
+    return control.gains(impedance)
 
 
 def _drive_end(drive, impedance):
-    rigid, given, Kp, Ki = _gains(drive, impedance)
-    return TopEnd(drive.signal().mean, stiff=rigid, inertia=drive.inertia, Kp=Kp, Ki=Ki, given=given)
+    rigid, given, Kp, Ki, linear = _gains(drive, impedance)
+    return TopEnd(drive.signal().mean, stiff=rigid, inertia=drive.inertia, Kp=Kp, Ki=Ki, given=given,
+                  control=drive.control, linear=linear)  # fmt: skip
 
 
 # Samples of an interpolation; least travel time of a part over the step, so that all of them are known.
@@ -249,12 +257,12 @@ _SPARE = 512
 
 @dataclass(frozen=True)
 class TopEnd:
-    """The upper end: I om' = Kp (Om - om) + Ki phi + M0 - M, phi' = Om - om; or om = Om where stiff; or M = phi, the
-    force of the start.
+    """The upper end: I om' = Kp (Om - om) + Ki phi + M0 - M, phi' = Om - om; or om = Om where stiff; or by a linear
+    control, see `linear_control`; or M = phi, the force of the start.
 
     Args:
         mean: function (start, end) of times (s) that gives the mean of the speed Om asked for; None for the force of
-            the start. inertia: I. given: M0.
+            the start. inertia: I. given: M0. linear: a `StateSpace` of the control; None for Kp and Ki.
     """
 
     mean: Callable[[float, float], float] | None
@@ -263,30 +271,52 @@ class TopEnd:
     Kp: float = 0.0
     Ki: float = 0.0
     given: float = 0.0
+    control: DriveControl | None = None
+    linear: StateSpace | None = None
 
     def rest(self, speed, force):
         """(om, phi) at the beginning of a motion, for a speed and a force handed down; phi balances that force without
-        a difference of speeds, where there is one."""
+        a difference of speeds, where there is one. Then the state of a linear control, 0."""
         if self.mean is None:
             return speed, force
+        if self.linear is not None:
+            return speed, 0.0, *np.zeros(len(self.linear.A)).tolist()
         return speed, (force - self.given) / self.Ki if self.Ki else 0.0
 
     def step(self, state, start, end, impedance, wave):
         """The mean speed in a step from start to end (s), and the new state, by the implicit midpoint rule.
 
         Args:
-            state: (om, phi). impedance: of the string, with its drag. wave: M - Z om that arrives.
+            state: see `rest`. impedance: of the string, with its drag. wave: M - Z om that arrives.
         """
-        h, (om, phi) = end - start, state
+        h, (om, phi, *x) = end - start, state
         if self.mean is None:
             return (phi - wave) / impedance, state
         asked = self.mean(start, end)
+        if self.linear is not None:
+            return self._controlled(h, om, np.array(x), impedance, wave, asked)
         if self.stiff:
             return asked, (asked, 0.0)
         inert, turned = 2 * self.inertia / h, self.Ki * h / 2
         push = inert * om + self.Ki * phi + self.given - wave + (self.Kp + turned) * asked
         mean = push / (inert + self.Kp + turned + impedance)
         return mean, (2 * mean - om, phi + h * (asked - mean))
+
+    def _controlled(self, h, om, x, impedance, wave, asked):
+        """`step` of a linear control: its mean output is y = c + d u, with the mean u = (Om - om, M)."""
+        A, B, C, D = arrays_of(self.linear)
+        half = np.linalg.inv(np.eye(len(x)) - h / 2 * A)
+        c, d = C @ half @ x, D + h / 2 * C @ half @ B
+        fixed, by_speed = c + d @ (asked, wave - (self.linear.level or 0.0)), d[1] * impedance - d[0]
+        if self.linear.of_speed:
+            mean = (asked + fixed) / (1 - by_speed)
+        else:
+            check_answer(self.control, d[1], h)
+            inert = 2 * self.inertia / h
+            mean = (inert * om + fixed - wave) / (inert + impedance - by_speed)
+        u = np.array([asked - mean, wave + impedance * mean - (self.linear.level or 0.0)])
+        x = 2 * half @ (x + h / 2 * B @ u) - x
+        return mean, (2 * mean - om, 0.0, *x.tolist())
 
 
 class DelayLines:
