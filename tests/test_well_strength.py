@@ -86,9 +86,10 @@ def test_the_tables_of_api(grade, wear):
     assert found == pytest.approx(API[grade, wear], abs=0.7)
 
 
-#: Casing (diameter, lb/ft), yield strength (psi), collapse and internal yield (psi, rounded to 10). 4 1/2 in: the casing
-#: data table on engineersedge.com (13213); 7 and 9 5/8 in: the catalogue in rep/roque1996.xlsx of the public repository
-#: lcsgouveia/casing_selection (3cb96f0), which has 7930 psi, 20 psi less than the formula, for 53.50 of 110e3 psi.
+#: Casing (diameter, lb/ft), yield strength (psi), collapse and internal yield (psi, rounded to 10). 4 1/2 in: the
+#: casing data table on engineersedge.com (13213); 7 and 9 5/8 in: the catalogue in rep/roque1996.xlsx of the public
+#: repository lcsgouveia/casing_selection (3cb96f0), which has 7930 psi, 20 psi less than the formula, for 53.50 of
+#: 110e3 psi.
 CASINGS = {
     "4 1/2 in 9.50": (55e3, 3310, 4380), "4 1/2 in 10.50": (55e3, 4010, 4790), "4 1/2 in 11.60": (80e3, 6350, 7780),
     "7 in 23.00": (80e3, 3830, 6340), "7 in 26.00": (55e3, 4320, 4980), "7 in 29.00": (110e3, 8530, 11220),
