@@ -123,7 +123,6 @@ def test_a_study_within_a_case():
     assert cf.study(sums, {"n": [1, 2, 3, 4]}).results == [1, 3, 6, 10]
 
 
-@pytest.mark.ranks
 @pytest.mark.parametrize(
     "value",
     [1.0 / 3.0, 7, True, None, "text", np.nan, -np.inf, 1 - 2j, np.float32(0.1), [1.5, np.nan], np.eye(2, dtype=int),
@@ -290,7 +289,6 @@ def test_failures_are_tried_again_where_this_is_asked_for(tmp_path_all, capsys):
     assert len(lines_in(tmp_path_all)) == 6
 
 
-@pytest.mark.ranks
 @pytest.mark.parametrize("damage", [b"{}", b"[1]", b"\xff", b'{"case": 99, "attempt": 1, "seconds": 1, "result": 0}'])
 def test_lines_that_no_study_wrote_are_left_out(damage, tmp_path_all):
     found = cf.study(third, CASES, folder=tmp_path_all)
@@ -356,7 +354,6 @@ def test_another_study_is_refused(tmp_path_all, monkeypatch):
     assert cf.study(pressure, given[pressure], folder=tmp_path_all / "pressure").results == [9.81 * 1200.0]
 
 
-@pytest.mark.ranks
 def test_what_a_task_does_not_use_is_not_compared(tmp_path_all, monkeypatch):
     """Numbers that have the name of an attribute, or that the task itself counts with, may be others at every call."""
     here = sys.modules[__name__]
@@ -373,7 +370,6 @@ def counted(i):
     return i.real
 
 
-@pytest.mark.ranks
 def test_what_cannot_be_compared_is_refused_with_a_folder_alone(tmp_path_all):
     for task, cases in ((lambda x: 1, [{"x": object()}]), (Call(), [{"x": 1}])):
         assert cf.study(task, cases).results == [1]
