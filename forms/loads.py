@@ -43,7 +43,18 @@ def tendon(point, test, T, a, a_s):
     """The tension T of a thread through the points r + R a, without friction: -T times the change of its length per
     unit of arc length. It is `equilibrium.balance` of the force T t and the moment R a x T t, t the thread's direction;
     `a` and its derivative a_s are inertial, at rest."""
-    arm, arm_s = point.R * a, point.R * (a_s + ufl.cross(point.curvature, a))
-    along = point.r_s + arm_s
+    arm, arm_s, along = _thread(point, a, a_s)
     change = test.phi_r_s + ufl.cross(test.phi_s, arm) + ufl.cross(test.phi, arm_s)
     return -T * ufl.dot(along, change) / ufl.sqrt(ufl.dot(along, along))
+
+
+def thread_stretch(point, a, a_s):
+    """The length of the thread of `tendon` per unit of arc length."""
+    _, _, along = _thread(point, a, a_s)
+    return ufl.sqrt(ufl.dot(along, along))
+
+
+def _thread(point, a, a_s):
+    """R a, its derivative along the rod, and that of r + R a."""
+    arm_s = point.R * (a_s + ufl.cross(point.curvature, a))
+    return point.R * a, arm_s, point.r_s + arm_s

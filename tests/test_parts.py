@@ -209,6 +209,7 @@ def everything():
         cf.Thermal(rods[1], 1e-5, cf.signals.Ramp(3.0), gradient=(1.0, 2.0)), cf.Growth(rods[2], 1.1, permanent=True),
         cf.Pretension(rods[3], force=3.0), cf.Pretension(rods[4], rest_length=0.9, permanent=False),
         cf.Tendon(rods[1], (0.1, 0.2), cf.signals.Ramp(3.0)), cf.Tendon(rods[2], cf.Helical(0.1, -0.5, 0.3), 2.0),
+        cf.Tendon(rods[3], (0.1, 0.2), shortening=0.01, axial=5e4),
     ]  # fmt: skip
     joints = [cf.Joint(rods[5].end, rods[6].start, release=(0.2, 0.5, 0.9))]
     velocities = [cf.InitialVelocity(rods[5], linear=(0, 1.0, 0), angular=(0, 0, 0.3))]

@@ -1,4 +1,4 @@
-"""Tendons: threads along a rod, guided by its sections without friction, that are tightened to move it.
+"""Tendons: threads along a rod, guided by its sections without friction, that are tightened or shortened to move it.
 
 A tendon runs through the points r + R a(s), a = R_R p(s), and has the tension T all along. Its energy is T times its
 length, whose variation is a force T t and a moment R a x T t in every section, t the direction of the tendon. It is
@@ -16,7 +16,7 @@ import numpy as np
 from cosserat_fenicsx.checks import Numbers, refuse
 from cosserat_fenicsx.kinds import Number
 from cosserat_fenicsx.numerics import PLACES
-from cosserat_fenicsx.parts import ForceSize, FunctionAlong, Length, Several, at_least
+from cosserat_fenicsx.parts import ForceSize, FunctionAlong, Length, Several, at_least, positive
 from cosserat_fenicsx.scene import action
 from cosserat_fenicsx.scene.action import LineAction
 from cosserat_fenicsx.scene.loads import Load
@@ -60,7 +60,7 @@ class Helical(FunctionAlong):
 
 @dataclass(frozen=True)
 class Tendon(Load, LineAction):
-    """A tendon along a whole rod, with a given tension and without friction.
+    """A tendon along a whole rod, with a given tension or of a given length, and without friction.
 
     The contact force of the rod does not include it: a rod pulled by a tendon alone has the contact force -T t, and its
     supports have no reaction.
@@ -70,18 +70,27 @@ class Tendon(Load, LineAction):
         offset: where the tendon runs in the section, m from the axis along d_1 and d_2: two numbers; or `Helical`,
             `Along` or `AlongTable` with three components, along d_1, d_2, d_3.
         tension: N, not negative; or a function of time.
+        shortening: instead of a tension, how much shorter the tendon gets, m, from its length in the reference at the
+            load factor 0; negative to slacken it. In `solve` alone. A tendon does not push: where it would, its tension
+            is zero, and it is shorter along the rod than its length.
+        axial: of a tendon of given length, its stiffness EA, N; None where it does not stretch.
         jumps: times where a function of time is not smooth, s.
         permanent: whether it acts in full, before all that the load factor multiplies.
 
     Raises:
-        SceneError: not a rod, numbers that are not finite, a negative tension, or an offset that jumps.
+        SceneError: not a rod, numbers that are not finite, a negative tension, an offset that jumps, both or none
+            of tension and shortening, or a tendon of given length that is permanent.
     """
 
     rod: RodOrName
     offset: Annotated[Numbers | FunctionAlong, VectorInTime(Several("length", 2), (FunctionAlong,), functions=False)]
-    tension: Annotated[ForceSize | Callable[[float], float], VectorInTime(Number("force", at_least(0, "a tension")))]
+    tension: (
+        Annotated[ForceSize | Callable[[float], float], VectorInTime(Number("force", at_least(0, "a tension")))] | None
+    ) = None
     jumps: Numbers = ()
     permanent: bool = False
+    shortening: Annotated[float, Number("length")] | None = None
+    axial: Annotated[float, Number("force", positive())] | None = None
 
     work, is_thread = "tendon", True
     traits = dict(dead=False, known_force=False, rates=False, turns=True, flat=True)
@@ -89,10 +98,26 @@ class Tendon(Load, LineAction):
     def validate(self):
         if isinstance(self.offset, AlongPieces):
             refuse(self, "offset", self.offset, "a function without jumps, Along or AlongTable")
+        if (self.tension is None) == (self.shortening is None):
+            refuse(self, "tension", self.tension, "either tension (N) or shortening (m)")
+        if self.axial is not None and not self.shortens:
+            refuse(self, "axial", self.axial, "None, since the tension is given")
+        if self.permanent and self.shortens:
+            refuse(self, "permanent", True, "False: the load factor multiplies a shortening")
+
+    @property
+    def shortens(self):
+        """See `Action`."""
+        return self.shortening is not None
+
+    @property
+    def scaled(self):
+        """See `Action`."""
+        return not (self.permanent or self.shortens)
 
     def data(self, rod, s):
         s = np.asarray(s, dtype=float)
-        tension = np.full(s.shape, float(np.reshape(self.tension, -1)[0]))
+        tension = np.full(s.shape, 0.0 if self.shortens else float(np.reshape(self.tension, -1)[0]))
         return (
             action.scalar(tension, "N"),
             action.vector(self._arm(rod, s), "m"),

@@ -21,6 +21,8 @@ from cosserat_fenicsx.errors import NotConverged
 #: Newton stops when the increment, or the remaining error estimated from the contraction, is below this (root mean
 #: square over the nodal unknowns, positions in units of L).
 INCREMENT = 1e-11
+# Inverse iterations for the motions that are resisted least.
+_INVERSE = 30
 _Reason = PETSc.SNES.ConvergedReason
 # SNES's reasons for the verdicts in chain.h.
 _REASONS = (
@@ -102,11 +104,15 @@ class Newton(Pointers):
 
     def apply(self, pc, residual, step):
         """PETSc calls this to compute the step, which it subtracts from x."""
-        self._direction()
+        by_load = self._direction()
+        if self.problem.tensions:
+            self.problem.tensions.take(by_load=by_load)
         step.array_w[:] = self._step.array_r
 
     def _direction(self):
+        """Find the step; returns the change of the load factor in it."""
         self.problem.solve(self.problem.b, self._step)
+        return 0.0
 
     @cached_property
     def bordered(self):
@@ -185,7 +191,7 @@ class BorderedNewton(Newton):
         if self.neutral is not None:
             self._leave_out_neutral(step)
         if self._normal is None:
-            return
+            return 0.0
         load_factor, normal = problem.load_factor, self._normal
         off = problem.x.array_r - self._x0 - step.array_r
         left = inner(normal, off) + self._weight * (load_factor - self._load_factor0)
@@ -195,13 +201,13 @@ class BorderedNewton(Newton):
         if math.isfinite(change):
             problem.set_load_factor(load_factor + change)
             self._take_loads()
+        return change
 
     def _leave_out_neutral(self, step):
         """Remove the neutral motion from the step and from dx/d load_factor, and update it by inverse iteration."""
         inner, motion = self.problem.model.inner, self.neutral
-        force = self.problem.load_derivative(self.problem.x)
-        force.array_w[:] = motion
-        self.problem.solve(force, self._free)
+        self._force.array_w[:] = motion
+        self.problem.solve(self._force, self._free)
         free = self._free.array_r
         size = inner(motion, free)
         for vector in (step, self._slope):
@@ -234,6 +240,22 @@ class BorderedNewton(Newton):
         moved = (displacements @ self._by_nodes(self._free.array_r)[..., None])[..., 0]
         work, size = self.work(motion, moved), math.sqrt(self.work(moved, moved))
         return (1 / work if work else math.inf), moved / (size or 1.0)
+
+    def softest(self, count):
+        """The changes of the unknowns (owned entries) of so many motions that the tangent at the problem's x and load
+        factor resists least, by inverse iteration."""
+        numbers, nodes = np.random.default_rng(self.problem.model.comm.rank), self.problem.model.numbering.nodes
+        motions, changes = list(numbers.standard_normal((count, nodes, 6))), [None] * count
+        for _ in range(_INVERSE):
+            for i in range(count):
+                _, motion = self.response(motions[i])
+                change = self._free.array_r.copy()
+                for other, by in zip(motions[:i], changes[:i], strict=True):
+                    share = self.work(motion, other)
+                    motion, change = motion - share * other, change - share * by
+                size = math.sqrt(self.work(motion, motion))
+                motions[i], changes[i] = motion / size, change / size
+        return changes
 
     def _tie_maps(self):
         return self.problem.model.tie_maps(self._by_nodes(self.problem.x.array_r))
@@ -324,6 +346,8 @@ class LimitedNewton:
         x.axpy(-1.0, self._change)
         problem.set_state(x)
         problem.advance()
+        if problem.tensions:
+            problem.tensions.take(share)
         if share < 1.0:
             for carried, old in zip(self._carried, before, strict=True):
                 carried[:] = old + share * (carried - old)

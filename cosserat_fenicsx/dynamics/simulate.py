@@ -28,6 +28,7 @@ from cosserat_fenicsx.scene.action import path_dependent
 from cosserat_fenicsx.scene.scene import Scene, check_magnitudes, check_tensions
 from cosserat_fenicsx.scene.stages import refuse_stages
 from cosserat_fenicsx.statics.meshes import turning_in_law
+from cosserat_fenicsx.statics.problem import refuse_given_lengths
 from cosserat_fenicsx.storage.store import Nowhere, Store
 from cosserat_fenicsx.storage.stored_history import KIND, StoredHistory
 
@@ -120,6 +121,7 @@ def simulate(
             "that applies the loads slowly"
         )
     refuse_stages("simulate", scene)
+    refuse_given_lengths("simulate", scene)
     if scene.rod_contact and (scene.rod_contact.stiffness is None or comm.size > 1):
         raise SceneError(
             "simulate: rods touch each other on one process, with elastic surfaces: expected one process, and a "

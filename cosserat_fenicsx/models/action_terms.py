@@ -136,6 +136,11 @@ class ActionTerms:
         """The Functions that are updated with the state in every Newton iteration."""
         return [function for term in self.terms if term.kind.refreshed for function in term.data]
 
+    @property
+    def tensions(self):
+        """The Functions of the tensions of tendons of given length."""
+        return [term.data[0] for term in self.terms if term.kind.finds_tension]
+
     def refresh(self):
         """Update the data that depend on the position, at the model's state."""
         for term in self.terms:

@@ -370,7 +370,7 @@ class RodModel:
     def changing(self):
         """The Functions whose values change along a path."""
         actions = self.actions
-        return (self.state, *self.carried, *actions.refreshed, *actions.memory_functions)
+        return (self.state, *self.carried, *actions.refreshed, *actions.tensions, *actions.memory_functions)
 
     @property
     def constants(self):

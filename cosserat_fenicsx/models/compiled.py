@@ -18,6 +18,7 @@ from cosserat_fenicsx import compat
 from cosserat_fenicsx.compat import compiling
 from cosserat_fenicsx.forms import equilibrium
 from cosserat_fenicsx.forms.equilibrium import VirtualMotion
+from cosserat_fenicsx.forms.loads import thread_stretch
 from cosserat_fenicsx.forms.point import NONE, resultants, variation
 from cosserat_fenicsx.numerics import lobatto_weights
 
@@ -285,6 +286,18 @@ def action_densities(model, point_at):
             if not isinstance(density, ufl.constantvalue.Zero):  # as of what resists velocities, in statics
                 found[number] = place, density
     return found
+
+
+def threads_of(model, terms, along):
+    """Forms of the `Term`s of threads of a model, UFL: the sum of tensions times lengths; its change along a change of
+    the state (`along`, a Function); and what the tensions add to the residual."""
+    state, gauss = model.state, measures(model).gauss
+    test = model.tests_of(ufl.TestFunction(model.space), model.motion_of(state, state))
+    points = [model.point_of(state, rest=term.rest, frame=term.frame) for term in terms]
+    pairs = list(zip(terms, points, strict=True))
+    energy = sum(term.numbers[0] * thread_stretch(at, *term.numbers[1:]) * gauss for term, at in pairs)
+    force = -sum(term.work(at, test) * gauss for term, at in pairs)
+    return [energy, ufl.derivative(energy, state, along), force]
 
 
 def varied_actions(acting, test, direction):

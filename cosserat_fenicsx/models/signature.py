@@ -132,6 +132,11 @@ class TermKind(namedtuple("TermKind", "work place sizes memory scaled evolve ref
         """Whether its data are those at the Gauss points."""
         return self.place in ("line", "law")
 
+    @property
+    def finds_tension(self):
+        """Whether it is a thread of given length (`Action.shortens`), whose tension is found."""
+        return self.thread and self.scaled == "full"
+
 
 def place_actions(scene, layout):
     """Terms of the actions: [(`TermKind`, [(action, rod index, vertex or None)])]. Actions of one kind share a term if

@@ -18,13 +18,19 @@ _INSIDE = 1e-9
 
 class TendonState(NamedTuple):
     """A tendon in several states: its tension (n,), N, and its length along the rod (n,), m; `print` shows the first
-    and the last."""
+    and the last, and in how many states it is slack."""
 
     tension: np.ndarray
     length: np.ndarray
 
+    @property
+    def slack(self):
+        """(n,) whether it has no tension."""
+        return self.tension == 0
+
     def __str__(self):
-        return f"tension {span_in_words(self.tension, 'N')}, length {span_in_words(self.length, 'm')}"
+        slack = f", slack in {self.slack.sum()} of {len(self.slack)} states" if self.slack.any() else ""
+        return f"tension {span_in_words(self.tension, 'N')}, length {span_in_words(self.length, 'm')}{slack}"
 
 
 class Threads:
@@ -81,6 +87,9 @@ class Threads:
     def tension(self, thread):
         """(n,) N."""
         records = self._records
+        if thread.shortens:
+            found = [other for other in self._threads if other.shortens]
+            return records["reactions"][:, found.index(thread) - len(found)] * self._result.scales.force
         times = records["time"] if "time" in records.columns else np.zeros(len(records))
         full = thread.amplitude * np.array([np.reshape(at(thread, t).tension, -1)[0] for t in times], dtype=float)
         return full * records["load_factor"] if thread.scaled else full

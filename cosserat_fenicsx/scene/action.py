@@ -128,12 +128,14 @@ class Action(Part, family="load or action", homes=("cosserat_fenicsx.scene.loads
         is_thread: whether it is the tension of a thread along a rod, which is no part of the rod's contact force. Its
             `data` are then the tension, N, and the arm from the axis to the thread, m, and its derivative along the
             rod, inertial in the reference.
+        shortens: whether it is a thread of given length, whose tension is found (statics.tensions). It then has
+            `shortening` (m) and `axial` (N, or None), is not `scaled`, and the tension in its `data` is 0.
         traits: None; or a dict of the fields of `models.traits.Traits`, where it takes long to find them from `work`.
     """
 
     at_nodes, scaled, permanent, follows, memory, evolve, traits = False, True, False, False, (), None, None
     delayed, resists, touches, presses, gaps, in_law, is_thread = None, False, False, False, None, False, False
-    rods_touch = False
+    rods_touch = shortens = False
     amplitude = 1.0
 
     def acts_on(self, rod):

@@ -13,6 +13,7 @@ from cosserat_fenicsx.algebra.pool import PROBLEMS
 from cosserat_fenicsx.algebra.tie_rows import TieRows
 from cosserat_fenicsx.checks import tolerance, whole
 from cosserat_fenicsx.errors import NotConverged, SceneError
+from cosserat_fenicsx.models.compiled import threads_of
 from cosserat_fenicsx.models.determinate import DeterminateInPlane, DeterminateInSpace
 from cosserat_fenicsx.models.planar import PlanarModel
 from cosserat_fenicsx.models.signature import Signature
@@ -25,6 +26,7 @@ from cosserat_fenicsx.scene.scene import Scene
 from cosserat_fenicsx.scene.stages import refuse_stages
 from cosserat_fenicsx.scene.statical import check_no_mechanism
 from cosserat_fenicsx.statics.stability import NegativeModes
+from cosserat_fenicsx.statics.tensions import Tensions
 from cosserat_fenicsx.statics.touching import RodContacts
 
 
@@ -39,6 +41,8 @@ def check_arguments(scene, tol, elements, bound=NAMES, *, owner="solve"):
         refuse_stages(owner, scene)
     if owner != "solve":
         refuse_rod_contact(owner, scene)
+    elif scene.stages or scene.rod_contact:
+        refuse_given_lengths(owner, scene)
     tolerance(owner, tol)
     criteria_of(bound)
     if elements is not None:
@@ -70,8 +74,11 @@ def check_static(scene):
 
 
 def refuse_rod_contact(owner, scene, comm=None):
-    """Refuse (SceneError) rods that touch each other where a function, the `owner` of the message, has no such contact;
-    comm: of `solve`, which has it for scenes without stages, on one rank; None elsewhere."""
+    """Refuse (SceneError) rods that touch each other, and tendons of given length, where a function, the `owner` of the
+    message, does not have them; comm: of `solve`, which has contact of rods for scenes without stages, on one rank;
+    None elsewhere."""
+    if comm is None:
+        refuse_given_lengths(owner, scene)
     if scene.rod_contact and comm is None:
         raise SceneError(
             f"{owner}: RodContact acts in `solve` and `simulate` alone: expected a scene without it, or the "
@@ -87,6 +94,17 @@ def refuse_rod_contact(owner, scene, comm=None):
                          "stages, and one process")  # fmt: skip
 
 
+def refuse_given_lengths(owner, scene):
+    """Refuse (SceneError) tendons of given length where a function, the `owner` of the message, does not have them."""
+    for load in scene.all_loads:
+        if load.shortens:
+            raise SceneError(
+                f"{owner}: a {type(load).__name__} of given length is known to `solve` alone, in a scene without "
+                "stages and without rods that touch each other: expected its tension, such as that which "
+                "path.tendon(tendon).tension gives"
+            )
+
+
 #: Change of the load factor for central differences, whose error is of second order in that of prescribed rotations.
 CHANGE = 1e-4
 
@@ -96,8 +114,8 @@ class Problem(Equations):
 
     load_factor: of loads and prescribed motions; while `begins`, that of permanent loads, from 0 to 1, before all
     others. touching: the `RodContacts` of the scene, or None. fields: the `PackedExpression` of `CompiledForms.fields`,
-    or None; load_norm: Euclidean norm of the dead loads at load factor 1, dimensionless; sweep: the `Sweep` that finds
-    points in C, once it was asked for.
+    or None; tensions: the `Tensions` of tendons of given length, or None; load_norm: Euclidean norm of the dead loads
+    at load factor 1, dimensionless; sweep: the `Sweep` that finds points in C, once it was asked for.
     """
 
     ties_class, sweep, touching = TieRows, None, None
@@ -124,6 +142,7 @@ class Problem(Equations):
         if forms.fields and model.comm.size == 1:
             size = len(forms.gauss) * forms.fields_size
             self.fields = PackedExpression(forms.fields, model.mesh, len(model.cell_dofs), size)
+        self.tensions = Tensions(self, threads_of) if model.actions.tensions else None
         self._loaded, self.begins, self._hooks = None, False, self.c.hooks
 
     def load(self, scene, layout):
@@ -151,6 +170,8 @@ class Problem(Equations):
         self.set_load_factor(0.0)
         self.numbering.from_local(self._state, self.x)
         self.set_state(self.x)
+        if self.tensions:
+            self.tensions.load()
         self.touching = RodContacts(self) if scene.rod_contact else None
         self.c.hooks = self._hooks | RESIDUAL * bool(self.touching)
         return anew
@@ -189,6 +210,27 @@ class Problem(Equations):
         self._share[...] = 1.0
         self.set_load_factor(0.0)
 
+    def factor(self):
+        super().factor()
+        if self.tensions:
+            self.tensions.forget()
+
+    solve_without_tendons = Equations.solve
+
+    def solve(self, b, x):
+        solved = super().solve(b, x)
+        if solved and self.tensions:
+            solved = self.tensions.complete(b, x)
+            if not solved:
+                self.c.singular = 1
+                x.set(np.nan)
+        return solved
+
+    def multipliers(self):
+        """Those of the constraint equations, then the tensions of tendons of given length."""
+        tensions = [self.tensions.values] if self.tensions else []
+        return np.concatenate([super().multipliers(), *tensions])
+
     def commit(self):
         """Accept the state: path-dependent loads update their history variables."""
         if self._remembers:
@@ -196,11 +238,15 @@ class Problem(Equations):
 
     def numbers(self):
         """Copies of all arrays that define the state: this rank's unknowns, then the carried fields."""
-        return [self.x.array_r.copy(), *(live.copy() for live in self._live)]
+        tensions = [self.tensions.values.copy()] if self.tensions else []
+        return [self.x.array_r.copy(), *(live.copy() for live in self._live), *tensions]
 
     def put(self, numbers):
         """Set the state from what `numbers` returned, or from a linear combination of such."""
         self.x.array_w[:] = numbers[0]
+        if self.tensions:
+            *numbers, tensions = numbers
+            self.tensions.put(tensions)
         for live, values in zip(self._live, numbers[1:], strict=True):
             live[:] = values
         self.set_state(self.x)
@@ -208,6 +254,9 @@ class Problem(Equations):
     def begin_at(self, values, n, multipliers):
         """Set the state from a solution on another mesh; values, n: see `RodModel.set_motion`."""
         self.model.set_motion(values, n)
+        if self.tensions:
+            multipliers, tensions = np.split(multipliers, [-len(self.tensions.values)])
+            self.tensions.put(tensions)
         self.numbering.from_local(self._state, self.x)
         if self.ties:
             self.ties.put(self.x, multipliers)
@@ -231,10 +280,11 @@ class Problem(Equations):
         """The first-order changes of all arrays of `numbers` along a change of the unknowns per unit of load factor
         (owned entries); that of the carried contact force by the linearised strains, without loss of digits on slender
         rods, and by the actions in the law."""
+        tensions = [self.tensions.slope.copy()] if self.tensions else []
         if not self.c.advance:
-            return [slope]
+            return [slope, *tensions]
         behind, ahead = (self._advanced(step) for step in (0.0, slope))
-        return [slope, ahead - behind + self.rate_by_law()]
+        return [slope, ahead - behind + self.rate_by_law(), *tensions]
 
     def rate_by_law(self):
         """The change of the carried contact force with the load factor at the state, by actions in the law."""
@@ -279,6 +329,10 @@ class Problem(Equations):
     def _refresh(self):
         if self._refreshes:
             self.model.actions.refresh()
+
+    def is_load_derivative(self, b):
+        """Whether a vector is what `load_derivative` returns."""
+        return b is self._difference[0]
 
     def load_derivative(self, x):
         """d residual/d load factor at x by a central difference, exact for loads; valid until the next call."""

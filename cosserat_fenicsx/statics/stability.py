@@ -28,6 +28,7 @@ class NegativeModes(Called):
 
     def __init__(self, problem):
         super().__init__()
+        self._tensions = problem.tensions
         self.parts = [Part(problem, i) for i in range(len(problem.model.second_variations))]
         self.sideways, self._sideways, self.logarithm = 0, self._ffi.new("int *"), math.nan
         self.c = variation = self._ffi.new("second_variation *")
@@ -65,6 +66,10 @@ class NegativeModes(Called):
         found = self._lib.negative_modes(self.c, self._sideways)
         self.raise_failure()
         self.sideways, self.logarithm = self._sideways[0], self.c.logarithm
+        if self._tensions and found >= 0:
+            held, logarithm = self._tensions.pivots()
+            self.logarithm += logarithm
+            return found - held
         return found
 
 

@@ -155,7 +155,8 @@ class Locator:
         counts = [point.negative_modes for _, point in (chord.known[0], chord.known[-1])]
         if min(counts) < 0:  # singular to rounding at one of the two
             return []
-        candidates = self._by_tangent if self.track.without_potential else self._by_count
+        held = self.track.problem.tensions
+        candidates = self._by_tangent if self.track.without_potential else self._softest if held else self._by_count
         found = []
         for near, point, modes in candidates(chord, sorted(counts), limits):
             if not modes:  # rounding hides them
@@ -199,6 +200,16 @@ class Locator:
         end = max(chord.known[0][1], chord.known[-1][1], key=lambda point: point.negative_modes)
         self.track.put(end.numbers, end.load_factor)
         return [(None, end, [mode]) for mode in self.track.stability.whole.modes(counts[-1], side=-1)]
+
+    def _softest(self, chord, counts, limits):
+        """As `_by_tangent`, where tendons of given length hold modes of the second variation: the motions that are
+        resisted least at the end with more negative modes."""
+        first, last = counts
+        if last - first == len(limits):
+            return []
+        end = max(chord.known[0][1], chord.known[-1][1], key=lambda point: point.negative_modes)
+        self.track.put(end.numbers, end.load_factor)
+        return [(None, end, [mode]) for mode in self.track.bordered.softest(last - first)]
 
     def _singular(self, kind, chord, place, directions):
         """The `Crossing`s at a coordinate, one for each direction (a change of the unknowns, owned entries)."""

@@ -173,6 +173,12 @@ class Track:
             moved, _ = self.model.sizes(self.problem.numbers()[0] - self.here.numbers[0])
             if moved > self._longest:
                 solved = replace(solved, converged=False, reason="a rod moved farther at once than an obstacle is wide")
+        tensions = self.problem.tensions
+        if not solved.converged and tensions and tensions.undetermined:
+            why = (
+                "the tensions of tendons that do not stretch are not determined: give some of them a stiffness, axial="
+            )
+            solved = replace(solved, reason=why)
         if not solved.converged:
             self.failure = solved.reason
         return solved

@@ -1,0 +1,181 @@
+"""Tendons of given length in statics: their tensions, unknowns beside those of the nodes.
+
+With the tangent K and the residual b at given tensions T, b's derivatives G by T, the derivatives A of the lengths by
+the unknowns, and the gaps g = l - l_0 (1 + T/EA), l_0 the length that is left of a tendon without tension, Newton's
+step (d, t), which is subtracted from (x, T), is that of
+
+    [ K   G      ] [d]   [b]
+    [ A  -l_0/EA ] [t] = [g]
+
+by block elimination: K is factorised as without tendons, and S = A K^-1 G + l_0/EA is a small matrix, the compliance of
+the rods against their tendons. A tendon does not push: T >= 0, g <= 0 and T g = 0 after the step. The equilibrium has
+as many negative modes as K, less the negative eigenvalues of S (Haynsworth, Linear Algebra Appl. 1 (1968) 73).
+"""
+
+import numpy as np
+from dolfinx import fem
+
+from cosserat_fenicsx import compat
+from cosserat_fenicsx.algebra.building import Packed
+from cosserat_fenicsx.compat import compiling
+from cosserat_fenicsx.errors import SceneError
+
+# Condition number of S above which it is singular.
+_SINGULAR = 1e12
+# Length over the largest one in the step below which a slack tendon is about to be taut.
+_EDGE = 1e-9
+# Exchanges of tendons between slack and taut in a step, per tendon.
+_EXCHANGES = 20
+
+
+class Tensions:
+    """The tensions of the tendons of given length of a `Problem`; values: (tendons,) in the order of the scene,
+    dimensionless; undetermined: whether the last solution failed since lengths do not determine them; slope: (tendons,)
+    their change with the load factor, from the last solution for `Problem.load_derivative`; threads_of: see
+    `models.compiled`."""
+
+    def __init__(self, problem, threads_of):
+        self._problem, self._model = problem, problem.model
+        model = problem.model
+        self._terms = [term for term in model.actions.terms if term.kind.finds_tension]
+        self._along = fem.Function(model.space)
+        with compiling():
+            forms = compat.forms(model.mesh, threads_of(model, self._terms, self._along))
+        self._length, self._change, force = forms
+        self._force = Packed(force, (model.state, *(term.data[0] for term in self._terms)), model.constants)
+
+    def load(self):
+        """Take the tendons of the scene that the model was loaded with, in its reference configuration."""
+        problem, model = self._problem, self._model
+        found = [(where[0], term, where[2]) for term in self._terms for where in term._where]
+        found = [next(x for x in found if x[0] is action) for action in model.scene.actions if action.shortens]
+        self._where = [(term._arrays[0], rows) for _, term, rows in found]
+        scales, tendons, size = model.scales, [action for action, *_ in found], len(found)
+        self._short = np.array([tendon.shortening for tendon in tendons]) / scales.length
+        self._softness = np.array([scales.force / (tendon.axial or np.inf) for tendon in tendons])
+        self.values, self._active = np.zeros(size), np.ones(size, dtype=bool)
+        self.undetermined, self.slope = False, np.zeros(size)
+        self._step = np.zeros(size)
+        self._columns = [problem.numbering.vector() for _ in tendons]
+        self._responses = [problem.numbering.vector() for _ in tendons]
+        self._force.refresh()
+        self._at_rest = self._lengths(self._length)
+        for tendon, length in zip(tendons, self._at_rest * scales.length, strict=True):
+            if tendon.shortening >= length:
+                raise SceneError(
+                    f"Tendon.shortening = {tendon.shortening:g}: expected less than the length of the tendon, "
+                    f"{length:.6g} m"
+                )
+        self.forget()
+
+    def put(self, values):
+        """Set the tensions."""
+        self.values = np.array(values, dtype=float)
+        self._fill(self.values)
+
+    def _fill(self, values):
+        for (array, rows), value in zip(self._where, values, strict=True):
+            array[rows] = value
+
+    def _one_by_one(self):
+        """Set the tension of each tendon in turn to 1 and all others to 0; at the end their own again."""
+        for unit in np.eye(len(self.values)):
+            self._fill(unit)
+            yield
+        self._fill(self.values)
+
+    def _lengths(self, form):
+        """(tendons,) of the tendons' lengths, or of their changes along `_along`."""
+        found = np.array([fem.assemble_scalar(form) for _ in self._one_by_one()])
+        return self._model.comm.allreduce(found)
+
+    def _changes(self, vector):
+        """(tendons,) A times a change of the unknowns, a vector of the solver."""
+        self._along.x.array[:] = 0.0
+        self._problem.numbering.to_local(vector, self._along.x.array)
+        return self._lengths(self._change)
+
+    @property
+    def _left(self):
+        """(tendons,) lengths without tension."""
+        return self._at_rest - float(self._problem.load_factor_array) * self._short
+
+    def forget(self):
+        """The tangent has other factors."""
+        self._compliance = None
+
+    @staticmethod
+    def _regular(S):
+        """Whether lengths determine tensions: not where some tendons that do not stretch determine the others."""
+        return not len(S) or np.linalg.cond(S) < _SINGULAR
+
+    def _comply(self):
+        """S, once for the factors of the tangent."""
+        if self._compliance is None:
+            for column, _ in zip(self._columns, self._one_by_one(), strict=False):
+                self._problem._assemble(self._force, column)
+            for column, response in zip(self._columns, self._responses, strict=True):
+                self._problem.solve_without_tendons(column, response)
+            found = [self._changes(response) for response in self._responses]
+            self._compliance = np.array(found).T + np.diag(self._left * self._softness)
+        return self._compliance
+
+    def complete(self, b, x):
+        """Complete x = K^-1 b to the solution of the bordered system: with the gaps, or their derivative by the load
+        factor, where b is the problem's residual or its derivative, and with none for other forces. Slack tendons
+        remain slack, except in a step for the residual. False where S is singular."""
+        problem, S, moved = self._problem, self._comply(), self._changes(x)
+        self.undetermined = True
+        if b is problem.b:
+            gaps = self._lengths(self._length) - self._left * (1 + self._softness * self.values)
+            found = self._complementary(S, moved - gaps - S @ self.values)
+            if found is None:
+                return False
+            self._step = step = self.values - found
+        else:
+            of_load = problem.is_load_derivative(b)
+            gaps = self._short * (1 + self._softness * self.values) if of_load and not problem.begins else 0.0
+            on, step = self._active, np.zeros(len(moved))
+            if not self._regular(S[np.ix_(on, on)]):
+                return False
+            step[on] = np.linalg.solve(S[np.ix_(on, on)], (moved - gaps)[on])
+            if of_load:
+                self.slope = -step
+        for response, share in zip(self._responses, step, strict=True):
+            x.axpy(-share, response)
+        self.undetermined = False
+        return True
+
+    def _complementary(self, S, a):
+        """T >= 0 with S T + a >= 0 and T (S T + a) = 0, by exchanges of the first tendon of the wrong sign (Murty,
+        Linear Algebra Appl. 7 (1974) 65), from those that were taut last; None where S is singular."""
+        for _ in range(_EXCHANGES * len(a)):
+            on, T = self._active, np.zeros(len(a))
+            if not self._regular(S[np.ix_(on, on)]):
+                return None
+            T[on] = -np.linalg.solve(S[np.ix_(on, on)], a[on])
+            slack = S @ T + a
+            wrong = np.where(on, T < 0, slack < 0)
+            if not wrong.any():
+                may = on | (slack <= _EDGE * np.abs(a).max())  # carry a part of what others carry
+                return T if not T.any() or self._regular(S[np.ix_(may, may)]) else None
+            self._active = on.copy()
+            self._active[np.argmax(wrong)] ^= True
+        return T
+
+    def take(self, share=1.0, by_load=0.0):
+        """Subtract a share of the last step for the residual from the tensions, and add a change of the load factor
+        times `slope`."""
+        self.put(self.values - share * self._step + by_load * self.slope)
+
+    def pivots(self):
+        """(number of negative eigenvalues of S, logarithm of its determinant's absolute value) at the problem's
+        state."""
+        problem, on = self._problem, self.values > 0
+        problem.function(problem.x, problem.b)
+        problem.factor()
+        if problem.c.singular or not on.any():
+            return 0, 0.0
+        S = self._comply()[np.ix_(on, on)]
+        sizes = np.linalg.eigvalsh((S + S.T) / 2)
+        return int((sizes < 0).sum()), float(np.log(np.abs(sizes)).sum())

@@ -1,0 +1,116 @@
+"""Tendons of given length: closed forms of an arm that they bend, slacken along, and hold against buckling."""
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+import cosserat_fenicsx as cf
+
+EI, GJ, EA, GA, LENGTH, E = 0.02, 0.016, 5000.0, 3000.0, 0.3, 0.01
+ROD = cf.Rod(cf.Line((0, 0, 0), (0, 0, LENGTH)), cf.Stiffness((GA, GA), EA, (EI, EI), GJ), name="arm")
+COMPLIANCE = 1 / EA + E**2 / EI  # of the arm, per length, against a tendon at the offset E
+
+
+def arm(*loads):
+    return cf.Scene([ROD], [cf.Clamp(ROD.start)], loads)
+
+
+@pytest.mark.parametrize("axial", [None, 300.0])
+@pytest.mark.parametrize("model", ["planar", "spatial"])
+def test_it_bends_an_arm(axial, model, truth, request):
+    """An arc, whose tendon has T L (1/EA + e^2/EI) + (L - d) T/axial = d; without stretch T is that of the truths."""
+    tendon = cf.Tendon(ROD, (E, 0), shortening=0.006, axial=axial)
+    path = cf.solve(arm(tendon), [0.5, 1.0], elements=4, model=model)
+    short = 0.006 * path.load_factors
+    tension = short / (LENGTH * COMPLIANCE + (LENGTH - short) / (axial or np.inf))
+    state, name = path.tendon(tendon), f"tendons: by length, {request.node.callspec.id}, tension over its own"
+    if axial is None:
+        assert tension[-1] == pytest.approx(3.8461538461538463, rel=1e-15)
+    truth(name, state.tension[-1] / tension[-1], 1.0, 1e-8, of=1.0, most=1e-10)
+    assert state.tension == pytest.approx(tension, rel=1e-10)
+    assert state.length == pytest.approx((LENGTH - short) * (1 + tension / (axial or np.inf)), rel=1e-13)
+    angle, stretch = E * tension / EI * LENGTH, 1 - tension / EA
+    tip = np.outer(stretch * LENGTH / angle, (1, 1)) * np.column_stack([1 - np.cos(angle), np.sin(angle)])
+    assert path.position(ROD.end)[:, [0, 2]] == pytest.approx(tip, abs=1e-10)
+    assert path.stable.all() and not path.events
+
+
+def test_the_tension_of_a_length_gives_that_length():
+    """Around the arm, by tension and by the shortening that this gave; `tol` holds for the tension of that path."""
+    pulled = cf.solve(arm(cf.Tendon(ROD, cf.Helical(E, LENGTH), 4.0)), [0.0, 1.0], tol=1e-7)
+    length = pulled.tendon(pulled.scene.loads[0]).length
+    wound = cf.Tendon(ROD, cf.Helical(E, LENGTH), shortening=length[0] - length[1])
+    path = cf.solve(arm(wound), [1.0], tol=1e-7)
+    assert path.tendon(wound).tension == pytest.approx([4.0], rel=1e-9)
+    assert path.position(ROD.end)[-1] == pytest.approx(pulled.position(ROD.end)[-1], abs=1e-8)
+    assert path.error[-1] < 1e-7
+
+
+def test_it_does_not_push():
+    """A moment bends the arm towards the tendon, which is slack until its shortening exceeds what the moment gives."""
+    tendon, moment = cf.Tendon(ROD, (E, 0), shortening=0.006), 0.02
+    scene = arm(tendon, cf.Moment(ROD.end, (0, moment, 0), permanent=True))
+    path = cf.solve(scene, [0.0, 0.25, 0.5, 0.7, 1.0], elements=4)
+    tension = np.maximum((0.006 / LENGTH * path.load_factors - E * moment / EI) / COMPLIANCE, 0)
+    state = path.tendon(tendon)
+    assert state.tension == pytest.approx(tension, abs=1e-8) and (tension > 0).sum() == 2
+    assert (state.slack == (tension == 0)).all() and "slack in 3 of 5 states" in str(state)
+    length = LENGTH * (1 - tension * COMPLIANCE - E * moment / EI)
+    assert state.length == pytest.approx(length, rel=1e-11)
+    back = cf.solve(scene, [1.0, 0.25], elements=4)
+    assert back.tendon(tendon).tension == pytest.approx(tension[[4, 1]], abs=1e-8)
+
+
+def test_two_of_them_hold_a_column(truth):
+    """Two tendons on both sides keep the end of a column from turning in their plane, where it buckles as between two
+    guides that move aside: P l + P^2/(GA + T/l) = pi^2 EI/L^2, with the stretch l and the sum T of the tensions. Across
+    their plane they hold nothing, and it buckles as a cantilever."""
+    pair, share = [cf.Tendon(ROD, (side * E, 0), shortening=1e-3 * LENGTH) for side in (1, -1)], 1e-3
+    path = cf.solve(arm(*pair, cf.Force(ROD.end, (0, 0, -1.0))), (0, 2.5), model="spatial", elements=8)
+
+    def load(turns):
+        def excess(eta):
+            stretch, tension = 1 - share * eta, (EA * share - 1) * eta
+            return eta * stretch + eta**2 / (GA + tension / stretch) - (turns * np.pi / LENGTH) ** 2 * EI
+
+        return brentq(excess, 0.1, 4, xtol=1e-14)
+
+    found = [event.load_factor for event in path.events]
+    assert [event.kind for event in path.events] == ["bifurcation"] * 2
+    truth("tendons: two hold a column, load factors", found, [load(0.5), load(1)], 1e-6, of=1.0)
+    assert path.negative_modes[-1] == 2
+    assert path.tendon(pair[0]).tension == pytest.approx((EA * share - 1) / 2 * path.load_factors, rel=1e-9)
+    bent, across = (np.abs(event.mode[-1]) for event in path.events)
+    assert bent.argmax() == 1 and across.argmax() == 0
+
+
+@pytest.mark.parametrize(
+    ("make", "says"),
+    [
+        (lambda: cf.Tendon(ROD, (E, 0)), "either tension (N) or shortening (m)"),
+        (lambda: cf.Tendon(ROD, (E, 0), 1.0, shortening=0.1), "either tension (N) or shortening (m)"),
+        (lambda: cf.Tendon(ROD, (E, 0), 1.0, axial=1.0), "the tension is given"),
+        (lambda: cf.Tendon(ROD, (E, 0), shortening=0.1, axial=0.0), "Tendon.axial"),
+        (lambda: cf.Tendon(ROD, (E, 0), shortening=0.1, permanent=True), "Tendon.permanent"),
+        (lambda: cf.solve(arm(cf.Tendon(ROD, (E, 0), shortening=0.3)), [1.0], elements=4), "less than the length"),
+        (lambda: cf.buckling(arm(cf.Tendon(ROD, (E, 0), shortening=0.1))), "known to `solve` alone"),
+    ],
+)  # fmt: skip
+def test_what_is_refused(make, says):
+    with pytest.raises(cf.SceneError) as found:
+        make()
+    assert says in str(found.value)
+
+
+def test_tendons_that_determine_each_other_are_refused():
+    """Four that do not stretch have the same sum on both diagonals; elastic ones share the load."""
+    sides = [(E, 0), (-E, 0), (0, E), (0, -E)]
+
+    def four(axial):
+        return arm(*(cf.Tendon(ROD, side, shortening=1e-3 * LENGTH, axial=axial) for side in sides))
+
+    with pytest.raises(cf.NotConverged, match="axial="):
+        cf.solve(four(None), [1.0], elements=4)
+    path = cf.solve(four(1e5), [1.0], elements=4)
+    tension = 1e-3 / (4 / EA + (1 - 1e-3) / 1e5)
+    assert [path.tendon(x).tension[-1] for x in path.scene.loads] == pytest.approx([tension] * 4, rel=1e-9)
