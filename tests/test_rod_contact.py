@@ -179,3 +179,27 @@ def test_friction_holds_and_slips(tmp_path, truth):
         assert np.linalg.norm(found.friction[0]) == pytest.approx(friction * found.force[0], rel=1e-6)
         assert found.friction[0, 1] == pytest.approx(slips[1], rel=1e-4)
     assert any("friction" in why for why in path.why)
+
+
+def test_rods_that_turn_with_their_contact_do_not_slip():
+    """A frame whose rods stick to each other under follower loads is turned about one of them by 86 degrees: friction
+    along that axis is that of the frame at rest."""
+    r, found = 0.02, []
+    soft, stiff = (cf.Stiffness((x * 1e6, x * 1e6), x * 1e7, (x * 1e3, x * 1e3), x * 1e3) for x in (1, 100))
+    first = cf.Rod(cf.Line((0, 0, 0), (1, 0, 0)), soft, name="first")
+    frame = cf.Rod(cf.Line((0, 0, 0), (0.5, 0.5, 2 * r)), stiff, name="frame")
+    other = cf.Rod(cf.Line((0.5, 0.5, 2 * r), (0.5, -0.3, 2 * r)), soft, name="other")
+    joints = [cf.Joint(first.start, frame.start), cf.Joint(frame.end, other.start)]
+    touch = cf.RodContact(radius=r, friction=0.5, pairs=(("first", "other"),))
+    loads = [
+        touch,
+        cf.FollowerForce(other.end, (0, -40.0, 0), permanent=True),
+        cf.FollowerForce(other.end, (6.0, 0, 0)),
+    ]
+    for turned, states in ((0.0, [0.0, 1.0]), (1.5, np.linspace(0, 1, 21))):
+        support = cf.Prescribed(first.start, displacement=(0, 0, 0), rotation=(turned, 0, 0))
+        path = cf.solve(cf.Scene([first, frame, other], [support], loads, joints=joints), states, elements=4)
+        contact = path.contacts(touch)
+        assert contact.sticks.all() and len(contact) == 1
+        found.append(contact.friction[0, 0])
+    assert found[1] == pytest.approx(found[0], rel=1e-3)  # 1.5 % off by slips along the last normal

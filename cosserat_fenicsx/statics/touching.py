@@ -309,15 +309,23 @@ class RodContacts:
     def _s(self, touches):
         return np.column_stack([self.strands.s(touches.element[:, k], touches.place[:, k]) for k in (0, 1)])
 
-    def _slips(self, nodes, pulls):
+    def _slips(self, touches, nodes, pulls):
         """Rows of the unknowns (m, 2, 7 n), derivatives of slips across contacts by them, and (m, 2) the slips since
         the accepted state."""
         (x, q, _), parts = self._accepted, pulls[:, 1:]
         turning = small_rotations((q + self._q) / 2)
         by = np.concatenate([parts[..., :3], np.einsum("kpni,knij->kpnj", parts[..., 3:], turning[nodes])], axis=3)
-        moved = np.concatenate([self._x - x, self._q - q], axis=1)
         rows = np.broadcast_to(self._rows[nodes][:, None], by.shape)
-        return *(z.reshape(*by.shape[:2], -1) for z in (rows, by)), np.einsum("kpnj,knj->kp", by, moved[nodes])
+        # None where rods turn with their contact like one rigid body: Cayley's rotations about the mean direction.
+        moves, sides = np.sum(pulls[:, 0, :, :3] * touches.normal[:, None], axis=2), self._sides(touches)
+        arms = -np.sum(parts[:, 0, :, 3:] * sides[:, None, 1], axis=2) / touches.distance[:, None]
+        turned = np.einsum("nij,nj->ni", turning, self._q - q) / np.sum(q * self._q, axis=1)[:, None]
+        apart, moved, turned = (
+            np.einsum("kn,knj->kj", share, z[nodes])
+            for share, z in ((moves, (self._x + x) / 2), (moves, self._x - x), (arms, turned))
+        )
+        slips = np.einsum("kpj,kj->kp", sides, moved - np.cross(turned, apart))
+        return *(z.reshape(*by.shape[:2], -1) for z in (rows, by)), slips
 
     def complete(self, change):
         """Complete Newton's change without contact, K^-1 r, by the contacts; False where the tangent is singular."""
@@ -358,7 +366,7 @@ class RodContacts:
         of_contacts[:, 0] = moved(places, pulls[:, 0, :, :3].reshape(m, -1))
         start = touches.gap[:, None]
         if parts > 1:
-            *slipping, slips = self._slips(nodes, pulls)
+            *slipping, slips = self._slips(touches, nodes, pulls)
             of_contacts[:, 1:], start = moved(*slipping), np.c_[start, slips]
         S = np.concatenate([moved(bent, columns), of_contacts.reshape(m * parts, -1)])
         S, d = S[:, :-1], S[:, -1]
