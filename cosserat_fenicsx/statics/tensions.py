@@ -148,7 +148,8 @@ class Tensions:
 
     def _complementary(self, S, a):
         """T >= 0 with S T + a >= 0 and T (S T + a) = 0, by exchanges of the first tendon of the wrong sign (Murty,
-        Linear Algebra Appl. 7 (1974) 65), from those that were taut last; None where S is singular."""
+        Linear Algebra Appl. 7 (1974) 65), from those that were taut last; None where S is singular, or where the
+        exchanges do not end: some S that is not positive definite has no such T, or several."""
         for _ in range(_EXCHANGES * len(a)):
             on, T = self._active, np.zeros(len(a))
             if not self._regular(S[np.ix_(on, on)]):
@@ -161,7 +162,8 @@ class Tensions:
                 return T if not T.any() or self._regular(S[np.ix_(may, may)]) else None
             self._active = on.copy()
             self._active[np.argmax(wrong)] ^= True
-        return T
+        self.undetermined = False
+        return None
 
     def take(self, share=1.0, by_load=0.0):
         """Subtract a share of the last step for the residual from the tensions, and add a change of the load factor

@@ -43,8 +43,9 @@ _AT_END = 1e-6
 # A contact of the iteration before is the same up to this sliding, over the radius; added to the diagonal of the
 # compliance, over its mean.
 _SAME, _REGULAR = 4.0, 1e-12
-# Gap at which rods touch, over the largest radius; unknowns and rows of a node: of forces and moments.
-_TOUCHES, _FORCES = 1e-5, [0, 1, 2, 4, 5, 6]
+# Gap at which rods touch, over the largest radius, and the most by which contacts may give at a state for a compliance
+# that was made definite; unknowns and rows of a node: of forces and moments.
+_TOUCHES, _GIVES, _FORCES = 1e-5, 1e-6, [0, 1, 2, 4, 5, 6]
 # Laws of friction: iterations; error that ends them; least share of a step; error that is none, and what is not at its
 # bound.
 _MOST_LAWS, _LAWS, _LEAST, _LAWS_MET, _AT_BOUND = 60, 1e-13, 1e-3, 1e-8, 1e-6
@@ -267,6 +268,8 @@ class RodContacts:
             return Solved(False, iterations, f"forces are left over at a node, {self._in_words(self._touches)}")
         if self._broken > _LAWS_MET:
             return Solved(False, iterations, f"no forces obey the law of friction, {self._in_words(self._touches)}")
+        if self._gives > _GIVES * self._largest:
+            return Solved(False, iterations, f"forces at contacts are not determined, {self._in_words(self._touches)}")
         A = A[np.ix_(active, active)]
         self.removed = removed - np.count_nonzero(np.linalg.eigvalsh((A + A.T) / 2) < 0)
         return Solved(True, iterations, "converged")
@@ -331,7 +334,7 @@ class RodContacts:
         """Complete Newton's change without contact, K^-1 r, by the contacts; False where the tangent is singular."""
         touches, largest, parts = self._touches_now, self._newton._longest, self._parts
         near = touches.gap < 2.7 * max(largest, self._radius)
-        self._found, self._broken = np.zeros((len(touches), parts)), 0.0
+        self._found, self._broken, self._gives = np.zeros((len(touches), parts)), 0.0, 0.0
         if not near.any():
             self._last = np.zeros((self._found.size,) * 2), 0
             return True
@@ -389,13 +392,15 @@ class RodContacts:
         A = (A + A.T) / 2 if parts == 1 else A
         if parts > 1:
             lowest = np.linalg.eigvalsh((A + A.T) / 2)[0]
-        A += (_REGULAR * typical + 2 * max(-lowest, 0.0)) * np.eye(m * parts)
+        added = 2 * max(-lowest, 0.0)
+        A += (_REGULAR * typical + added) * np.eye(m * parts)
         free = start.ravel() + d[q:] + S[q:] @ M @ d
         if parts == 1:
             forces = complementary(A, free)[:, None]
         else:
             rubs = np.where(self._same(touches, self._accepted[2]) >= 0, self._friction, 0.0)
             forces, self._broken = rubbing(A, free, rubs, known)
+        self._gives = added * np.abs(forces).max()
         spread = M @ (d + S[:, q:] @ forces.ravel())
         spread[q:] += forces.ravel()
         change.array_w[:] -= solved @ spread
