@@ -49,15 +49,25 @@ def _source(address):
     if code_cache.why_unsafe(file) is not None or not file.exists():
         return None
     code = file.read_text(encoding="utf-8")
-    found = re.search(rf"^void {name}\(double\* restrict A,.*?^}}\n", code, re.DOTALL | re.MULTILINE)
-    return found and (name, found[0])
+    begin = code.find(f"void {name}(double* restrict A,")
+    return None if begin < 0 else (name, _up_to_its_last_brace(code[begin:]))
+
+
+def _up_to_its_last_brace(code):
+    """The function of C with which a text begins."""
+    depth = 0
+    for brace in re.finditer("[{}]", code):
+        depth += 1 if brace[0] == "{" else -1
+        if not depth:
+            return code[: brace.end()] + "\n"
+    return code
 
 
 def _in_lanes(code):
     """A kernel with vectors in place of numbers; tables and coordinates stay as they are."""
     code = re.sub(r"(?<!static const )\bdouble\b", "lanes", code)
     code = code.replace("const lanes* restrict coordinate_dofs", "const double* restrict coordinate_dofs")
-    code = re.sub(r"\blanes (\w+) = 0\.0;", r"lanes \1 = {0};", code)
+    code = re.sub(r"\blanes (\w+) = 0(\.0)?;", r"lanes \1 = {0};", code)
     return "static " + re.sub(rf"\b({'|'.join(_FUNCTIONS)})\(", r"lanes_\1(", code)
 
 
