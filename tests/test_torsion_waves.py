@@ -524,8 +524,10 @@ def test_a_rotation_to_the_left_is_the_mirror_image():
 @pytest.mark.parametrize("model", ["torsion", "axial and torsional"])
 def test_where_friction_allows_no_longer_step_a_shorter_one_is_compared(model):
     scene = replace(off_bottom()[0], friction=cf.drilling.WallFriction(0.3, 0.195, 0.05, of_rotation=True))
-    errors = cf.drilling.simulate(scene, 9, model=model, check=True, progress=False).errors
-    assert 0 < errors.peak < 5 and 0 < errors.largest_torque == errors.least_torque < 1000
+    found = cf.drilling.simulate(scene, 9, model=model, check=True, progress=False)
+    # Where it sticks and slips, rounding grows: by the compiler's options errors are 0.8 to 13 % of the largest torque.
+    assert 0 < found.errors.peak < 5
+    assert 0 < found.errors.largest_torque == found.errors.least_torque < 0.2 * np.abs(found.surface_torque).max()
 
 
 def test_a_mesh_that_cannot_be_coarser_is_compared_with_a_finer_one():

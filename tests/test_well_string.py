@@ -345,7 +345,7 @@ def test_the_command_line(tmp_path, capsys):
                                   for end in ("", "_contacts"))}  # fmt: skip
     assert {file.name for file in tmp_path.iterdir()} == names == set(re.findall(r"\w+\.csv", told))
     rows = (tmp_path / "trip_out.csv").read_text(encoding="utf-8").splitlines()
-    assert rows[0].startswith("md (m),north (m)") and rows[-1].startswith("3438.0,-346.4")
+    assert rows[0].startswith("measured depth (m),north (m)") and rows[-1].startswith("3438.0,-346.4")
     for option, value in (("--elements", "4"), ("--color", "tension")):
         assert main(["run", str(VOLVE), option, value]) == 2
         assert f"{option} is for rods" in capsys.readouterr().err
@@ -367,7 +367,8 @@ def test_the_command_line_in_field_units(tmp_path, capsys):
     hook = found.answer(found.operations[0]).hook_load / cf.units.kip
     assert f"hook load {hook:.6g} klbf" in told and "trip out, bit at 11279.5 ft" in told and "kN" not in told
     rows = (tmp_path / "trip_out.csv").read_text(encoding="utf-8").splitlines()
-    assert rows[0].startswith("md (ft),north (ft)") and float(rows[-1].split(",")[0]) == pytest.approx(3438 / 0.3048)
+    assert rows[0].startswith("measured depth (ft),north (ft)")
+    assert float(rows[-1].split(",")[0]) == pytest.approx(3438 / 0.3048)
     assert "hook load (klbf)" in (tmp_path / "depth_sweep.csv").read_text(encoding="utf-8").splitlines()[0]
     for file, word, words in ((VOLVE, "metric", "expected SI or field"), (RODS, "field", "this scene is of rods")):
         for command in ("run", "explain"):
