@@ -15,6 +15,8 @@ from cosserat_fenicsx.numerics import cross
 
 #: Sine of the angle of two strands above which they touch in a point; below, along a line.
 CROSSING = 0.2
+#: Friction that is at its bound, but for this share.
+AT_BOUND = 1e-6
 # Places of an element where strands are compared first; Newton steps to the nearest points; their largest size, in
 # elements, and the one at which they end, first, and from a step on after which rounding may not leave less: gaps have
 # its square.
@@ -357,35 +359,29 @@ class Strands:
         """(m, n) the nodes that move points of pairs of elements (m, 2)."""
         return np.concatenate([self.stencil[element[:, k]] for k in (0, 1)], axis=1)
 
+    def moves(self, element, place):
+        """(m, n) shares of `movers` in how far the second of a pair of places moves from the first."""
+        first, second = np.split(self.basis(element.T.ravel(), place.T.ravel()), 2)
+        return np.concatenate([-first, second], axis=1)
+
     def gradients(self, touches):
         """(m, n, 3) derivatives of the gaps by the positions of `nodes_of`."""
-        return self.pulls(touches.element, touches.place, touches.normal)
-
-    def pulls(self, element, place, direction):
-        """(m, n, 3) derivatives of how far apart pairs of places are along directions (m, 3), by the positions of
-        `movers`."""
-        first, second = self.bases(element, place)
-        return np.concatenate([-first, second], axis=1)[..., None] * direction[:, None, :]
+        return self.moves(touches.element, touches.place)[..., None] * touches.normal[:, None]
 
     def surface_pulls(self, element, place, direction, apart, across=None):
         """Forces and moments (m, parts, n, 6) at `movers` of unit forces along directions (m, 3) and, of three parts,
         along `across` (m, 2, 3) on the surfaces, midway between centrelines that are `apart` (m,)."""
-        first, second = self.bases(element, place)
-        moves = np.concatenate([-first, second], axis=1)
+        moves = self.moves(element, place)
         found = np.zeros((len(moves), 1 if across is None else 3, moves.shape[1], 6))
         found[:, 0, :, :3] = moves[..., None] * direction[:, None]
         if across is not None:
             radii = self.radii[element]
             deep = (radii.sum(axis=1) - apart) / 2
-            arms = np.concatenate([(radii[:, k] - deep)[:, None] * basis for k, basis in ((0, first), (1, second))], 1)
+            arms = moves * np.repeat((radii - deep[:, None]) * (-1, 1), moves.shape[1] // 2, axis=1)
             found[:, 1:, :, :3] = moves[:, None, :, None] * across[:, :, None]
             turned = np.stack([across[:, 1], -across[:, 0]], axis=1)  # n x t
             found[:, 1:, :, 3:] = -arms[:, None, :, None] * turned[:, :, None]
         return found
-
-    def bases(self, element, place):
-        """(2, m, 3 (p + 1)) `basis` at both points of pairs of places (m, 2)."""
-        return np.stack(np.split(self.basis(element.T.ravel(), place.T.ravel()), 2))
 
     def curvatures(self, x, touches):
         """The second derivatives of the gaps by the positions of `nodes_of`, with the points that slide, as sums of

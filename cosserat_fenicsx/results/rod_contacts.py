@@ -7,12 +7,10 @@ import numpy as np
 from cosserat_fenicsx.errors import NotConverged
 from cosserat_fenicsx.quantities import Quantity, Units
 from cosserat_fenicsx.results import screen
-from cosserat_fenicsx.strands import CROSSING, Strands, across, closest_segments, overlap
+from cosserat_fenicsx.strands import AT_BOUND, CROSSING, Strands, across, closest_segments, overlap
 
 # Gaps over the radius up to which rods may touch; forces over the largest that are rounding.
 _TOUCHES, _NOTHING = 1e-5, 1e-9
-# Friction that is at its bound, but for this share.
-_AT_BOUND = 1e-6
 # Depth over the radius that is allowed between the places where rods touch.
 _DEEP = 0.02
 
@@ -104,7 +102,7 @@ def _by_balance(path, record, strands, found):
     if path.scene.rod_contact.friction:
         ways = np.concatenate([ways, across(found.normal)], axis=1)
     m, parts, _ = ways.shape
-    moves = np.sum(strands.gradients(found) * found.normal[:, None], axis=2)
+    moves = strands.moves(found.element, found.place)
     nodes, matrix, total = strands.nodes_of(found), np.zeros((len(record.rq), m)), np.zeros((len(record.rq), 3))
     np.add.at(matrix, (nodes, np.arange(m)[:, None]), moves)
     np.add.at(total, strands.cells, record.rod_forces)
@@ -122,7 +120,7 @@ def rod_contacts_of(path, k):
     friction = total - forces[:, None] * found.normal
     if action.stiffness is not None:
         friction = np.full_like(friction, np.nan)
-    sticks = np.linalg.norm(friction, axis=1) < (1 - _AT_BOUND) * action.friction * forces
+    sticks = np.linalg.norm(friction, axis=1) < (1 - AT_BOUND) * action.friction * forces
     names = np.array([rod.name for rod in path.scene.rods])
     (rod, s, place), (other, other_s, _) = (
         (names[strands.rods[e]], strands.s(e, a) * length, strands.at(x, e, a) * length)
@@ -159,7 +157,7 @@ def _at_nodes(history, k, strands):
     """(N, 3) the sums of the forces of elastic surfaces at nodes, N."""
     found, forces, x = _pressed(history, k, strands)
     total = np.zeros_like(x)
-    moves = np.sum(strands.gradients(found) * found.normal[:, None], axis=2)
+    moves = strands.moves(found.element, found.place)
     np.add.at(total, strands.nodes_of(found), moves[..., None] * forces[:, None])
     return total * history.scales.force
 

@@ -22,7 +22,7 @@ import numpy as np
 from cosserat_fenicsx.algebra.newton import LimitedNewton, Solved
 from cosserat_fenicsx.interrupts import obey
 from cosserat_fenicsx.numerics import small_rotations
-from cosserat_fenicsx.strands import Strands, across, in_words
+from cosserat_fenicsx.strands import AT_BOUND, Strands, across, in_words
 
 # Largest movement of a node in a step over the smallest radius and the gap (a point between nodes moves up to 1.3 times
 # as far, so that two strands approach each other by less than the sum of their radii); largest rotation, rad.
@@ -46,9 +46,8 @@ _SAME, _REGULAR = 4.0, 1e-12
 # Gap at which rods touch, over the largest radius, and the most by which contacts may give at a state for a compliance
 # that was made definite; unknowns and rows of a node: of forces and moments.
 _TOUCHES, _GIVES, _FORCES = 1e-5, 1e-6, [0, 1, 2, 4, 5, 6]
-# Laws of friction: iterations; error that ends them; least share of a step; error that is none, and what is not at its
-# bound.
-_MOST_LAWS, _LAWS, _LEAST, _LAWS_MET, _AT_BOUND = 60, 1e-13, 1e-3, 1e-8, 1e-6
+# Laws of friction: iterations; error that ends them; least share of a step; error that is none.
+_MOST_LAWS, _LAWS, _LEAST, _LAWS_MET = 60, 1e-13, 1e-3, 1e-8
 # First stiffness of springs that keep the tangent stable, over that of the rods at a contact; factor of the next one;
 # the largest; eigenvalues of the compliance that need none, over its mean: out of equilibrium it is not symmetric.
 _SPRING, _STIFFER, _STIFFEST, _NOTHING = 1e-3, 10.0, 1e6, 1e-6
@@ -261,7 +260,7 @@ class RodContacts:
     def _confirmed(self, iterations):
         """`Solved`, where the contacts of the last step are those of the state, with its negative modes."""
         problem, (A, removed), (normal, *friction) = self._problem, self._last, self._forces.T
-        held = np.linalg.norm(friction, axis=0) < (1 - _AT_BOUND) * self._friction * normal if friction else ()
+        held = np.linalg.norm(friction, axis=0) < (1 - AT_BOUND) * self._friction * normal if friction else ()
         active = np.stack([normal > 0, *[held for _ in friction]], axis=1).ravel()
         allowed = _BALANCED * (problem.load_norm + normal.max(initial=0.0)) + self._model.round_off
         if not self._newton.imbalance() <= allowed:
@@ -320,7 +319,7 @@ class RodContacts:
         by = np.concatenate([parts[..., :3], np.einsum("kpni,knij->kpnj", parts[..., 3:], turning[nodes])], axis=3)
         rows = np.broadcast_to(self._rows[nodes][:, None], by.shape)
         # None where rods turn with their contact like one rigid body: Cayley's rotations about the mean direction.
-        moves, sides = np.sum(pulls[:, 0, :, :3] * touches.normal[:, None], axis=2), self._sides(touches)
+        moves, sides = self.strands.moves(touches.element, touches.place), self._sides(touches)
         arms = -np.sum(parts[:, 0, :, 3:] * sides[:, None, 1], axis=2) / touches.distance[:, None]
         turned = np.einsum("nij,nj->ni", turning, self._q - q) / np.sum(q * self._q, axis=1)[:, None]
         apart, moved, turned = (

@@ -197,9 +197,14 @@ class Locator:
         can be singular only where its symmetric part is indefinite."""
         if not counts[-1]:
             return []
+        end = self._at_softer_end(chord)
+        return [(None, end, [mode]) for mode in self.track.stability.whole.modes(counts[-1], side=-1)]
+
+    def _at_softer_end(self, chord):
+        """The `PathPoint` of the end with more negative modes, to which the problem is put."""
         end = max(chord.known[0][1], chord.known[-1][1], key=lambda point: point.negative_modes)
         self.track.put(end.numbers, end.load_factor)
-        return [(None, end, [mode]) for mode in self.track.stability.whole.modes(counts[-1], side=-1)]
+        return end
 
     def _softest(self, chord, counts, limits):
         """As `_by_tangent`, where tendons of given length hold modes of the second variation: the motions that are
@@ -207,8 +212,7 @@ class Locator:
         first, last = counts
         if last - first == len(limits):
             return []
-        end = max(chord.known[0][1], chord.known[-1][1], key=lambda point: point.negative_modes)
-        self.track.put(end.numbers, end.load_factor)
+        end = self._at_softer_end(chord)
         return [(None, end, [mode]) for mode in self.track.bordered.softest(last - first)]
 
     def _singular(self, kind, chord, place, directions):
