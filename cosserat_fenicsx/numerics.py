@@ -120,6 +120,17 @@ class ElementRule:
         return cells, (basis or self.basis)(np.clip(local, 0.0, 1.0))
 
 
+def svd(matrix, full_matrices=True):
+    """(U, singular values, V^T) as of `numpy.linalg.svd`, also where LAPACK's fast algorithm fails, as it does with
+    OpenBLAS 0.3.34 for some matrices without a fault."""
+    try:
+        return np.linalg.svd(matrix, full_matrices)
+    except np.linalg.LinAlgError:
+        from scipy.linalg import svd as slower  # slow to import
+
+        return slower(matrix, full_matrices, lapack_driver="gesvd")
+
+
 def _interpolating(points, x):
     """(len(x), len(points)) Lagrange polynomials of points in [0, 1], at x."""
     points, x = 2 * points - 1, 2 * x - 1

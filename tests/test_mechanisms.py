@@ -13,6 +13,7 @@ from plane_scenes import STEEL, Drawn, hinged_arch, lee_frame, thin_cantilever
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.models.signature import Signature, choose
 from cosserat_fenicsx.models.rodmesh import Layout
+from cosserat_fenicsx.numerics import svd
 from cosserat_fenicsx.parts import per_scene
 from cosserat_fenicsx.scene import action, statical
 from cosserat_fenicsx.scene.statical import check_no_mechanism, free_motions
@@ -49,7 +50,7 @@ def dense_rows(rods, constraints):
 
 
 def kernel(matrix):
-    _, sizes, right = np.linalg.svd(matrix)
+    _, sizes, right = svd(matrix)
     return right[np.count_nonzero(sizes > 1e-9 * sizes.max(initial=0)) :]
 
 

@@ -13,6 +13,7 @@ from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigs, splu
 from cosserat_fenicsx.algebra import eigen
 from cosserat_fenicsx.errors import NotConverged
 from cosserat_fenicsx.interrupts import interruptible, obey
+from cosserat_fenicsx.numerics import svd
 
 # Eigenvalues below this fraction of the shift are not resolved: the solver returns combinations of their vectors.
 _BLURRED = 1e-5
@@ -345,7 +346,7 @@ class QuadraticPencil:
         left, found = np.ones(len(values), dtype=bool), []
         free = np.flatnonzero(self._free(values, vectors))
         if len(free):
-            U, sizes, _ = np.linalg.svd(np.column_stack([vectors[:, free].real, vectors[:, free].imag]), False)
+            U, sizes, _ = svd(np.column_stack([vectors[:, free].real, vectors[:, free].imag]), False)
             found += [(0j, x.astype(complex), 0.0) for x in U.T[sizes > _SAME_MOTION * sizes[0]]]
             left[free] = False
         most = count + (len(found) if point else 0)  # free motions may be farther from the point than others
@@ -403,6 +404,6 @@ def _real_basis(X):
     """A real basis of the space of several vectors (size, m), where there is one; else the vectors."""
     if X.shape[1] == 1:
         return X
-    U, sizes, _ = np.linalg.svd(np.column_stack([X.real, X.imag]), full_matrices=False)
+    U, sizes, _ = svd(np.column_stack([X.real, X.imag]), full_matrices=False)
     m = X.shape[1]
     return U[:, :m] if sizes[m] <= _NO_PART * sizes[0] else X

@@ -8,6 +8,7 @@ import functools
 import numpy as np
 
 from cosserat_fenicsx.errors import SceneError
+from cosserat_fenicsx.numerics import svd
 from cosserat_fenicsx.scene.curves import Line
 from cosserat_fenicsx.scene.action import some_of
 from cosserat_fenicsx.scene.supports import Clamp, Joint, PositionTie, TurnTie
@@ -84,7 +85,7 @@ def null_space(row, column, value, shape):
     if size <= _DENSE:
         matrix = np.zeros(shape)
         np.add.at(matrix, (row, column), value)
-        _, sizes, right = np.linalg.svd(matrix, full_matrices=shape[0] < size)
+        _, sizes, right = svd(matrix, full_matrices=shape[0] < size)
         return right[np.count_nonzero(sizes > _RANK_TOLERANCE * sizes.max(initial=0)) :].T, True
     from scipy.sparse import csc_matrix, identity  # slow to import, and few scenes need it
     from scipy.sparse.linalg import splu
@@ -102,7 +103,7 @@ def null_space(row, column, value, shape):
         for _ in range(_ITERATIONS):
             vectors = np.linalg.qr(factors.solve(vectors))[0]
         triangle = np.linalg.qr(matrix @ vectors, mode="r")
-        _, sizes, right = np.linalg.svd(triangle)
+        _, sizes, right = svd(triangle)
         sizes = np.append(sizes, np.zeros(count - len(sizes)))
         zero = sizes <= _RANK_TOLERANCE * largest
         if sizes[0] > _GAP * largest or count == size:

@@ -28,6 +28,8 @@ from cosserat_fenicsx.numerics import directors, lobatto_weights
 _REMAINING, _SQUARED = 0.1, 100.0
 # Rounding errors of an eigenvalue with such a change, a difference of large entries, over those without.
 _OF_CHANGE = 8.0
+# Error where such a change is not above rounding errors of the eigenvalue, over these: they, the change and its own.
+_HIDING = 4.0
 # Largest force, over EI/L^2, with which what resists velocities may act on the rods in a steady rotation.
 _DRIVEN = 1e-6
 
@@ -63,7 +65,7 @@ def softness(problem, K):
 
 def corrected(softness, M, C, values, vectors, rounding, trusted):
     """Eigenvalues without `softness`, to first order with left eigenvectors taken for right ones, unless that is within
-    their relative rounding errors (n,); and these with what is left.
+    their relative rounding errors (n,); and these with what is left, or with what rounding may hide of the change.
 
     Args:
         M, C: see the head of this file; C is None where `values` are squares of frequencies.
@@ -79,7 +81,7 @@ def corrected(softness, M, C, values, vectors, rounding, trusted):
     change = np.where((values == 0) | (inertia == 0), 0.0, change / np.where(inertia == 0, 1.0, inertia))
     share = np.abs(change) / np.where(values == 0, 1.0, np.abs(values))
     known, left = share > rounding, share * (np.minimum(_REMAINING, _SQUARED * share) if trusted else 1.0)
-    return np.where(known, values + change, values), np.where(known, _OF_CHANGE * rounding + left, rounding)
+    return np.where(known, values + change, values), np.where(known, _OF_CHANGE * rounding + left, _HIDING * rounding)
 
 
 class Bodies:
