@@ -75,6 +75,8 @@ def earliest_helix(soft, pieces, sections):
 
 def growth(solved, pieces, sections):
     """(n,) factors by which helices above the lower ends of pieces amplify a change of tension there."""
+    if not solved.helical.any():
+        return np.ones(len(solved.helical))
     start = _start(solved.chain, pieces, sections, None)
     mean = np.abs(solved.tension @ UP_TO[-1])
     with np.errstate(invalid="ignore", divide="ignore"):

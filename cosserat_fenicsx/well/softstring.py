@@ -33,6 +33,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.polynomial.legendre import legval, legvander
+from scipy.linalg.blas import dtbsv
 from scipy.optimize import brentq
 
 from cosserat_fenicsx.errors import NotConverged, SceneError, nearest
@@ -263,17 +264,16 @@ def _integrated(slope, source, length):
     """P with P' = slope P + source, from 0 at the lower end of the lowest piece, by its integrating factor: at the
     ends of pieces (n + 1,) and, as slope and source, at their Gauss points."""
     A, gain = (slope @ POINTS_TO.T) * length[:, None], np.exp((slope @ WEIGHTS) * length)
-    decay = source * np.exp(-A)
+    shrunk = np.exp(-A)
+    decay = source * shrunk
     starts = chained(gain, gain * (decay @ WEIGHTS) * length)
-    return starts, np.exp(A) * (starts[:-1, None] + (decay @ POINTS_TO.T) * length[:, None])
+    return starts, (starts[:-1, None] + (decay @ POINTS_TO.T) * length[:, None]) / shrunk
 
 
 def chained(gain, added):
     """(n + 1,) recurrence from 0: each value is gain times the value before, plus `added` (n,)."""
-    found = [0.0]
-    for a, b in zip(gain.tolist(), added.tolist(), strict=True):
-        found.append(a * found[-1] + b)
-    return np.array(found)
+    below = np.stack([np.ones(len(added) + 1), np.append(-gain, 0.0)])  # diagonal and what is below it
+    return dtbsv(1, below, np.append(0.0, added), lower=1, diag=1)
 
 
 def _zero(below, inside, above):

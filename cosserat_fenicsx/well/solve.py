@@ -87,13 +87,14 @@ def model_errors(path, pieces, soft, solved, sections, rings=()):
     clearance = (pieces.hole - pieces.radius)[chain.origin]
     missed, stiff = (np.zeros(len(load)) for _ in range(2))
     missed[groups] = _turns(chain, solved, groups, clearance[groups])
-    jumps, stiffer = _jumps(path, pieces, solved.tension[groups[1:], 0], EI[groups])
+    beside = path.curvature(np.concatenate([np.maximum(pieces.bottom - 1e-6, 0.0), pieces.bottom])).reshape(2, -1, 3)
+    jumps, stiffer = _jumps(path, pieces, beside, solved.tension[groups[1:], 0], EI[groups])
     missed[groups[1:]] += jumps
     missed[groups] += _edges(pieces, solved, groups, EI[groups])
     missed[groups[-1]] += _hung(chain, solved, clearance[-1], EI[-1])
     missed *= _SET.caution
     stiff[groups[1:]] = stiffer
-    stiff[groups] += _levers(path, pieces, solved, groups, EI[groups], clearance[groups])
+    stiff[groups] += _levers(pieces, beside, solved, groups, EI[groups], clearance[groups])
     extra = _snakes(chain, solved, EI, clearance)
     grown = growth(solved, pieces, sections)
     pried, arms = _at_rings(chain, solved, pieces.bottom[-1], clearance, EI, rings)
@@ -214,13 +215,13 @@ def _edges(pieces, solved, groups, EI):
     return found
 
 
-def _levers(path, pieces, solved, groups, EI, clearance):
+def _levers(pieces, beside, solved, groups, EI, clearance):
     """Wall force (N) that is missed at the lower ends of pieces, from below, where EI k jumps: the string takes the
     moment by a pair of forces at a distance of sqrt(8 d/k), where they exceed the load there."""
-    md, n = pieces.bottom[::-1], len(groups)
+    n = len(groups)
     wide = np.maximum(np.append(EI[1:], 0.0), np.append(0.0, EI[:-1]))  # of neighbours
     EI = np.where(pieces.bottom[::-1] - pieces.top[::-1] < _SET.short, np.minimum(EI, wide), EI) if n > 1 else EI
-    above, below = _beside(path, md)
+    above, below = beside[:, ::-1]
     moment = np.linalg.norm(EI[:, None] * above - np.append(0.0, EI[:-1])[:, None] * below, axis=1)
     known = (moment > 0) & (EI > 0)
     moment, stiff = np.where(known, moment, 0.0), np.where(known, EI, 1.0)
@@ -228,22 +229,18 @@ def _levers(path, pieces, solved, groups, EI, clearance):
     return np.maximum(2 * moment / apart - solved.side[groups, 0] * solved.chain.climb[groups] * apart, 0.0)
 
 
-def _jumps(path, pieces, tension, EI):
-    """Wall force (N) that is missed where pieces meet, from below, and EI dk^2 (N m)."""
+def _jumps(path, pieces, beside, tension, EI):
+    """Wall force (N) that is missed where pieces meet, from below, and EI dk^2 (N m); beside: (2, n, 3) curvature
+    vectors just above and below the bottoms of pieces."""
     md, up = pieces.bottom[:-1], slice(None, None, -1)
     t, down = path.tangent(md), np.array([0.0, 0.0, 1.0])
-    k = _beside(path, md)
+    k = beside[:, :-1]
     offsets = []
     for i, curvature in ((slice(None, -1), k[0]), (slice(1, None), k[1])):
         q = tension[up, None] * curvature + pieces.weight[i, None] * (down - t * t[:, 2:])
         offsets.append((pieces.hole - pieces.radius)[i, None] * _unit(q, 1))
     jump, away = np.linalg.norm(k[1] - k[0], axis=1), np.linalg.norm(offsets[1] - offsets[0], axis=1)
     return np.abs(tension) * np.sqrt(2 * away * jump)[up], np.minimum(EI[1:], EI[:-1]) * jump[up] ** 2
-
-
-def _beside(path, md):
-    """Curvature vectors just above and below measured depths."""
-    return path.curvature(np.maximum(md - 1e-6, 0.0)), path.curvature(md)
 
 
 def _unit(vectors, axis):
