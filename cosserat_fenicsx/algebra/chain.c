@@ -137,8 +137,8 @@ static void find_scales(const double *F, int n, int m, double *scale, double *wh
 /* LU factors of the first m rows and columns of F (n, n) with row exchanges among them, and the rest reduced. Columns
    without an acceptable pivot are tried again after the others; at most `most` may be left over. Returns how many were
    eliminated, -1 if F is singular: pivots are zero that are smaller than `zero` times the largest number in the column
-   before elimination, where `scale` is given with all rows scaled by their sums. scale: (n,) work space for these, or 0;
-   whole: (m,) work space. */
+   before elimination, where `scale` is given with all rows scaled by their sums. scale: (n,) work space for these, or
+   0; whole: (m,) work space. */
 static int reduce(double *restrict F, int n, int m, int most, int *row, int *column, double zero,
                   double *restrict scale, double *restrict whole)
 {
@@ -181,9 +181,9 @@ static int reduce(double *restrict F, int n, int m, int most, int *row, int *col
     return k;
 }
 
-/* Signs of the pivots of the first m rows and columns of a symmetric F (n, n), the largest on the diagonal first; whole:
-   their diagonal before, against which zero is judged, whatever the scale of an unknown. Returns the logarithm of the
-   product of their absolute values. */
+/* Signs of the pivots of the first m rows and columns of a symmetric F (n, n), the largest on the diagonal first;
+   whole: their diagonal before, against which zero is judged, whatever the scale of an unknown. Returns the logarithm
+   of the product of their absolute values. */
 static double signs(double *F, int n, int m, double *whole, int *negative, int *zero)
 {
     double product = 1;
@@ -275,8 +275,9 @@ static void condense(chain *s, int t, const double *F, int n, int k, int d)
     for (int i = d; i < slots; i++) block[(size_t)i * all + i] = 1;
 }
 
-/* The factors of a front F (n, n) with k pivots by columns, for `subtract_column`: those of L from the first on, those of
-   U above the pivots from the last on. Each begins and ends where four numbers of the front do, filled up with zeros. */
+/* The factors of a front F (n, n) with k pivots by columns, for `subtract_column`: those of L from the first on, those
+   of U above the pivots from the last on. Each begins and ends where four numbers of the front do, filled up with
+   zeros. */
 static void keep_factors(chain *s, int t, const double *F, int n, int k)
 {
     double *to = s->factor + (size_t)t * s->room * (s->wide + BESIDE), *inverse = s->inverse + (size_t)t * s->room;
@@ -315,8 +316,8 @@ int eliminate(chain *s, kernel *k, const double *matrices)
         const int last = s->ends[t] != -1;
         double *F = s->front + (size_t)(t % 2) * s->room * s->room; /* of earlier ones the factors are kept */
         int eliminated = -1;
-        /* A pivot that seems to be zero is judged again with rows scaled: in the column of a rotation the forces against
-           shear of a slender rod exceed all moments, and the more the shorter the element. */
+        /* A pivot that seems to be zero is judged again with rows scaled: in the column of a rotation the forces
+           against shear of a slender rod exceed all moments, and the more the shorter the element. */
         for (int scaled = 0; scaled < 2 && eliminated < 0; scaled++) {
             assemble(s, k, matrices, F, t, d, before, n_before, k_before, 0);
             for (int i = 0; i < n; i++) row[i] = i;
@@ -399,7 +400,7 @@ void backward(chain *s, const double *interface, double *x)
     }
 }
 
-/* ---- a sparse system ---------------------------------------------------------------------------------------------- */
+/* ---- a sparse system ------------------------------------------------------------------------------------------ */
 
 /* Rows and columns of the entries of square matrices one after another; sizes: (count,); where: their unknowns. */
 void spread(int count, const int *sizes, const int *where, int *rows, int *columns)

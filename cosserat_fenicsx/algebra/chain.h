@@ -29,10 +29,10 @@ typedef struct kernel {
 } kernel;
 
 /* Elimination of the unknowns of elements in turn, along the rods. A segment is a run of elements that share unknowns
-   with the next; its first and last element may have unknowns of the interface, which are kept. The matrix of an element
-   in turn, its front, has the unknowns [delayed | left | own | right | start]: those that earlier elements could not
-   eliminate, those shared with the element before, its own, those shared with the next (or, at the end, kept), and those
-   of the interface where the segment began. The first three are eliminated. */
+   with the next; its first and last element may have unknowns of the interface, which are kept. The matrix of an
+   element in turn, its front, has the unknowns [delayed | left | own | right | start]: those that earlier elements
+   could not eliminate, those shared with the element before, its own, those shared with the next (or, at the end,
+   kept), and those of the interface where the segment began. The first three are eliminated. */
 typedef struct {
     int elements, width;           /* unknowns of an element, for the kernel */
     int size, room, delays, kept;  /* unknowns of this rank; largest front; most delayed unknowns; of the interface */
@@ -47,14 +47,14 @@ typedef struct {
     double *front;                 /* (2, room, room) of the element in turn and of the one before */
     int wide;                      /* room, rounded up to a multiple of 4 */
     double *factor, *inverse;      /* (elements, room, wide + 4) factors by columns; (elements, room) of the pivots */
-    int *row, *column, *done;      /* (elements, room) order of rows, unknowns of columns; (elements, 2) size of the front,
-                                      eliminated */
+    int *row, *column, *done;      /* (elements, room) order of rows, unknowns of columns; (elements, 2) size of the
+                                      front, eliminated */
     double *forward, *condensed;   /* (elements, wide); matrices of the segments on the interface */
     double *diagonal;              /* (interface,) sum of the elements' diagonals there */
     double *carry, *work;          /* (room,) each */
     int negative, zero;            /* pivots, after `count` */
     double logarithm;              /* of the product of their absolute values, after `count` */
-    double zero_pivot;             /* of `eliminate`, relative to the largest number in the column; smaller ones are zero */
+    double zero_pivot;             /* of `eliminate`, relative to the largest number in the column; less is zero */
 } chain;
 
 /* A small system of the unknowns that elimination leaves, as a dense matrix. */
@@ -69,16 +69,16 @@ typedef struct {
 typedef struct {
     int count, nodes, pairs, added, turning, block; /* ties; tied nodes; pairs of these; ties that are equations of the
                                        system; ties whose gradient changes; unknowns of a node */
-    int width, at_load_factor, at_multiplier, plane; /* of the numbers of a tie; whether the unknowns are (r, theta) in a
-                                       plane, else (r, q, ..) */
+    int width, at_load_factor, at_multiplier, plane; /* of the numbers of a tie; whether the unknowns are (r, theta) in
+                                                        a plane, else (r, q, ..) */
     void *value, *changes;          /* FFCx's functions of the numbers: (13,) c and its gradient; (12, 12) */
     const int *ends, *pair;         /* (ties, 2) nodes, (ties, 2, 2) pairs; -1 for the ground */
-    const int *first, *second, *mirrored, *own; /* (pairs,) nodes of rows and columns, and the exchanged pair; (nodes,) */
+    const int *first, *second, *mirrored, *own; /* (pairs,) nodes of rows, of columns, exchanged pair; (nodes,) */
     const int *turns, *equation;    /* (turning,), (added,) ties */
     const int *rows, *multiplier;   /* (nodes, block), (added,) unknowns of this rank, or -1 */
     double *numbers;                /* (ties, width) see forms/ties.py */
-    const double *axes, *offset, *at_rest; /* of a plane: (3, 3) rows, (nodes, 3) the constant part of the positions; (nodes,
-                                       block) */
+    const double *axes, *offset, *at_rest; /* of a plane: (3, 3) rows, (nodes, 3) the constant part of the positions;
+                                              (nodes, block) */
     double *nodal, *multipliers;    /* (nodes, block), (ties,) of the state */
     double share;                   /* where in a step reactions act, see TieRows */
     double *start, *shift;          /* (nodes, block) at the start of a step; (ties,) values that are required of c */
@@ -99,16 +99,16 @@ typedef struct {
     double *blocks, *resistance, *stiffness; /* (pairs, size, size), (nodes, size), (ties,) */
 } tied_variation;
 
-/* Contact of nodes with the wall of a tube in a time step, whose nodes move linearly with the forces: see contact.c. All
-   vectors are inertial. */
+/* Contact of nodes with the wall of a tube in a time step, whose nodes move linearly with the forces: see contact.c.
+   All vectors are inertial. */
 typedef struct {
-    int nodes, reach, at_end, most; /* nodes that may touch; how many on each side of one its force moves; whether forces
-                                       are those of the end of the step, not of its mean; sweeps */
+    int nodes, reach, at_end, most; /* nodes that may touch; how many on each side of one its force moves; whether
+                                       forces are those of the end of the step, not of its mean; sweeps */
     const double *clearance, *stiffness, *friction, *damping, *arm; /* (nodes,); arm: radius of the rod's surface */
     double h, share, smallest;      /* the step; changes that end the sweeps, of the first one and of all */
     const double *tangent, *start;  /* (nodes, 3) of the tube; from its axis to the rod at the start, across it */
-    const float *compliance;        /* (nodes, 6, 2 reach + 1, 6) by each component of the force and moment of a node the
-                                       motion of its neighbours, and of itself in the middle */
+    const float *compliance;        /* (nodes, 6, 2 reach + 1, 6) by each component of the force and moment of a node
+                                       the motion of its neighbours, and of itself in the middle */
     double *moved;                  /* (nodes, 6) displacement and rotation in the step with the forces */
     double *force, *law;            /* (nodes, 6) force and moment; (nodes, 3) normal force, friction round and along */
     double *multiplier;             /* (nodes,) of friction at its bound, the last ones */
@@ -203,8 +203,8 @@ typedef struct {
     int easy, hard;                 /* Newton iterations */
     double step, smallest, largest; /* the next step; bounds */
     double shrink;                  /* factor of a step that is rejected */
-    int rejections, patience, accepted; /* rejected steps without two accepted ones between, and most of them; whether the
-                                       last one was accepted */
+    int rejections, patience, accepted; /* rejected steps without two accepted ones between, and most of them; whether
+                                           the last one was accepted */
 } step_control;
 
 /* What to do with a step (the last three reject it), and why a sweep returned. */
@@ -262,26 +262,26 @@ typedef struct {
 /* What the unknowns of a model are: theta, q, (r, theta) or (r, q). */
 enum { IN_PLANE, IN_SPACE, PLANAR, SPATIAL };
 
-/* A mesh of rods that clamps and rigid joints hold, without couplings of strains, and its last state. Elements and nodes
-   are in the order of the scene; a rod's first node is p times its first element plus the number of the rod. Frames and
-   units are those of the forms. */
+/* A mesh of rods that clamps and rigid joints hold, without couplings of strains, and its last state. Elements and
+   nodes are in the order of the scene; a rod's first node is p times its first element plus the number of the rod.
+   Frames and units are those of the forms. */
 typedef struct {
     sweep *sweep;
     int kind, rods, elements, nodes, p, points, components, forces; /* of a node's unknowns; of n */
     const int *first;               /* (rods + 1,) elements */
-    const int *order;               /* (rods, 3) of a tree, from the clamps on: rod, its element end there, node of the rod
-                                       before or -1 */
+    const int *order;               /* (rods, 3) of a tree, from the clamps on: rod, its element end there, node of the
+                                       rod before or -1 */
     const int *from, *field_from;   /* (nodes, components) unknowns, or -1 where held at rest; (elements, points, n) */
     const double *at_rest, *rest, *reference; /* a point of the sweep; (nodes, components); (nodes, 3) positions */
     const double *basis, *slopes, *from_slopes, *by_fields, *by_densities; /* see ElementRule */
     const double *sizes, *axes;     /* (elements,) lengths; (3, 3) rows */
-    const double *K, *J, *R_R, *v_R, *known, *density; /* (elements, points, n): law, reference, n at load factor 1 where
-                                       statics gives it, loads per length, or 0 */
+    const double *K, *J, *R_R, *v_R, *known, *density; /* (elements, points, n): law, reference, n at load factor 1
+                                                          where statics gives it, loads per length, or 0 */
     const double *gyrations, *limits; /* (rods,) radii; rounding of n and of m, least stiffness J, of bending, relative
                                        rounding of the motion */
     double longest;                 /* element */
-    double *nodal, *placed, *motion, *gauss, *contact; /* (nodes, components), (nodes, 3), (nodes, 7) displacement and q,
-                                       (elements, points, 9) n, m and r', (elements, p + 1, 6) */
+    double *nodal, *placed, *motion, *gauss, *contact; /* (nodes, components), (nodes, 3), (nodes, 7) displacement and
+                                                          q, (elements, points, 9) n, m and r', (elements, p + 1, 6) */
 } mesh;
 
 /* kind: position, rotation, force or moment; place: among displacement, q, n and m. */
@@ -294,11 +294,11 @@ typedef struct {
 /* Two meshes that are compared, see compared.c; the constants are those of results/accuracy.py and compared.py. */
 typedef struct {
     mesh *coarse, *fine;
-    int places, equal, single; /* places of a coarse element; whether fine elements are of one length, and one is a rod */
+    int places, equal, single; /* places of a coarse element; fine elements are of one length; one is a rod */
     int queries, moves, numbers;
     const double *inside, *weights; /* (places, p + 1) of a coarse element; (all places, p + 1) of the fine ones */
     const int *cells;               /* (all places,) fine elements */
-    const double *start, *move_weight; /* (numbers,) a point of the fine mesh at rest; what is added to it: numbers of */
+    const double *start, *move_weight; /* (numbers,) a point of the fine mesh at rest; numbers of what is added to it */
     const int *move_to, *move_from; /* the coarse state, each (moves,): unknowns of the nodes, then n at Gauss points */
     double length, held[2];         /* longest rod; force and moment that actions without stress would need */
     double ahead, far, of_ends, safety, safety_below, asymptotic, nothing, still, least_moment, vanishing, rounding;

@@ -1,9 +1,9 @@
 /* Many cases of one scene: the numbers of a few are written at a time, each on two meshes of its own; they are swept
    from rest on the first, corrected on the second, and judged by both. What is not decided here is left to Python.
 
-   Two meshes of a case: the state of the finer one from that of the coarser, the error estimate of both, and queries. What
-   is compared, and with what margins, is said in results/compared.py and results/accuracy.py, contact forces at nodes in
-   results/recovery.py, and the states of each model in its file of models/. */
+   Two meshes of a case: the state of the finer one from that of the coarser, the error estimate of both, and queries.
+   What is compared, and with what margins, is said in results/compared.py and results/accuracy.py, contact forces at
+   nodes in results/recovery.py, and the states of each model in its file of models/. */
 #include "chain.h"
 
 #include <math.h>
@@ -213,7 +213,9 @@ static int find_sizes(const comparison *p, const mesh *m, double *sizes)
             moved = fmax(moved, square(m->motion + 7 * i, 3));
             half = fmax(half, square(m->motion + 7 * i + 4, 3));
         }
-        half = sqrt(half), rotation = fmax(rotation, 2 * half), turned = fmax(turned, sqrt(8) * half * m->gyrations[rod]);
+        half = sqrt(half);
+        rotation = fmax(rotation, 2 * half);
+        turned = fmax(turned, sqrt(8) * half * m->gyrations[rod]);
     }
     largest_contact(m, &force, &moment);
     moved = fmax(sqrt(moved), p->nothing), force = fmax(force, p->least_moment * p->held[0]);
@@ -314,7 +316,7 @@ static int answer(const comparison *p, double *values, double *errors)
     return 0;
 }
 
-/* ---- many cases --------------------------------------------------------------------------------------------------- */
+/* ---- many cases ----------------------------------------------------------------------------------------------- */
 
 /* The whole sweeps to their load factor, from rest; those leave where a step was not decided or the rest state is not
    stable. */

@@ -55,8 +55,8 @@ static double settle_normal(const contact *c, int i, double R0, double R_now, do
 }
 
 /* T with |T| <= most that makes the slip A T + b zero, or else opposite to T: the minimum of T A T/2 + b T in that
-   disc, by Newton's method for the multiplier (More & Sorensen, SIAM J. Sci. Stat. Comput. 4 (1983) 553), from the given
-   one. From above its step goes below, and from there it rises to the solution. */
+   disc, by Newton's method for the multiplier (More & Sorensen, SIAM J. Sci. Stat. Comput. 4 (1983) 553), from the
+   given one. From above its step goes below, and from there it rises to the solution. */
 static void settle_friction(const double A[3], const double b[2], double most, double *multiplier, double T[2])
 {
     double shift = *multiplier, size = 0;
@@ -140,8 +140,8 @@ static void move_by(const contact *c, int i, const double *v)
                + W[j + 4 * width] * v[4] + W[j + 5 * width] * v[5];
 }
 
-/* The motion of all nodes in the step from `before` to unknowns `now`: displacements and rotations, by the mean rotation;
-   with them the work of a force and a moment in a step is exact. */
+/* The motion of all nodes in the step from `before` to unknowns `now`: displacements and rotations, by the mean
+   rotation; with them the work of a force and a moment in a step is exact. */
 void find_motion(contact *c, const double *now)
 {
     const double *before = c->before;

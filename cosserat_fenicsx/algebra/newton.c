@@ -1,12 +1,12 @@
-/* Newton's method for equilibria, and the iterations of a time step. Hooks let Python add constraint equations, exchange
-   with other ranks, and evaluate loads. */
+/* Newton's method for equilibria, and the iterations of a time step. Hooks let Python add constraint equations,
+   exchange with other ranks, and evaluate loads. */
 #include "chain.h"
 
 #include <math.h>
 #include <string.h>
 
-enum { STATE = 1, RESIDUAL = 2, TANGENT = 4, INTERFACE = 8, ADD_UP = 16, SUM = 32, MATRICES = 64, CONTACT = 256, COMPLIANCE = 512,
-       NODES = 1024 };
+enum { STATE = 1, RESIDUAL = 2, TANGENT = 4, INTERFACE = 8, ADD_UP = 16, SUM = 32, MATRICES = 64, CONTACT = 256,
+       COMPLIANCE = 512, NODES = 1024 };
 enum { FAILED = 1 };
 /* Increments at a wall that no longer shrink, by rounding, are measured anew after some steps without them. */
 static const double FADES = 0.9;
@@ -172,8 +172,8 @@ static int respond_exactly(problem *p, double *change)
     return 0;
 }
 
-/* Add the response to the last change of the forces, by the compliance, to Newton's step. What that leaves out is in the
-   next residual. */
+/* Add the response to the last change of the forces, by the compliance, to Newton's step. What that leaves out is in
+   the next residual. */
 static void respond_nearby(contact *c, double *change)
 {
     double sum = 0;
@@ -278,10 +278,10 @@ int iterate(stepping *s)
 
 /* ---- equilibria -------------------------------------------------------------------------------------------------- */
 
-/* See `error_is_small`. Convergence is not taken for quadratic (`contracts`) on slender rods whose contact force is carried
-   or unknown: rounding makes their tangent inexact for motions of low stiffness. Where n follows from the motion alone,
-   Newton steps alternate between bending and the correction of the stretch that this causes; the larger ones of successive
-   pairs of steps (`period`) are compared then, because one small step does not imply convergence. */
+/* See `error_is_small`. Convergence is not taken for quadratic (`contracts`) on slender rods whose contact force is
+   carried or unknown: rounding makes their tangent inexact for motions of low stiffness. Where n follows from the
+   motion alone, Newton steps alternate between bending and the correction of the stretch that this causes; the larger
+   ones of successive pairs of steps (`period`) are compared then, because one small step does not imply convergence. */
 static int has_converged(const newton *n)
 {
     double before = 0, step = 0;
@@ -302,8 +302,8 @@ static int root_of(const problem *p, double sum, double *root)
     return 0;
 }
 
-/* Judge the residual b after a step, or at the start where `change` is 0. Of the step only the part that is motion counts:
-   forces and multipliers differ in scale and in rounding error. */
+/* Judge the residual b after a step, or at the start where `change` is 0. Of the step only the part that is motion
+   counts: forces and multipliers differ in scale and in rounding error. */
 int judge_residual(newton *n, const double *b, const double *change)
 {
     const problem *p = n->problem;

@@ -19,8 +19,8 @@ static double now(void)
     return t.tv_sec + 1e-9 * t.tv_nsec;
 }
 
-/* Complete the count of a part with the unknowns of the interface; 0 where these have eigenvalues that are not positive,
-   which Python finds. */
+/* Complete the count of a part with the unknowns of the interface; 0 where these have eigenvalues that are not
+   positive, which Python finds. */
 static int completed(const second_variation *v, int k)
 {
     double logarithm;
@@ -65,7 +65,7 @@ static double largest(const sweep *s, const double *a, const double *b)
     return sqrt(fmax(moved, s->turn * s->turn * turned));
 }
 
-/* ---- step control, for Python too ---------------------------------------------------------------------------------- */
+/* ---- step control, for Python too ------------------------------------------------------------------------------ */
 
 /* The load factor that the next step from `here` to a load factor ends at. */
 double step_goal(const step_control *c, double here, double load_factor)
@@ -84,8 +84,8 @@ double step_growth(const step_control *c, double off, int order, int iterations)
     return iterations > c->easy ? fmin(growth, 1) : growth;
 }
 
-/* What to do with a step whose end is `off` the predictor, from the number of known points and, of the increments to the
-   end and to the predictor, their inner product, the latter's square, and the square of their difference. */
+/* What to do with a step whose end is `off` the predictor, from the number of known points and, of the increments to
+   the end and to the predictor, their inner product, the latter's square, and the square of their difference. */
 int judge_step(step_control *c, int known, double off, double along, double size, double apart)
 {
     c->shrink = 0.5;

@@ -1,13 +1,13 @@
-/* Constraint equations of supports and joints: reactions, their tangent and their second variation, in blocks of the nodes
-   that they tie, and the small dense system of the interface to which they belong. FFCx's kernels know the equations
-   (forms/ties.py). */
+/* Constraint equations of supports and joints: reactions, their tangent and their second variation, in blocks of the
+   nodes that they tie, and the small dense system of the interface to which they belong. FFCx's kernels know the
+   equations (forms/ties.py). */
 #include "chain.h"
 
 #include <math.h>
 #include <stdint.h>
 #include <string.h>
 
-enum { MAPS = 2048, RQ = 7, FOUND = 13, SMALL = 6 }; /* numbers of: r and q; c and its gradient; small motions of a node */
+enum { MAPS = 2048, RQ = 7, FOUND = 13, SMALL = 6 }; /* numbers of: r and q; c and its gradient; a node's motions */
 
 static int python_hook(void *self, int what, double *a, double *b);
 
@@ -226,13 +226,14 @@ void spring_ties(ties *t, double load_factor, const double *axes, int n, const d
             const int pair = t->pair[4 * i + block];
             for (int k = 0; pair >= 0 && k < n; k++)
                 for (int l = 0; l < n; l++)
-                    out[n * (n * pair + k) + l] += stiffness[i] * along[n * (block / 2) + k] * along[n * (block % 2) + l];
+                    out[n * (n * pair + k) + l] +=
+                        stiffness[i] * along[n * (block / 2) + k] * along[n * (block % 2) + l];
         }
     }
 }
 
-/* The part of supports and joints in the second variation, (pairs, n, n), with springs whose scales `resistance` (nodes,
-   n) follow from the elements' diagonal on the interface. */
+/* The part of supports and joints in the second variation, (pairs, n, n), with springs whose scales `resistance`
+   (nodes, n) follow from the elements' diagonal on the interface. */
 void hold_variation(const tied_variation *v, double load_factor, const double *diagonal)
 {
     ties *t = v->ties;

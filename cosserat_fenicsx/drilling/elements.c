@@ -242,8 +242,8 @@ static double rub(model *m)
     return fabs(m->force[2 * i] - m->c[2 * i]) / m->rho[2 * i];
 }
 
-/* Friction between both sides of joints, as that of a motor's rotor in its housing: where it holds them they creep, by a
-   damper; elsewhere it is a given force. Returns whether one begins to stand or to slip. */
+/* Friction between both sides of joints, as that of a motor's rotor in its housing: where it holds them they creep, by
+   a damper; elsewhere it is a given force. Returns whether one begins to stand or to slip. */
 static int rub_joints(model *m)
 {
     const int n = m->dofs;

@@ -96,7 +96,8 @@ static inline int several(const friction *f, double rho)
 }
 
 /* See `slides`: by Newton's method from the right, kept between slips at which the sum is too small and too large. */
-static __attribute__((noinline, cold)) double slides_by_other(const friction *f, double rho, double F, double *R, double *slope, long long *iterations)
+static __attribute__((noinline, cold)) double slides_by_other(const friction *f, double rho, double F, double *R,
+                                                               double *slope, long long *iterations)
 {
     const double enough = 1e-14 * F / rho;
     double low = 0, high = F / rho, s = high;

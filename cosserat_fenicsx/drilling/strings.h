@@ -1,5 +1,5 @@
-/* The interface of the C code of this folder to Python; read by cffi too, so declarations alone. SI units. Arrays belong
-   to numpy. */
+/* The interface of the C code of this folder to Python; read by cffi too, so declarations alone. SI units. Arrays
+   belong to numpy. */
 
 #ifndef COSSERAT_STRINGS_H
 #define COSSERAT_STRINGS_H
@@ -33,8 +33,8 @@ enum { ROW = 22, MOST_PAIRS = 6 };
 extern "Python" double call_law(void *self, double slip, double load, double *slope);
 #endif
 
-/* A linear control of the drive: x' = A x + B u, y = C x + D u, u = (Om - om, M - level), by the midpoint rule; y is its
-   torque, or its speed less the one asked for. See linear_control.py. */
+/* A linear control of the drive: x' = A x + B u, y = C x + D u, u = (Om - om, M - level), by the midpoint rule; y is
+   its torque, or its speed less the one asked for. See linear_control.py. */
 typedef struct {
     int size, late;                  /* of x; steps by which y acts late */
     int used, of_speed;              /* whether there is one; whether y is a speed */
