@@ -5,10 +5,10 @@ from cosserat_fenicsx import drilling as drilling
 from cosserat_fenicsx import signals as signals
 from cosserat_fenicsx import units as units
 from cosserat_fenicsx import well as well
-from cosserat_fenicsx.actions.actuation import Actuation as Actuation
-from cosserat_fenicsx.actions.actuation import Growth as Growth
-from cosserat_fenicsx.actions.actuation import Pretension as Pretension
-from cosserat_fenicsx.actions.actuation import Thermal as Thermal
+from cosserat_fenicsx.actions.tendons import Actuation as Actuation
+from cosserat_fenicsx.actions.tendons import Growth as Growth
+from cosserat_fenicsx.actions.tendons import Pretension as Pretension
+from cosserat_fenicsx.actions.tendons import Thermal as Thermal
 from cosserat_fenicsx.actions.centrifugal import Centrifugal as Centrifugal
 from cosserat_fenicsx.actions.fluids import AddedMass as AddedMass
 from cosserat_fenicsx.actions.fluids import Drag as Drag
@@ -24,7 +24,7 @@ from cosserat_fenicsx.actions.springs import PointMass as PointMass
 from cosserat_fenicsx.actions.springs import Spring as Spring
 from cosserat_fenicsx.actions.tendons import Helical as Helical
 from cosserat_fenicsx.actions.tendons import Tendon as Tendon
-from cosserat_fenicsx.dynamics.resuming import read_history as read_history
+from cosserat_fenicsx.dynamics.simulate import read_history as read_history
 from cosserat_fenicsx.dynamics.simulate import simulate as simulate
 from cosserat_fenicsx.errors import CosseratError as CosseratError
 from cosserat_fenicsx.errors import InstallationError as InstallationError
@@ -35,7 +35,7 @@ from cosserat_fenicsx.errors import SceneError as SceneError
 from cosserat_fenicsx.errors import SceneWarning as SceneWarning
 from cosserat_fenicsx.files.read import read as read
 from cosserat_fenicsx.files.read import write as write
-from cosserat_fenicsx.files.rods import RodScene as RodScene
+from cosserat_fenicsx.files.read import RodScene as RodScene
 from cosserat_fenicsx.quantities import Quantity as Quantity
 from cosserat_fenicsx.results.history import History as History
 from cosserat_fenicsx.results.modes import Buckling as Buckling
@@ -43,8 +43,8 @@ from cosserat_fenicsx.results.modes import Modes as Modes
 from cosserat_fenicsx.results.modes import ModesAlong as ModesAlong
 from cosserat_fenicsx.results.path import Path as Path
 from cosserat_fenicsx.results.records import Event as Event
-from cosserat_fenicsx.results.sensitivity import Sensitivity as Sensitivity
-from cosserat_fenicsx.results.sensitivity import Uncertainty as Uncertainty
+from cosserat_fenicsx.results.queries import Sensitivity as Sensitivity
+from cosserat_fenicsx.results.queries import Uncertainty as Uncertainty
 from cosserat_fenicsx.results.stored import read_result as read_result
 from cosserat_fenicsx.scene.action import Action as Action
 from cosserat_fenicsx.scene.action import LineAction as LineAction

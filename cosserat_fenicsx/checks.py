@@ -20,7 +20,7 @@ from pathlib import Path
 
 import numpy as np
 
-from cosserat_fenicsx.dimensions import BY_UNIT, LARGEST, MOST, in_si
+from cosserat_fenicsx.quantities import BY_UNIT, LARGEST, MOST, in_si
 from cosserat_fenicsx.errors import SceneError, SceneWarning, nearest
 
 #: Numbers, as a list, a tuple or an array.
@@ -91,7 +91,7 @@ def number(owner, field, value, expected, accept, above_zero=False, dimension=No
     Args:
         expected: for messages, with the SI unit in its first parentheses.
         above_zero: whether numbers so small that their powers are zero are refused too.
-        dimension: of text with a unit, see `dimensions`; None for that of the SI unit.
+        dimension: of text with a unit, see `quantities.DIMENSIONS`; None for that of the SI unit.
     """
     unit, told = _unit_of(expected), value
     if isinstance(value, str):

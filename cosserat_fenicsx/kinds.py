@@ -23,7 +23,7 @@ import numpy as np
 
 from cosserat_fenicsx import checks
 from cosserat_fenicsx.checks import instance, refuse
-from cosserat_fenicsx.dimensions import DIMENSIONS, LARGEST, in_si
+from cosserat_fenicsx.quantities import DIMENSIONS, LARGEST, in_si
 from cosserat_fenicsx.errors import SceneError, nearest
 
 #: {what its members are: class} of all families.
@@ -303,7 +303,7 @@ def between(low, high, what=""):
 
 @dataclasses.dataclass(frozen=True)
 class Number(Kind):
-    """A number of a dimension (see `dimensions`), None for none; text with a unit is converted."""
+    """A number of a dimension (see `quantities.DIMENSIONS`), None for none; text with a unit is converted."""
 
     dimension: str | None = None
     limits: Limits = Limits()

@@ -3,7 +3,7 @@
 import inspect
 import re
 
-from cosserat_fenicsx.dimensions import DIMENSIONS
+from cosserat_fenicsx.quantities import DIMENSIONS
 from cosserat_fenicsx.files.read import KINDS, class_of
 from cosserat_fenicsx.kinds import FAMILIES, Object, arguments_of, is_family, members
 

@@ -14,7 +14,7 @@ from ended_motions import SMALL
 from moving_scenes import flying_in_space
 
 import cosserat_fenicsx as cf
-from cosserat_fenicsx.dynamics import resuming
+from cosserat_fenicsx.dynamics import simulate
 from cosserat_fenicsx.storage import files
 from cosserat_fenicsx.storage.store import Store, read
 
@@ -191,4 +191,4 @@ def written(folder):
     return {file.name: file.read_bytes() for file in Path(folder).iterdir()}
 
 
-assert resuming  # loaded before any copy of this process is made
+assert simulate  # loaded before any copy of this process is made

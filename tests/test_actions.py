@@ -13,7 +13,7 @@ from conftest import refuses
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.actions.fluids import AddedMass, LinearDrag
 from cosserat_fenicsx.forms import contact
-from cosserat_fenicsx.models.traits import traits_of
+from cosserat_fenicsx.models.formulation import traits_of
 from cosserat_fenicsx.scene import action
 
 EI, RHO = 1.0, 1.0

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import random_comparison
 import random_scenes
-from comparison import bar_mesh, corotational, curves, mcre
+from comparison import bar_mesh, corotational, curves, mcre, truncated
 from comparison.column import Column
 from comparison.follow import follow
 from comparison.mcre_limit import TruncatedColumn
@@ -19,7 +19,6 @@ from scipy.spatial.transform import Rotation
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx import analytic
-from cosserat_fenicsx.forms import truncated
 from cosserat_fenicsx.results.accuracy import on_mesh
 from cosserat_fenicsx.statics.path.events import Locator
 from cosserat_fenicsx.statics.path.track import PathPoint
@@ -209,7 +208,7 @@ def test_the_mcre_before_and_beyond_its_limit_point():
 
 @pytest.mark.slow
 def test_ever_more_elements_tend_to_the_truncated_energy():
-    """The limit point of forms/truncated.py on two meshes; those of the elements converge to it with second order."""
+    """The limit point of the truncated energy on two meshes; those of elements converge to it with second order."""
     limit = mcre.limit(TruncatedColumn())
     assert limit.eta == pytest.approx(mcre.limit(TruncatedColumn(8, 3)).eta, rel=1e-6)
     gaps = [limit.eta - mcre.limit(mcre.problem(n)).eta for n in (256, 512)]

@@ -9,7 +9,7 @@ from ended_motions import Stopped, stop_at
 from torsion_scenes import part
 
 import cosserat_fenicsx as cf
-from cosserat_fenicsx.drilling.pipe_friction import PipeFriction
+from cosserat_fenicsx.drilling.wall_friction import PipeFriction
 from cosserat_fenicsx.models.action_terms import StationMotion
 
 pytestmark = pytest.mark.serial

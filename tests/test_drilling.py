@@ -14,7 +14,7 @@ from fake_string import Pendulum, scene, use
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.cli.main import main
-from cosserat_fenicsx.dimensions import DIMENSIONS
+from cosserat_fenicsx.quantities import DIMENSIONS
 from cosserat_fenicsx.drilling.bit_laws import BitLaw
 from cosserat_fenicsx.drilling.charts import advance_unit
 from cosserat_fenicsx.drilling.choose import BOTH, TORSION, chosen

@@ -41,7 +41,7 @@ def test_forms_know_ufl_alone():
 
 #: Modules that all subpackages may import; and the other subpackages that each subpackage may import.
 SHARED = set(
-    "analytic checks code_cache compat dimensions errors interrupts kinds names new_files numerics parts progress "
+    "analytic checks code_cache compat errors interrupts kinds names new_files numerics parts progress "
     "quantities ranks strands units".split()
 )
 ROOMS = {
@@ -66,7 +66,7 @@ ROOMS = {
 FITTERS = {
     "statics": "critical meshes linear_buckling natural_modes small_motions refinement sensitivity solve problem "
                "cases pair path/recorder".split(),
-    "dynamics": "time_loop resuming simulate start pace".split(),
+    "dynamics": "time_loop simulate start pace".split(),
 }  # fmt: skip
 
 

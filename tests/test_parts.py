@@ -20,7 +20,7 @@ import cosserat_fenicsx as cf
 from cosserat_fenicsx import parts, units
 from cosserat_fenicsx.cli import drilling, well
 from cosserat_fenicsx.cli.main import parser
-from cosserat_fenicsx.dimensions import DIMENSIONS, MOST, in_si
+from cosserat_fenicsx.quantities import DIMENSIONS, MOST, in_si
 from cosserat_fenicsx.drilling.bit_laws import BitLaw
 from cosserat_fenicsx.files import read
 from cosserat_fenicsx.parts import NotData, Part, from_data, members, to_data

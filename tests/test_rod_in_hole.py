@@ -11,7 +11,7 @@ import pytest
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.actions.walls import TubeRing, TubeWall
 from cosserat_fenicsx.models.rodmesh import Layout
-from cosserat_fenicsx.models.traits import found_traits, traits_of
+from cosserat_fenicsx.models.formulation import found_traits, traits_of
 from cosserat_fenicsx.statics.problem import solvers_of
 from cosserat_fenicsx.statics.settling import settle, stages_from
 from cosserat_fenicsx.well.rod.in_hole import NAMES, UNSEEN, RodErrors

@@ -15,7 +15,7 @@ from reference_wells import in_build_section
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.cli.main import main
-from cosserat_fenicsx.dimensions import DIMENSIONS, in_si
+from cosserat_fenicsx.quantities import DIMENSIONS, in_si
 from cosserat_fenicsx.numerics import lobatto_weights
 from cosserat_fenicsx.parts import arguments_of, members
 from cosserat_fenicsx.well.components import StringPart, standard_sizes

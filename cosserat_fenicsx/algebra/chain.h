@@ -124,8 +124,8 @@ typedef struct {
     double missing, omitted;        /* the last of these errors; by it, norm of what the last response leaves out */
 } contact;
 
-/* Contacts of rods with each other in a time step, see pairs.c. Each has a normal force and, with friction, two forces
-   across it; their motions are the gap at the end of the step and two slips in it. */
+/* Contacts of rods with each other in a time step, see contact.c. Each has a normal force and, with friction, two
+   forces across it; their motions are the gap at the end of the step and two slips in it. */
 typedef struct {
     int count, parts, most;         /* contacts; 1, or 3 with friction; sweeps */
     double friction, share, smallest; /* coefficient; changes that end the sweeps, of the first one and of all */

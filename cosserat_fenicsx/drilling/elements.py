@@ -18,9 +18,8 @@ from cosserat_fenicsx.drilling.chain import chain_of, fewest_in_period, unresolv
 from cosserat_fenicsx.drilling.joints import largest_speed
 from cosserat_fenicsx.drilling.laws import InC, check_bit
 from cosserat_fenicsx.drilling.linear_control import step_for
-from cosserat_fenicsx.drilling.protocol import StringModel
-from cosserat_fenicsx.drilling.signals import ScalarSignal, intervals
-from cosserat_fenicsx.drilling.steady_start import (
+from cosserat_fenicsx.drilling.protocol import (
+    StringModel,
     check_rock,
     check_steady,
     follows_the_bit,
@@ -28,6 +27,7 @@ from cosserat_fenicsx.drilling.steady_start import (
     steady_state,
     steady_velocities,
 )
+from cosserat_fenicsx.drilling.signals import ScalarSignal, intervals
 from cosserat_fenicsx.drilling.top_drive import Hook, Sample, Sampler, divided
 from cosserat_fenicsx.drilling.wall_friction import law_of, static_weight
 from cosserat_fenicsx.errors import SceneError

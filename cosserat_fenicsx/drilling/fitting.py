@@ -20,7 +20,7 @@ import numpy as np
 from scipy.stats import qmc
 
 from cosserat_fenicsx.checks import instance, number, refuse, warn
-from cosserat_fenicsx.dimensions import BY_UNIT, in_si
+from cosserat_fenicsx.quantities import BY_UNIT, Quantity, in_si
 from cosserat_fenicsx.drilling.choose import chosen, model_of
 from cosserat_fenicsx.drilling.history import DrillingHistory
 from cosserat_fenicsx.drilling.motion import simulate
@@ -28,7 +28,6 @@ from cosserat_fenicsx.drilling.readings import Readings, computed
 from cosserat_fenicsx.drilling.scene import Drilling
 from cosserat_fenicsx.errors import NotConverged, SceneError
 from cosserat_fenicsx.progress import StageProgress
-from cosserat_fenicsx.quantities import Quantity
 from cosserat_fenicsx.ranks import world
 from cosserat_fenicsx.results.result import Charted, by_name
 from cosserat_fenicsx.scene.parameters import parameter_of, scene_with

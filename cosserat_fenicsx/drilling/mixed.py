@@ -12,7 +12,7 @@ from cosserat_fenicsx.drilling.history import COLUMNS, DrillingHistory
 from cosserat_fenicsx.drilling.pipe_above import PipeAbove
 from cosserat_fenicsx.drilling.rod_bit import BitAtEnd
 from cosserat_fenicsx.drilling.scene import Drilling
-from cosserat_fenicsx.drilling.steady_start import follows_the_bit
+from cosserat_fenicsx.drilling.protocol import follows_the_bit
 from cosserat_fenicsx.drilling.wall_friction import law_of, static_weight
 from cosserat_fenicsx.numerics import directors, small_rotations
 from cosserat_fenicsx.quantities import Units

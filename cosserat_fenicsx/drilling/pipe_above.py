@@ -20,10 +20,9 @@ import ufl
 
 from cosserat_fenicsx.checks import positive, refuse, store
 from cosserat_fenicsx.drilling.linear_control import arrays_of, check_answer
-from cosserat_fenicsx.drilling.pipe_friction import PipeFriction
+from cosserat_fenicsx.drilling.wall_friction import PipeFriction, ViscousDrag
 from cosserat_fenicsx.drilling.scene import Drilling, Segment, segment_of
 from cosserat_fenicsx.drilling.top_drive import DriveControl, Hook, StateSpace, TopDrive
-from cosserat_fenicsx.drilling.wall_friction import ViscousDrag
 from cosserat_fenicsx.parts import ForceSize
 from cosserat_fenicsx.scene.action import PointAction, scalar, vector
 from cosserat_fenicsx.scene.rod import Station, StationOrName, is_known

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cosserat_fenicsx.checks import File, finite_array, instance, number, refuse, text_of
-from cosserat_fenicsx.dimensions import BY_UNIT, DIMENSIONS
+from cosserat_fenicsx.quantities import BY_UNIT, DIMENSIONS
 from cosserat_fenicsx.drilling.history import DrillingHistory
 from cosserat_fenicsx.errors import SceneError, nearest
 

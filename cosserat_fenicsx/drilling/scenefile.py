@@ -29,7 +29,7 @@ depth = 2800.0                   # wall_damping
 [response]                       # optional: frequencies, and what else `frequency_response` takes
 [fit]                            # optional: readings of a rig, their noise; [[fit.unknowns]]: name, least, largest
 
-Numbers are in SI, or text with a unit (`dimensions`).
+Numbers are in SI, or text with a unit (`quantities.DIMENSIONS`).
 """
 
 import math

@@ -29,10 +29,15 @@ import numpy as np
 from cosserat_fenicsx.checks import instance, positive, refuse
 from cosserat_fenicsx.drilling.laws import InC, check_bit
 from cosserat_fenicsx.drilling.linear_control import step_for
-from cosserat_fenicsx.drilling.protocol import PROFILE, StringModel
+from cosserat_fenicsx.drilling.protocol import (
+    PROFILE,
+    StringModel,
+    check_steady,
+    steady_speed_of_bit,
+    steady_velocities,
+)
 from cosserat_fenicsx.drilling.scene import Drilling
 from cosserat_fenicsx.drilling.signals import means
-from cosserat_fenicsx.drilling.steady_start import check_steady, steady_speed_of_bit, steady_velocities
 from cosserat_fenicsx.drilling.top_drive import Sample, divided
 from cosserat_fenicsx.drilling.wall_friction import law_of, loads_between, scene_pieces, wall_of
 from cosserat_fenicsx.well.components import DrillString

@@ -14,8 +14,8 @@ rule is trapezoidal.) What sticks does not creep. Where the slip turns back in a
 energy, the law holds for the slip in the step: the work of friction is never positive.
 
 Newton's method has the tangent of the rods without contact, by whose inverse gaps and slips respond linearly to forces.
-With it the forces of all contacts are found before a step is taken (algebra/pairs.c); what is not linear is in the next
-residual.
+With it the forces of all contacts are found before a step is taken (algebra/contact.c); what is not linear is in the
+next residual.
 """
 
 import numpy as np

@@ -15,7 +15,7 @@ from mpi4py import MPI
 from cosserat_fenicsx import compat
 from cosserat_fenicsx.compat import compiling
 from cosserat_fenicsx.forms import ties as eq
-from cosserat_fenicsx.models.traits import resultant_at_rest
+from cosserat_fenicsx.models.formulation import resultant_at_rest
 from cosserat_fenicsx.scene.planes import independent_in
 from cosserat_fenicsx.scene.signals import at, signals_of
 from cosserat_fenicsx.scene.supports import AngleTie, PositionTie

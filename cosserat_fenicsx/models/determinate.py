@@ -10,7 +10,7 @@ from cosserat_fenicsx.forms.point import NONE, Point
 from cosserat_fenicsx.forms.rotation import rotation_matrix, rotation_vector
 from cosserat_fenicsx.models.base import RodModel
 from cosserat_fenicsx.models.compiled import along, compile_static
-from cosserat_fenicsx.models.planar import PlaneModel, in_space
+from cosserat_fenicsx.models.spatial import PlaneModel, in_space
 from cosserat_fenicsx.models.rod_data import gauss_function, spread
 from cosserat_fenicsx.numerics import conjugate_product, directors
 

@@ -30,8 +30,7 @@ from cosserat_fenicsx.models.compiled import (
     section_of,
 )
 from cosserat_fenicsx.models.connections import ties_of
-from cosserat_fenicsx.models.spatial import Damped, SpatialModel
-from cosserat_fenicsx.models.planar import PlanarModel
+from cosserat_fenicsx.models.spatial import Damped, PlanarModel, SpatialModel
 from cosserat_fenicsx.models.rod_data import (
     check_inertia,
     element_function,

@@ -9,8 +9,7 @@ import numpy as np
 
 from cosserat_fenicsx.errors import SceneError, nearest
 from cosserat_fenicsx.models.connections import Connections
-from cosserat_fenicsx.models.formulation import KNOWN, Formulation, formulation_of
-from cosserat_fenicsx.models.traits import traits_of, work_of
+from cosserat_fenicsx.models.formulation import KNOWN, Formulation, formulation_of, traits_of, work_of
 from cosserat_fenicsx.parts import per_scene
 from cosserat_fenicsx.scene.action import describe
 from cosserat_fenicsx.scene.signals import at

@@ -16,6 +16,7 @@ import numpy as np
 from cosserat_fenicsx.checks import number, positive, refuse
 from cosserat_fenicsx.errors import LibraryMissing, SceneError
 from cosserat_fenicsx.interrupts import obey
+from cosserat_fenicsx.progress import Progress
 from cosserat_fenicsx.new_files import replaced
 from cosserat_fenicsx.numerics import spun
 from cosserat_fenicsx.pictures.drawing import (
@@ -38,7 +39,6 @@ from cosserat_fenicsx.pictures.drawing import (
     thicker,
 )
 from cosserat_fenicsx.pictures.view import plain, round_step
-from cosserat_fenicsx.progress import Progress
 from cosserat_fenicsx.ranks import Alone, on_first
 
 #: Default frames per second, and width and height in pixels.

@@ -10,10 +10,9 @@ from cosserat_fenicsx.checks import File, refuse
 from cosserat_fenicsx.numerics import directors
 from cosserat_fenicsx.quantities import Quantity
 from cosserat_fenicsx.results import screen
-from cosserat_fenicsx.results.contacts import contacts_in_words
+from cosserat_fenicsx.results.contacts import ROD_FORCE, RodContacts, contacts_in_words, rod_contacts_of
 from cosserat_fenicsx.results.recovery import viscous_contact
 from cosserat_fenicsx.results.result import by_name
-from cosserat_fenicsx.results.rod_contacts import ROD_FORCE, RodContacts, rod_contacts_of
 from cosserat_fenicsx.results.rods import RodResult
 from cosserat_fenicsx.results.whirl import Orbit, WallForces, Whirl, orbit_of, wall_forces, whirl
 from cosserat_fenicsx.scene.action import Action

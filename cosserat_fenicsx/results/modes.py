@@ -9,7 +9,7 @@ import numpy as np
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.quantities import Quantity
 from cosserat_fenicsx.results.result import Result, by_name
-from cosserat_fenicsx.results.sensitivity import Sensitivity, Uncertainty
+from cosserat_fenicsx.results.queries import Sensitivity, Uncertainty
 from cosserat_fenicsx.results.shapes import Shapes, in_words, largest_error
 from cosserat_fenicsx.scene.action import actions_in_words
 from cosserat_fenicsx.scene.parameters import Parameter, check_once

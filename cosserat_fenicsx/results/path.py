@@ -12,15 +12,20 @@ from cosserat_fenicsx.quantities import Quantity
 from cosserat_fenicsx.results import screen
 from cosserat_fenicsx.results.accuracy import leading_of
 from cosserat_fenicsx.results.compared import NAMES, Errors, all_cell_nodes, of_sections, sizes_of, words_of
-from cosserat_fenicsx.results.contacts import Contacts, contacts_in_words, contacts_of
+from cosserat_fenicsx.results.contacts import (
+    ROD_FORCE,
+    Contacts,
+    RodContacts,
+    contacts_in_words,
+    contacts_of,
+    rod_contacts_of,
+)
 from cosserat_fenicsx.results.modes import ModesAlong
 from cosserat_fenicsx.results.records import Event, Records
-from cosserat_fenicsx.results.recovery import element_contact
+from cosserat_fenicsx.results.recovery import Threads, element_contact
 from cosserat_fenicsx.results.result import by_name
-from cosserat_fenicsx.results.rod_contacts import ROD_FORCE, RodContacts, rod_contacts_of
 from cosserat_fenicsx.results.rods import RodResult
-from cosserat_fenicsx.results.sensitivity import Sensitivity, Uncertainty
-from cosserat_fenicsx.results.threads import Threads
+from cosserat_fenicsx.results.queries import Sensitivity, Uncertainty
 from cosserat_fenicsx.scene.action import Action, actions_in_words
 from cosserat_fenicsx.scene.parameters import Parameter, check_once
 from cosserat_fenicsx.scene.rod import RodOrName

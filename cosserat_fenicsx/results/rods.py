@@ -16,7 +16,7 @@ from cosserat_fenicsx.parts import per_scene
 from cosserat_fenicsx.results import screen
 from cosserat_fenicsx.results.compared import cells_of, located
 from cosserat_fenicsx.results.queries import Extremes, Reactions, Stresses, largest_in_words, reactions_in_words
-from cosserat_fenicsx.results.recovery import at_nodes
+from cosserat_fenicsx.results.recovery import TendonState, Threads, at_nodes
 from cosserat_fenicsx.results.result import (
     Result,
     _said,
@@ -30,7 +30,6 @@ from cosserat_fenicsx.results.result import (
     write_columns,
 )
 from cosserat_fenicsx.results.states import States
-from cosserat_fenicsx.results.threads import TendonState, Threads
 from cosserat_fenicsx.scene.action import describe, without_stress
 from cosserat_fenicsx.scene.rod import RodOrName, Station, StationOrName
 

@@ -15,7 +15,7 @@ from cosserat_fenicsx.results.path import Path
 from cosserat_fenicsx.results.result import Result
 
 # Functions that read a whole result, with their modules above this room, by the class that its file names.
-_READERS = {"Path": ("statics.path.recorder", "read_path"), "History": ("dynamics.resuming", "read_history")}
+_READERS = {"Path": ("statics.path.recorder", "read_path"), "History": ("dynamics.simulate", "read_history")}
 
 
 class StoredResult(Result):

@@ -130,7 +130,8 @@ class Action(Part, family="load or action", homes=("cosserat_fenicsx.scene.loads
             rod, inertial in the reference.
         shortens: whether it is a thread of given length, whose tension is found (statics.tensions). It then has
             `shortening` (m) and `axial` (N, or None), is not `scaled`, and the tension in its `data` is 0.
-        traits: None; or a dict of the fields of `models.traits.Traits`, where it takes long to find them from `work`.
+        traits: None; or a dict of the fields of `models.formulation.Traits`, where it takes long to find them from
+            `work`.
     """
 
     at_nodes, scaled, permanent, follows, memory, evolve, traits = False, True, False, False, (), None, None

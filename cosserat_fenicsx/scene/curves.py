@@ -17,7 +17,7 @@ import numpy as np
 from numpy.polynomial import legendre
 
 from cosserat_fenicsx.checks import File, Numbers, Rows, positive, refuse, store, text_of, vector
-from cosserat_fenicsx.dimensions import LARGEST
+from cosserat_fenicsx.quantities import LARGEST
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.numerics import directors, gauss
 from cosserat_fenicsx.parts import FileName, Limits, Number, Part, Several

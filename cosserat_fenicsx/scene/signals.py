@@ -32,7 +32,7 @@ from cosserat_fenicsx.checks import (
     text_of,
     vector,
 )
-from cosserat_fenicsx.dimensions import LARGEST
+from cosserat_fenicsx.quantities import LARGEST
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.kinds import Either
 from cosserat_fenicsx.parts import FileName, FunctionAlong, FunctionOfTime, Limits, Number

@@ -28,7 +28,7 @@ from cosserat_fenicsx.errors import NotConverged, SceneError
 from cosserat_fenicsx.models.compiled import EnergyOfMotion, made_once
 from cosserat_fenicsx.numerics import PLACES, derivative
 from cosserat_fenicsx.results.records import Event
-from cosserat_fenicsx.results.sensitivity import Sensitivity, called
+from cosserat_fenicsx.results.queries import Sensitivity, called
 from cosserat_fenicsx.statics.path.follower import Follower, standing
 from cosserat_fenicsx.statics.path.load_control import StepControl
 from cosserat_fenicsx.statics.problem import refuse_rod_contact

@@ -10,10 +10,10 @@ import numpy as np
 
 from cosserat_fenicsx.errors import NotConverged, SceneError
 from cosserat_fenicsx.interrupts import obey
-from cosserat_fenicsx.models.rodmesh import Layout
-from cosserat_fenicsx.models.traits import traits_of
-from cosserat_fenicsx.parts import FunctionAlong, per_scene
 from cosserat_fenicsx.progress import MeshProgress
+from cosserat_fenicsx.models.rodmesh import Layout
+from cosserat_fenicsx.models.formulation import traits_of
+from cosserat_fenicsx.parts import FunctionAlong, per_scene
 from cosserat_fenicsx.results.accuracy import (
     LONGEST_IN_LAYER,
     contact_edges,

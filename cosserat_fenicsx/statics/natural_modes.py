@@ -16,7 +16,7 @@ from cosserat_fenicsx.algebra.pencil import Pencil, QuadraticPencil, on_every_ra
 from cosserat_fenicsx.checks import instance, number, refuse, tolerance, whole
 from cosserat_fenicsx.errors import NotConverged, SceneError
 from cosserat_fenicsx.interrupts import obey
-from cosserat_fenicsx.models.traits import traits_of
+from cosserat_fenicsx.models.formulation import traits_of
 from cosserat_fenicsx.ranks import communicator
 from cosserat_fenicsx.results.contacts import refuse_grazing
 from cosserat_fenicsx.results.modes import Modes, ModesAlong

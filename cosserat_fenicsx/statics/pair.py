@@ -11,8 +11,7 @@ from functools import cached_property
 import numpy as np
 from dolfinx import fem
 
-from cosserat_fenicsx.algebra.building import Pointers
-from cosserat_fenicsx.algebra.lanes import LockStep, allowed
+from cosserat_fenicsx.algebra.building import LockStep, Pointers, allowed
 from cosserat_fenicsx.interrupts import obey
 from cosserat_fenicsx.models.rod_data import bending_lengths, bounded, field_values
 from cosserat_fenicsx.results import accuracy, compared

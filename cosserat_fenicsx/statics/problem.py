@@ -15,9 +15,8 @@ from cosserat_fenicsx.checks import tolerance, whole
 from cosserat_fenicsx.errors import NotConverged, SceneError
 from cosserat_fenicsx.models.compiled import threads_of
 from cosserat_fenicsx.models.determinate import DeterminateInPlane, DeterminateInSpace
-from cosserat_fenicsx.models.planar import PlanarModel
+from cosserat_fenicsx.models.spatial import PlanarModel, SpatialModel
 from cosserat_fenicsx.models.signature import Signature
-from cosserat_fenicsx.models.spatial import SpatialModel
 from cosserat_fenicsx.ranks import communicator
 from cosserat_fenicsx.parts import per_scene
 from cosserat_fenicsx.results.compared import NAMES, criteria_of

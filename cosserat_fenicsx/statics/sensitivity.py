@@ -24,7 +24,7 @@ from cosserat_fenicsx.models.signature import Signature
 from cosserat_fenicsx.numerics import PLACES, STEP, derivative, is_smooth
 from cosserat_fenicsx.results.accuracy import on_mesh
 from cosserat_fenicsx.results.path import PerturbedPath
-from cosserat_fenicsx.results.sensitivity import Sensitivity
+from cosserat_fenicsx.results.queries import Sensitivity
 from cosserat_fenicsx.scene.action import path_dependent
 from cosserat_fenicsx.scene.parameters import parameter_of
 from cosserat_fenicsx.statics.problem import record_of, solvers_of

@@ -13,10 +13,9 @@ from cosserat_fenicsx import units as constants
 from cosserat_fenicsx.actions.fluids import AddedMass, LinearDrag
 from cosserat_fenicsx.actions.walls import value_at
 from cosserat_fenicsx.checks import File, Numbers, doubt_width, number, positive, refuse, store, warn
-from cosserat_fenicsx.dimensions import in_si, size_of
+from cosserat_fenicsx.quantities import Units, in_si, size_of
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.parts import Depth, Diameter, FileName, Friction, Number, Part, WallStiffness, at_least
-from cosserat_fenicsx.quantities import Units
 from cosserat_fenicsx.results.screen import InWords
 from cosserat_fenicsx.scene.rod import Rod
 from cosserat_fenicsx.scene.sections import Circle, Tube

@@ -45,7 +45,7 @@ wear = 0.8
 [build_rate]                     # optional: of each operation with weight on bit
 anisotropy = 0.1                 # optional
 
-Numbers are in SI, or text with a unit (`dimensions`).
+Numbers are in SI, or text with a unit (`quantities.DIMENSIONS`).
 """
 
 from collections.abc import Sequence

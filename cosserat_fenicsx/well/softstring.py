@@ -38,7 +38,7 @@ from scipy.optimize import brentq
 
 from cosserat_fenicsx.errors import NotConverged, SceneError, nearest
 from cosserat_fenicsx.numerics import gauss
-from cosserat_fenicsx.results.sensitivity import Sensitivity, Uncertainty
+from cosserat_fenicsx.results.queries import Sensitivity, Uncertainty
 from cosserat_fenicsx.well.pieces import down_along
 
 

@@ -37,10 +37,9 @@ from typing import Any
 import numpy as np
 
 from cosserat_fenicsx.checks import instance, number, refuse, store
-from cosserat_fenicsx.dimensions import in_si
+from cosserat_fenicsx.quantities import Units, in_si
 from cosserat_fenicsx.errors import SceneError, nearest
 from cosserat_fenicsx.parts import Part
-from cosserat_fenicsx.quantities import Units
 from cosserat_fenicsx.results.screen import InWords
 from cosserat_fenicsx.units import inch, ksi, psi
 from cosserat_fenicsx.well.components import Collar, DrillPipe, HeavyWeight, StringPart

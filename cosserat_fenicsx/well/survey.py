@@ -15,7 +15,7 @@ import numpy as np
 
 from cosserat_fenicsx import checks, units
 from cosserat_fenicsx.checks import bytes_of, instance, positive, text_of
-from cosserat_fenicsx.dimensions import size_of
+from cosserat_fenicsx.quantities import size_of
 from cosserat_fenicsx.errors import SceneError, nearest
 from cosserat_fenicsx.results.result import import_library
 

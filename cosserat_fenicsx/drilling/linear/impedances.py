@@ -20,7 +20,7 @@ import numpy as np
 
 from cosserat_fenicsx.checks import refuse
 from cosserat_fenicsx.drilling.linear_control import check_late, polynomials_of
-from cosserat_fenicsx.drilling.steady_start import follows_the_bit
+from cosserat_fenicsx.drilling.protocol import follows_the_bit
 from cosserat_fenicsx.drilling.top_drive import Hook
 
 #: |g L|^2 below which sinh(g L)/g and its derivative are computed by series, truncated at 1e-16.

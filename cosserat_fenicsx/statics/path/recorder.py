@@ -16,18 +16,16 @@ from cosserat_fenicsx.models.connections import Connections
 from cosserat_fenicsx.models.rodmesh import Layout
 from cosserat_fenicsx.ranks import communicator
 from cosserat_fenicsx.results.accuracy import on_mesh
-from cosserat_fenicsx.results.contacts import check_passes
+from cosserat_fenicsx.results.contacts import check_apart, check_passes
 from cosserat_fenicsx.results import saved
 from cosserat_fenicsx.results.path import Path
 from cosserat_fenicsx.results.records import Event, Record, Records, lost_at
-from cosserat_fenicsx.results.rod_contacts import check_apart
 from cosserat_fenicsx.results.staged import StagedPath
 from cosserat_fenicsx.scene.action import rubs
 from cosserat_fenicsx.statics.critical import derivatives_of
-from cosserat_fenicsx.statics.path.arclength import plain
+from cosserat_fenicsx.statics.path.follower import Follower, plain
 from cosserat_fenicsx.statics.path.chord import Chord
 from cosserat_fenicsx.statics.path.events import Lost
-from cosserat_fenicsx.statics.path.follower import Follower
 from cosserat_fenicsx.statics.path.track import NEAR, NOTHING, between
 from cosserat_fenicsx.statics.problem import Promoted, record_of
 

@@ -6,7 +6,7 @@ from a quasi-static solution; a rotation vector; nodal unknowns measured from th
 fourth order in them. So: within an element the rod is in equilibrium, solved order by order in the nodal unknowns, and
 the energy of that solution is kept to fourth order (for which the second-order terms of the solution are enough:
 third-order ones enter the energy from the fifth order on). Under mesh refinement it converges to the truncated energy
-of forms/truncated.py (`mcre_limit`); see `limit`.
+of truncated.py (`mcre_limit`); see `limit`.
 
 With a = u', g = w' - phi, b = w' phi - phi^2/2, c = -u' phi, the strains' expansions give the energy per length, by
 order,

@@ -1,4 +1,4 @@
-"""The truncated energy (forms/truncated.py), to which the reconstructed MCRE converges, discretised with dolfinx."""
+"""The truncated energy (truncated.py), to which the reconstructed MCRE converges, discretised with dolfinx."""
 
 import numpy as np
 import ufl
@@ -8,9 +8,9 @@ from mpi4py import MPI
 from scipy.sparse import csr_matrix
 from scipy.sparse.linalg import splu
 
+from comparison import truncated
 from comparison.column import CRITICAL, Column
 from cosserat_fenicsx import compat
-from cosserat_fenicsx.forms import truncated
 
 
 def assembled(form, free):

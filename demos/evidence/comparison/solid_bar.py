@@ -17,11 +17,11 @@ from mpi4py import MPI
 from petsc4py import PETSc
 from scipy.interpolate import CubicSpline
 
+from comparison import solid
 from comparison.bar_mesh import half_disc, moments, swept
 from comparison.column import CRITICAL, Column
 from cosserat_fenicsx import compat
 from cosserat_fenicsx.checks import refuse
-from cosserat_fenicsx.forms import solid
 
 _GAUSS_POINTS = {"quadrature_degree": 5}  # three in each direction
 
