@@ -113,6 +113,7 @@ def test_a_bend_decides_for_the_rod_and_is_missed_where_there_is_none():
     assert "ONE MOMENT of a turn" in turning.summary()
 
 
+@pytest.mark.once
 @pytest.mark.parametrize("case", KNOWN, ids=lambda case: case["name"])
 def test_rates_of_build(case):
     given, truth = case["input"], case["straight hole"]
@@ -183,6 +184,7 @@ def plain(**changed):
             "mud": well.Mud(1200.0)} | changed  # fmt: skip
 
 
+@pytest.mark.once
 @pytest.mark.parametrize(("given", "words"), [
     (lambda: plain(operation=well.TripOut()), "an operation with weight on bit"),
     (lambda: plain(anisotropy=-0.1), "a number from 0 to 10"),
@@ -202,6 +204,7 @@ def test_rates_that_are_refused(given, words):
 SCENE = Path(__file__).parents[1] / "demos" / "wells" / "bent_motor.toml"
 
 
+@pytest.mark.once
 def test_the_scene_of_a_bent_motor(tmp_path):
     scene = cf.read(SCENE)
     found = scene.builds(scene.operations[0])
@@ -215,6 +218,7 @@ def test_the_scene_of_a_bent_motor(tmp_path):
         cf.read(again)
 
 
+@pytest.mark.once
 def test_motions_leave_a_bend_out_or_refuse_it():
     motor = well.Collar(7.5, "NC46-65", name="motor", bend=1.0, bend_at=2.0)
     string, drive = well.DrillString([motor, well.DrillPipe(size="5 in 19.50 lb/ft")]), cf.drilling.TopDrive(6.0)
@@ -224,6 +228,7 @@ def test_motions_leave_a_bend_out_or_refuse_it():
         cf.drilling.mixed_scene(motion)
 
 
+@pytest.mark.once
 @pytest.mark.parametrize(("given", "words"), [
     ({"bend": 6.0, "bend_at": 2.0}, "a bend (degrees) from 0 to 5"),
     ({"bend": 1.0}, "Collar.bend_at = None: expected its distance (m) from the lower end, between 0 and the length"),

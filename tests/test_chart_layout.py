@@ -16,7 +16,7 @@ import cosserat_fenicsx as cf
 from cosserat_fenicsx.pictures.charts import draw_chart
 
 pytest.importorskip("matplotlib")
-pytestmark = pytest.mark.serial
+pytestmark = [pytest.mark.serial, pytest.mark.once]
 #: Pixels that a letter is high at least, and that boxes of texts may share: their margins.
 LEGIBLE, MARGIN = 9.0, 1.0
 

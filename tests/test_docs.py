@@ -15,7 +15,7 @@ from cosserat_fenicsx.parts import FAMILIES, members
 from cosserat_fenicsx.results.compared import CRITERIA
 from cosserat_fenicsx.results.result import Result
 
-pytestmark = pytest.mark.serial
+pytestmark = [pytest.mark.serial, pytest.mark.once]
 ROOT = Path(__file__).parent.parent
 DOCS = ROOT / "docs"
 PAGES = [ROOT / "README.md", ROOT / "CHANGELOG.md", *sorted(DOCS.glob("**/*.md"))]

@@ -68,9 +68,12 @@ QUICK = {
         unknowns == 448 and list(seconds) == [1, 2] and apart < 1e-9 for unknowns, seconds, apart in found), ()),
 }  # fmt: skip
 FAST = list(QUICK)[:5]
+ONCE, SLOW = pytest.mark.once, pytest.mark.slow
 
 
-@pytest.mark.parametrize("name", [x if x in FAST else pytest.param(x, marks=pytest.mark.slow) for x in QUICK])
+@pytest.mark.parametrize(
+    "name", ["overhead", *(pytest.param(x, marks=[ONCE] if x in FAST else [ONCE, SLOW]) for x in [*QUICK][1:])]
+)
 def test_quick(name, tmp_path):
     if name == "ranks" and shutil.which("mpirun") is None:
         pytest.skip("needs mpirun")
@@ -106,6 +109,7 @@ def test_sanitizers_find_what_is_read_out_of_bounds(tmp_path, monkeypatch):
     assert code and "heap-buffer-overflow" in said and "third.c:1 in third" in said
 
 
+@pytest.mark.once
 def test_mutants_quick():
     """A wrong sign in the direction of a line is found by the tests of curves, and they pass without it."""
     import mutants
@@ -126,6 +130,7 @@ def test_mutants_quick():
     assert mutants.read_durations(said) == ({"t::a": 1.25, "t::b[x]": 2.0}, {"t::a"})
 
 
+@pytest.mark.once
 def test_rungs_quick(tmp_path):
     """All models valid for a scene give the same tip; cheaper ones have fewer unknowns."""
     import rungs
@@ -138,6 +143,7 @@ def test_rungs_quick(tmp_path):
         assert all(error < 2e-6 for _, _, _, _, error, _ in rows), rows
 
 
+@pytest.mark.once
 @pytest.mark.slow
 def test_scaling_quick(tmp_path):
     """The numbers of unknowns, and the rod in plain C: its tip moves as far as that of such a rod. Times are not
@@ -152,6 +158,7 @@ def test_scaling_quick(tmp_path):
     assert "| planar P1 |" in text and "asked at most" in text and "nan" not in text
 
 
+@pytest.mark.once
 @pytest.mark.slow
 def test_steps_quick(tmp_path):
     """Models and schemes give the same motion; most steps reuse a tangent; a hinge lets the rod move farther. Times
@@ -166,6 +173,7 @@ def test_steps_quick(tmp_path):
     assert all(iterations < 6 for _, iterations, _ in found)
 
 
+@pytest.mark.once
 @pytest.mark.slow
 def test_orders_quick(tmp_path):
     """Schemes have their orders with joints, damping and driven supports too; meshes 2p."""
@@ -200,6 +208,7 @@ def of_the_suite(duration, quasi_static=False, gravity=(0, 0, 0), **rod):
     )  # fmt: skip
 
 
+@pytest.mark.once
 def test_scenarios_of_another_suite():
     """An equilibrium, a motion from a given shape, and an end that is driven."""
     import cosseratbench_suite as suite
@@ -224,6 +233,7 @@ def test_scenarios_of_another_suite():
         suite.solve(across, 4, 2)
 
 
+@pytest.mark.once
 def test_tables_and_pictures_are_put_into_the_documentation(tmp_path):
     """And every table has its place there."""
     import put_in_docs
@@ -258,6 +268,7 @@ def test_tables_and_pictures_are_put_into_the_documentation(tmp_path):
         assert all(x in (None, y) for x, y in zip(size or found, found, strict=True)), (name, found)
 
 
+@pytest.mark.once
 def test_strings_beside_other_methods(tmp_path):
     """Errors fall to those of the reference numbers or are those of the methods' orders; peers are not asked."""
     import soft_string
@@ -275,6 +286,7 @@ def test_strings_beside_other_methods(tmp_path):
     assert (tmp_path / "work_precision_string_quick.png").stat().st_size > 20000
 
 
+@pytest.mark.once
 def test_random_strings_quick(tmp_path):
     """A string of 1.9 km with a PI control: every check is made, with both models, and nothing is off."""
     import random_strings
@@ -317,6 +329,7 @@ def test_own_cell(trial, method):
         assert cell.value == pytest.approx(1.0, abs=1e-3)
 
 
+@pytest.mark.once
 def test_a_small_step_alone_is_no_convergence():
     """Without an independent contact force, Newton's method bends a slender rod in one step, which stretches it; the
     next, small step corrects this. What rounding puts out of reach is refused."""
@@ -331,6 +344,7 @@ def test_a_small_step_alone_is_no_convergence():
         cf.solve(problems.scene_of(problem)[1], [0.5], model="spatial", formulation="displacement", tol=1e-4)
 
 
+@pytest.mark.once
 def test_a_word_on_stability_is_held_against_becks_column():
     """Verdicts for answers that are right, wrong with a warning, and wrong without one."""
 
@@ -350,6 +364,7 @@ def test_a_word_on_stability_is_held_against_becks_column():
         assert catalogue.BY_KEY["flutter"].run(word).verdict == verdict
 
 
+@pytest.mark.once
 @pytest.mark.slow
 def test_what_is_written_for_comparison_fails_as_it_is_known_to():
     """Rotation vectors, truncated rotations and bare loops fail as expected, so that the comparison has a meaning."""
@@ -370,6 +385,7 @@ def test_what_is_written_for_comparison_fails_as_it_is_known_to():
     assert all("of order 2.0 in the mesh" in found[trial, vector].note for trial in ("order", "steps"))
 
 
+@pytest.mark.once
 @pytest.mark.slow
 def test_the_command_is_broken_off_and_goes_on(tmp_path, monkeypatch, capsys):
     """The quick comparison of a few methods; programs that are not installed are marked as such."""
@@ -402,6 +418,7 @@ def test_the_command_is_broken_off_and_goes_on(tmp_path, monkeypatch, capsys):
     assert (tmp_path / "failures_quick.png").stat().st_size > 50000
 
 
+@pytest.mark.once
 @pytest.mark.slow
 def test_quick_work_precision(tmp_path, capsys):
     """This package's results are as accurate as their degree allows; every peer gives a result or a reason why not."""
@@ -431,6 +448,7 @@ def test_quick_work_precision(tmp_path, capsys):
         assert (tmp_path / f"work_precision_quick_{name}.png").stat().st_size > 20000
 
 
+@pytest.mark.once
 @pytest.mark.slow
 def test_quick_work_precision_of_motions(tmp_path, capsys):
     """Every scheme is as accurate as its step allows; Exudyn is included if installed."""
@@ -450,6 +468,7 @@ def test_quick_work_precision_of_motions(tmp_path, capsys):
     assert "| Flying spaghetti in space, ends at t = 10 s | cosserat_fenicsx: energy |" in capsys.readouterr().out
 
 
+@pytest.mark.once
 @pytest.mark.slow
 def test_broken_off_run_goes_on(tmp_path, monkeypatch):
     """Samples are kept, unless sources have changed; an interruption prints how to continue."""
@@ -477,6 +496,7 @@ def test_broken_off_run_goes_on(tmp_path, monkeypatch):
     assert not work_precision.Record(file).rows and not work_precision.Record(file, fresh=True).rows
 
 
+@pytest.mark.once
 def test_truths_belong_to_their_models():
     """References for the 45-degree bend and the paper's column, with and without shear."""
     from peers import problems
@@ -490,6 +510,7 @@ def test_truths_belong_to_their_models():
     assert problems.error("bend", "Reissner", problems.truth("bend", "Reissner")) == 0
 
 
+@pytest.mark.once
 def test_a_peer_that_hangs_or_dies_is_reported():
     from peers.process import Peer
 
@@ -506,6 +527,7 @@ def test_a_peer_that_hangs_or_dies_is_reported():
         assert ask(0, True) == {"failed": "the process ended with code 3"}
 
 
+@pytest.mark.once
 def test_what_is_not_installed_is_named(tmp_path, monkeypatch):
     from peers.environments import Missing, command
     from trials import programs
@@ -520,6 +542,7 @@ def test_what_is_not_installed_is_named(tmp_path, monkeypatch):
         assert methods.cell(catalogue.BY_KEY["truncated"], missing).verdict == cells.MISSING
 
 
+@pytest.mark.once
 def test_ratios_that_are_asked_for():
     """Of each side the fastest that is accurate enough; by tol it is the true error that counts. The frontier has no
     result that another beats in both."""
@@ -553,6 +576,7 @@ def test_ratios_that_are_asked_for():
     assert frontier(rows) == [rows[3], rows[2], rows[0]]
 
 
+@pytest.mark.once
 def test_truths_are_told_with_their_errors(tmp_path):
     import truths
 

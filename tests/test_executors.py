@@ -16,7 +16,7 @@ from conftest import column
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.ranks import are_apart
 
-pytestmark = [pytest.mark.serial, pytest.mark.slow]
+pytestmark = [pytest.mark.serial, pytest.mark.once, pytest.mark.slow]
 CASES = {"eta": [0.3, 0.6, -1.0, 0.9], "elements": [4]}
 
 

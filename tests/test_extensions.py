@@ -87,6 +87,7 @@ def test_a_motion_with_it_goes_on(mast, tmp_path):
     assert np.array_equal(again.position("mast.end"), whole.position("mast.end"))
 
 
+@pytest.mark.once
 def test_it_is_written_and_refused_by_its_fields(mast, tmp_path):
     found = cf.read(mast)
     data = to_data(found.scene)
@@ -111,6 +112,7 @@ def test_it_is_written_and_refused_by_its_fields(mast, tmp_path):
             cf.read(mast)
 
 
+@pytest.mark.once
 @pytest.mark.parametrize("file", FILES, ids=lambda file: file.stem)
 def test_a_scene_written_reads_back_equal(file, tmp_path):
     jsonschema = pytest.importorskip("jsonschema")
@@ -130,6 +132,7 @@ def test_a_scene_written_reads_back_equal(file, tmp_path):
 SCHEMA = schema_of_files()
 
 
+@pytest.mark.once
 def test_the_schema_refuses_what_the_reader_refuses(capsys):
     jsonschema = pytest.importorskip("jsonschema")
     assert main(["schema", "extensions.gust"]) == 0
@@ -153,6 +156,7 @@ def test_the_schema_refuses_what_the_reader_refuses(capsys):
             from_tables(changed, DEMOS)
 
 
+@pytest.mark.once
 def test_functions_of_time_have_units():
     rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, "2 m")), cf.Circle("1 cm"), cf.Material("1 GPa"))
     force = cf.Force(rod.end, cf.signals.Ramp(("1 kN", 0, 0), end="2 s")).force
@@ -164,6 +168,7 @@ def test_functions_of_time_have_units():
         cf.drilling.TopDrive(cf.signals.Ramp("60 s"))
 
 
+@pytest.mark.once
 def test_places_in_files():
     text = """# a comment with [brackets]
 a.b = 1
@@ -318,6 +323,7 @@ model = "soft"
 """
 
 
+@pytest.mark.once
 def test_an_operation():
     """The answer is that of `BackReam` with a weight on bit below zero."""
     answer = cf.well.torque_and_drag(HOLE, STRING, OPERATION, mud=MUD, model="soft")
@@ -332,6 +338,7 @@ def test_an_operation():
         PullRotating(-1, 0.1, 40)
 
 
+@pytest.mark.once
 def test_its_sweep_is_kept_and_drawn(tmp_path):
     """Another overpull is another sweep; the folder holds whole objects."""
     given = {"mud": MUD, "model": "soft", "folder": tmp_path / "sweep", "progress": False}
@@ -348,6 +355,7 @@ def test_its_sweep_is_kept_and_drawn(tmp_path):
     assert any("pull rotating" in text.get_text() for axes in figure.axes for text in axes.get_legend().get_texts())
 
 
+@pytest.mark.once
 def test_its_scene_file(tmp_path):
     """The answer is that in Python; a scene that is written reads back equal; a wrong key is refused with its line."""
     file = tmp_path / "well.toml"
@@ -419,6 +427,7 @@ BIT_LAWS = [
 ]
 
 
+@pytest.mark.once
 @pytest.mark.parametrize("law", BIT_LAWS)
 @pytest.mark.parametrize("model", [TORSION, BOTH])
 def test_a_bit_law_as_a_function(law, model):
@@ -432,6 +441,7 @@ def test_a_bit_law_as_a_function(law, model):
     assert law is BIT_LAWS[-1] or found.counts["iterations"] < 12 * len(found.rows)
 
 
+@pytest.mark.once
 def test_a_bit_law_as_a_function_starts_steadily_and_is_linearised():
     law = cf.drilling.Stribeck(1.0, 0.7, 2.0, radius=0.1)
     stiff = scene(_Falling(law))
@@ -449,6 +459,7 @@ def test_a_bit_law_as_a_function_starts_steadily_and_is_linearised():
     assert found == pytest.approx(expected, rel=1e-5)
 
 
+@pytest.mark.once
 @pytest.mark.parametrize("model", [TORSION, BOTH])
 def test_held_in_band(model):
     """With a narrow band it is the law that drops at once; with a wide one the bit needs more to leave it."""
@@ -465,6 +476,7 @@ def test_held_in_band(model):
     wide.plot()
 
 
+@pytest.mark.once
 def test_wall_friction_as_a_function():
     """Against rotation alone, and against axial and rotary slip together."""
     law = cf.drilling.WallFriction(0.3, 0.2, 0.05)
@@ -480,6 +492,7 @@ def test_wall_friction_as_a_function():
             same(found, expected, 1e-5)
 
 
+@pytest.mark.once
 @pytest.mark.parametrize("model", [TORSION, BOTH])
 def test_stribeck_curve(model):
     """It drags more at high speed than its kinetic friction alone, and takes as much as the ledger says."""
@@ -495,6 +508,7 @@ def test_stribeck_curve(model):
     assert np.ptp(steady.surface_torque) < 1e-2 * steady.surface_torque.mean()
 
 
+@pytest.mark.once
 @pytest.mark.parametrize("model", [TORSION, BOTH])
 def test_a_control_called_once_a_sample(model, tmp_path):
     """With short samples it is the PI control; a motion that is resumed has the same digits."""
@@ -571,6 +585,7 @@ def test_all_three_in_a_scene_file_stored_and_resumed(tmp_path):
             cf.read(tmp_path / "wrong.toml")
 
 
+@pytest.mark.once
 def test_a_control_called_once_a_sample_in_the_linear_theory():
     """It stands for its gains, where it has some."""
     control = LimitedSpeed(2000.0, 1000.0, most=1e5)
@@ -593,6 +608,7 @@ def test_a_control_called_once_a_sample_in_the_linear_theory():
         cf.drilling.PipeAbove(rod.start, PIPE, blind)
 
 
+@pytest.mark.once
 @pytest.mark.parametrize(("torque", "words"), [
     (lambda speed, weight: -speed, "torque = -1e-06: expected a number, not negative, at the speed 1e-06"),
     (lambda speed, weight: speed * weight, "torque = nan: expected a number, not negative"),
@@ -608,6 +624,7 @@ def test_laws_that_fail_are_refused_in_words(torque, words):
         cf.drilling.mixed_scene(scene(friction=StribeckCurve(0.3, 0.2, 0.1), hole=BENT_HOLE), 900.0)
 
 
+@pytest.mark.once
 def test_a_law_with_an_array():
     """It cannot be hashed, and is sampled anew."""
 
@@ -624,6 +641,7 @@ def test_a_law_with_an_array():
     assert history.torque_on_bit.max() == pytest.approx(same_law.static, rel=1e-3) and history.bit_speed.max() > 6.0
 
 
+@pytest.mark.once
 def test_a_law_that_fails_during_the_motion():
     @dataclass(frozen=True)
     class Fails(BitLaw):
@@ -636,6 +654,7 @@ def test_a_law_that_fails_during_the_motion():
         cf.drilling.simulate(scene(Fails(), hook=cf.drilling.Hook(5e6, -1e-3)), 2.0, model=BOTH, progress=False)
 
 
+@pytest.mark.once
 def test_controls_that_fail_are_refused_in_words():
     @dataclass(frozen=True)
     class Changing(SampledControl):

@@ -7,7 +7,7 @@ import pytest
 
 import cosserat_fenicsx as cf
 
-pytestmark = pytest.mark.serial
+pytestmark = [pytest.mark.serial, pytest.mark.once]
 READ = Path(__file__).parent / "reference" / "fit_readings.csv"  # made by another program, see the truth
 NOISE = {"drive_speed": 0.05, "surface_torque": 100.0}
 RANGES = {"bit.law.static": (4e3, 9e3), "bit.law.dynamic": (1e3, 4.9e3), "bit.law.speed": (1.0, 6.0)}

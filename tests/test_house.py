@@ -10,7 +10,7 @@ import pytest
 
 import cosserat_fenicsx as cf
 
-pytestmark = pytest.mark.serial
+pytestmark = [pytest.mark.serial, pytest.mark.once]
 ROOT = Path(__file__).parent.parent
 PACKAGE = ROOT / "cosserat_fenicsx"
 

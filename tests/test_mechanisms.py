@@ -75,6 +75,7 @@ def dense_redundant(supports, joints):
     return len(kernel(matrix.T)) > 0
 
 
+@pytest.mark.once
 @pytest.mark.parametrize("dense", [150, 0])
 def test_random_frames_have_the_free_motions_of_a_dense_decomposition(monkeypatch, dense):
     monkeypatch.setattr(statical, "_DENSE", dense)
@@ -111,6 +112,7 @@ def gate(angle):
     return cf.Scene([rod, joined], [cf.Hinge(rod.start, (0, 0, 1.0)), cf.Clamp(joined.end)], [], [turned])
 
 
+@pytest.mark.once
 @pytest.mark.parametrize("dense", [150, 0])
 def test_what_is_nearly_free_is_told_from_what_is_free(monkeypatch, dense):
     """Hinges that are out of line by 1e-8 rad and more hold a rod, as the largest of dense decompositions say."""
@@ -131,6 +133,7 @@ def chain(sag, count, feet=cf.Hinge):
     return cf.Scene(rods, [feet(rods[0].start, y), feet(rods[-1].end, y)], [], joints)
 
 
+@pytest.mark.once
 @pytest.mark.parametrize("count", [2, 400])
 def test_the_flat_arch_of_three_hinges(count):
     """Three hinges in line leave an infinitesimal mechanism; a little off it they hold."""
@@ -146,6 +149,7 @@ def processor_time(act):
     return time.process_time() - begun
 
 
+@pytest.mark.once
 @pytest.mark.parametrize(("size", "rods", "most"), [
     ((18,), 1008, 0.5), pytest.param((57, 58), 10_033, 5.0, marks=pytest.mark.slow),
 ])  # fmt: skip
@@ -156,6 +160,7 @@ def test_frames_of_thousands_of_rods_are_built_in_no_time(size, rods, most):
     assert processor_time(lambda: check_no_mechanism(cf.Scene(*parts))) < most
 
 
+@pytest.mark.once
 def test_the_free_motion_of_one_rod_among_a_thousand_is_named():
     rods, supports, loads, joints = grid_shell(18)
     held = cf.Scene(rods, supports, loads, joints)
@@ -175,6 +180,7 @@ def test_the_free_motion_of_one_rod_among_a_thousand_is_named():
     assert np.abs(np.delete(found, 499, axis=0)).max() < 1e-9
 
 
+@pytest.mark.once
 def test_many_loose_rods_are_refused_in_seconds():
     """With ball joints everywhere every rod spins about its axis; so many motions are counted up to a limit."""
     scene = cf.Scene(*grid_shell(12, lambda joint: "all"))
@@ -186,6 +192,7 @@ def test_many_loose_rods_are_refused_in_seconds():
     assert processor_time(refused) < 6.0
 
 
+@pytest.mark.once
 @pytest.mark.parametrize("share", [0.3, 0.6, 0.9])
 def test_larger_frames_have_the_free_motions_of_a_dense_decomposition(monkeypatch, share):
     """56 rods, a share of whose joints are ball joints and hinges in random directions, or all hinges vertical."""
@@ -206,6 +213,7 @@ def test_larger_frames_have_the_free_motions_of_a_dense_decomposition(monkeypatc
     assert np.abs(found[0].T @ found[0] - found[1].T @ found[1]).max(initial=0) < 1e-9
 
 
+@pytest.mark.once
 def test_redundant_constraints_of_many_are_named():
     """One doubled hinge among a thousand joints, and one among 200 rods that meet at a point."""
     rods, supports, loads, joints = grid_shell(18)
@@ -299,6 +307,7 @@ def test_why_not_determinate():
     assert path.model == "planar"
 
 
+@pytest.mark.once
 @pytest.mark.parametrize("turns", [8, 16, 32])
 def test_a_helix_is_in_no_plane(turns):
     """Whatever the positions of its turns relative to the sampling points."""
@@ -337,6 +346,7 @@ def test_the_same_is_found_once():
         Signature.of(scene, layout, degree=True, **arguments)
 
 
+@pytest.mark.once
 def test_nothing_is_kept_of_a_scene_that_is_gone():
     calls = []
 

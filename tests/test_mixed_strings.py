@@ -268,6 +268,7 @@ def free_end(lines, duration, h):
     return np.array(speeds)
 
 
+@pytest.mark.once
 def test_a_free_pipe_under_a_stiff_drive_turns_by_the_double_speed_in_turns():
     """Travel time of 1 s, in whole steps: 0, then twice the drive's speed for 2 s, 0 for 2 s, and so on."""
     lines = DelayLines([5.0], [1.0], [0.0, 0.0], TopEnd(lambda a, b: 3.0, stiff=True))
@@ -275,6 +276,7 @@ def test_a_free_pipe_under_a_stiff_drive_turns_by_the_double_speed_in_turns():
     np.testing.assert_allclose(speeds, [0, 6, 6, 0, 0, 6, 6, 0, 0], atol=1e-12)
 
 
+@pytest.mark.once
 @pytest.mark.parametrize("split", [[1.0], [0.3, 0.7], [0.21, 0.35, 0.44]])
 def test_parts_of_one_impedance_are_one_pipe_and_interpolation_creates_no_energy(split):
     """Travel times that are no whole numbers of steps; a smooth wave of 1 s goes up and down for 20 s."""
@@ -290,6 +292,7 @@ def test_parts_of_one_impedance_are_one_pipe_and_interpolation_creates_no_energy
     assert (np.diff(energies) <= 0).all() and energies[-1] > 0.999 * energies[0]
 
 
+@pytest.mark.once
 def test_parts_of_several_impedances_scatter_as_they_should():
     """The first wave that passes from Z = 5 to Z = 2 doubles by 2 x 5/(5 + 2), less than 2 at the free end."""
     lines = DelayLines([5.0, 2.0], [1.0, 1.0], [0.0, 0.0, 0.0], TopEnd(lambda a, b: 1.0, stiff=True))
@@ -456,6 +459,7 @@ def exact(scene, until):
     return lambda t: weight(t, found.sol(t)[0])
 
 
+@pytest.mark.once
 @pytest.mark.parametrize("mass", [0.0, MASS])
 def test_a_weight_on_rigid_rock_is_that_of_the_wave_and_the_impulse_is_told(mass):
     """m v of the bit's mass at once, Z v of the wave that starts; neither depends on the step, or on the elements."""
@@ -476,6 +480,7 @@ def test_a_weight_on_rigid_rock_is_that_of_the_wave_and_the_impulse_is_told(mass
     assert any("impulse" in axes.get_ylabel() for axes in history.plot().axes) == (mass > 0)
 
 
+@pytest.mark.once
 @pytest.mark.parametrize(("stiffness", "mass"), [(2.5e7, 300.0), (1e8, 3000.0), (1e9, 20e3)])
 def test_rock_that_gives_way_makes_a_force_that_converges(stiffness, mass):
     """The bit leaves the rock and comes down again; the largest weight is right to 1 % with the usual step."""
@@ -494,6 +499,7 @@ def test_rock_that_gives_way_makes_a_force_that_converges(stiffness, mass):
     assert f"a spring of {stiffness:.4g} N/m" in history.details() and "impulse" not in history.details()
 
 
+@pytest.mark.once
 def test_steps_that_do_not_resolve_an_impact_are_told():
     scene = bouncing(1e9, 300.0)
     assert AxialTorsional(scene).dt == pytest.approx(0.2 * scene.segments[0].axial_impedance / 1e9)
@@ -502,6 +508,7 @@ def test_steps_that_do_not_resolve_an_impact_are_told():
     assert not any("APPROXIMATE" in why for why in AxialTorsional(bouncing(2.5e7), 4e-3).why)
 
 
+@pytest.mark.once
 @pytest.mark.parametrize("mass", [0.0, 2000.0])
 def test_a_bit_that_is_set_down_on_rigid_rock_has_the_impulse_of_its_mass(mass):
     """It is lifted, then lowered with 1 m/s, at rest in itself: m v, and the force Z v of the wave that starts."""
@@ -520,6 +527,7 @@ def test_a_bit_that_is_set_down_on_rigid_rock_has_the_impulse_of_its_mass(mass):
         assert unbalanced(rows) < 1e-11
 
 
+@pytest.mark.once
 def test_a_disc_that_bounces_has_its_whole_mass():
     """The mass of the last disc, on a spring, comes down on a rock that rises."""
     discs = cf.drilling.Discs((1e3, 100.0), (500.0,), masses=(1e5, 2e3), axial_stiffnesses=(1e6,))
@@ -530,6 +538,7 @@ def test_a_disc_that_bounces_has_its_whole_mass():
     assert history.impulse_on_bit[0] == pytest.approx(2500.0 * UP, rel=1e-3) and history.weight_on_bit.max() < 4e4
 
 
+@pytest.mark.once
 def test_a_torque_by_the_weight_leaves_out_what_belongs_to_an_impulse():
     """Whatever the step; and what is recalled goes on to the same digits."""
     largest = []
@@ -545,12 +554,14 @@ def test_a_torque_by_the_weight_leaves_out_what_belongs_to_an_impulse():
     np.testing.assert_array_equal(model.advance(200), again.advance(200))
 
 
+@pytest.mark.once
 def test_a_rock_in_other_units_is_doubted():
     """1000 kN/mm, say, as a number of 1e3 N/m."""
     with pytest.warns(cf.SceneWarning, match="BitOnRock.rock_stiffness = 1000 N/m: 60000 N press the bit by 60 m into"):
         cf.drilling.BitOnRock(cf.drilling.Lobes(3, 8e-3), weight=6e4, rock_stiffness=1e3)
 
 
+@pytest.mark.once
 @pytest.mark.parametrize(("given", "words"), [
     ({"weight": 1e4, "rock_stiffness": 0.0}, "BitOnRock.rock_stiffness = 0.0: expected a positive number or inf"),
     ({"rock_stiffness": 1e8}, "BitOnRock.weight = None: expected the weight on bit .* where the rock has"),
@@ -562,6 +573,7 @@ def test_refused_bits(given, words):
         cf.drilling.BitOnRock(**({"law": cf.drilling.Stribeck(1e3, 1e3)} | given))
 
 
+@pytest.mark.once
 @pytest.mark.parametrize("stiffness", [1e6, 1e8, math.inf])
 def test_the_weight_of_a_hook_that_is_lowered_is_that_of_springs_in_a_row(stiffness):
     """Lines, string and rock; and in steady rotation on rock that gives way nothing changes."""
@@ -579,6 +591,7 @@ DEMOS = Path(__file__).parent.parent / "demos"
 FILES = sorted((DEMOS / "strings").glob("*.toml"))
 
 
+@pytest.mark.once
 def test_the_demos_give_their_numbers(capsys):
     import strings
     from known_numbers import deviation
@@ -590,6 +603,7 @@ def test_the_demos_give_their_numbers(capsys):
     assert "Drill-strings in motion" in capsys.readouterr().out
 
 
+@pytest.mark.once
 def test_a_coarse_map_agrees_with_the_linear_theory(capsys):
     import strings_map
     from known_numbers import deviation
@@ -599,6 +613,7 @@ def test_a_coarse_map_agrees_with_the_linear_theory(capsys):
     assert "25 simulations of 120 s on 1 rank(s)" in told and "the bit oscillates in 12, a mode grows in 4" in told
 
 
+@pytest.mark.once
 def test_the_command_line_explains_them(capsys):
     for file in FILES:
         assert main(["explain", str(file)]) == 0
@@ -614,6 +629,7 @@ def test_the_command_line_explains_them(capsys):
         assert words in told, words
 
 
+@pytest.mark.once
 @pytest.mark.slow
 def test_the_command_line_maps_the_stability(tmp_path, capsys):
     pytest.importorskip("matplotlib")

@@ -11,7 +11,7 @@ import pytest
 
 import cosserat_fenicsx as cf
 
-pytestmark = [pytest.mark.serial, pytest.mark.slow]
+pytestmark = [pytest.mark.serial, pytest.mark.once, pytest.mark.slow]
 umbridge = pytest.importorskip("umbridge")
 SERVER = Path(__file__).parent.parent / "demos" / "model_server.py"
 AT = [210e9, 0.2, 3e3, -60e3]

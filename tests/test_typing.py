@@ -8,7 +8,7 @@ import pytest
 
 import cosserat_fenicsx as cf
 
-pytestmark = pytest.mark.serial
+pytestmark = [pytest.mark.serial, pytest.mark.once]
 HERE = Path(__file__).parent
 
 
