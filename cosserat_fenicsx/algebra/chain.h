@@ -106,9 +106,14 @@ typedef struct {
                                        forces are those of the end of the step, not of its mean; sweeps */
     const double *clearance, *stiffness, *friction, *damping, *arm; /* (nodes,); arm: radius of the rod's surface */
     double h, share, smallest;      /* the step; changes that end the sweeps, of the first one and of all */
-    const double *tangent, *start;  /* (nodes, 3) of the tube; from its axis to the rod at the start, across it */
-    const float *compliance;        /* (nodes, 6, 2 reach + 1, 6) by each component of the force and moment of a node
-                                       the motion of its neighbours, and of itself in the middle */
+    const double *tangent, *across, *start; /* (nodes, 3) of the tube, and an axis u across it, v = tangent x u;
+                                       (nodes, 2) from the tube's axis to the rod at the start, by u and v */
+    const float *compliance;        /* (nodes, 4, 2 reach + 1, 4) by each unit force of a node the motion of its
+                                       neighbours, and of itself in the middle. Forces: along u and v, friction along
+                                       the tube, and round it its moment alone; motions: see `motion_of` */
+    const float *turning;           /* (nodes, 4, 2 reach + 1, 2) by the same forces the rotations about u and v */
+    double *motion, *forces, *earlier, *turned; /* (nodes, 4) motions and forces of these kinds; forces before the
+                                       sweeps; (nodes, 2) */
     double *moved;                  /* (nodes, 6) displacement and rotation in the step with the forces */
     double *force, *law;            /* (nodes, 6) force and moment; (nodes, 3) normal force, friction round and along */
     double *multiplier;             /* (nodes,) of friction at its bound, the last ones */

@@ -79,6 +79,12 @@ static void settle_friction(const double A[3], const double b[2], double most, d
     if (size > most) T[0] *= most / size, T[1] *= most / size;
 }
 
+/* Faster than fmax. */
+static double most_of(double a, double b)
+{
+    return a < b ? b : a;
+}
+
 static double dot3(const double *a, const double *b)
 {
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
@@ -89,56 +95,70 @@ static void cross3(const double *a, const double *b, double *c)
     c[0] = a[1] * b[2] - a[2] * b[1], c[1] = a[2] * b[0] - a[0] * b[2], c[2] = a[0] * b[1] - a[1] * b[0];
 }
 
-/* Directions at a node: x from the axis to the rod at the end, e and its size where the force acts, tau round it. */
+/* Where a node is across its tube, by its axes u and v there: x from the tube's axis to the rod at the end, e and its
+   size where the force acts. The direction round the tube is tau = (-e[1], e[0]). */
 typedef struct {
-    double x[3], R0, R, both, e[3], share, tau[3];
+    double x[2], R0, R, both, e[2], share;
 } place;
 
-static place place_of(const contact *c, int i)
+/* moved: motion along u and v in the step. */
+static place place_of(const contact *c, int i, const double *moved)
 {
     place p;
-    const double *t = c->tangent + 3 * i, *x0 = c->start + 3 * i, *moved = c->moved + 6 * i;
-    const double along = dot3(moved, t);
-    double m[3];
-    for (int k = 0; k < 3; k++) {
-        p.x[k] = x0[k] + moved[k] - along * t[k];
+    const double *x0 = c->start + 2 * i;
+    double m[2];
+    for (int k = 0; k < 2; k++) {
+        p.x[k] = x0[k] + moved[k];
         m[k] = c->at_end ? p.x[k] : x0[k] + p.x[k];
     }
-    p.R0 = sqrt(dot3(x0, x0)), p.R = sqrt(dot3(p.x, p.x));
-    const double size = sqrt(dot3(m, m));
+    p.R0 = sqrt(x0[0] * x0[0] + x0[1] * x0[1]), p.R = sqrt(p.x[0] * p.x[0] + p.x[1] * p.x[1]);
+    const double size = sqrt(m[0] * m[0] + m[1] * m[1]);
     p.both = c->at_end ? p.R : p.R0 + p.R, p.share = p.both > 0 ? size / p.both : 0;
-    for (int k = 0; k < 3; k++) p.e[k] = size > 0 ? m[k] / size : 0;
-    cross3(t, p.e, p.tau);
+    for (int k = 0; k < 2; k++) p.e[k] = size > 0 ? m[k] / size : 0;
     return p;
 }
 
-static double dot6(const double *a, const double *b)
+/* Where node i is after its motion `moved` (6,), and this motion (4,): along u and v, the slip along the tube, and what
+   the rotation about the tube adds to the slip round it. */
+static place motion_of(const contact *c, int i, const double *moved, double *motion)
 {
-    double sum = 0;
-    for (int k = 0; k < 6; k++) sum += a[k] * b[k];
-    return sum;
+    const double *t = c->tangent + 3 * i, *u = c->across + 3 * i, arm = c->arm[i];
+    double v[3];
+    cross3(t, u, v);
+    motion[0] = dot3(u, moved), motion[1] = dot3(v, moved), motion[3] = arm * dot3(t, moved + 3);
+    const place p = place_of(c, i, motion);
+    motion[2] = dot3(t, moved) + arm * (p.e[1] * dot3(u, moved + 3) - p.e[0] * dot3(v, moved + 3));
+    return p;
 }
 
-/* The motion (displacement, rotation) of node i itself by a force and a moment v. */
+static double slip_round(const place *p, const double *motion)
+{
+    return p->e[0] * motion[1] - p->e[1] * motion[0] + motion[3];
+}
+
+static double dot4(const double *a, const double *b)
+{
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3];
+}
+
+/* The motion of node i itself by its forces v, (4,) each. */
 static void respond(const contact *c, int i, const double *v, double *Wv)
 {
-    const size_t width = 6 * (2 * (size_t)c->reach + 1);
-    const float *W = c->compliance + i * 6 * width + 6 * c->reach;
-    for (int k = 0; k < 6; k++) Wv[k] = 0;
-    for (int m = 0; m < 6; m++, W += width)
-        for (int k = 0; k < 6; k++) Wv[k] += W[k] * v[m];
+    const size_t width = 4 * (2 * (size_t)c->reach + 1);
+    const float *W = c->compliance + i * 4 * width + 4 * c->reach;
+    for (int k = 0; k < 4; k++, W++)
+        Wv[k] = W[0] * v[0] + W[width] * v[1] + W[2 * width] * v[2] + W[3 * width] * v[3];
 }
 
-/* Add the motion of all neighbours of node i, and of itself, by a force and a moment v. */
-static void move_by(const contact *c, int i, const double *v)
+/* Add numbers of all neighbours of node i, and of itself, by its forces v: `each` of a node. */
+static void add_by(const contact *c, int i, const float *by, int each, const double *v, double *all)
 {
-    const size_t width = 6 * (2 * (size_t)c->reach + 1);
+    const size_t width = each * (2 * (size_t)c->reach + 1);
     const int first = i < c->reach ? 0 : i - c->reach, end = i + c->reach < c->nodes ? i + c->reach + 1 : c->nodes;
-    const float *W = c->compliance + i * 6 * width + 6 * (first + c->reach - i);
-    double *restrict to = c->moved + 6 * first;
-    for (int j = 0; j < 6 * (end - first); j++)
-        to[j] += W[j] * v[0] + W[j + width] * v[1] + W[j + 2 * width] * v[2] + W[j + 3 * width] * v[3]
-               + W[j + 4 * width] * v[4] + W[j + 5 * width] * v[5];
+    const float *W = by + i * 4 * width + each * (first + c->reach - i);
+    double *restrict to = all + each * first;
+    for (int j = 0; j < each * (end - first); j++)
+        to[j] += W[j] * v[0] + W[j + width] * v[1] + W[j + 2 * width] * v[2] + W[j + 3 * width] * v[3];
 }
 
 /* The motion of all nodes in the step from `before` to unknowns `now`: displacements and rotations, by the mean
@@ -160,24 +180,13 @@ void find_motion(contact *c, const double *now)
     }
 }
 
-/* Forces and moments of unit friction round and along the axis; their work by a motion is the slip. */
-static void slip_directions(const contact *c, int i, const place *p, double *across, double *along)
-{
-    const double *t = c->tangent + 3 * i, arm = c->arm[i];
-    for (int k = 0; k < 3; k++) {
-        across[k] = p->tau[k], across[3 + k] = arm * t[k];
-        along[k] = t[k], along[3 + k] = -arm * p->tau[k];
-    }
-}
-
 /* Size of the slip of every node in the step, for the given motion, also of nodes that do not touch. */
 void slips(const contact *c, double *size)
 {
     for (int i = 0; i < c->nodes; i++) {
-        double across[6], along[6];
-        const place p = place_of(c, i);
-        slip_directions(c, i, &p, across, along);
-        size[i] = hypot(dot6(across, c->moved + 6 * i), dot6(along, c->moved + 6 * i));
+        double motion[4];
+        const place p = motion_of(c, i, c->moved + 6 * i, motion);
+        size[i] = hypot(slip_round(&p, motion), motion[2]);
     }
 }
 
@@ -185,60 +194,105 @@ void slips(const contact *c, double *size)
    axis directions found one after the other would grow apart. Nothing is left of this where the change is none. */
 static void foretell_turning(const contact *c, int i, const place *p, double N, double *change)
 {
-    const size_t width = 6 * (2 * (size_t)c->reach + 1);
-    const float *W = c->compliance + i * 6 * width + 6 * c->reach;
+    const size_t width = 4 * (2 * (size_t)c->reach + 1);
+    const float *W = c->compliance + i * 4 * width + 4 * c->reach;
     const double stiffness = p->both > 0 ? N / p->both : 0;
-    if (!(stiffness * (W[0] + W[width + 1] + W[2 * width + 2]) > LITTLE)) return;
-    double round[6] = {p->tau[0], p->tau[1], p->tau[2]}, by[6], moving[6];
+    if (!(stiffness * (W[0] + W[width + 1]) > LITTLE)) return;
+    const double round[4] = {-p->e[1], p->e[0]};
+    double by[4], moving[4];
     respond(c, i, round, by), respond(c, i, change, moving);
-    const double more = -stiffness * dot3(round, moving) / (1 + stiffness * dot3(round, by));
-    for (int k = 0; k < 3; k++) change[k] += more * round[k];
+    const double more = -stiffness * dot4(round, moving) / (1 + stiffness * dot4(round, by));
+    for (int k = 0; k < 2; k++) change[k] += more * round[k];
 }
 
 /* Solve a node with the forces of all others; returns the size of the change of its motion by its own. */
 static double settle_node(contact *c, int i)
 {
-    double *force = c->force + 6 * i, *moved = c->moved + 6 * i, *law = c->law + 3 * i;
-    const place p = place_of(c, i);
+    double *forces = c->forces + 4 * i, *motion = c->motion + 4 * i, *law = c->law + 3 * i;
+    const place p = place_of(c, i, motion);
     if (p.R0 <= c->clearance[i] && p.R <= c->clearance[i] && law[0] == 0 && law[1] == 0 && law[2] == 0) return 0;
-    double inward[6] = {0}, across[6], along[6], out[6] = {0}, by[3][6], slip[6], change[6];
-    for (int k = 0; k < 3; k++) inward[k] = -p.share * p.e[k], out[k] = p.R > 0 ? p.x[k] / p.R : 0;
-    slip_directions(c, i, &p, across, along);
+    const double inward[4] = {-p.share * p.e[0], -p.share * p.e[1]}, round[4] = {-p.e[1], p.e[0], 0, 1};
+    const double along[4] = {0, 0, 1, 0};
+    double by[3][4], slip[4], change[4];
     respond(c, i, inward, by[0]);
-    const double N = settle_normal(c, i, p.R0, p.R, law[0], -dot6(out, by[0]));
+    const double give = p.R > 0 ? -(p.x[0] * by[0][0] + p.x[1] * by[0][1]) / p.R : 0;
+    const double N = settle_normal(c, i, p.R0, p.R, law[0], give);
     double T[2] = {0, 0};
     if (c->friction[i] > 0 && N > 0) {
-        respond(c, i, across, by[1]), respond(c, i, along, by[2]);
-        for (int k = 0; k < 6; k++) slip[k] = moved[k] + by[0][k] * (N - law[0]);
-        const double A[3] = {dot6(across, by[1]), (dot6(across, by[2]) + dot6(along, by[1])) / 2, dot6(along, by[2])};
-        const double b[2] = {dot6(across, slip) - A[0] * law[1] - A[1] * law[2],
-                             dot6(along, slip) - A[1] * law[1] - A[2] * law[2]};
+        respond(c, i, round, by[1]), respond(c, i, along, by[2]);
+        for (int k = 0; k < 4; k++) slip[k] = motion[k] + by[0][k] * (N - law[0]);
+        const double A[3] = {dot4(round, by[1]), (dot4(round, by[2]) + by[1][2]) / 2, by[2][2]};
+        const double b[2] = {dot4(round, slip) - A[0] * law[1] - A[1] * law[2],
+                             slip[2] - A[1] * law[1] - A[2] * law[2]};
         settle_friction(A, b, c->friction[i] * N, c->multiplier + i, T);
     }
     law[0] = N, law[1] = T[0], law[2] = T[1];
-    for (int k = 0; k < 6; k++) change[k] = N * inward[k] + T[0] * across[k] + T[1] * along[k] - force[k];
+    for (int k = 0; k < 4; k++) change[k] = N * inward[k] + T[0] * round[k] + T[1] * along[k] - forces[k];
     foretell_turning(c, i, &p, N, change);
-    for (int k = 0; k < 6; k++) force[k] += change[k];
-    double moving[6], size = 0;
+    for (int k = 0; k < 4; k++) forces[k] += change[k];
+    double moving[4], size = 0;
     respond(c, i, change, moving);
-    for (int k = 0; k < 6; k++) size = fmax(size, fabs(moving[k]) * (k < 3 ? 1 : c->arm[i]));
-    move_by(c, i, change);
+    for (int k = 0; k < 4; k++) size = most_of(size, fabs(moving[k]));
+    add_by(c, i, c->compliance, 4, change, c->motion);
     return size;
+}
+
+/* Motions and forces of all nodes by their axes, before they are settled. */
+static void take_axes(contact *c)
+{
+    for (int i = 0; i < c->nodes; i++) {
+        const double *t = c->tangent + 3 * i, *u = c->across + 3 * i, *force = c->force + 6 * i, *law = c->law + 3 * i;
+        double *forces = c->forces + 4 * i, v[3];
+        cross3(t, u, v);
+        motion_of(c, i, c->moved + 6 * i, c->motion + 4 * i);
+        forces[0] = dot3(u, force), forces[1] = dot3(v, force), forces[2] = law[2], forces[3] = law[1];
+        for (int k = 0; k < 4; k++) c->earlier[4 * i + k] = forces[k];
+    }
+}
+
+/* The motion and the forces of all nodes after they are settled. */
+static void leave_axes(contact *c)
+{
+    memset(c->turned, 0, 2 * c->nodes * sizeof *c->turned);
+    for (int i = 0; i < c->nodes; i++) {
+        double change[4];
+        for (int k = 0; k < 4; k++) change[k] = c->forces[4 * i + k] - c->earlier[4 * i + k];
+        if (dot4(change, change) > 0) add_by(c, i, c->turning, 2, change, c->turned);
+    }
+    for (int i = 0; i < c->nodes; i++) {
+        const double *t = c->tangent + 3 * i, *u = c->across + 3 * i, *turned = c->turned + 2 * i;
+        const double *law = c->law + 3 * i, *motion = c->motion + 4 * i, arm = c->arm[i];
+        double *moved = c->moved + 6 * i, *force = c->force + 6 * i, v[3], change[4];
+        cross3(t, u, v);
+        const place before = motion_of(c, i, moved, change), p = place_of(c, i, motion);
+        for (int k = 0; k < 4; k++) change[k] = motion[k] - change[k];
+        change[2] += arm * (before.e[0] * turned[1] - before.e[1] * turned[0]); /* of the displacement alone */
+        const double spin = arm > 0 ? change[3] / arm : 0;
+        const double inward = -law[0] * p.share, in_u = inward * p.e[0] - law[1] * p.e[1];
+        const double in_v = inward * p.e[1] + law[1] * p.e[0];
+        for (int k = 0; k < 3; k++) {
+            moved[k] += change[0] * u[k] + change[1] * v[k] + change[2] * t[k];
+            moved[3 + k] += turned[0] * u[k] + turned[1] * v[k] + spin * t[k];
+            force[k] = in_u * u[k] + in_v * v[k] + law[2] * t[k] + 0.0; /* never -0 */
+            force[3 + k] = arm * (law[1] * t[k] + law[2] * (p.e[1] * u[k] - p.e[0] * v[k])) + 0.0;
+        }
+    }
 }
 
 /* Forces of all nodes with which their law holds, to a share of the first change; the motion follows. Returns the
    number of sweeps. */
 int settle(contact *c)
 {
-    double first = 0;
-    for (int sweep = 0; sweep < c->most; sweep++) {
-        double change = 0;
-        for (int i = 0; i < c->nodes; i++) change = fmax(change, settle_node(c, sweep % 2 ? c->nodes - 1 - i : i));
-        if (!isfinite(change)) return c->most;
-        first = fmax(first, change);
-        if (change <= fmax(c->share * first, c->smallest)) return sweep + 1;
+    double first = 0, change = INFINITY;
+    int sweeps = 0;
+    take_axes(c);
+    while (sweeps < c->most && change > fmax(c->share * first, c->smallest)) {
+        change = 0;
+        for (int i = 0; i < c->nodes; i++) change = most_of(change, settle_node(c, sweeps % 2 ? c->nodes - 1 - i : i));
+        first = fmax(first, change), sweeps++;
     }
-    return c->most;
+    leave_axes(c);
+    return sweeps;
 }
 
 /* Whether the normal forces differ from those of the given motion, or a node has crossed the axis while it touches: the
@@ -246,12 +300,12 @@ int settle(contact *c)
 int broken(const contact *c)
 {
     for (int i = 0; i < c->nodes; i++) {
-        const double *law = c->law + 3 * i;
-        double slope;
-        const place p = place_of(c, i);
+        const double *law = c->law + 3 * i, *x0 = c->start + 2 * i;
+        double slope, motion[4];
+        const place p = motion_of(c, i, c->moved + 6 * i, motion);
         const double off = fabs(normal_force(c, i, p.R0, p.R, &slope) - law[0]);
         if (!(off <= 1e-6 * law[0] + 1e-10 * c->stiffness[i])) return 1;
-        if (law[0] > 0 && c->clearance[i] > 0 && dot3(p.x, c->start + 3 * i) <= 0) return 1;
+        if (law[0] > 0 && c->clearance[i] > 0 && p.x[0] * x0[0] + p.x[1] * x0[1] <= 0) return 1;
     }
     return 0;
 }
@@ -261,7 +315,8 @@ double stored(const contact *c, int at_start)
 {
     double sum = 0;
     for (int i = 0; i < c->nodes; i++) {
-        const place p = place_of(c, i);
+        double motion[4];
+        const place p = motion_of(c, i, c->moved + 6 * i, motion);
         const double deep = fmax((at_start ? p.R0 : p.R) - c->clearance[i], 0);
         sum += c->stiffness[i] * deep * deep / 2;
     }
@@ -275,14 +330,13 @@ double lost(const contact *c, const double *before)
 {
     double sum = 0;
     for (int i = 0; i < c->nodes; i++) {
-        const double *t = c->tangent + 3 * i, *moved = c->moved + 6 * i, *end = c->law + 3 * i, *start = before + 3 * i;
-        const place p = place_of(c, i);
-        const double k = c->stiffness[i], arm = c->arm[i], gap = c->clearance[i], p0 = fmax(p.R0 - gap, 0);
-        const double round = dot3(p.tau, moved) + arm * dot3(t, moved + 3);
-        const double along = dot3(t, moved) - arm * dot3(p.tau, moved + 3);
+        const double *end = c->law + 3 * i, *start = before + 3 * i;
+        double motion[4];
+        const place p = motion_of(c, i, c->moved + 6 * i, motion);
+        const double k = c->stiffness[i], gap = c->clearance[i], p0 = fmax(p.R0 - gap, 0);
         const double at_end = end[0] - k * fmax(p.R - gap, 0);
         const double damping = at_end + (p0 > 0 && start[0] == 0 ? at_end : start[0] - k * p0);
-        const double friction = (start[1] + end[1]) * round + (start[2] + end[2]) * along;
+        const double friction = (start[1] + end[1]) * slip_round(&p, motion) + (start[2] + end[2]) * motion[2];
         sum += fmax(damping * (p.R - p.R0) / 2, 0) + fmax(-friction / 2, 0);
     }
     return sum;

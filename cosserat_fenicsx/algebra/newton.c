@@ -8,8 +8,9 @@
 enum { STATE = 1, RESIDUAL = 2, TANGENT = 4, INTERFACE = 8, ADD_UP = 16, SUM = 32, MATRICES = 64, CONTACT = 256,
        COMPLIANCE = 512, NODES = 1024 };
 enum { FAILED = 1 };
-/* Increments at a wall that no longer shrink, by rounding, are measured anew after some steps without them. */
-static const double FADES = 0.9;
+/* Increments at a wall that no longer shrink, by rounding, are measured anew after some steps without them; one that is
+   this many times larger than before may have stopped for another reason, such as an old tangent. */
+static const double FADES = 0.9, RISES = 10;
 
 static int python_hook(void *self, int what, double *a, double *b);
 
@@ -237,7 +238,8 @@ static void judge_increment(stepping *s, double step, double before)
     else if (step > s->diverged) s->verdict = GROWN;
     else if (complete && (step <= s->enough || (s->iterations > 1 && error_is_small(step, before, 0, s->enough))))
         s->verdict = CONVERGED, s->noise *= FADES;
-    else if (step <= s->rounding && rate > 0.5 && s->iterations > 1) s->verdict = CONVERGED, s->noise = c ? step : 0;
+    else if (step <= s->rounding && rate > 0.5 && s->iterations > 1)
+        s->verdict = CONVERGED, s->noise = !c ? 0 : s->noise > 0 ? fmin(step, RISES * s->noise) : step;
     else if (s->iterations >= s->most) s->verdict = RAN_OUT;
     else if (s->iterations > 1) {
         const double left = log(s->enough / step);

@@ -10,7 +10,7 @@ the rest.
 import numpy as np
 
 from cosserat_fenicsx.algebra.building import Pointers
-from cosserat_fenicsx.numerics import lobatto_weights, small_rotations
+from cosserat_fenicsx.numerics import cross, lobatto_weights, small_rotations
 
 
 class TouchingNodes:
@@ -89,7 +89,7 @@ def motion_between(before, after):
 
 
 # Number of nodes up to which the compliance is complete; of more, neighbours on each side that it couples.
-_FEW, _NEIGHBOURS = 16, 8
+_FEW, _NEIGHBOURS = 16, 10
 # The compliance, which differs little from step to step, is updated where its relative error exceeds the second number
 # and this many times its smallest error. Responses below the third number (dimensionless) may be rounding.
 _WORSE, _MISSED, _ROUNDING = 10.0, 1e-3, 1e-9
@@ -98,6 +98,13 @@ _WORSE, _MISSED, _ROUNDING = 10.0, 1e-3, 1e-9
 _MOST, _SHARE, _OF_NEIGHBOURS, _SMALLEST = 200, 1e-6, 0.1, 1e-16
 # Numbers of a node in C.
 _OF_NODES = "clearance", "stiffness", "friction", "damping", "arm", "multiplier"
+
+
+def perpendicular(u, t):
+    """(n, 3) unit vectors normal to unit vectors t (n, 3), as close to u as can be; where u is zero, any."""
+    u = np.where(u.any(axis=1, keepdims=True), u, np.eye(3)[np.argmin(np.abs(t), axis=1)])
+    u = u - (u * t).sum(axis=1, keepdims=True) * t
+    return u / np.linalg.norm(u, axis=1, keepdims=True)
 
 
 class NodalContact(Pointers):
@@ -124,7 +131,12 @@ class NodalContact(Pointers):
             self._numbers[name][:] = np.concatenate([getattr(p, name) for p in touched])[order] / units[name]
         sizes = {
             "tangent": 3,
-            "start": 3,
+            "across": 3,
+            "start": 2,
+            "motion": 4,
+            "forces": 4,
+            "earlier": 4,
+            "turned": 2,
             "moved": 6,
             "force": 6,
             "law": 3,
@@ -135,7 +147,8 @@ class NodalContact(Pointers):
         }
         self._vectors = {name: np.zeros((n, size)) for name, size in sizes.items()}
         # of half the numbers' accuracy: it guides iterations, and its reading takes most of their time
-        self._compliance = np.zeros((n, 6, 2 * reach + 1, 6), dtype=np.float32)
+        self._compliance = np.zeros((n, 4, 2 * reach + 1, 4), dtype=np.float32)
+        self._turning = np.zeros((n, 4, 2 * reach + 1, 2), dtype=np.float32)
         self._weaker = np.concatenate([np.full((len(p.slots), 2), p.weaker) for p in touched])[order]
         self._weaker[:, 1] *= model.time / scales.length
         self._slip, self._slip_begun = np.full(n, np.nan), np.zeros(n)  # speeds of slip in the last step
@@ -148,6 +161,7 @@ class NodalContact(Pointers):
         contact.exact, contact.rows = n <= _FEW, self.integers(nodes.rows)
         of_unknowns = {name: np.zeros(problem.numbering.size) for name in ("load", "response")}
         contact.compliance = self._ffi.from_buffer("float[]", self._compliance)
+        contact.turning = self._ffi.from_buffer("float[]", self._turning)
         arrays = {"fixed": nodes.fixed, **of_unknowns}
         for name, array in {**self._numbers, **self._vectors, **arrays}.items():
             setattr(contact, name, self.doubles(array))
@@ -166,8 +180,10 @@ class NodalContact(Pointers):
             tube = place.wall.tube_around(place.s, points[at], place.md)
             place.md = tube.md
             away = (points[at] - tube.position) / scales.length
-            along = np.einsum("ij,ij->i", away, tube.tangent)
-            vectors["tangent"][at], vectors["start"][at] = tube.tangent, away - along[:, None] * tube.tangent
+            u = perpendicular(vectors["across"][at], tube.tangent)
+            vectors["tangent"][at], vectors["across"][at] = tube.tangent, u
+            v = cross(tube.tangent, u)
+            vectors["start"][at] = np.column_stack([(away * u).sum(axis=1), (away * v).sum(axis=1)])
             numbers["clearance"][at], numbers["arm"][at] = tube.clearance / scales.length, tube.arm / scales.length
             numbers["friction"][at] = tube.friction
         self.c.h = h
@@ -201,7 +217,13 @@ class NodalContact(Pointers):
     def find_compliance(self):
         """Find the compliance by the current tangent."""
         self._known_for, self.c.usual, self.c.stale = self.c.h, np.inf, False
-        nodes, n, reach = self._nodes, self.c.nodes, self.c.reach
+        nodes, n, reach, vectors = self._nodes, self.c.nodes, self.c.reach, self._vectors
+        t, u, arm = vectors["tangent"], vectors["across"], self._numbers["arm"][:, None]
+        v, out = cross(t, u), vectors["start"] / np.maximum(np.linalg.norm(vectors["start"], axis=1), 1e-300)[:, None]
+        tau, none = out[:, :1] * v - out[:, 1:] * u, np.zeros((n, 3))
+        # (n, 4, 6) forces and moments, whose works are the motions, and (n, 2, 3) axes of rotations, see `contact` in C
+        pairs = (u, none), (v, none), (t, -arm * tau), (none, arm * t)
+        units, about = np.stack([np.hstack(pair) for pair in pairs], axis=1), np.stack([u, v], axis=1)
         turning = small_rotations(nodes.of_local(self._problem.state)[:, 3:])
         apart = min(2 * reach + 1, n)
         for first in range(apart):
@@ -209,13 +231,14 @@ class NodalContact(Pointers):
             j = sources[:, None] + np.arange(-reach, reach + 1)
             inside, j = (j >= 0) & (j < n), np.clip(j, 0, n - 1)
             inside &= np.abs(nodes.points[j] - nodes.points[sources, None]) <= self._coupled
-            for component in range(6):
+            for component in range(4):
                 force = np.zeros((n, 6))
-                force[sources, component] = 1.0
+                force[sources] = units[sources, component]
                 found = nodes.of_vector(nodes.response(force))
-                turned = (turning @ found[:, 3:, None])[..., 0]
-                moved = np.concatenate([found[:, :3], turned], axis=1)
-                self._compliance[sources, component] = np.where(inside[..., None], moved[j], 0.0)
+                turned = turning @ found[:, 3:, None]
+                moved = units @ np.concatenate([found[:, :3, None], turned], axis=1)
+                self._compliance[sources, component] = np.where(inside[..., None], moved[j, :, 0], 0.0)
+                self._turning[sources, component] = np.where(inside[..., None], (about @ turned)[j, :, 0], 0.0)
 
     # -- books -------------------------------------------------------------------------------------------------------
 
@@ -244,7 +267,8 @@ class NodalContact(Pointers):
     def memory(self):
         kept = {name: self._vectors[name].copy() for name in ("force", "law")}
         md = np.concatenate([place.md for place in self._walls])
-        kept |= {"md": md, "slip": self._slip.copy(), "compliance": self._compliance.copy()}
+        kept |= {"md": md, "slip": self._slip.copy(), "across": self._vectors["across"].copy()}
+        kept |= {"compliance": self._compliance.copy(), "turning": self._turning.copy()}
         kept["multiplier"] = self._numbers["multiplier"].copy()
         return {**kept, "known_for": self._known_for, "usual": self.c.usual, "missing": self.c.missing,
                 "stale": bool(self.c.stale)}  # fmt: skip
@@ -252,7 +276,8 @@ class NodalContact(Pointers):
     def recall(self, memory):
         for name in ("force", "law"):
             self._vectors[name][:] = memory[name]
-        self._compliance[:], self._slip[:] = memory["compliance"], memory["slip"]
+        self._vectors["across"][:], self._slip[:] = memory["across"], memory["slip"]
+        self._compliance[:], self._turning[:] = memory["compliance"], memory["turning"]
         self._numbers["multiplier"][:] = memory["multiplier"]
         self._known_for, self.c.usual = float(memory["known_for"]), float(memory["usual"])
         self.c.missing, self.c.stale = float(memory["missing"]), bool(memory["stale"])

@@ -215,7 +215,7 @@ class Iteration:
     increment: float = 1e-12
     smallest: float = 2e-16
     rounding: float = 1e-10  # increments below it that no longer shrink have converged, too: rounding of a stiff rod
-    of_noise: float = 0.1  # at a wall, errors below this share of such increments in earlier steps are allowed
+    of_noise: float = 1.0  # at a wall, errors below this multiple of such increments in earlier steps are allowed
     rate: float = 3e-4  # contraction of increments with a new tangent, as measured
     # Cost of a new tangent, in iterations: as measured, 1.3 in a plane, 5 in space, 8 with constraint equations. From 1
     # to 8 the time of a motion varies by a few per cent.
