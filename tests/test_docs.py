@@ -149,7 +149,8 @@ def test_programs_run(page, program, shown, tmp_path, monkeypatch):
 def test_scene_files_are_read(page, scene, tmp_path):
     file = tmp_path / "scene.toml"
     file.write_text(scene, encoding="utf-8")
-    shutil.copy(Path(__file__).parent / "reference" / "fit_readings.csv", tmp_path / "rig.csv")
+    for name, beside in (("fit_readings.csv", "rig.csv"), ("portal.inp", "portal.inp")):
+        shutil.copy(Path(__file__).parent / "reference" / name, tmp_path / beside)
     assert cf.read(file).title
 
 

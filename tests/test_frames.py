@@ -8,6 +8,7 @@ import pytest
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.numerics import conjugate_product
+from cosserat_fenicsx.parts import to_data
 
 pytestmark = pytest.mark.serial
 STEEL = cf.Material(E=210e9, nu=0.3, density=7850.0)
@@ -129,6 +130,53 @@ def test_meshes_of_other_programs_give_the_same_frame(written, tmp_path):
         cf.frame_from(file, THICK, STEEL, clamped="foot")
     with pytest.raises(cf.SceneError, match=r"line \d is in .*: expected a section for it"):
         cf.frame_from(file, dict([*sections.items()][:1]), STEEL)
+
+
+IN_A_FILE = """
+[mesh]
+file = "portal.inp"
+material = { E = 210e9, density = 7850.0 }
+clamped = "FEET"
+scale = 0.5
+groups = [{ name = "LEGS", section = { type = "Circle", diameter = 0.2 } },
+          { name = "BEAM", section = { type = "Circle", diameter = 0.1 } }]
+
+[[loads]]
+type = "Force"
+station = "DECK"
+force = [1e4, 0, 0]
+
+[[loads]]
+type = "LineForce"
+rod = "BEAM"
+force = [0, 300.0, -5e3]
+
+[[loads]]
+type = "Force"
+station = "rod1@1.0"
+force = [0, 0, -2e3]
+"""
+
+
+def test_a_scene_file_takes_the_rods_of_a_mesh_and_its_names(tmp_path):
+    file = Path(__file__).parent / "reference" / "portal.inp"
+    (tmp_path / "portal.inp").write_bytes(file.read_bytes())
+    (tmp_path / "scene.toml").write_text(IN_A_FILE, encoding="utf-8")
+    frame = cf.frame_from(file, {"LEGS": THICK, "BEAM": THIN}, STEEL, clamped="FEET", scale=0.5)
+    loads = [cf.Force(frame.at(k), (1e4, 0, 0)) for k in (1, 2)]
+    loads += [cf.LineForce(frame.rods[1], (0, 300.0, -5e3)), cf.Force(frame.rods[1].at(1.0), (0, 0, -2e3))]
+    found = cf.read(tmp_path / "scene.toml")
+    assert tip(found.scene, "rod1@0.7") == pytest.approx(tip(frame.scene(loads), "rod1@0.7"), rel=1e-9)
+    cf.write(found, tmp_path / "again.toml")
+    assert to_data(cf.read(tmp_path / "again.toml").scene) == to_data(found.scene)
+    for given, other, words in (
+        ('"FEET"', '"FOOT"', r"line 5, column 1: .*no points are named 'FOOT': did you mean 'FEET'\?"),
+        ('"BEAM"\n', '"BEAMS"\n', r"line 15, column 1: Scene.loads\[1\].rod = 'BEAMS'"),
+        ("groups = [", "section = { type = 'Circle', diameter = 0.1 }\ngroups = [", "either a section of all rods, or"),
+    ):
+        (tmp_path / "scene.toml").write_text(IN_A_FILE.replace(given, other), encoding="utf-8")
+        with pytest.raises(cf.SceneError, match=words):
+            cf.read(tmp_path / "scene.toml")
 
 
 @pytest.mark.parametrize(("changed", "words"), [

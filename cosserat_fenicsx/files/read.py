@@ -19,6 +19,12 @@ material = { E = "210 GPa", nu = 0.3 }
 # mass off the axis: eccentricity = [0.01, 0.0], or [{ to = 5.0, offset = [0.01, 0.0] }, { offset = [0.0, 0.0] }]
 # a curve from a file beside this one: curve = { type = "Spline", points = "survey.csv" }
 
+[mesh]                            # optional, rods from the lines of a mesh beside this file: arguments of `frame_from`
+file = "tower.msh"
+material = "steel"
+clamped = "FEET"
+groups = [{ name = "LEGS", section = { type = "Circle", diameter = 0.2 } }]  # or section = {...}, of all lines
+
 [[supports]]
 type = "Clamp"
 station = "column.start"          # or "column.end", or "column@5.0" for s = 5 m
@@ -83,6 +89,7 @@ from cosserat_fenicsx.parts import (
     use,
 )
 from cosserat_fenicsx.scene.action import Action
+from cosserat_fenicsx.scene.frames import Mesh
 from cosserat_fenicsx.scene.rod import Rod
 from cosserat_fenicsx.scene.scene import Scene
 from cosserat_fenicsx.scene.sections import Material
@@ -419,6 +426,8 @@ class RodScene(Part):
     """A scene of rods and what is to be computed of it, from `read`.
 
     Args:
+        mesh: more rods, with joints and supports, along the lines of a mesh; None for none. Loads and supports may name
+            its groups of rods as a `rod`, and its sets of points as a `station`: they act on each of them.
         rods, supports, loads, joints, velocities, stages, title: those of the `Scene`.
         solve: arguments of `solve`; None for its defaults.
         simulate: arguments of `simulate`, for a motion; None for an equilibrium path.
@@ -430,7 +439,7 @@ class RodScene(Part):
         SceneError: see `Scene`.
     """
 
-    rods: Annotated[Sequence[Rod], Items(Object((Rod,)))]
+    rods: Annotated[Sequence[Rod], Items(Object((Rod,)))] = ()
     supports: Sequence[Support] = ()
     loads: Sequence[Action] = ()
     joints: Sequence[Joint] = ()
@@ -439,13 +448,21 @@ class RodScene(Part):
     stages: Sequence[Stage] = ()
     solve: Solve | None = None
     simulate: Simulate | None = None
+    mesh: Mesh | None = None
 
     def __repr__(self):
         return f"<RodScene of {self.scene!r}>"
 
     def validate(self):
         names = [field.name for field in dataclasses.fields(Scene)]
-        store(self, scene=Scene(**{name: getattr(self, name) for name in names}))
+        given = {name: getattr(self, name) for name in names}
+        if self.mesh:
+            if self.stages:
+                refuse(self, "stages", self.stages, "none beside a [mesh]; Frame.scene(loads, stages=...) has both")
+            given |= {name: self.mesh.everywhere(given[name]) for name in ("supports", "loads", "velocities")}
+            for name in ("rods", "joints", "supports"):
+                given[name] = [*getattr(self.mesh.frame, name), *given[name]]
+        store(self, scene=Scene(**given))
 
     @property
     def settings(self) -> dict[str, Any]:

@@ -1,14 +1,19 @@
 """Frames: straight rods between points, joined where they meet, from arrays or from a file with a mesh of lines."""
 
+import copy
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from os import PathLike
+from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 
-from cosserat_fenicsx.checks import File, Numbers, Rows, finite_array
+from cosserat_fenicsx.checks import File, Numbers, Rows, finite_array, refuse, store
 from cosserat_fenicsx.errors import SceneError, nearest
+from cosserat_fenicsx.parts import FileName, Part, Several, positive
 from cosserat_fenicsx.scene.curves import Line
 from cosserat_fenicsx.scene.profiles import Section
 from cosserat_fenicsx.scene.rod import Rod, Station
@@ -75,6 +80,12 @@ class Frame:
         if group not in self._rods_of:
             raise SceneError(f"Frame.rods_in: no rods are in the group {group!r}: {_known(group, self._rods_of)}")
         return tuple(rod for rod, belongs in zip(self.rods, self._rods_of[group], strict=True) if belongs)
+
+    def places_of(self, kind, name):
+        """The stations of the points ("station"), or the rods ("rod"), that a mesh gives this name; none has it: ()."""
+        if kind == "station":
+            return [self.at(int(k)) for k in self._points_of.get(name, ())]
+        return self.rods_in(name) if name in self._rods_of else ()
 
     @cached_property
     def _ends(self):
@@ -329,3 +340,68 @@ def _known(name, known):
     if not known:
         return "the mesh names none"
     return nearest(name, [str(x) for x in known])
+
+
+@dataclass(frozen=True)
+class MeshGroup(Part):
+    """The section and the material of the lines of a group of a mesh.
+
+    Args:
+        name: of the group, or its number. section: of its rods. material: None for that of the mesh.
+    """
+
+    name: str | int
+    section: Section
+    material: Material | None = None
+
+
+@dataclass(frozen=True)
+class Mesh(Part):
+    """Straight rods along the lines of a mesh, in a scene file. They are called "rod0", "rod1" and so on.
+
+    Args:
+        file: the mesh, beside the scene file.
+        section, material: of all rods, or of the groups that name none.
+        groups: a section for each group of lines, instead of one `section`.
+        clamped, pinned, hinged: names of points, a text or a list. scale, d1: as for `frame_from`.
+
+    Attributes:
+        frame: the `Frame`.
+
+    Raises:
+        SceneError: see `frame_from`.
+    """
+
+    file: Annotated[File, FileName()]
+    section: Section | None = None
+    material: Material | None = None
+    groups: Sequence[MeshGroup] = ()
+    clamped: str | Sequence[str] = ()
+    pinned: str | Sequence[str] = ()
+    hinged: str | Sequence[str] = ()
+    scale: Annotated[float, positive()] = 1.0
+    d1: Annotated[tuple, Several()] | None = None
+
+    called = "mesh"
+
+    def validate(self):
+        if (self.section is None) == (not self.groups):
+            refuse(self, "section", self.section, "either a section of all rods, or groups with a section each")
+        store(self, file=str(Path(self.file).absolute()))
+        section = {group.name: group.section for group in self.groups} or self.section
+        material = {group.name: group.material or self.material for group in self.groups} or self.material
+        held = {name: getattr(self, name) for name in ("clamped", "pinned", "hinged", "scale", "d1")}
+        store(self, frame=frame_from(self.file, section, material, **held))
+
+    def everywhere(self, items):
+        """Loads, supports or velocities; one whose station or rod is a name of the mesh at each place of that name: at
+        the first in its own place of the list, which messages count by, at the others behind all."""
+        found, more = list(items), []
+        for i, item in enumerate(items):
+            key = next((key for key in ("station", "rod") if isinstance(getattr(item, key, None), str)), None)
+            places = self.frame.places_of(key, getattr(item, key)) if key else ()
+            copies = [copy.copy(item) for _ in places]
+            for one, place in zip(copies, places, strict=True):
+                store(one, **{key: place})
+            found[i], more = [*copies, item][0], [*more, *copies[1:]]
+        return found + more

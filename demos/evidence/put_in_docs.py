@@ -50,8 +50,8 @@ ALONE = {
     "work_precision": ("Speed against accuracy: all times",),
     "cosseratbench": ("The scenarios of cosseratbench",),
 }
-#: The pictures of the gallery, by the files of the scenes.
-GALLERY = [f"{file.stem}.png" for file in sorted((ROOT / "demos").glob("**/*.toml"))]
+#: The pictures of the gallery: of `make heap`, and by the files of the scenes.
+GALLERY = ["heap.png", *(f"{file.stem}.png" for file in sorted((ROOT / "demos").glob("**/*.toml")))]
 #: The pictures that recipes write, as their pages show them.
 RECIPES = {
     picture: f"{page.stem.removeprefix('recipes_')}/{picture}"
