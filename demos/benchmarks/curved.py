@@ -119,7 +119,8 @@ def bend_kynema():
 @problem(
     "Composite cantilever",
     "statics",
-    "Q. Wang et al., Wind Energy 20 (2017) 1439 (BeamDyn); kynema/kynema, static_composite_beam_bending.cpp (public)",
+    "Q. Wang et al., Wind Energy 20 (2017) 1439, doi:10.1002/we.2101 (BeamDyn); kynema/kynema, "
+    "static_composite_beam_bending.cpp (public)",
     "L = 10, full 6 x 6 stiffness with bend-twist coupling, tip force 150 across",
 )
 def composite_cantilever():
@@ -137,7 +138,8 @@ def composite_cantilever():
 @problem(
     "Twisted cantilever",
     "statics",
-    "Q. Wang et al., Wind Energy 20 (2017) 1439 (BeamDyn); kynema/kynema, static_twisted_composite_beam_bending.cpp "
+    "Q. Wang et al., Wind Energy 20 (2017) 1439, doi:10.1002/we.2101 (BeamDyn); kynema/kynema, "
+    "static_twisted_composite_beam_bending.cpp "
     "(public)",
     "L = 10, twisted by 90 degrees, EA = 2.5e10, GA = 8.2604167e9, GJ = 1.41872656e8, EI = 5.20833e8 and "
     "1.30208333e8, tip force -4e6",
@@ -242,7 +244,8 @@ def helical_roll_up():
 @problem(
     "A ring that folds into three coils",
     "statics",
-    "Y. Goto, Y. Watanabe, T. Kasugai & M. Obata, Int. J. Solids Struct. 29 (1992) 893: a third of the radius at half "
+    "Y. Goto, Y. Watanabe, T. Kasugai & M. Obata, Int. J. Solids Struct. 29 (1992) 893, "
+    "doi:10.1016/0020-7683(92)90024-N: a third of the radius at half "
     "a turn",
     "as in demos/folding_ring.toml: R = 20, section 1 x 1/3, E = 2.1e7, nu = 0.3, two opposite points turned by pi "
     "each",

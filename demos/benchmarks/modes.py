@@ -89,7 +89,8 @@ def huang(EI, GA, mass, J, guess):
 @problem(
     "Thick beams, pinned and clamped",
     "motion",
-    "Timoshenko, Phil. Mag. 41 (1921) 744; Huang, J. Appl. Mech. 28 (1961) 579: frequency equations",
+    "Timoshenko, Phil. Mag. 41 (1921) 744, doi:10.1080/14786442108636264; Huang, J. Appl. Mech. 28 (1961) 579: "
+    "frequency equations",
     "pinned: height L/10, nu = 0.3, shear factor 5/6; clamped-free: EI 2, GA 3e4, 1.5 kg/m, rotary inertia 1e-4 kg m",
 )
 def timoshenko_beams():
