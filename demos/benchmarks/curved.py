@@ -48,8 +48,8 @@ def bend_45():
         path = last = cf.solve(held(rod, cf.Force(rod.end, (0, 0, 600.0))), list(truth), tol=1e-8)
         place, error = path.position(rod.end), moved(path)
         rows += [
-            Row(f"tip at 300, 450, 600, {name}, strong form", exact[:, :3].ravel(), place.ravel(), error.repeat(3), 1e-6,
-                "tol = 1e-8"),
+            Row(f"tip at 300, 450, 600, {name}, strong form", exact[:, :3].ravel(), place.ravel(), error.repeat(3),
+                1e-6, "tol = 1e-8"),
             Row(f"angle of the tip, rad, {name}, strong form", exact[:, 3], path.rotation_angle(rod.end), turned(path),
                 1e-8, "tol = 1e-8"),
         ]  # fmt: skip
@@ -111,8 +111,8 @@ def bend_kynema():
     ):
         rod = cf.Rod(curve, section)
         path = cf.solve(held(rod, cf.Force(rod.end, (0, 0, 600.0))), [1.0], tol=1e-9)
-        rows.append(Row(f"displacement of the tip{name}", printed, path.displacement(rod.end)[0], moved(path, 0), allowed,
-                        because))  # fmt: skip
+        found = path.displacement(rod.end)[0]
+        rows.append(Row(f"displacement of the tip{name}", printed, found, moved(path, 0), allowed, because))
     return rows, path.plot
 
 

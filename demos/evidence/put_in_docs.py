@@ -7,7 +7,8 @@
 
 A table replaces what stands between <!-- name --> and <!-- /name --> in a page of docs/; one that is too long for that
 has a page of its own in docs/tables/. Pictures are cut to what is drawn, reduced to few colours and put in
-docs/pictures/, those for pages of 400 pixels, which demos write beside them (pictures/charts.py), in its folder narrow/.
+docs/pictures/; those for pages of 400 pixels, which demos write beside them (pictures/charts.py), in its folder
+narrow/.
 """
 
 import argparse
@@ -97,14 +98,16 @@ LARGE = {"failures.png": (1380, 1380)}
 
 
 def kept(picture, file, most=(WIDTH, WIDTH), colours=COLOURS):
-    """Write the picture (.png) as the documentation keeps it: without white margins, at most 1100 pixels wide and high, or
-    `most` (width, height)."""
+    """Write the picture (.png) as the documentation keeps it: without white margins, at most 1100 pixels wide and high,
+    or `most` (width, height). Neighbouring colours of the palette are mixed, else bars of colours have bands."""
     image = Image.open(picture).convert("RGB")
     rows, columns = np.nonzero((np.asarray(image) < 250).any(axis=2))
     box = columns.min() - MARGIN, rows.min() - MARGIN, columns.max() + MARGIN, rows.max() + MARGIN
     image = image.crop((max(box[0], 0), max(box[1], 0), min(box[2], image.width), min(box[3], image.height)))
     image.thumbnail(most, Image.Resampling.LANCZOS)
-    image.quantize(colours, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE).save(file, "PNG", optimize=True)
+    palette = image.quantize(colours, Image.Quantize.FASTOCTREE)
+    palette.putpalette([255 if value > 252 else value for value in palette.getpalette()])  # white is kept white
+    image.quantize(palette=palette, dither=Image.Dither.FLOYDSTEINBERG).save(file, "PNG", optimize=True)
 
 
 def main(names, out="out", docs=ROOT / "docs"):
