@@ -64,6 +64,7 @@ def test_springs_hold_a_rod_and_each_model_agrees():
     assert found["planar"] > math.pi / 2
 
 
+@pytest.mark.serial
 def test_a_spring_beyond_half_a_turn():
     """The moment of a rotational spring stays proportional to the angle beyond pi, in every model."""
     stiff = cf.Stiffness(shear=(1e7, 1e7), axial=1e7, bending=(1e6, 1e6), torsion=1e6)
@@ -152,6 +153,7 @@ def wall_forces(path):
     return (density * path.rule.lobatto * sizes[:, None]).ravel(), places.ravel()
 
 
+@pytest.mark.serial
 @pytest.mark.parametrize("case", [1, 3])
 def test_a_bottom_hole_assembly_lies_on_the_wall(case):
     """Pipe in a straight inclined hole: bit force and tangency length by
@@ -212,6 +214,7 @@ TANGENT, ACROSS = np.array([1, 2, 2]) / 3, np.array([2, 1, -2]) / 3
 SCHEMES = ("momentum", "energy", "generalised-alpha")
 
 
+@pytest.mark.serial
 def test_across_and_along():
     """A force on the middle of a free rod: the acceleration is F/(m L) along it and F/((m + m_a) L) across it."""
     for axial in (False, True):
@@ -228,6 +231,7 @@ def test_across_and_along():
                 np.testing.assert_allclose(p, 3 * (2.0 * TANGENT + 5.0 * ACROSS), rtol=1e-9)
 
 
+@pytest.mark.serial
 def test_an_eccentric_rod_with_masses_on_its_axis():
     """Free, with the added mass and a point mass on the axis: energy and momenta as of the single bodies, and kept."""
     rod = cf.Rod(BAR.curve, HEAVY, eccentricity=(0.1, -0.05))
@@ -271,6 +275,7 @@ def test_frequencies_in_a_fluid():
     )
 
 
+@pytest.mark.serial
 def test_drag_stops_a_rod():
     """m v' = -c v, across and along."""
     v = 2.0 * TANGENT + 5.0 * ACROSS
@@ -282,6 +287,7 @@ def test_drag_stops_a_rod():
         assert np.abs(history.balance).max() < 1e-3 * history.energy[0]
 
 
+@pytest.mark.serial
 def test_the_mud_around_a_collar():
     steel = cf.Material(206e9, 0.3, density=7850.0)
     line, mud = cf.Line((0, 0, 0), (0, 0, 12)), cf.well.Mud(1200.0, added_mass=1.7, drag=283.0)
@@ -314,13 +320,14 @@ REFUSED = {
 }  # fmt: skip
 
 
-test_what_is_refused = refuses(REFUSED)
+test_what_is_refused = pytest.mark.serial(refuses(REFUSED))
 
 
 SLIM = cf.Stiffness((1e6, 1e6), 1e6, (1.0, 1.0), 0.8, mass=1.0, inertia=(1e-8, 1e-8, 2e-8))
 BEAM = cf.Rod(cf.Line((0, 0, 0), (1.0, 0, 0)), SLIM, name="beam")
 
 
+@pytest.mark.serial
 def test_permanent_loads_come_first():
     """Weight first, then the end force: the path begins under the
     weight, and ends where both applied together would."""
@@ -341,6 +348,7 @@ def test_permanent_loads_come_first():
     assert path.model == "spatial" and "determinate" in cf.solve(scene, [1.0]).model
 
 
+@pytest.mark.serial
 def test_loads_that_change_along_a_rod(tmp_path):
     """A triangular load q s/L on a cantilever: 11 q L^4/(120 EI), by a function, a table, a file; and pieces."""
     q = 1e-3
@@ -460,6 +468,7 @@ class Pressure(cf.LineAction):
         )
 
 
+@pytest.mark.serial
 def test_data_that_follow_the_position():
     """A quarter of a ring, expanded by a pressure p against a round
     wall: p - EA u/R^2 = kp (u - clearance) for u << R."""
@@ -571,6 +580,7 @@ def test_a_memory_of_velocities(scheme):
     assert history.displacement(FREE.at(0.5))[-1, 0] == pytest.approx((1 - np.exp(-c)) / c, abs=2 * c * dt)
 
 
+@pytest.mark.serial
 def test_motions_without_a_place_for_memory():
     scene = cf.Scene([FREE], [], [Slider(FREE.end, 100.0, 1.0)])
     with pytest.raises(cf.SceneError, match="steps back in time: expected actions without memory"):
@@ -598,6 +608,7 @@ def test_no_peak_of_a_long_table_is_missed(rows, peak):
         assert path.force(rod.start)[0, 2] == pytest.approx(F, rel=1e-6)
 
 
+@pytest.mark.serial
 def test_a_function_may_change_between_calls():
     size = [1e-3]
     scene = cf.Scene([BEAM], [cf.Clamp(BEAM.start)], [cf.LineForce(BEAM, cf.signals.Along(lambda s: (0, 0, size[0])))])
@@ -606,6 +617,7 @@ def test_a_function_may_change_between_calls():
     assert cf.solve(scene, [1.0], elements=4).displacement(BEAM.end)[0, 2] == pytest.approx(2 * first, rel=1e-6)
 
 
+@pytest.mark.serial
 def test_what_ufl_tells():
     station = BEAM.end
     told = {
@@ -649,6 +661,7 @@ def test_what_ufl_tells():
     assert not traits_of(Sideways(station), [BEAM]).turns
 
 
+@pytest.mark.serial
 def test_a_load_from_a_file_beside_its_scene(tmp_path):
     scene = cf.Scene([BEAM], [cf.Clamp(BEAM.start)], [cf.LineForce(BEAM, (0, 0, 1.0), permanent=True)])
     cf.write(scene, tmp_path / "scene.toml")
@@ -660,6 +673,7 @@ def test_a_load_from_a_file_beside_its_scene(tmp_path):
     assert cf.read(tmp_path / "scene.toml").scene.loads[0].force == cf.signals.AlongTable(tmp_path / "load.csv")
 
 
+@pytest.mark.serial
 def test_units_of_data_are_what_their_names_say():
     """Powers of force, length and time: kg is N s^2/m."""
     base = {

@@ -19,6 +19,7 @@ def sheared(euler, GA):
     return GA / 2 * (np.sqrt(1 + 4 * euler / GA) - 1)
 
 
+@pytest.mark.serial
 @pytest.mark.parametrize("EA, GA", [(np.inf, 20.0), (1e3, 400.0), (20.0, 20.0)])
 def test_shear_counts(EA, GA):
     """Against P (1 + P/GA) = P_Euler. For infinite EA `solve` finds the same events;
@@ -35,6 +36,7 @@ def test_shear_counts(EA, GA):
     assert abs(near - exact) <= max(0.2 * abs(found.load_factors[0] - exact), 1e-6)
 
 
+@pytest.mark.serial
 def test_the_error_bar_holds_what_both_meshes_have_in_common():
     """Infinite stiffnesses are bounded: a propped column, (4.4934)^2 and twice that, at two tolerances."""
     rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, 1.0)), cf.Stiffness((np.inf, np.inf), np.inf, (1.0, 2.0), 1.0))
@@ -109,6 +111,7 @@ def test_critical_loads_of_slender_frames_scatter_little():
     assert np.ptp(found) < 1e-6 * found.mean()
 
 
+@pytest.mark.serial
 @pytest.mark.parametrize("held", ["clamped", "hinged"])
 def test_rounding_of_slender_columns_is_small_and_told(held):
     """L/d from 10^2 to 10^5 against Engesser's load with EA and GA, to first order in P/EA; EA L^2/EI is 10^11.
@@ -127,6 +130,7 @@ def test_rounding_of_slender_columns_is_small_and_told(held):
         assert off < 2e-9 and 0.8 * off <= found.error[0] < 2e-8, (slender, off, found.error)
 
 
+@pytest.mark.serial
 def test_rounding_of_a_slender_column_at_a_spring_or_under_load():
     """A spring at the top, which acts in full at the load factor 0: tan a = a - a^3/k with P = a^2, again without shear
     at L/d = 10^5. About a loaded state contact forces are rounded by eps EA: that is told, or refused; P + P^2/GA =
@@ -268,6 +272,7 @@ def test_becks_column(load_factor):
     assert not found.conservative and len(found.load_factors) == 0 and found.bound == pytest.approx(np.pi**2, rel=1e-4)
 
 
+@pytest.mark.serial
 def test_a_blade_under_a_moment_about_its_normal():
     """As a cantilever it has no static bifurcation; between forks that prevent its twist it buckles at M = pi sqrt(EI
     GJ).
@@ -303,6 +308,7 @@ CONSERVATIVE = {
 }  # fmt: skip
 
 
+@pytest.mark.serial
 @pytest.mark.parametrize("case", CONSERVATIVE)
 def test_loads_with_a_potential(case):
     """Determined from the virtual work on the motions that the supports allow, not from the classes of loads."""
@@ -317,6 +323,7 @@ def test_loads_with_a_potential(case):
         assert found.bound == pytest.approx(exact, rel=1e-5)
 
 
+@pytest.mark.serial
 @pytest.mark.slow
 def test_paths_and_vibrations_say_so_too():
     """For motions in space, whichever model computed the path."""
@@ -510,6 +517,7 @@ def test_a_wire_that_hangs_as_an_arc(diameter, held):
     assert drop == pytest.approx(-sag, rel=2e-3)
 
 
+@pytest.mark.serial
 def test_a_moment_that_a_support_takes_buckles_nothing():
     """Rounding of the contact forces gave factors of 1e5 to 1e22, different on each mesh, and no convergence."""
     points = np.array([(i, j, 0.0) for i in range(3) for j in range(3)])

@@ -27,6 +27,7 @@ def test_default_settings_meet_their_tolerance(reference):
     assert (path.error <= 1e-6).all()
 
 
+@pytest.mark.serial
 def test_turning_arm(reference):
     """Beyond the reference file against `analytic`, a quadrature of the strong form."""
     etas = [eta for eta in ETAS if reference[eta]["eccentric_arm_delta"]]
@@ -93,6 +94,7 @@ def test_roll_up_closes(turns, elements):
     assert np.linalg.norm(path.position(rod.end)) < 1e-6 * rod.length
 
 
+@pytest.mark.serial
 def test_landing_again_lower_and_at_zero_retraces_the_path():
     rod, scene = column()
     path = cf.solve(scene, [0.0, 0.9, 1.2, 0.9, 0.0, 1.2, 1.2, -0.5, 0.9], elements=8)
@@ -102,6 +104,7 @@ def test_landing_again_lower_and_at_zero_retraces_the_path():
     assert path.stable.all() and path.iterations.sum() < 250
 
 
+@pytest.mark.serial
 def test_hanging_under_its_own_weight():
     """The stretch rho g L^2/(2E), and the contact force at the upper end."""
     rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, -20.0)), cf.Circle(0.2), STEEL)
@@ -309,6 +312,7 @@ def test_against_the_strong_form(name):
             np.testing.assert_allclose(fields[field][i], exact[field], atol=2e-6 * size)
 
 
+@pytest.mark.serial
 def test_force_just_beyond_an_interior_load():
     """A force at mid-span: n is F before and 0 after it, from the next element on."""
     rod = cf.Rod(cf.Line((0, 0, 0), (10.0, 0, 0)), cf.Circle(0.2), STEEL)
@@ -317,6 +321,7 @@ def test_force_just_beyond_an_interior_load():
         assert path.force(rod.at(s))[0, 2] == pytest.approx(expected, abs=1e-3), s
 
 
+@pytest.mark.serial
 def test_self_weight_column():
     """q L^3/EI = 7.8373474 (Greenhill)."""
     section = cf.Stiffness(shear=(1e7, 1e7), axial=1e7, bending=(1.0, 1.5), torsion=0.5, mass=7.8373474 / 9.81)
@@ -339,6 +344,7 @@ def test_nearly_perfect_columns_stay_on_the_branch_of_their_tilt(weak, tilt):
         assert path.stable[0] and path.displacement(rod.end)[0, 1] > 0.1, load
 
 
+@pytest.mark.serial
 @pytest.mark.parametrize("loads", [pytest.param(0, marks=pytest.mark.serial), 7])
 @pytest.mark.parametrize("degree, tol", [(2, 1e-5), (3, 1e-6), (4, 1e-6)])
 def test_the_estimate_covers_the_error_everywhere(degree, tol, loads):
@@ -358,6 +364,7 @@ def test_the_estimate_covers_the_error_everywhere(degree, tol, loads):
         assert error <= max(path.error[k], 1e-12) <= tol
 
 
+@pytest.mark.serial
 @pytest.mark.parametrize("formulation", ["displacement", "multiplier"])
 def test_every_formulation_recovers_the_force_in_equilibrium(formulation):
     rod = cf.Rod(cf.Line((0, 0, 0), (3.0, 4.0, 12.0)), cf.Rectangle(0.3, 0.4), STEEL)
@@ -403,6 +410,7 @@ def test_a_wire_drawn_straight(diameter, move):
     assert path.stable.all() and path.displacement(rod.at(55.0))[0, 2] == pytest.approx(-sag, rel=5e-5)
 
 
+@pytest.mark.serial
 @pytest.mark.parametrize("control", ["load", "arc"])
 def test_what_is_advised_helps(control):
     """The first step must be smaller than allowed; and there is no warning about the units."""

@@ -135,6 +135,7 @@ def test_a_rotor_with_damping_inside_and_outside():
     assert found.kind.tolist() == ["flutter"] and not found.stable and found.whirl(0) == 1
 
 
+@pytest.mark.serial
 def test_what_modes_refuse():
     rod, clamp = cantilever()
     for loads, more, words in (
@@ -157,6 +158,7 @@ def test_what_modes_refuse():
         cf.campbell(cf.Scene([rod], [clamp], [cf.Centrifugal((0, 0, 1.0))]), [-1.0])
 
 
+@pytest.mark.serial
 def test_free_motions_and_their_decay_are_found_as_such():
     """A free rod has six motions for nothing; with drag each of them decays, too."""
     for drag, kinds in ((0.0, ["free"] * 6 + ["oscillates"]), (0.1, ["free"] * 6 + ["overdamped"])):
@@ -165,6 +167,7 @@ def test_free_motions_and_their_decay_are_found_as_such():
         assert found.kind.tolist() == kinds and found.eigenvalues[:6].tolist() == [0j] * 6
 
 
+@pytest.mark.serial
 def test_slow_decay_is_no_free_motion_and_free_motions_are_not_nearer_than_others():
     """l^2 + c l + w^2 = 0 with a strong drag, whose small root is about -w^2/c."""
     for drag in (1e4, 1e6):
@@ -177,6 +180,7 @@ def test_slow_decay_is_no_free_motion_and_free_motions_are_not_nearer_than_other
     assert cf.modes(cf.Scene([rod]), 2, near=0, elements=2).kind.tolist() == ["free"] * 2
 
 
+@pytest.mark.serial
 def test_a_tendon_and_a_free_spin_in_complex_modes():
     """Without anything that damps, complex modes are the undamped ones."""
     rod, clamp = cantilever((1.0, 1.5), J=1e-4)
@@ -190,6 +194,7 @@ def test_a_tendon_and_a_free_spin_in_complex_modes():
         assert found.negative_modes == plain.negative_modes == 0
 
 
+@pytest.mark.serial
 def test_modes_are_followed_from_free_ones():
     """A rod hinged on the axis of its rotation: free at rest, it flaps with the rate of the rotation."""
     rod, _ = cantilever()
@@ -199,6 +204,7 @@ def test_modes_are_followed_from_free_ones():
     np.testing.assert_allclose([x.eigenvalues.imag[0] for x in found.modes], found.rates, atol=1e-4)
 
 
+@pytest.mark.serial
 @pytest.mark.parametrize("damped", [False, True])
 def test_the_error_covers_the_bounds_in_place_of_infinite_stiffnesses(damped):
     """A cantilever without shear: cos x cosh x = -1."""

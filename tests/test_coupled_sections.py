@@ -65,6 +65,7 @@ def test_a_moment_along_an_eigenvector_bends_to_a_helix(model, formulation):
     np.testing.assert_allclose(fields["strain"], np.tile(strains, (len(fields["s"]), 1)), atol=1e-6)
 
 
+@pytest.mark.serial
 def test_small_bending_twists_and_shears():
     """Linear theory: curvature and strain are linear in s; displacement and rotation of the tip are their integrals."""
     M = random_matrix(1)
@@ -84,6 +85,7 @@ def test_small_bending_twists_and_shears():
     assert abs(theta[2]) > 0.05 * np.abs(theta).max()
 
 
+@pytest.mark.serial
 def test_a_rope_unwinds_under_tension():
     """n3 = EA e + c k, m3 = c e + GJ k; its end is free to rotate, or held by a support or by a moment."""
     EA, GJ, c, F = 900.0, 0.8, 12.0, 40.0
@@ -131,6 +133,7 @@ def test_a_line_off_the_centroid_is_a_shifted_rod(model, formulation):
     np.testing.assert_allclose(fa["strain"], stretched, atol=1e-6)
 
 
+@pytest.mark.serial
 @pytest.mark.slow
 @pytest.mark.parametrize("load", [cf.Force, cf.FollowerForce])
 @pytest.mark.parametrize("formulation", ["mixed", "displacement"])
@@ -165,6 +168,7 @@ def test_critical_loads_of_turned_principal_axes():
     np.testing.assert_allclose(found, np.array(expected), rtol=0.02)  # shear and shortening
 
 
+@pytest.mark.serial
 def test_a_tapered_matrix_has_the_euler_load_of_its_principal_axes():
     plain, turned = (
         cf.Rod(cf.Line((0, 0, 0), (0, 0, L)), lambda s, angle=angle: cf.Stiffness.offset(
@@ -176,6 +180,7 @@ def test_a_tapered_matrix_has_the_euler_load_of_its_principal_axes():
     assert [cf.euler_load(plain), cf.euler_load(turned)] == pytest.approx([expected] * 2, rel=1e-12)
 
 
+@pytest.mark.serial
 def test_infinite_stiffness_beside_a_matrix():
     """Another rod of the scene may be rigid against stretch and shear; the contact force is an unknown then."""
     tips = []
@@ -203,6 +208,7 @@ def test_rotating_the_scene_turns_the_answer():
         np.testing.assert_allclose(a, b, atol=1e-10)
 
 
+@pytest.mark.serial
 @pytest.mark.parametrize("model", ["determinate", "spatial"])
 def test_negative_modes_of_a_column_off_its_line(model):
     """Compressed through its centroid it stays straight, for any offset of its line; it buckles about both axes."""
@@ -218,6 +224,7 @@ def test_negative_modes_of_a_column_off_its_line(model):
     assert path.negative_modes.tolist() == [0, 1, 2, 3, 4]
 
 
+@pytest.mark.serial
 @pytest.mark.parametrize("tension", [1e4, 1e7])
 def test_a_taut_wire_off_its_line_has_no_negative_modes(tension):
     """T L^2/EI is far above the usual bound of K in the second variation."""
@@ -277,6 +284,7 @@ def damped(**damping):
         yield cf.Rod(rod.curve, rod.section, name="rod", damping=cf.Damping(**damping))
 
 
+@pytest.mark.serial
 @pytest.mark.slow
 @pytest.mark.parametrize("scheme", ["momentum", "energy", "generalised-alpha"])
 def test_turned_principal_axes_move_as_turned_directors(scheme):

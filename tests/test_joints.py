@@ -97,6 +97,7 @@ def test_ranks_agree_on_branching_structures(release):
         np.testing.assert_allclose(together.force(rod.start), alone.force(rod.start), atol=1e-7)
 
 
+@pytest.mark.serial
 def test_number_of_unknowns():
     """The shared node counts once; nodes have seven unknowns; a hinge adds five equations."""
     _, rigid, elements = star()
@@ -124,6 +125,7 @@ def test_a_closed_ring(elements):
     assert np.linalg.norm(path.displacement(far)) > 0.3
 
 
+@pytest.mark.serial
 def test_apart():
     a, b, c = (line(*ends, name) for ends, name in (
         (((0, 0, 0), (1, 0, 0)), "a"), (((1, 0, 1e-3), (2, 0, 0)), "b"), (((1, 0, 0), (2, 0, 0)), "c")))  # fmt: skip
@@ -143,6 +145,7 @@ def test_apart():
             make()
 
 
+@pytest.mark.serial
 def test_every_pair_of_three_rods_may_be_joined():
     rods = [line((0, 0, 0), tip, f"r{i}") for i, tip in enumerate([(0, 0, -1.0), (1.0, 0, 0.3), (-0.4, 0.9, 0.5)])]
     pairs = [(0, 1), (1, 2), (2, 0)]
@@ -243,6 +246,7 @@ def test_infinite_stiffness_between_supports():
     assert path.stable.all()
 
 
+@pytest.mark.serial
 def test_follower_loads_are_dead_loads_where_they_end_up():
     rod = bow()
     force, moment = (0.9, -0.4, 0.6), (0.2, 0.3, -0.5)
@@ -254,6 +258,7 @@ def test_follower_loads_are_dead_loads_where_they_end_up():
     assert not any("flutter" in sentence for sentence in dead.why)
 
 
+@pytest.mark.serial
 def test_line_moment_bends_without_force():
     """m' = -mu, n = 0: the angle is mu (L s - s^2/2)/EI."""
     rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, 1.0)), SECTION)
@@ -263,6 +268,7 @@ def test_line_moment_bends_without_force():
     np.testing.assert_allclose(path.moment(rod.at(0.3))[-1], [0, 4.0 * 0.7, 0], atol=1e-9)
 
 
+@pytest.mark.serial
 def test_weight_is_a_line_force_on_every_rod():
     rods = [bow(), cf.Rod(cf.Line((0, 0, 0), (1.0, 0, 0)), SECTION)]
     clamps = [cf.Clamp(rod.start) for rod in rods]
@@ -275,6 +281,7 @@ def test_weight_is_a_line_force_on_every_rod():
     assert np.abs(one.displacement(rods[0].end)).max() < 1e-13
 
 
+@pytest.mark.serial
 def test_refusals():
     rod, other = bow(), cf.Rod(cf.Line((0, 0, 0), (1, 0, 0)), SECTION, name="other")
 
@@ -309,6 +316,7 @@ def test_refusals():
             case()
 
 
+@pytest.mark.serial
 def test_a_small_rod_beside_a_large_one_keeps_its_stability():
     """Penalties of its supports are relative to its own stiffness, not to that of a long wire in the same scene."""
     steel = cf.Material(E=210e9, nu=0.3)
@@ -322,6 +330,7 @@ def test_a_small_rod_beside_a_large_one_keeps_its_stability():
     assert path.stable.all()
 
 
+@pytest.mark.serial
 def test_what_is_not_determined_is_said_in_words():
     rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, 1.0)), cf.Stiffness((np.inf, np.inf), np.inf, (1.0, 1.0), 1.0))
     scene = cf.Scene([rod], [cf.Clamp(rod.start), cf.Pin(rod.end)], [cf.LineForce(rod, (1.0, 0, 0))])
@@ -330,6 +339,7 @@ def test_what_is_not_determined_is_said_in_words():
             cf.solve(scene, [1.0], model=model)
 
 
+@pytest.mark.serial
 def test_one_jump_of_more_than_half_a_turn_is_refused():
     rod = bow()
     scene = cf.Scene([rod], [cf.Clamp(rod.start), cf.Prescribed(rod.end, rotation=(0, 1.0, 0))])
@@ -350,6 +360,7 @@ def test_many_turns_are_not_mistaken_for_fewer(load_factors):
         np.testing.assert_allclose(path.moment(rod.start), expected, atol=1e-5)
 
 
+@pytest.mark.serial
 def test_a_roller_across_the_plane_alone_changes_nothing_in_it():
     """The planar model has then no constraint equation at all."""
     rod, scene = column()

@@ -55,6 +55,7 @@ def test_no_copy_of_a_low_frequency_is_missing(EI):
     assert squares[2] > 30 * squares[1]
 
 
+@pytest.mark.serial
 def test_motions_for_nothing_of_a_very_thin_rod():
     """Length over diameter 1e4: rounding changes the squares of rigid motions by 1e-2 in units of EI/(rho A L^4)."""
     rod = cf.Rod(LINE, cf.Circle(1e-4), cf.Material(1e9, 0.3, 1e3))
@@ -63,6 +64,7 @@ def test_motions_for_nothing_of_a_very_thin_rod():
     assert squares[6] == pytest.approx(4.7300407**4 * 1e9 * (0.5e-4) ** 2 / 4 / 1e3, rel=1e-2)
 
 
+@pytest.mark.serial
 def test_a_column_beyond_its_critical_load_is_unstable():
     """Pinned at both ends: the growth of the mode, and as many negative modes as the path has."""
     section = cf.Stiffness((1e6, 1e6), 1e6, (1.0, 50.0), 10.0, mass=1.0, inertia=(1e-6, 1e-4, 1e-4))
@@ -144,6 +146,7 @@ def test_a_vibration_keeps_its_amplitude_over_a_thousand_periods():
     assert first.times[turns[-1]] == pytest.approx(len(turns) * period, rel=5e-3)
 
 
+@pytest.mark.serial
 def test_a_sagged_cable_whose_mesh_has_short_elements():
     """100 m on two hinges: the boundary layers need elements of 6e-5 of the length, on which pivots of rotations are
     small beside the forces against shear; they are not zero. A permanent weight, and one times a load factor."""
@@ -187,6 +190,7 @@ def test_what_resists_velocities_is_left_out_of_undamped_modes_and_told():
             assert "left out" in text.lower() and told in text.replace("\n", " "), text
 
 
+@pytest.mark.serial
 @pytest.mark.filterwarnings("ignore::cosserat_fenicsx.SceneWarning")
 def test_of_hundreds_of_negative_squares_only_the_lowest_are_looked_for(monkeypatch):
     """E = 210 Pa, meant in GPa: the weight buckles the rod at every node, and all these modes took minutes."""

@@ -106,6 +106,7 @@ def test_the_file_holds_supports_and_loads():
     np.testing.assert_allclose(states[0, :, :3], rest, atol=1e-6)
 
 
+@pytest.mark.serial
 def test_the_factor_of_displacements_is_checked(viewed, tmp_path_all):
     with pytest.raises(cf.SceneError, match="write.magnify = 0: expected"):
         viewed.write(tmp_path_all / "rod.html", magnify=0)

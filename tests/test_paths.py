@@ -89,6 +89,7 @@ def test_limit_points_in_closed_form(control):
     assert np.isfinite(shown[: limits[1]]).all() and (np.diff(shown[: limits[1]]) > 0).all()
 
 
+@pytest.mark.serial
 def test_load_control_alone_says_what_it_met():
     _, scene, load = torsion_pendulum()
     with pytest.raises(cf.NotConverged, match="There may be a limit point.*control='auto'") as refusal:
@@ -214,6 +215,7 @@ def test_a_ring_sways_and_tips():
     np.testing.assert_allclose(there.displacement(top), back.displacement(top) * [1, 1, -1], atol=1e-8)
 
 
+@pytest.mark.serial
 def test_a_closed_branch_is_no_way_to_higher_loads():
     _, _, scene = shallow_arch()
     with pytest.raises(cf.NotConverged, match="the path is closed") as refusal:
@@ -287,6 +289,7 @@ def t_frame(soft, k=1.5):
     )
 
 
+@pytest.mark.serial
 def test_bifurcations_are_neither_lost_nor_found_twice():
     """The lowest mode is that of a soft member until that of another crosses zero: the lowest eigenvalue has a kink."""
     scene = t_frame(0.1)
@@ -298,6 +301,7 @@ def test_bifurcations_are_neither_lost_nor_found_twice():
     np.testing.assert_allclose([e.load_factor for e in fine], [3.410490, 5.058076], rtol=1e-6)
 
 
+@pytest.mark.serial
 @pytest.mark.parametrize(
     "soft", [pytest.param(1e-2, marks=pytest.mark.serial), pytest.param(1e-6, marks=pytest.mark.serial), 1e-10]
 )
@@ -314,6 +318,7 @@ def test_soft_members_hide_no_bifurcation(soft):
     assert [e.load_factor for e in path.events] == pytest.approx([4.493409457909064**2], rel=1e-6)
 
 
+@pytest.mark.serial
 @pytest.mark.parametrize(("apart", "counts"), [(9e-12, False), (2e-11, True)])
 def test_rounding_of_a_column_that_keeps_its_line_is_no_error(apart, counts):
     """Positions of two meshes differ by rounding times a load near that of buckling."""
@@ -367,6 +372,7 @@ def test_an_event_is_not_beyond_the_end_and_of_one_kind():
     lie_between_their_points(path)
 
 
+@pytest.mark.serial
 def test_divergence_under_a_follower_load():
     """A pinned column, loaded at half its height: tan(k/2) = -k/2, P = k^2; indefinite long before if symmetrised."""
     rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, 1.0), d1=(1, 0, 0)), cf.Stiffness((np.inf,) * 2, np.inf, (1.0, 4.0), 1.0))
@@ -425,6 +431,7 @@ def test_what_depends_on_the_mesh_is_told(monkeypatch):
     assert count.startswith("negative modes go from 0 to 1 on the way to the load factor 1.2")
 
 
+@pytest.mark.serial
 def test_events_of_two_meshes_are_compared_kind_by_kind():
     def path(*events):
         listed = [cf.Event(kind, eta, np.zeros((1, 3)), 0) for kind, eta in events]
@@ -470,6 +477,7 @@ def another_motion():
     return cf.simulate(scene, 0.1, **MOTION)
 
 
+@pytest.mark.serial
 def test_calls_within_until():
     """The same signature with twice the eccentricity: sharing one problem gave 15.8724713 m; and a motion."""
     rod, scene = column(eccentricity=0.2)
@@ -482,6 +490,7 @@ def test_calls_within_until():
         np.testing.assert_allclose(path.displacement(rod.end), plain.displacement(rod.end), atol=1e-10)
 
 
+@pytest.mark.serial
 def test_calls_within_a_force():
     """A motion, an equilibrium, and both of them three deep, in a force as a function of time."""
     plain, made = tip_of_motion(rising), []
@@ -524,6 +533,7 @@ def test_results_outlive_their_problem():
     np.testing.assert_array_equal(failure.value.path.displacement(rod.end), expected)
 
 
+@pytest.mark.serial
 def test_warm_calls_make_nothing():
     """Nor do calls that end with a solver's error, or that change to another model."""
     rod, scene = column(eccentricity=0.0)

@@ -54,6 +54,7 @@ def bars(section, force, *, length=10.0, supports=cf.Clamp):
     )  # fmt: skip
 
 
+@pytest.mark.serial
 def test_what_matters_colours_the_rods(solved):
     """Euler's load is the bound between regimes of a beam; a cable is at 100/pi^2 = 10.1 times pi^2 EI/L^2."""
     thin, EI = cf.Circle(0.01), 210e9 * np.pi * 0.01**4 / 64
@@ -106,6 +107,7 @@ def test_tangled_shapes_stand_side_by_side():
         assert (not coloured[first:last].all()) == gap
 
 
+@pytest.mark.serial
 def test_ticks_are_round_and_free_of_rounding():
     """In the units that are asked for."""
 
@@ -130,6 +132,7 @@ def test_ticks_are_round_and_free_of_rounding():
 VIEW = View.of(np.array([[0.0, 0, 0], [10, 0, 5]]), np.array([10.0, 0, 5]), (700, 500))
 
 
+@pytest.mark.serial
 def test_labels_keep_off_each_other_and_off_the_edge():
     labels = Labels(VIEW, [np.linspace(0, 10, 50)[:, None] * [1.0, 0, 0]])
     placed = [labels.near(f"label {i}", np.array([10.0, 0, 0]), np.array([1.0, 0, 0]), size=20) for i in range(60)]
@@ -141,6 +144,7 @@ def test_labels_keep_off_each_other_and_off_the_edge():
         assert a[2] <= b[0] or b[2] <= a[0] or a[3] <= b[1] or b[3] <= a[1]
 
 
+@pytest.mark.serial
 @pytest.mark.parametrize("seed", [9, 11])
 def test_lines_to_labels_do_not_cross(seed):
     """Fourteen labels along a string, on both sides."""
@@ -156,6 +160,7 @@ def test_lines_to_labels_do_not_cross(seed):
             assert not ((shares > 0) & (shares < 1)).all()
 
 
+@pytest.mark.serial
 def test_labels_of_the_lower_end_keep_off_the_string():
     """Five long ones where there is no room beside the end: farther away, not over the string."""
     way = np.array([0.7, 0, -0.7])
@@ -169,6 +174,7 @@ def test_labels_of_the_lower_end_keep_off_the_string():
         assert not ((pixels > (x0, y0)) & (pixels < (x1, y1))).all(axis=1).any()
 
 
+@pytest.mark.serial
 def test_numbers_of_an_axis_are_even():
     """Every n-th one, from that on which leaves most room where another label stands at an end."""
     ticks = [(f"{k:.3f}", np.array([2.0 * k, 0, 0])) for k in range(6)]
@@ -198,6 +204,7 @@ def test_labels_that_are_close_are_all_drawn():
         assert dark[500 - y1 : 500 - y0, x0:x1].sum() > 20
 
 
+@pytest.mark.serial
 def test_loads_are_read_by_their_units():
     rod = cf.Rod(cf.Line((0, 0, 0), (2, 0, 0)), cf.Circle(0.05), STEEL, name="r")
     loads = [
@@ -282,6 +289,7 @@ def test_tubes_are_drawn_around_their_rods():
     assert without_sign(scene, True) == "" and without_sign(scene, False).startswith("TubeWall on r")
 
 
+@pytest.mark.serial
 @pytest.mark.parametrize("lean", [(0, 0, 1), (1, 0, 0), (1, -2, 2)])
 def test_supports_touch_what_they_hold(lean):
     """The sign of a pin reaches into the rod, whether this stands on it, lies on it or leans, seen from a corner."""
@@ -512,6 +520,7 @@ def test_every_mode_has_its_panel(bent, tmp_path):
     assert all(1e-3 < panel.mean() < 0.2 for panel in np.split(vivid, 3, axis=1))
 
 
+@pytest.mark.serial
 def test_a_shape_is_drawn_as_large_as_the_picture_says(bent):
     rod, _, found = bent
     shape = Drawn(found, 0, 0.1)
@@ -526,6 +535,7 @@ def test_a_shape_is_drawn_as_large_as_the_picture_says(bent):
     np.testing.assert_allclose(np.linalg.det(body.directors), 1)
 
 
+@pytest.mark.serial
 def test_a_twist_is_drawn_by_its_rotation():
     strip = cf.Rod(cf.Line((0, 0, 0), (2, 0, 0)), cf.Rectangle(0.2, 0.02), cf.Material(E=210e9, density=7850.0))
     rollers = [cf.Roller(strip.end, axis) for axis in ((0, 1, 0), (0, 0, 1))]

@@ -111,6 +111,7 @@ def test_balance_in_space(formulation):
     assert off_balance(path) < 1e-11
 
 
+@pytest.mark.serial
 @pytest.mark.parametrize("model", ["planar", "spatial"])
 def test_balance_in_a_plane(model):
     path = cf.solve(frame(planar=True), [0.3, 1.0], elements=3, model=model)
@@ -129,6 +130,7 @@ def test_balance_of_a_tree(model, flat):
     assert path.model == model and off_balance(path) < 1e-11
 
 
+@pytest.mark.serial
 def test_tables_tell_reactions():
     path = cf.solve(frame(), [1.0], elements=3, model="spatial")
     told = list(reactions_in_words(path))
@@ -202,6 +204,7 @@ FORCE, BOTH = slice(0, 3), slice(0, 6)
 STEPS = {"dt": 0.02, "elements": 3, "degree": 3}
 
 
+@pytest.mark.serial
 @pytest.mark.slow
 @pytest.mark.parametrize(("scheme", "model"), [("momentum", "planar"), ("momentum", "spatial"), ("energy", "spatial")])
 def test_rate_of_momentum(scheme, model):
@@ -213,6 +216,7 @@ def test_rate_of_momentum(scheme, model):
     assert off_rate(history, FORCE if scheme == "energy" else BOTH) < 1e-9
 
 
+@pytest.mark.serial
 @pytest.mark.parametrize("model", ["planar", "spatial"])
 def test_rate_of_momentum_by_generalised_alpha(model):
     """With rho_inf = 1 the rate of linear momentum is the average of the
@@ -247,6 +251,7 @@ def push_of_wall(displacements, result, clearance, stiffness):
     return -(weights * pressure / np.where(rho, rho, 1.0)) @ away
 
 
+@pytest.mark.serial
 @pytest.mark.slow
 @pytest.mark.parametrize("what", ["bed", "wall"])
 def test_what_acts_along_rods_and_sees_the_state(what):

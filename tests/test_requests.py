@@ -69,6 +69,7 @@ def motions(scene, **more):
     return cf.simulate(scene, 1.0, dt=0.1, **more)
 
 
+@pytest.mark.serial
 @pytest.mark.parametrize("work", [cf.buckling, cf.modes, motions, lambda scene, **more: cf.solve(scene, [1.0], **more)])
 def test_too_many_elements_are_refused_before_the_work(work):
     """With a message, and without allocating memory for all elements."""
@@ -100,6 +101,7 @@ def test_the_command_line_refuses_both(command, more, tmp_path, capsys, monkeypa
     assert re.search(words, capsys.readouterr().err)
 
 
+@pytest.mark.serial
 def test_enormous_loads_and_motions_are_refused_before_the_work():
     steel = cf.Material(E=210e9, nu=0.3, density=7850.0)
     rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, 20.0)), cf.Circle(0.2), steel)

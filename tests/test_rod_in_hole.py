@@ -42,6 +42,7 @@ def built(case, **options):
     )  # fmt: skip
 
 
+@pytest.mark.serial
 @pytest.mark.parametrize("case", KNOWN["stiff build"], ids=lambda case: case["name"])
 def test_a_string_crosses_from_wall_to_wall_of_a_build_section(case):
     answer, given = built(case), case["input"]
@@ -74,6 +75,7 @@ def test_a_frictionless_string_hangs_by_its_tension_and_its_depth():
     assert answer.stretch == pytest.approx(answer.s[-1] * 1.6e5 / 1e12, rel=0.1)
 
 
+@pytest.mark.serial
 @pytest.mark.parametrize("case", KNOWN["bottom-hole assembly"][1:3], ids=["bit", "stabiliser"])
 def test_an_assembly_touches_the_low_side_at_its_tangency(case):
     exact, inc, length = case["exact_kirchhoff"], case["inclination_deg"], 60.0
@@ -188,6 +190,7 @@ def test_two_sections_two_frictions_and_rings():
     assert answer.wall_force == pytest.approx(sum(x.force for x in answer.contacts), rel=1e-3)
 
 
+@pytest.mark.serial
 def test_a_string_on_the_axis_has_no_twist_and_no_jump_of_its_quaternion():
     path = cf.well.WellPath.from_survey([0, 100, 400, 700], [0, 30, 170, 20], [0, 0, 90, 300])
     rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, 700)), PIPE)
@@ -271,6 +274,7 @@ def test_a_string_of_several_rods_is_the_same():
     assert np.abs(lines[0] - lines[1]).max() < 1e-9
 
 
+@pytest.mark.serial
 def test_side_force_and_moment_on_a_coarse_mesh():
     """They are near to those of a fine mesh, which the wall's forces at the nodes are not, and the estimates are above
     their errors."""
@@ -291,6 +295,7 @@ def test_side_force_and_moment_on_a_coarse_mesh():
     assert coarse.side_force @ coarse.node_length == pytest.approx(coarse.node_force.sum(), rel=1e-12)
 
 
+@pytest.mark.serial
 def test_changes_that_are_small_by_chance_are_not_believed():
     """Three meshes: the last change is 1e-9, the one before 1e-4; the wall's softness is known from the first one."""
     scales, rounding = dict.fromkeys(NAMES, 2.0), dict.fromkeys(NAMES, 0.0)

@@ -34,6 +34,7 @@ def same(found, truth, tolerance):
                 )
 
 
+@pytest.mark.serial
 @pytest.mark.parametrize("seed", [None, pytest.param(1, marks=pytest.mark.serial)])
 @pytest.mark.parametrize("name", SCENES)
 def test_rungs_agree(name, seed):
@@ -106,6 +107,7 @@ def test_number_of_ranks_changes_nothing(name):
             same(together, alone, 1e-9)
 
 
+@pytest.mark.serial
 @pytest.mark.parametrize("model", ["determinate", "planar", "spatial"])
 def test_a_perfect_round_column_loses_two_motions_at_once(model):
     """One in the plane and one out of it; planar models count both."""
@@ -123,6 +125,7 @@ def test_lateral_buckling_is_seen_in_the_plane(model, rigid):
     assert path.model == model and path.negative_modes.tolist() == [0, 0, 1, 1]
 
 
+@pytest.mark.serial
 def test_supports_count_out_of_the_plane_too():
     """A strip that would buckle sideways on a pin, but not on a hinge about the normal."""
     section = cf.Stiffness((1e6, 1e6), 1e6, (1.0, 4.0), 2.0)
@@ -135,6 +138,7 @@ def test_supports_count_out_of_the_plane_too():
             assert path.negative_modes.tolist() == [0, 1]
 
 
+@pytest.mark.serial
 def test_points_keep_their_own_numbers_when_another_scene_is_solved():
     """States expanded later must not be affected by a scene that was loaded in between."""
     first, second = tree(Drawn(1)), tree(Drawn(2))
@@ -165,6 +169,7 @@ def in_space(kind):
     return cf.Scene([twig, rod], [cf.Clamp(rod.at(0.1 * L))], loads, [cf.Joint(rod.at(0.6 * L), twig.start)])
 
 
+@pytest.mark.serial
 @pytest.mark.parametrize("kind", ["helix", "soft", "steel"])
 def test_determinate_in_space_agrees(kind):
     scene = in_space(kind)
@@ -177,6 +182,7 @@ def test_determinate_in_space_agrees(kind):
     same(path, alone, 1e-9)
 
 
+@pytest.mark.serial
 def test_determinate_in_space_counts_what_the_spatial_counts():
     """Under a dead moment in space, which has no potential, and past lateral buckling."""
     rod, scene = thin_cantilever()
@@ -306,6 +312,7 @@ def test_every_support_joint_and_load_as_mixed_has_them(name):
     assert paths[1].iterations.sum() <= 1.3 * paths[0].iterations.sum() + 2
 
 
+@pytest.mark.serial
 def test_the_largest_compression_is_the_load_on_every_mesh():
     rod, scene = column()
     for elements in (4, 16, 32, 64, 128):
@@ -420,6 +427,7 @@ def test_meshes_are_refined_from_coarser_ones():
     assert sum(path.elements) <= 2 * sum(mixed.elements)
 
 
+@pytest.mark.serial
 def test_infinite_and_very_large_stiffnesses_make_the_force_an_unknown():
     k = column()[0].stiffness
     rod, scene = column(section=cf.Stiffness((np.inf, np.inf), np.inf, k.bending, k.torsion))
@@ -428,6 +436,7 @@ def test_infinite_and_very_large_stiffnesses_make_the_force_an_unknown():
     assert path.stable.all() and any("an unknown (formulation 'multiplier')" in why for why in path.why)
 
 
+@pytest.mark.serial
 def test_names_are_resolved_once():
     assert formulation_of(None).name == "mixed" and formulation_of("multiplier") == Multiplier()
     with pytest.raises(cf.SceneError, match="formulation = 'multiplyer': did you mean 'multiplier'"):

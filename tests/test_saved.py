@@ -155,7 +155,8 @@ def test_damaged_and_foreign_files_are_refused(tmp_path):
         ([cf.read_path], lambda store: store.pop("solution/gauss"), "is damaged .*gauss"),
         ([cf.read_path, cf.read_result], lambda store: store.attrs.update(version=99),
          "its format is 99, and this release reads up to 1"),
-        ([cf.read_path, cf.read_result], lambda store: store.attrs.update(format="another"), "it is of another program"),
+        ([cf.read_path, cf.read_result], lambda store: store.attrs.update(format="another"),
+         "it is of another program"),
         ([cf.read_path], lambda store: store.attrs.update(kind="History"),
          "it holds a History: expected a Path; read_result reads any"),
         ([cf.read_result], lambda store: store.attrs.update(kind="Nothing"), "is damaged .*Nothing"),
@@ -169,6 +170,7 @@ def test_damaged_and_foreign_files_are_refused(tmp_path):
                 read(other)
 
 
+@pytest.mark.serial
 def test_scenes_with_code_are_not_saved(tmp_path_all):
     """An old file stays."""
     rod, scene = column(section=lambda s: cf.Circle(0.2 + 0.001 * s))
@@ -368,6 +370,7 @@ def test_profiles_as_csv(path, tmp_path_all):
     assert rows[-1]["von Mises stress (Pa)"] == "" and float(rows[-1]["s (m)"]) == 1.0
 
 
+@pytest.mark.serial
 def test_what_does_not_fit_is_refused(path, tmp_path_all):
     for options, expected in (({"rod": "mast"}, "no rod is named 'mast'|mast"), ({"k": 7}, "expected .* from -2 to 1")):
         with pytest.raises(cf.SceneError, match=expected):
@@ -383,6 +386,7 @@ def test_what_does_not_fit_is_refused(path, tmp_path_all):
     assert [file.name for file in tmp_path_all.iterdir()] == ["folder.csv"]
 
 
+@pytest.mark.serial
 def test_indices_are_whole_numbers(path):
     for wrong in ("x", 1.0, True):
         for asked in (lambda k: path[k], lambda k: path.at_points([k]), lambda k: path.fields(k)):
@@ -395,6 +399,7 @@ def test_indices_are_whole_numbers(path):
         path.stress("zz")
 
 
+@pytest.mark.serial
 def test_dicts(path, history):
     told = path.to_dict()
     assert told["kind"] == "Path" and told["title"] == "two" and told["units"]["curvature"] == "1/m"
@@ -409,6 +414,7 @@ def test_dicts(path, history):
     assert told["units"]["angular_momentum"] == "kg m^2/s" and told["scheme"] == history.scheme
 
 
+@pytest.mark.serial
 def test_notebooks_show_a_table_and_a_picture(path, history):
     """Titles and names are text; the last line ends where the tip is, in the plane that shows most."""
     rod, scene = column()
@@ -528,6 +534,7 @@ def test_a_stored_history_goes_by_its_folder(tmp_path, monkeypatch):
         pickle.loads(text)
 
 
+@pytest.mark.serial
 def test_what_cannot_be_pickled_is_named():
     """A deep copy does not need to pickle."""
     _, scene = swinging(lambda t: (0, 0, math.sin(t)))

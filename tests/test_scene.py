@@ -70,7 +70,7 @@ REFUSED = {
 }  # fmt: skip
 
 
-test_refused = refuses(REFUSED)
+test_refused = pytest.mark.serial(refuses(REFUSED))
 
 
 ARGUMENTS = {
@@ -95,11 +95,12 @@ ARGUMENTS = {
 }  # fmt: skip
 
 
-test_arguments_refused = refuses(
-    ARGUMENTS, lambda arguments: cf.solve(**{"scene": column()[1], "load_factors": [0.1], **arguments})
+test_arguments_refused = pytest.mark.serial(
+    refuses(ARGUMENTS, lambda arguments: cf.solve(**{"scene": column()[1], "load_factors": [0.1], **arguments}))
 )
 
 
+@pytest.mark.serial
 @pytest.mark.parametrize("given", [0.1, np.float64(0.1), np.array(0.1), np.array([0.1]), [0.1], iter([0.1]), range(1)])
 def test_load_factors_in_many_guises(given):
     _, scene = column()
@@ -146,6 +147,7 @@ def test_interruption_keeps_what_is_done():
     assert stop.value.path.load_factors.tolist() == [0.25, 0.5]
 
 
+@pytest.mark.serial
 def test_sections():
     """Against closed forms; the torsion of rectangles against Timoshenko & Goodier's table (0.1406, 0.2287, 0.3123)."""
     steel = cf.Material(E=2.6, nu=0.3)  # G = 1
@@ -161,6 +163,7 @@ def test_sections():
     np.testing.assert_allclose(thin.shear[0] / (thin.axial / 2.6), 2 * 1.3 / (4 + 3 * 0.3), rtol=1e-5)
 
 
+@pytest.mark.serial
 def test_frames_of_a_line():
     np.testing.assert_allclose(LINE.frame(0.0), np.eye(3))
     for end in ((1, 2, -2), (0, 0, -1), (1e-9, 0, -1), (-3, 1, 0)):
@@ -170,6 +173,7 @@ def test_frames_of_a_line():
         np.testing.assert_allclose(R[:, 2], np.array(end) / np.linalg.norm(end))
 
 
+@pytest.mark.serial
 def test_what_looks_like_a_slip_is_asked_about():
     """Warnings about a forgotten joint, a section in mm, a modulus in MPa;
     none where two rods are supported at one point, or joined."""
@@ -239,6 +243,7 @@ CHANGES = {
 }  # fmt: skip
 
 
+@pytest.mark.serial
 @pytest.mark.parametrize("case", CHANGES)
 def test_refused_changes(case, tmp_path):
     old, new, words = CHANGES[case]
@@ -299,6 +304,7 @@ MISTAKES = [
 ]  # fmt: skip
 
 
+@pytest.mark.serial
 @pytest.mark.parametrize(("kind", "old", "new", "expected"), MISTAKES)
 def test_mistakes_are_refused_with_their_places(kind, old, new, expected, tmp_path):
     """An unknown key, a unit of another dimension and what is given twice, in every kind of scene file."""
@@ -313,6 +319,7 @@ def test_mistakes_are_refused_with_their_places(kind, old, new, expected, tmp_pa
     assert str(refusal.value).startswith(f"{file}, line {line}, column {column}: ") and words in str(refusal.value)
 
 
+@pytest.mark.serial
 @pytest.mark.parametrize(
     ("text", "line", "column"),
     [("[a\n", 1, 3), ("a = 1\n[a]\n[b\n", 2, 1), ("a = {}\n[a.b]\n", 2, 5), ("x = 5 m\n", 1, 7), ("[[a]]\n[a]", 2, 1)],
@@ -325,6 +332,7 @@ def test_what_is_no_toml_is_refused_with_its_place(text, line, column, tmp_path)
     assert str(refusal.value).startswith(f"{file}, line {line}, column {column}: ")
 
 
+@pytest.mark.serial
 def test_marks_and_encodings_of_editors(tmp_path):
     """A mark at the beginning of UTF-8 is skipped; other encodings are named."""
     text = DEMO.read_text(encoding="utf-8").replace("Eccentrically", "B\u00fcgel")
@@ -370,6 +378,7 @@ def framed(named=True):
     return cf.Scene([post, beam], [cf.Clamp(foot), cf.Roller(outer, (0, 0, 1))], loads, [cf.Joint(head, inner)])
 
 
+@pytest.mark.serial
 def test_names_and_objects_are_the_same():
     named, plain = (cf.solve(scene, [1.0], elements=2, degree=2) for scene in (framed(), framed(named=False)))
     np.testing.assert_array_equal(named.position("beam.end"), plain.position("beam.end"))
@@ -425,6 +434,7 @@ REFUSED_NAMES = {
 test_refused_names = pytest.mark.serial(refuses(REFUSED_NAMES, lambda make: make(rods())))
 
 
+@pytest.mark.serial
 def test_what_a_file_says_is_what_solve_takes(tmp_path):
     file = tmp_path / "post.toml"
     file.write_text(FRAME)
@@ -464,8 +474,9 @@ def test_a_probable_mistake_in_units_is_a_warning_where_the_caller_is():
         assert told[0].filename == __file__
 
 
+@pytest.mark.serial
 def test_moduli_that_no_metal_has_are_asked_about_and_soft_ones_are_not():
-    """Steel typed in kPa, by its density or as a rolled profile; rubber, a catheter and titanium are not asked about."""
+    """Steel typed in kPa, by its density or as a rolled profile; rubber, catheter and titanium are not asked about."""
 
     def doubts(E, density, section=None):
         rod = cf.Rod(cf.Line((0, 0, 0), (3, 0, 0)), section or cf.Circle(0.01), cf.Material(E, 0.3, density), name="r")

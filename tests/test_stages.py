@@ -177,6 +177,7 @@ def test_a_path_goes_on_from_another_one(held):
         cf.solve(column([], [cf.Stage([cf.Force("rod.end", (1, 0, 0))])]), start=whole)
 
 
+@pytest.mark.serial
 def test_stages_in_a_scene_file(held, tmp_path_all):
     cf.write(held.scene, tmp_path_all / "scene.toml")
     text = (tmp_path_all / "scene.toml").read_text()
@@ -189,6 +190,7 @@ PUSH, SIDE = cf.Force("rod.end", (1, 0, 0)), cf.Force("rod@0.7", (0, 1, 0))
 PIN = cf.Pin("rod.end")
 
 
+@pytest.mark.serial
 @pytest.mark.parametrize(
     ("refused", "words"),
     [

@@ -123,6 +123,7 @@ def test_a_study_within_a_case():
     assert cf.study(sums, {"n": [1, 2, 3, 4]}).results == [1, 3, 6, 10]
 
 
+@pytest.mark.serial
 @pytest.mark.parametrize(
     "value",
     [1.0 / 3.0, 7, True, None, "text", np.nan, -np.inf, 1 - 2j, np.float32(0.1), [1.5, np.nan], np.eye(2, dtype=int),
@@ -154,6 +155,7 @@ def test_results_that_cannot_be_kept_are_failures(value):
         cf.study(needs, [{"i": 0}])
 
 
+@pytest.mark.serial
 @pytest.mark.parametrize(("task", "cases", "words"), [
     (3, [{"a": 1, "b": 1}], r"study\.task = 3: expected a function"),
     (product, [], r"study\.cases = \[\]: expected at least one case"),
@@ -289,6 +291,7 @@ def test_failures_are_tried_again_where_this_is_asked_for(tmp_path_all, capsys):
     assert len(lines_in(tmp_path_all)) == 6
 
 
+@pytest.mark.serial
 @pytest.mark.parametrize("damage", [b"{}", b"[1]", b"\xff", b'{"case": 99, "attempt": 1, "seconds": 1, "result": 0}'])
 def test_lines_that_no_study_wrote_are_left_out(damage, tmp_path_all):
     found = cf.study(third, CASES, folder=tmp_path_all)

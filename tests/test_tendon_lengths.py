@@ -46,6 +46,7 @@ def test_the_tension_of_a_length_gives_that_length():
     assert path.error[-1] < 1e-7
 
 
+@pytest.mark.serial
 def test_it_does_not_push():
     """A moment bends the arm towards the tendon, which is slack until its shortening exceeds what the moment gives."""
     tendon, moment = cf.Tendon(ROD, (E, 0), shortening=0.006), 0.02
@@ -84,6 +85,7 @@ def test_two_of_them_hold_a_column(truth):
     assert bent.argmax() == 1 and across.argmax() == 0
 
 
+@pytest.mark.serial
 @pytest.mark.parametrize(
     ("make", "says"),
     [
@@ -102,6 +104,7 @@ def test_what_is_refused(make, says):
     assert says in str(found.value)
 
 
+@pytest.mark.serial
 def test_tendons_that_determine_each_other_are_refused():
     """Four that do not stretch have the same sum on both diagonals; elastic ones share the load."""
     sides = [(E, 0), (-E, 0), (0, E), (0, -E)]

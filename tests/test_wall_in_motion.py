@@ -51,6 +51,7 @@ def resting(path, stiffness, linear=(0, 0, 0), angle=0.0, **wall):
     return rod, cf.Scene([rod], [], loads, velocities=[cf.InitialVelocity(rod, linear=linear)]), deep
 
 
+@pytest.mark.serial
 @pytest.mark.parametrize("scheme", SCHEMES)
 def test_an_impact_is_half_a_vibration_on_the_wall(scheme):
     """Penetration v sqrt(m/k) and duration pi sqrt(m/k); the rod flies back as fast."""
@@ -71,6 +72,7 @@ def sorted_pair(x, t):
     return x[order], t[order]
 
 
+@pytest.mark.serial
 def test_damping_takes_what_hunt_and_crossley_say():
     """Restitution 1 - (2/3) damping v for small ones; the loss is booked."""
     damping, v = 0.05, 0.4
@@ -81,6 +83,7 @@ def test_damping_takes_what_hunt_and_crossley_say():
     assert history.dissipated[-1] == pytest.approx(history.kinetic[0] * (1 - back**2), rel=1e-3)
 
 
+@pytest.mark.serial
 def test_without_friction_energy_and_angular_momentum_stay():
     """Oblique impacts of a spinning rod on a stiff wall, in steps as long as an impact."""
     for scheme in ("momentum", "energy"):
@@ -101,6 +104,7 @@ def test_friction_and_damping_are_no_source_of_energy():
         assert history.dissipated[-1] > 0.3 * history.kinetic[0]
 
 
+@pytest.mark.serial
 @pytest.mark.parametrize("scheme", SCHEMES)
 def test_sliding_is_stopped_by_coulombs_friction(scheme):
     """It stops after v/(mu g), at v^2/(2 mu g), and stays there exactly."""
@@ -118,6 +122,7 @@ def test_sliding_is_stopped_by_coulombs_friction(scheme):
     assert history.dissipated[-1] == pytest.approx(history.kinetic[0], rel=2e-2)
 
 
+@pytest.mark.serial
 def test_a_rod_rolls_in_the_hole_without_slip():
     """A cylinder that rolls in a trough: omega^2 = 2 g/(3 (R - a)), and nothing is dissipated."""
     stiffness, angle = 1e8, 0.1
@@ -133,12 +138,14 @@ def test_a_rod_rolls_in_the_hole_without_slip():
     assert np.abs(history.dissipated).max() < 1e-6 * np.ptp(history.kinetic)
 
 
+@pytest.mark.serial
 def test_friction_does_not_act_where_nothing_touches():
     rod, scene = in_hole(VERTICAL, (0, 0, 1.0), (0, 0, 5.0), friction=0.5)
     history = cf.simulate(scene, 0.1, dt=1e-2, **SMALL)
     assert drift(history.linear_momentum) < 1e-12 and drift(history.angular_momentum) < 1e-12
 
 
+@pytest.mark.serial
 def test_a_ring_touches_alone():
     rod, mass = thick_rod(VERTICAL)
     ring = HoleRing(rod.at(0.5), VERTICAL, C, A, stiffness=1e5, friction=0.2, begins=BEGIN)
@@ -148,6 +155,7 @@ def test_a_ring_touches_alone():
     assert deepest == pytest.approx(0.5 * np.sqrt(mass / 1e5), rel=1e-3)
 
 
+@pytest.mark.serial
 def test_a_ring_in_gauge_is_met_in_steps_as_asked():
     """The direction of its force turns far in a step, while damping makes the force large: few are halved."""
     off = np.array([2e-4, 2e-4, 0.0])
@@ -187,6 +195,7 @@ def test_it_is_continued_to_the_same_digits(scheme, tmp_path, monkeypatch):
         assert getattr(history, name).tobytes() == getattr(whole, name).tobytes(), name
 
 
+@pytest.mark.serial
 @pytest.mark.parametrize(("wrong", "word"), [
     ({"friction": -0.1}, "friction"),
     ({"damping": -1.0}, "damping"),
@@ -202,6 +211,7 @@ def test_bad_numbers_are_refused(wrong, word):
         HoleWall(rod, VERTICAL, **{"radius": A + C, "contact_radius": A, **wrong})
 
 
+@pytest.mark.serial
 def test_equilibria_and_other_schemes_refuse_it():
     rod, scene = in_hole(VERTICAL, (0.5, 0, 0))
     with pytest.raises(cf.SceneError, match="HoleWall acts in motions alone"):
@@ -230,6 +240,7 @@ def test_forces_of_walls_are_told(tmp_path_all):
         history.wall_forces(scene.loads[1])
 
 
+@pytest.mark.serial
 def test_friction_is_weaker_in_slip():
     """v' = -mu(v) g until it stops; and a weight at tan = 0.25 moves it from rest where friction is 0.2, not 0.3."""
     mu, kinetic, speed, v = 0.3, 0.4, 0.05, 0.2
@@ -268,6 +279,7 @@ def test_joined_rods_are_one():
         np.testing.assert_allclose(three, one, rtol=1e-6)
 
 
+@pytest.mark.serial
 def test_a_pipe_at_rest_stays_there():
     """On the low side, from its equilibrium, in steps in which waves pass five nodes: no step is halved."""
     path = cf.well.WellPath.from_survey([0, 400], [90, 90], [0, 0])

@@ -37,6 +37,7 @@ def out():
     return cf.well.torque_and_drag(hole(build()), STRING, cf.well.TripOut(weight=-50e3), tol=1e-4)
 
 
+@pytest.mark.serial
 def test_auto_goes_on_to_the_rod_and_says_why(out):
     assert out.model == "rod" and out.enough and out.error <= 1e-4 and math.isnan(out.model_error)
     soft = cf.well.torque_and_drag(hole(build()), STRING, cf.well.TripOut(weight=-50e3), model="soft")
@@ -67,6 +68,7 @@ def test_what_is_about_to_be_done_is_said_before_a_long_run(model, told, monkeyp
         assert "ends after about 10" in first
 
 
+@pytest.mark.serial
 def test_a_search_ends_after_so_much_work_and_says_what_to_do(monkeypatch):
     """Coiled tubing with weight on bit in a horizontal hole: a helix, and with more weight on bit lock-up."""
     path = cf.well.WellPath.from_survey([0, 300, 600, 900], [0, 0, 90, 90], [0, 0, 0, 0])
@@ -79,6 +81,7 @@ def test_a_search_ends_after_so_much_work_and_says_what_to_do(monkeypatch):
             cf.well.torque_and_drag(*asked, cf.well.Sliding(weight), mud=MUD, model="rod")
 
 
+@pytest.mark.serial
 def test_what_the_answer_of_the_rod_tells(out):
     n = len(out.md)
     for name in (
@@ -299,6 +302,7 @@ def test_what_is_handed_on(monkeypatch):
     assert (named["bottom_tension"], named["bottom_torque"], named["wall_stiffness"]) == (-30e3, 2e3, 3e8)
 
 
+@pytest.mark.serial
 def test_what_cannot_be_a_rod(monkeypatch):
     path = build()
     soft = cf.well.DrillString([cf.well.Component(None, None, 241.13, 0.0635)])
@@ -331,6 +335,7 @@ def test_what_cannot_be_a_rod(monkeypatch):
         cf.well.torque_and_drag(hole(flat), STRING, cf.well.TripIn(), model="rod")
 
 
+@pytest.mark.serial
 def test_the_chart_shows_side_force_without_peaks_and_forces_at_points_with_numbers(out):
     pytest.importorskip("matplotlib")
     figure = out.plot()
@@ -363,6 +368,7 @@ FOUND = [
 ]  # fmt: skip
 
 
+@pytest.mark.serial
 @pytest.mark.slow
 @pytest.mark.parametrize(("name", "operation", "load"), FOUND)
 def test_whole_wells(name, operation, load):
@@ -371,6 +377,7 @@ def test_whole_wells(name, operation, load):
     assert not any("MORE" in line for line in found.why)  # the soft string's estimate covers the difference
 
 
+@pytest.mark.serial
 def test_a_string_in_a_vertical_hole_is_a_helix_and_not_straight():
     path = cf.well.WellPath.from_survey([0, 310], [0, 0], [0, 0])
     string = cf.well.DrillString([cf.well.Bit(0.2159), cf.well.DrillPipe(size="5 in 19.50 lb/ft")])
@@ -406,6 +413,7 @@ def test_a_helix_has_the_hand_that_torque_favours(torque):
     assert "has -24.9" in said and "of the other hand -23.5" in said
 
 
+@pytest.mark.serial
 def test_a_torque_of_a_string_that_does_not_turn_is_not_more_than_was_estimated(out):
     """A helix and the side of the contact make a few N m; the estimates are about the hook load alone."""
     soft = cf.well.torque_and_drag(hole(build()), STRING, cf.well.TripIn(), model="soft")
@@ -414,6 +422,7 @@ def test_a_torque_of_a_string_that_does_not_turn_is_not_more_than_was_estimated(
     assert any("MORE" in line for line in _found(soft, out.solved, {"soft": (1e6, 0.0)}))
 
 
+@pytest.mark.serial
 def test_an_unknown_number_of_negative_modes_is_not_enough(out):
     assert out.enough
     with patch.object(out.solved, "negative_modes", -1):
@@ -434,6 +443,7 @@ def test_a_string_that_stays_straight_where_there_is_a_helix_is_not_enough():
     assert answer.model_error == pytest.approx(abs(apart) / 90e3, rel=1e-3)
 
 
+@pytest.mark.serial
 def test_the_view_from_the_side(out, tmp_path_all):
     """The lower 60 m in the hole: its wall, the low side that the string lies on, and what it presses there with."""
     axes = out.plot_from_side(length=60.0).axes[0]
