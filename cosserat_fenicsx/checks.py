@@ -164,6 +164,8 @@ def finite_array(owner, field, value, expected):
 
 def vector(owner, field, value, unit, size=3):
     """A tuple of `size` finite numbers; text with a unit is converted."""
+    if type(value) is tuple and len(value) == size and all(type(x) is float and abs(x) <= LARGEST for x in value):
+        return value  # at once: frames have tens of thousands of points
     expected = f"{size} finite numbers ({unit})"
     array = finite_array(owner, field, value, expected)
     if array.shape != (size,):

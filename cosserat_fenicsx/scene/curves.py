@@ -140,15 +140,22 @@ _SERIES = np.array([(-1) ** k / math.factorial(2 * k + 3) for k in range(9)])
 def start_frame(owner, d3, default):
     """The frame [d1 d2 d3] of a unit tangent, (3, 3), with d1 by the component of `owner.d1`, or else of `default`,
     normal to the tangent; a SceneError for d1 along it."""
-    given = np.asarray(default if owner.d1 is None else owner.d1, dtype=float)
-    across = given - np.dot(given, d3) * d3
-    if np.linalg.norm(across) <= 1e-6 * np.linalg.norm(given):
+    d3, given = d3.tolist(), np.asarray(default if owner.d1 is None else owner.d1, dtype=float).tolist()
+    # twice, against cancellation where `given` is almost along the tangent; numpy takes most of the time of a frame
+    size = math.hypot(*given)
+    across = _across(given, d3)
+    if math.hypot(*across) <= 1e-6 * size:
         refuse(owner, "d1", owner.d1, "a direction across the tangent at the start")
-    d1 = across / np.linalg.norm(across)
-    d1 = d1 - np.dot(d1, d3) * d3  # twice, against cancellation where `given` is almost along the tangent
-    d1 /= np.linalg.norm(d1)
-    (x, y, z), (a, b, c) = d3.tolist(), d1.tolist()  # np.cross takes most of the time of a frame's lines
+    (a, b, c), (x, y, z) = _across(across, d3), d3
+    size = math.hypot(a, b, c)
+    a, b, c = a / size, b / size, c / size
     return np.array([[a, y * c - z * b, x], [b, z * a - x * c, y], [c, x * b - y * a, z]])
+
+
+def _across(v, t):
+    """What is left of a vector v across a unit vector t, three numbers each."""
+    along = math.fsum(a * b for a, b in zip(v, t, strict=True))
+    return [a - along * b for a, b in zip(v, t, strict=True)]
 
 
 def level_axis(t):
@@ -399,11 +406,10 @@ class Line(Curve):
     breaks, uniform = (), True
 
     def validate(self):
-        chord = np.subtract(self.end, self.start)
-        length = float(np.linalg.norm(chord))
-        if not length > 1e-12 * max(np.abs(self.start).max(), np.abs(self.end).max()):
+        length = math.dist(self.start, self.end)
+        if not length > 1e-12 * max(map(abs, (*self.start, *self.end))):
             refuse(self, "end", self.end, f"a point apart from start = {self.start}")
-        d3 = chord / length
+        d3 = np.subtract(self.end, self.start) / length
         store(self, length=length, _frame=start_frame(self, d3, level_axis(d3)))
 
     def position(self, s: float | Numbers) -> np.ndarray:

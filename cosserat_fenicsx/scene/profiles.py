@@ -240,32 +240,39 @@ class Sections:
 
     def __init__(self, owner, given, material):
         self.owner, self.material = owner, material
-        self.pieces = self._check_pieces(given if isinstance(given, list | tuple) else [(None, given)])
+        self.pieces = self._check_pieces(given)
         self.start = self._stiffness(self._piece(0.0, 0))
-        fixed = [_UNKNOWN if _is_law(section) else _row(self._stiffness(section)) for _, section in self.pieces]
-        self._fixed, self._law = np.array(fixed), [row is _UNKNOWN for row in fixed]
-        rows = [self._fixed[[not law for law in self._law]]]
-        before = 0.0
+        self._law = [_is_law(section) for _, section in self.pieces]
+        if self.constant:
+            self._fixed, self.coupled, self.range = _of_constant(self.start)
+        else:
+            fixed = [_UNKNOWN if law else _row(self._stiffness(section))
+                     for law, (_, section) in zip(self._law, self.pieces, strict=True)]  # fmt: skip
+            self._fixed = np.array(fixed)
+            self.coupled, self.range = _bounds(self._sampled())
+        if self.coupled and np.isinf(self.range[1].K).any():
+            expected = "finite stiffnesses along a rod that has a section with a matrix"
+            refuse(f"Rod '{owner.name}'", "section", given, expected)
+
+    def _sampled(self):
+        """The rows of pieces, of functions those of samples."""
+        rows, before = [self._fixed[[not law for law in self._law]]], 0.0
         for i, (end, _) in enumerate(self.pieces):
             if self._law[i]:
                 s = before + (end - before) * (1 - np.cos(np.linspace(0, np.pi, _SAMPLES))) / 2
                 rows.append(self._rows(s, np.full(_SAMPLES, i)))
             before = end
-        rows = np.concatenate(rows)
-        self.coupled = bool(np.isfinite(rows[:, _DIAGONAL:]).any())
-        if self.coupled and np.isinf(rows[:, :3]).any():
-            expected = "finite stiffnesses along a rod that has a section with a matrix"
-            refuse(f"Rod '{owner.name}'", "section", given, expected)
-        self.range = tuple(_split(bound(rows[:, :_DIAGONAL], axis=0), False) for bound in (np.min, np.max))
+        return np.concatenate(rows)
 
     def _check_pieces(self, given):
-        where = f"Rod '{self.owner.name}'"
-        if not given:
-            refuse(where, "section", given, "at least one piece (s_end, section)")
-        pieces = checked_pieces(where, "section", given, self.owner.length, "section")
+        where, pieces = f"Rod '{self.owner.name}'", [(self.owner.length, given)]
+        if isinstance(given, list | tuple):
+            if not given:
+                refuse(where, "section", given, "at least one piece (s_end, section)")
+            pieces = checked_pieces(where, "section", given, self.owner.length, "section")
         for i, (_, section) in enumerate(pieces):
             if not _is_law(section):
-                field = "section" if len(given) == 1 else f"section[{i}]"
+                field = "section" if len(pieces) == 1 else f"section[{i}]"
                 instance("Rod", field, section, Section, "a section such as Circle(diameter), or a function of s")
         return tuple(pieces)
 
@@ -364,6 +371,20 @@ class Sections:
 def _stiffness_of(section, material):
     """The `Stiffness` of a section, made once for many rods."""
     return section.stiffness(material)
+
+
+@lru_cache(maxsize=16)
+def _of_constant(stiffness):
+    """The row of a `Stiffness`, and `_bounds` of it, made once for many rods."""
+    fixed = np.array([_row(stiffness)])
+    fixed.flags.writeable = False
+    return fixed, *_bounds(fixed)
+
+
+def _bounds(rows):
+    """Whether rows have a matrix; and the least and the largest of every stiffness, see `Sections`."""
+    both = tuple(_split(bound(rows[:, :_DIAGONAL], axis=0), False) for bound in (np.min, np.max))
+    return bool(np.isfinite(rows[:, _DIAGONAL:]).any()), both
 
 
 def _is_law(section):
