@@ -29,7 +29,7 @@ def results():
     "name", [name if name in FIRST else pytest.param(name, marks=pytest.mark.once) for name in PROBLEMS]
 )
 def test_it_agrees_with_its_published_numbers(name, results):
-    found = results[name] = manual.solved(PROBLEMS[name])
+    found = results[name] = manual.solved(PROBLEMS[name], again=False)
     for row in found["rows"]:
         off = np.atleast_1d(np.abs(np.subtract(row["ours"], row["published"])))
         assert (off <= row["allowed"]).all(), f"{row['quantity']}: {row['ours']} for {row['published']}"

@@ -51,6 +51,7 @@ def vertical(length=1000.0, diameter=0.2159, friction=0.0):
     )
 
 
+@pytest.mark.once
 def test_standard_sizes():
     assert PIPE.outer_diameter == 0.127 and pytest.approx(0.0809625) == PIPE.contact_radius
     assert pytest.approx(20.89 * cf.units.lb_per_ft) == PIPE.mass
@@ -68,6 +69,7 @@ def test_standard_sizes():
     assert other.mass == pytest.approx(7850 * math.pi / 4 * (0.13**2 - other.inner_diameter**2))
 
 
+@pytest.mark.once
 def test_buoyancy():
     """Hook load of a string at rest in a vertical hole: weight in air less that of the displaced mud; the true tension
     at its open lower end is the pressure on its end."""
@@ -83,6 +85,7 @@ def test_buoyancy():
         assert answer.true_tension[0] == answer.tension[0]  # no pressure at the surface
 
 
+@pytest.mark.once
 def test_stretch_twist_and_stress_of_a_hanging_pipe():
     tube = cf.well.DrillPipe(outer_diameter=0.127, inner_diameter=0.1)
     area, w = math.pi / 4 * (0.127**2 - 0.1**2), tube.mass * 9.80665
@@ -97,6 +100,7 @@ def test_stretch_twist_and_stress_of_a_hanging_pipe():
     assert wet.von_mises == pytest.approx(np.abs(wet.tension) / area, rel=1e-9, abs=1e-3)
 
 
+@pytest.mark.once
 def test_the_state_along_the_string():
     out, turn = drag(cf.well.TripOut()), drag(cf.well.RotateOffBottom())
     assert (np.diff(out.md) >= 0).all() and out.md[0] == 0 and out.md[-1] == 2500
@@ -121,6 +125,7 @@ def test_the_state_along_the_string():
     assert shallow.md[-1] == 800.0 and shallow.hook_load < out.hook_load
 
 
+@pytest.mark.once
 @pytest.mark.parametrize(("weight", "where"), [(200e3, 1800.0), (100e3, 1900.0), (123.4e3, 1876.6), (450e3, 800.0)])
 def test_neutral_point_on_a_joint_and_on_a_point_of_the_answer(weight, where):
     """Tension that vanishes where the string is cut, in the middle of a piece, and between."""
@@ -140,6 +145,7 @@ def test_the_soft_string_says_what_it_leaves_out():
     assert cf.well.torque_and_drag(hole, string, cf.well.TripOut()).enough  # nothing turns: the models agree
 
 
+@pytest.mark.once
 @pytest.mark.parametrize(("do", "words"), [
     (lambda: cf.well.DrillPipe(size="5 in 19.50 lb/ft", length=-4),
      r"DrillPipe.length = -4: expected a positive number"),
@@ -196,6 +202,7 @@ def test_what_is_refused(do, words):
         do()
 
 
+@pytest.mark.once
 def test_a_rotation_in_radians_per_second_is_doubted():
     for operation in (cf.well.Ream, cf.well.BackReam):
         words = rf"{operation.__name__}.rpm = 8.37758 .* revolutions a minute, not in rad/s.* 8.37758 rad/s are 80$"
@@ -206,6 +213,7 @@ def test_a_rotation_in_radians_per_second_is_doubted():
         cf.well.Ream(0.15, 20)
 
 
+@pytest.mark.once
 def test_weight_on_bit_without_torque_or_bit_is_told():
     without = cf.well.DrillString([cf.well.Collar(90, "NC46-65"), cf.well.DrillPipe(size="5 in 19.50 lb/ft")])
     for string, torque, told in (
@@ -218,6 +226,7 @@ def test_weight_on_bit_without_torque_or_bit_is_told():
     assert "bit torque" not in str(drag(cf.well.TripOut(), model="soft"))
 
 
+@pytest.mark.once
 def test_dimensions_in_other_units_are_warned_of():
     for field, make in {
         "HoleSection.diameter": lambda: cf.well.HoleSection(100.0, 8.5, 0.2),
@@ -271,6 +280,7 @@ def test_what_a_file_says():
     assert scene.run()[0].hook_load == by_hand.hook_load
 
 
+@pytest.mark.once
 @pytest.mark.parametrize(("text", "dimension", "value"), [
     ("5 in", "length", 0.127),
     ('9.625"', "length", 0.244475),
@@ -298,6 +308,7 @@ def test_field_units(text, dimension, value):
     assert in_si("x", text, dimension) == pytest.approx(value, rel=1e-7)
 
 
+@pytest.mark.once
 @pytest.mark.parametrize(("old", "new", "words"), [
     ('"Bit", diameter = "8.5 in"', '"Bit", diameter = "8.5 yards"', "yards"),
     ("weight = 80e3", 'weight = "8 tons"', "expected tf, 1000 kgf, or kN or klbf: there are several tons"),
@@ -334,6 +345,7 @@ def test_files_that_are_refused(old, new, words, tmp_path):
         cf.read(tmp_path / "well.toml")
 
 
+@pytest.mark.once
 def test_the_command_line(tmp_path, capsys):
     assert main(["explain", str(VOLVE)]) == 0
     told = capsys.readouterr().out
@@ -355,6 +367,7 @@ def test_the_command_line(tmp_path, capsys):
     assert main(["run", str(tmp_path / "no_well.toml")]) == 2 and "[well] is missing" in capsys.readouterr().err
 
 
+@pytest.mark.once
 def test_the_command_line_in_field_units(tmp_path, capsys):
     assert main(["explain", str(VOLVE), "--units", "field"]) == 0
     told = capsys.readouterr().out
@@ -375,6 +388,7 @@ def test_the_command_line_in_field_units(tmp_path, capsys):
             assert main([command, str(file), "--units", word]) == 2 and words in capsys.readouterr().err
 
 
+@pytest.mark.once
 def test_holes_and_strings_are_printed_with_units():
     """By the sentences of `cosserat explain`, in the units asked for, on a screen of 100 columns and 30 rows."""
     found = cf.read(VOLVE)
@@ -398,6 +412,7 @@ def test_holes_and_strings_are_printed_with_units():
         found.summary("metric")
 
 
+@pytest.mark.once
 def test_doubts_are_said_once_and_without_code(tmp_path, capsys):
     stations = (
         "[well]\nstations = [[0, 0, 0], ['1 km', 0, 0], [3281, 30, 0]]\nsections = [{ to = 1000, diameter = 0.2159, "
@@ -413,6 +428,7 @@ def test_doubts_are_said_once_and_without_code(tmp_path, capsys):
         assert re.search(words, "\n".join(told)), words
 
 
+@pytest.mark.once
 def test_the_reference_has_every_key_unit_and_size():
     page = (DEMOS.parent / "docs" / "well_files.md").read_text(encoding="utf-8")
     told = set(re.findall(r"`([^`]+)`", re.sub(r"```.*?```", "", page, flags=re.S)))
@@ -571,6 +587,7 @@ def bump(s, at, force):
     return force / (2 * LAYER) * np.exp(-x) * (np.cos(x) + np.sin(x))
 
 
+@pytest.mark.once
 def test_a_peak_inside_a_contact_is_a_force():
     """A peak on a pressure that grows and jumps; that the wall is elastic makes it 7 % larger than the force."""
     contacts, s, regular, sizes, total = wall(lambda s: 300 + 4 * (s - 20) + 200 * (s > 50) + bump(s, 35.0, 400.0))
@@ -582,6 +599,7 @@ def test_a_peak_inside_a_contact_is_a_force():
     assert sum(x.force for x in contacts) == pytest.approx(total, rel=1e-12)
 
 
+@pytest.mark.once
 @pytest.mark.parametrize("h", [0.1, 2.4], ids=["the gap is seen", "a coarse mesh"])
 def test_the_edge_of_a_wider_part_presses_alone(h):
     """A force at the edge, a gap, and pressure beyond it: the moments tell them apart where the mesh does not."""
@@ -596,6 +614,7 @@ def test_the_edge_of_a_wider_part_presses_alone(h):
     assert points + (regular * sizes).sum() == pytest.approx(total, rel=1e-12)
 
 
+@pytest.mark.once
 def test_a_force_that_is_small_beside_the_pressure():
     """At the end of a contact."""
     contacts, s, regular, sizes, total = wall(lambda s: 500 + bump(s, 60.0, 600.0), h=0.1)
@@ -631,6 +650,7 @@ def test_forces_with_errors_as_large_are_left_out_and_titles_have_four_digits():
     assert torque > 1e4 and ticks == [-4.25, 0, 4.25]
 
 
+@pytest.mark.once
 def test_resultants_of_any_pressure_add_up():
     """Of rough pressures with gaps and jumps, on elements of any length, in layers of any length."""
     rng, nodes = np.random.default_rng(0), np.array([0.0, 0.5 - math.sqrt(0.05), 0.5 + math.sqrt(0.05), 1.0])

@@ -45,6 +45,7 @@ def sweep(**settings):
     return cf.well.depth_sweep(HOLE, STRING, OPERATIONS, DEPTHS, **given)
 
 
+@pytest.mark.once
 def test_a_sweep_is_its_answers():
     found = sweep()
     assert found.hook_load.shape == (3, 2, 5) and len(found) == 30 and found.done.all()
@@ -117,6 +118,7 @@ def test_a_sweep_by_the_rod_is_stopped_and_goes_on(monkeypatch, tmp_path):
     assert np.isnan(found.values["model_error"]).all() and (found.values["error"] <= 1e-4).all()
 
 
+@pytest.mark.once
 @pytest.mark.parametrize(("depths", "words"), [
     ([1000, 2600], "hole, which ends at 2500 m"), ([], "at least one measured depth"),
     ([1000, 50], "above the surface at the depth 50 m"),
@@ -127,6 +129,7 @@ def test_depths_that_do_not_fit_are_refused_first(depths, words):
         cf.well.depth_sweep(HOLE, STRING, OPERATIONS, depths, mud=MUD)
 
 
+@pytest.mark.once
 def test_depths_as_text():
     given = {"mud": MUD, "model": "soft"}
     swept = cf.well.depth_sweep(HOLE, STRING, [cf.well.TripOut()], ["3000 ft", 1828.8], **given)
@@ -137,6 +140,7 @@ def test_depths_as_text():
         cf.well.DrillPipe(size="5 in 20 lb/ft")
 
 
+@pytest.mark.once
 def test_lock_up_in_a_sweep_is_told():
     stiff = cf.Stiffness((1e9, 1e9), 7e8, (348950.0,) * 2, 9.4e5)
     string = cf.well.DrillString([cf.well.Component(None, stiff, 16.6, 0.05)])
@@ -163,6 +167,7 @@ def measured(noise, block=0.0):
     return found
 
 
+@pytest.mark.once
 def test_friction_from_measurements():
     exact = cf.well.calibrate_friction(HOLE.with_friction(0.5), STRING, measured(0.0), mud=MUD)
     assert exact.friction == pytest.approx([0.2, 0.3], abs=1e-7) and exact.misfit < 1e-4
@@ -189,6 +194,7 @@ def test_friction_from_measurements():
     assert given.block_weight == 250e3 and given.friction == pytest.approx([0.2, 0.3], abs=1e-6)
 
 
+@pytest.mark.once
 @pytest.mark.parametrize(("wrong", "words"), [
     (lambda m: (m.operation, m.hook_load + 150e3), "with block_weight=None it is .*weigh 1(49|50)"),
     (lambda m: (m.operation, m.hook_load / 1e3), "the hook loads are .*e-0. times those computed: expected N"),
@@ -203,6 +209,7 @@ def test_readings_that_do_not_fit_are_doubted(wrong, words):
     assert f"DOUBTFUL: misfit {found.misfit:.3g} where 1" in str(found)
 
 
+@pytest.mark.once
 def test_the_interval_covers_as_often_as_it_says():
     """Of a linear problem with the same solver: a rotating string, whose torque is nearly linear in the friction."""
     rng, hits = np.random.default_rng(8), 0
@@ -223,6 +230,7 @@ def test_the_interval_covers_as_often_as_it_says():
     assert 11 <= hits <= 29  # 20 with a standard deviation of 3.2
 
 
+@pytest.mark.once
 def test_measurements_that_are_refused():
     one = cf.well.RigMeasurement(1400.0, cf.well.TripOut(), 1e6)
     with pytest.raises(cf.SceneError, match="psi is a unit of pressure"):
@@ -237,6 +245,7 @@ def test_measurements_that_are_refused():
         cf.well.RigMeasurement(1400.0, cf.well.TripOut())
 
 
+@pytest.mark.once
 def test_charts(tmp_path):
     pytest.importorskip("matplotlib")
     found = sweep()
@@ -266,6 +275,7 @@ def test_charts(tmp_path):
     assert (found.to_dataframe()["trip in, friction 0.1: hook load (N)"] == found.hook_load[1, 0]).all()
 
 
+@pytest.mark.once
 def test_torques_below_their_error_are_shown_as_none():
     """A string that slides with the torque of a motor, and one that is tripped: what the rod leaves of a torque is not
     enlarged by an axis, and the friction of a string that rotates off bottom is none."""
@@ -286,6 +296,7 @@ def test_torques_below_their_error_are_shown_as_none():
     assert off.drag > 10 and "(no drag)" in off.summary("field")
 
 
+@pytest.mark.once
 def test_the_chart_of_a_sweep_marks_lock_up_and_thrusts_beyond_all_others():
     pytest.importorskip("matplotlib")
     loads = np.array([[[-1e5, -2e5, -3e5, -7e7, np.nan]], [[2e5, 3e5, np.nan, np.nan, np.nan]]])
@@ -305,6 +316,7 @@ def test_the_chart_of_a_sweep_marks_lock_up_and_thrusts_beyond_all_others():
     assert hook.figure.get_suptitle().endswith("7 of 10 answers so far") and len(torque.lines) == 2
 
 
+@pytest.mark.once
 def test_the_largest_error_of_a_sweep_names_its_quantity_and_place():
     """Over the largest load of the sweep: 60 % of a torque of 10 N m are nothing beside 10 kN m."""
     values = {name: np.full((2, 1, 3), 1e-3) for name in module.KEPT}
@@ -318,6 +330,7 @@ def test_the_largest_error_of_a_sweep_names_its_quantity_and_place():
         assert torque.startswith("surface torque") and "100 N m, 1 % of the largest one (rotate off" in torque
 
 
+@pytest.mark.once
 def test_axes_in_space_have_two_numbers_or_none():
     """Across the hole, whose radius is enlarged, none; of a short extent a finer step than of the others."""
     along = np.linspace(0, 1, 50)[:, None]
@@ -361,6 +374,7 @@ def swept(file, **given):
     return cf.well.depth_sweep(operations=[cf.well.TripOut()], depths=TWO_DEPTHS, folder=file, progress=False, **given)
 
 
+@pytest.mark.once
 def test_every_part_of_the_hole_is_compared(tmp_path):
     """Also what only the rod depends on: hook loads by two stiffnesses of the wall differ by 1 %."""
     file = tmp_path / "sweep"
@@ -387,6 +401,7 @@ class Own(cf.well.Component):
     maker: str = ""
 
 
+@pytest.mark.once
 def test_components_of_the_users_own_are_compared_by_all_their_fields(tmp_path):
     strings = [cf.well.DrillString([Own(None, None, 200.0, 0.0635, maker=maker)]) for maker in ("one", "other")]
     swept(tmp_path / "sweep", string=strings[0], mud=None)
@@ -421,6 +436,7 @@ def soft(path, clearance, operation, mu):
     return cf.well.torque_and_drag(hole, LONG_STRING, operation, model="soft", tol=1e-9)
 
 
+@pytest.mark.once
 @pytest.mark.parametrize(("name", "operation", "clearance", "differs"), IN_SPACE)
 def test_the_difference_of_whole_wells_is_covered(name, operation, clearance, differs):
     answer = soft(well(name), clearance, operation, 0.25)
@@ -430,6 +446,7 @@ def test_the_difference_of_whole_wells_is_covered(name, operation, clearance, di
         assert told < 6 * abs(differs)  # and not by far too much
 
 
+@pytest.mark.once
 @pytest.mark.parametrize(("radius", "angle", "below", "pull", "operation", "mu", "stiff", "flexible"), PLANE)
 def test_build_sections(radius, angle, below, pull, operation, mu, stiff, flexible):
     arc = radius * math.radians(angle)
@@ -440,6 +457,7 @@ def test_build_sections(radius, angle, below, pull, operation, mu, stiff, flexib
     assert abs(stiff - flexible) <= told < 8 * abs(stiff - flexible)
 
 
+@pytest.mark.once
 @pytest.mark.parametrize(("md", "inc", "differs"), [
     ([0, 200, 600], [0, 40, 40], -103.52), ([0, 300], [0, 60], -110.03), ([0, 100, 400], [30, 30, 70], -13.84),
 ])  # fmt: skip
@@ -449,12 +467,14 @@ def test_a_bend_at_an_end_takes_from_the_tension(md, inc, differs):
     assert abs(differs) <= answer.model_error * answer.tension.max() < 6 * abs(differs)
 
 
+@pytest.mark.once
 def test_torque_of_rotating_strings_is_covered():
     """The rod in contact gives 0.54 and 3.4 % less torque than the soft string by Coulomb's law."""
     for name, less in (("P", 0.0054), ("F-12", 0.034)):
         assert less <= soft(well(name), 0.04445, cf.well.RotateOffBottom(), 0.25).model_error < 4 * less
 
 
+@pytest.mark.once
 def test_a_snake_that_is_a_small_part_of_a_piece():
     """Above the helix of a vertical string: mu times the wall force of a helix that goes on to its top, by hand."""
     EI, weight, radius, friction = 1228200.0, 241.13, 0.0635, 0.3
@@ -468,6 +488,7 @@ def test_a_snake_that_is_a_small_part_of_a_piece():
     assert answer.helical.any() and answer.model_error * 662.6e3 == pytest.approx(snake, rel=0.05)
 
 
+@pytest.mark.once
 @pytest.mark.parametrize("length", [3500.0, 4000.0, 4500.0, 4800.0, 5000.0])
 def test_snakes_that_a_helix_above_multiplies(length):
     """A string pushed into a horizontal hole whose snake has half the wall force of a helix, in closed form: near
@@ -493,6 +514,7 @@ def test_snakes_that_a_helix_above_multiplies(length):
             assert math.isinf(told) and "may lock up" in str(answer)
 
 
+@pytest.mark.once
 def test_tension_beyond_what_a_pipe_carries_is_told():
     path = cf.well.WellPath.from_survey([0, 1000], [0, 0], [0, 0])
     hole = cf.well.Borehole(path, [cf.well.HoleSection(1000, 0.2159, 0.3)])

@@ -44,16 +44,16 @@ def load():
     return dict(sorted(PROBLEMS.items(), key=lambda item: order.index(item[1].chapter)))
 
 
-def solved(problem, picture=None):
+def solved(problem, picture=None, again=True):
     """Solve a problem, and draw it into a file.
 
     Returns:
         {"seconds": processor time of solving, "rows": a dict of `Row.__dict__`, "difference" and "agrees" each}, as
-        plain data. Where forms were compiled it is solved again, and that time taken.
+        plain data. Where forms were compiled it is solved again, unless `again` is False, and that time taken.
     """
     before = _compiled()
     (rows, draw), seconds = timed(problem.solve)
-    if _compiled() != before:
+    if again and _compiled() != before:
         (rows, draw), seconds = timed(problem.solve)
     if picture:
         picture.parent.mkdir(parents=True, exist_ok=True)
@@ -82,8 +82,8 @@ def text(problems, results, machine):
     rows = [row for found in results.values() for row in found["rows"]]
     agree = sum(row["agrees"] for row in rows)
     yield (
-        f"{len(results)} problems, {len(rows)} rows, of which {agree} are within what is allowed. In the column s is the "
-        f"processor time of solving, in seconds, with the forms compiled before. {in_words(machine)}."
+        f"{len(results)} problems, {len(rows)} rows, of which {agree} are within what is allowed. In the column s is "
+        f"the processor time of solving, in seconds, with the forms compiled before. {in_words(machine)}."
     )
     for chapter, title in CHAPTERS.items():
         here = {name: results[name] for name, x in problems.items() if x.chapter == chapter and name in results}
