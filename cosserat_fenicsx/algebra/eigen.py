@@ -20,7 +20,7 @@ _PROJECTED = 400
 _COARSE = 1e-9
 # Fewest unknowns of a matrix whose factors are kept for later ones; the relative residual of a solution with factors of
 # an earlier matrix, and the iterations that cost less than new factors.
-_KEPT, _REUSED, _MOST_REUSES = 2000, 1e-8, 12
+_KEPT, _REUSED, _MOST_REUSES = 2000, 1e-10, 12
 # % extra memory for fill-in, too little of which fails without a message, where pivots are exchanged and where not; and
 # the smallest pivot of a matrix with a diagonal of ones that is positive definite beyond doubt.
 _EXCHANGE, _NO_EXCHANGE, _SURELY = 200, 20, 1e-9
