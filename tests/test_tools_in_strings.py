@@ -20,7 +20,7 @@ from cosserat_fenicsx.drilling import (
     ViscousDrag,
 )
 from cosserat_fenicsx.drilling.linear.characteristic import Steady
-from cosserat_fenicsx.well import Bit, Collar, Component, DrillString, MudMotor, OscillationTool
+from cosserat_fenicsx.well import Bit, Collar, Component, DrillString, MotorCurve, MudMotor, OscillationTool
 
 pytestmark = [pytest.mark.serial, pytest.mark.once]
 TRUTHS = json.loads((Path(__file__).parent / "reference" / "tools.json").read_text(encoding="utf-8"))
@@ -136,6 +136,50 @@ def test_a_motor_that_stalls(model):
     assert "THE MOTOR STALLS from t = " in str(found) and "where it sticks the motor stalls" in " ".join(found.why)
     with pytest.raises(cf.SceneError, match="mud motor: it stalls"):
         cf.drilling.simulate(replace(scene, start="steady"), 1.0, model=model)
+
+
+# Of a maker's chart, at two flows: speeds of the rotor and torques on the bit.
+CHART = [MotorCurve(q, [k * x for x in (9.2, 8.6, 7, 4, 0)], [k * x for x in (0, 3e3, 6.5e3, 9e3, 10e3)])
+         for q, k in ((0.02, 0.4), (0.04, 1.0))]  # fmt: skip
+
+
+@pytest.mark.parametrize(("model", "dt"), [("torsion", 2e-4), ("axial and torsional", 4e-4)])
+def test_a_motor_by_its_chart(model, dt):
+    """A linear law of the bit meets the curve at one of its points; a curve of two points is the linear motor; and the
+    same that the line does where it stalls."""
+    charted = {"leakage": None, "curves": CHART}
+    for flow, k in ((GIVEN["Q"], 1.0), (0.03, 0.7)):  # halfway: the mean of both
+        tool = motor(**charted, flow=flow)
+        speed, torque = 7 * k, 6.5e3 * k
+        scene = above(tool, law=Rising(torque - 20 * (GIVEN["Om"] + speed), 20.0), start="steady")
+        found = cf.drilling.simulate(scene, 0.3, model=model, dt=dt, progress=False)
+        assert found.motor_speed == pytest.approx(speed, rel=1e-9) and found.torque_on_bit == pytest.approx(torque)
+        assert found.pressure[-1] == pytest.approx((torque + GIVEN["Tf"]) / tool.per_radian)
+        settled = cf.drilling.simulate(replace(scene, start="rest"), 9.0, model=model, dt=dt, progress=False)
+        assert settled.motor_speed[-1] == pytest.approx(speed, rel=1e-3)
+        assert abs(settled.balance[-1]) < 1e-6 * settled.work_of_drive[-1]
+    line = motor()
+    ends = MotorCurve(GIVEN["Q"], [line.speed(0.0), 0.0], pressures=[0.0, line.stall_torque() / line.per_radian])
+    for law in (Rising(GIVEN["T0"], GIVEN["b"]), Stribeck(30e3, 29e3)):
+        rows = [
+            cf.drilling.simulate(above(x, law=law, drag=ViscousDrag(torsion=2.0)), 1.0, model=model, dt=dt)
+            for x in (line, motor(leakage=None, curves=[ends]))
+        ]
+        assert rows[0].motor_speed == pytest.approx(rows[1].motor_speed, rel=1e-9, abs=1e-9)
+    assert rows[1].stalled[-1] and "THE MOTOR STALLS" in str(rows[1])
+
+
+def test_small_motions_take_the_slope_of_a_motors_curve():
+    """As that of the linear motor with this slope, at the same speed of the bit."""
+    tool = motor(leakage=None, curves=CHART)
+    scene = above(tool, law=Rising(6.5e3 - 20 * (GIVEN["Om"] + 7), 20.0), length=1000.0)
+    slope = tool.slope_at(7.0)
+    line = motor(leakage=tool.per_radian**2 / slope, flow=(6.5e3 + GIVEN["Tf"] + 7 * slope) / slope * tool.per_radian)
+    growth, same = (
+        cf.drilling.stability(x, [GIVEN["Om"]], up_to=2.0).growth
+        for x in (scene, replace(scene, string=DrillString([line, pipe(1000.0)])))
+    )
+    assert growth == pytest.approx(same, rel=1e-8) and tool.least_slope < slope < tool.slope
 
 
 @pytest.mark.parametrize("model", ["torsion", "axial and torsional"])
@@ -269,6 +313,14 @@ def test_tool_that_halves_the_pull(truth):
     (lambda: motor(size="6 3/4 in"), "MudMotor.size"),
     (lambda: motor(length=None), "MudMotor.length"),
     (lambda: motor(leakage=0.0), "MudMotor.leakage"),
+    (lambda: motor(curves=CHART), "MudMotor.leakage = .*: expected either a leakage"),
+    (lambda: motor(leakage=None, curves=CHART, flow=0.05), "MudMotor.flow = 0.05: .*, 0.02 to 0.04 m.3/s"),
+    (lambda: motor(leakage=None, curves=CHART, flow=Switched(0.04, 0.03, 1.0)), "MudMotor.flow = .*: .* a number"),
+    (lambda: motor(leakage=None, curves=CHART[::-1]), "MudMotor.curves = .*of ascending flow"),
+    (lambda: motor(leakage=None, curves=[MotorCurve(0.04, [10.0, 0.0], [0.0, 1e4])]), "at most 9.37.* without any"),
+    (lambda: MotorCurve(0.04, [9.0, 7.0, 8.0, 0.0], [0.0, 1e3, 2e3, 3e3]), "MotorCurve.speeds = .*which fall .* to 0"),
+    (lambda: MotorCurve(0.04, [9.0, 0.0], [1e3, 3e3]), "MotorCurve.torques = .*: expected 2 torques, .*rise from 0"),
+    (lambda: MotorCurve(0.04, [9.0, 0.0]), "either torques .N m. or pressures"),
     (lambda: above(motor(), bit=None), "Drilling.bit = None: expected a BitOnRock below mud motor"),
     (lambda: above(motor(), motor()), "one MudMotor"),
     (lambda: OscillationTool(2.0, outer_diameter=0.127, spring=1e6, frequency=16.0), "either a force"),

@@ -94,6 +94,10 @@ int build(model *m, double h)
             below = m->a[j] - m->o[j] * m->o[j] / below;
         }
     }
+    for (int p = 0; p < m->pairs; p++) {
+        const int j = m->pair[p] * n + m->pair_dof[p];
+        m->parted[p][0] = m->a[j], m->parted[p][1] = m->a[j + n], m->parted[p][2] = m->o[j];
+    }
     return 1;
 }
 
@@ -147,6 +151,7 @@ static void loads(model *m, double h, const double *signal)
         m->rubbed[p] = fmax(fmin(creep, m->pair_lost[p]), -m->pair_lost[p]);
         m->rubs[p] = 0;
     }
+    m->bends = m->softens = 0;
     for (int d = 0; d < n; d++) m->b[last * n + d] -= m->bit.force[d + 2 - n];
     if (n == 2) m->b[2 * last] += m->bit.hanging; /* the tension at rest contains a part of the weight on bit */
 }
@@ -242,17 +247,46 @@ static double rub(model *m)
     return fabs(m->force[2 * i] - m->c[2 * i]) / m->rho[2 * i];
 }
 
+/* The entries of the matrix beside a pair, with a damper more than without friction and curve. */
+static void damp_pair(model *m, int p, double more)
+{
+    const int j = m->pair[p] * m->dofs + m->pair_dof[p];
+    double *const entry[3] = {m->a + j, m->a + j + m->dofs, m->o + j};
+    for (int k = 0; k < 3; k++) *entry[k] = m->parted[p][k] + (k < 2 ? more : -more);
+}
+
+/* The tangent of a motor's curve at its speed, as what it adds to the torque and takes from the damper of the matrix,
+   which has its steepest slope. Returns whether the last one was not true there. */
+static int bend(model *m, int p)
+{
+    const int n = m->dofs, j = m->pair[p] * n + m->pair_dof[p];
+    const double rate = m->w[j + n] - m->w[j], c = m->pair_slope[p];
+    double slope;
+    const double more = torque_of_motor(&m->drives, rate, &slope) + c * rate, off = more - m->bends - m->softens * rate;
+    if (fabs(off) <= 1e-12 * c * (fabs(rate) + 1)) return 0;
+    m->softens = m->ease * (slope + c);
+    const double bends = more - m->softens * rate;
+    m->b[j] -= bends - m->bends, m->b[j + n] += bends - m->bends;
+    m->bends = bends;
+    return 1;
+}
+
 /* Friction between both sides of joints, as that of a motor's rotor in its housing: where it holds them they creep, by
-   a damper; elsewhere it is a given force. Returns whether one begins to stand or to slip. */
+   a damper; elsewhere it is a given force. And the curve of a motor. Returns whether one begins to stand or to slip, or
+   another tangent of the curve is taken. */
 static int rub_joints(model *m)
 {
     const int n = m->dofs;
     int changed = 0;
     for (int p = 0; p < m->pairs; p++) {
         const double lost = m->pair_lost[p];
-        if (lost == 0) continue;
+        const int bends = p == m->motor && m->drives.count;
+        if (bends) changed |= bend(m, p);
+        if (lost == 0) {
+            if (bends) damp_pair(m, p, -m->softens);
+            continue;
+        }
         const int j = m->pair[p] * n + m->pair_dof[p];
-        double *const entry[3] = {m->a + j, m->a + j + n, m->o + j};
         /* at most the inverse compliance between both sides */
         const double rho = m->ease * fmin(m->rho[j], m->rho[j + n]) / 4;
         const double tau = m->rubbed[p] + rho * (m->w[j + n] - m->w[j]);
@@ -261,12 +295,7 @@ static int rub_joints(model *m)
         changed |= more != 0 || stands != m->stands[p];
         m->b[j] += more, m->b[j + n] -= more;
         m->rubs[p] = force;
-        for (int k = 0; k < 3 && stands != m->stands[p]; k++) {
-            if (stands)
-                m->parted[p][k] = *entry[k], *entry[k] += (k < 2 ? 1 : -1) * lost / CREEP;
-            else
-                *entry[k] = m->parted[p][k];
-        }
+        if (bends || stands != m->stands[p]) damp_pair(m, p, (stands ? lost / CREEP : 0) - (bends ? m->softens : 0));
         m->stands[p] = stands;
     }
     return changed;

@@ -181,6 +181,8 @@ class AxialTorsional(StringModel):
             refuse("DrillString", "components", len(joints), f"at most {self._lib.MOST_PAIRS} tools that part it")
         m.pairs = len(joints)
         m.motor = next((p for p, (_, _, joint) in enumerate(joints) if joint.turns), -1)
+        if m.motor >= 0:
+            self._put_curve(m.drives, self.scene.motor)
         for name, values in (("pair", [x[0] for x in joints]), ("pair_dof", [x[1] for x in joints])):
             self._array(m, name, np.array(values, dtype=np.int32))
         for name in ("damping", "lost"):
@@ -249,7 +251,6 @@ class AxialTorsional(StringModel):
     def _set_steady(self, motion):
         """A steady start, see `steady_start`."""
         m, kept, unknowns, chain = self._m, self._kept, slice(2 - self._dofs, 2), self._chain
-        pairs = [(*at, joint.force(0.0) - joint.lost) for *at, joint in chain.joints]
         turned = next((end + 1 for end, _, joint in chain.joints if joint.turns), None)
         turning = float(steady_velocities(self.scene)[1])
 
@@ -277,6 +278,7 @@ class AxialTorsional(StringModel):
             bears = np.zeros(2) if bit is None else bit.law.steady_forces(bit.resting or 0.0, motion)
             extra = (bears - [m.bit.hanging, 0.0])[unknowns]
             friction = self._wall, m.of_rotation
+            pairs = [(*place, joint.steady(of_bit - turning)) for *place, joint in chain.joints]
             return bears, velocities, *steady_state(velocities[:, unknowns], chain, limits, friction, extra, pairs)
 
         if self._axial and follows_the_bit(

@@ -206,7 +206,7 @@ class DrillingHistory(ChartedBetween):
         motor = self.scene.motor
         if motor is None:
             return np.full(len(self), np.nan)
-        return (self._flow - motor.per_radian * self.motor_speed) / motor.leakage
+        return motor.pressure_at(self.motor_speed, self._flow)
 
     @property
     def _flow(self):

@@ -39,6 +39,11 @@ class Joint:
     force: ScalarSignal
     lost: float = 0.0
 
+    def steady(self, rate: float) -> float:
+        """What drives both sides apart at a rate (rad/s, or m/s) from 0 on, without the damper, N m or N."""
+        curved = self.turns and self.tool.curves
+        return self.tool.torque(rate) + self.damping * rate if curved else self.force(0.0) - self.lost
+
 
 def joints_of(laid, bottoms) -> tuple[Joint, ...]:
     """The `Joint`s of components in their places, from the top down; bottoms: measured depths of the lower ends of the
@@ -84,7 +89,9 @@ class _Driven(ScalarSignal):
 def fastest_rotor(scene) -> float:
     """The largest speed that its flow gives the rotor of a motor against its housing, rad/s; 0 without a motor."""
     joint = next((x for x in scene.joints if x.turns), None)
-    return 0.0 if joint is None else max(0.0, (joint.force.largest - joint.lost) / joint.damping)
+    if joint is None:
+        return 0.0
+    return joint.tool.speed(0.0) if joint.tool.curves else max(0.0, (joint.force.largest - joint.lost) / joint.damping)
 
 
 def speed_of_bit(scene, turning, down=None, rubbed=None):
@@ -102,15 +109,15 @@ def speed_of_bit(scene, turning, down=None, rubbed=None):
     motor, bit = scene.motor, scene.bit
     if motor is None:
         return turning
-    drag, stall = scene.drag_rates[1] * scene.turned_inertia, motor.stall_torque()
+    drag = scene.drag_rates[1] * scene.turned_inertia
 
     def excess(om):
         velocity = bit.law.rate(bit.resting, om) if down is None and bit.law.drills else down or 0.0
         torque = float(bit.law.steady_forces(bit.resting or 0.0, np.array([velocity, om]))[1])
         torque += rubbed(om) if rubbed else 0.0
-        return stall - motor.slope * (om - turning) - torque - drag * om
+        return motor.torque(om - turning) - torque - drag * om
 
-    return largest_speed(motor, excess, turning + stall / motor.slope, turning)
+    return largest_speed(motor, excess, turning + motor.speed(0.0), turning)
 
 
 def largest_speed(motor, excess, fastest, slowest, tried=_TRIED):

@@ -72,6 +72,15 @@ class StringModel(Pointers):
         array = self._kept[name] = np.array(values, dtype=np.int32 if whole else float, order="C")
         setattr(record, name, (self.integers if whole else self.doubles)(array))
 
+    def _put_curve(self, curve, motor):
+        """Give C the torque of a `MudMotor` with curves over the speed of its rotor, less that at rest."""
+        if motor.curves:
+            shape = motor.law.c.T.copy()
+            shape[:, 3] -= motor.driven()
+            self._array(curve, "knots", motor.law.x)
+            self._array(curve, "cubics", shape)
+            curve.count = len(shape)
+
     def _sample_torque(self, drive, top, first=0.0):
         """Take the samples of a drive's control; `top`: C's record that holds the torque `given` by the drive; `first`:
         torque (N m) or speed (rad/s) before its first command acts."""

@@ -207,7 +207,7 @@ static void commit(model *m, double h, const double *signal)
     for (int p = 0; p < m->pairs; p++) {
         const int j = m->pair[p] * n + m->pair_dof[p];
         const double rate = m->w[j + n] - m->w[j], lost = h * m->pair_slope[p] * rate * rate;
-        m->applied[p] = signal[n + p] - m->rubbed[p];
+        m->applied[p] = signal[n + p] - m->rubbed[p] + (p == m->motor ? m->bends + m->softens * rate : 0);
         sums->tools += h * m->applied[p] * rate - lost;
         sums->mud -= lost;
     }

@@ -32,6 +32,16 @@ static void shares(const curve *law, int row, double load, double *share)
     share[2] = t * t * (3 - 2 * t), share[3] = h * t * t * (t - 1);
 }
 
+/* The torque of a motor with a curve at a speed of its rotor, less that at rest, and its slope; straight beyond. */
+static double torque_of_motor(const curve *law, double speed, double *slope)
+{
+    const double at = fmin(fmax(speed, law->knots[0]), law->knots[law->count]);
+    const int k = interval_of(law->knots, law->count, at);
+    const double *c = law->cubics + 4 * (size_t)k, t = at - law->knots[k];
+    *slope = (3 * c[0] * t + 2 * c[1]) * t + c[2];
+    return ((c[0] * t + c[1]) * t + c[2]) * t + c[3] + *slope * (speed - at);
+}
+
 /* The largest torque at rest of a law of the bit under a load. */
 static double rests(const friction *f)
 {

@@ -71,6 +71,7 @@ typedef struct {
     double bit_inertia;
     double slope, dragged;                   /* of a motor above the bit: torque over speed, 0: none; drag below */
     double lost;                             /* largest torque of the friction of its rotor */
+    curve motor;                             /* its torque over its speed, less that at rest; empty: a line */
     const double *driven;                    /* torque that its flow gives it at rest, in each of the steps asked for */
     double bit_angle, turned, last_turned;   /* of the bit below a motor; its speed against the housing, see `speed` */
     double tools;                            /* work of the motor since the start, J */
@@ -138,10 +139,12 @@ typedef struct {
     const int *pair, *pair_dof;     /* (pairs,) elements, and their unknowns */
     const double *pair_slope;       /* (pairs,) dampers, which count as tools; signals follow those of the top */
     const double *pair_lost;        /* (pairs,) largest friction between both sides */
+    curve drives;                   /* torque of a motor over its speed, less that at rest; empty: a line */
+    double bends, softens;          /* what it adds to that of its damper, by value at rest and slope */
     double applied[6];              /* forces of the last step, friction included */
     double rubbed[6], rubs[6];      /* friction between both sides; that which is a given force */
     int stands[6];                  /* whether it holds them: then the matrix has a damper, */
-    double parted[6][3];            /* without which these were its entries */
+    double parted[6][3];            /* entries of the matrix without these */
     upper top[2];
     lower bit;
     books sums;

@@ -255,7 +255,7 @@ class TorsionWaves(StringModel):
             slope[-1] = self._law.steepest
         impedance = self._above + self._below + self._drag
         if self.scene.motor is not None:
-            c = self.scene.motor.slope
+            c = self.scene.motor.least_slope
             impedance[-1] *= c / (impedance[-1] + c)
         if self.scene.bit is not None:
             impedance[-1] += 2 * self._bit_inertia / self.cells.dt
@@ -335,6 +335,7 @@ class TorsionWaves(StringModel):
         c.bit_inertia = self._bit_inertia
         if scene.motor is not None:
             c.slope, c.lost = scene.motor.slope, scene.motor.lost_torque
+            self._put_curve(c.motor, scene.motor)
             c.dragged = scene.drag_rates[1] * scene.turned_inertia
         self._laws = [InC(self._ffi, self._wall)]
         self._laws[0].fill(c.wall)

@@ -108,23 +108,48 @@ static __attribute__((noinline)) void energies(const waves *w, double *kinetic, 
 
 /* The bit below a motor, whose torque is R - c (om_bit - om) less the friction of its rotor: the housing om bears it,
    P - A om = T. So the bit meets the wave (c P + A R)/(A + c) on the impedance c A/(A + c), or P on A while friction
-   holds the rotor. It turns forwards, backwards or not at all: one of them is true to its sense. */
-static double below_motor(waves *w, double P, double R)
+   holds the rotor. It turns forwards, backwards or not at all: one of them is true to its sense. Returns om; T into
+   *torque. */
+static double against_motor(waves *w, double P, double R, double c, double *torque)
 {
     const int n = w->cells;
-    const double A = w->above[n] + w->drag[n], c = w->slope, dt = w->dt, before = w->bit_speed;
-    double bit, T, om;
+    const double A = w->above[n] + w->drag[n], before = w->bit_speed;
+    double om;
     for (int sense = 1;; sense = sense > 0 ? -1 : 0) {
         const double S = sense ? c * A / (A + c) : A;
         const double F = sense ? (c * P + A * (R - sense * w->lost)) / (A + c) : P;
         w->bit_speed = before;
-        bit = turned(w, n, F, S + w->dragged, w->bit_inertia, &w->bit_speed);
-        T = F - S * bit;
-        om = sense ? (P - T) / A : bit;
-        if (!sense || w->lost == 0 || sense * (bit - om) > 0) break;
+        const double bit = turned(w, n, F, S + w->dragged, w->bit_inertia, &w->bit_speed);
+        *torque = F - S * bit;
+        om = sense ? (P - *torque) / A : bit;
+        w->turned = bit - om;
+        if (!sense || w->lost == 0 || sense * w->turned > 0) return om;
     }
+}
+
+/* The same of a motor with a curve, whose tangents Newton's method takes. The speed on a tangent is above the one it
+   touches at just where the answer is, so both ends of an interval close in on it. */
+static double below_motor(waves *w, double P, double R)
+{
+    const int n = w->cells;
+    const double dt = w->dt, before = w->bit_speed;
+    double T, om, low = -INFINITY, high = INFINITY;
     w->last_turned = w->turned;
-    w->turned = bit - om;
+    if (!w->motor.count) om = against_motor(w, P, R, w->slope, &T);
+    else
+        for (int i = 0;; i++) {
+            double slope, at = w->turned;
+            const double more = torque_of_motor(&w->motor, at, &slope);
+            w->bit_speed = before;
+            om = against_motor(w, P, R + more - slope * at, -slope, &T);
+            ++w->iterations;
+            const double change = w->turned - at, enough = 1e-12 * (1 + fabs(at));
+            if (fabs(change) <= enough || high - low <= enough) break;
+            if (i == MOST) return NAN;
+            *(change > 0 ? &low : &high) = at;
+            if (w->turned <= low || w->turned >= high) w->turned = (low + high) / 2;
+        }
+    const double bit = om + w->turned;
     w->bit_angle += dt * bit;
     w->tools += dt * T * w->turned;
     w->in_mud += dt * w->dragged * bit * bit;

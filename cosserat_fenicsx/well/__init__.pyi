@@ -41,6 +41,7 @@ from cosserat_fenicsx.well.assembly import build_rate as build_rate
 from cosserat_fenicsx.well.strength import PipeStrength as PipeStrength
 from cosserat_fenicsx.well.sweep import DepthSweep as DepthSweep
 from cosserat_fenicsx.well.sweep import depth_sweep as depth_sweep
+from cosserat_fenicsx.well.tools import MotorCurve as MotorCurve
 from cosserat_fenicsx.well.tools import MudMotor as MudMotor
 from cosserat_fenicsx.well.tools import OscillationTool as OscillationTool
 from cosserat_fenicsx.well.path import tortuosity as tortuosity

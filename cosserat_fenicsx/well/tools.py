@@ -8,13 +8,19 @@ takes the flow Q at the speed om of its rotor against its housing, and hands the
 The housing bears -T. For small motions about any speed the motor is a dashpot c between housing and bit. T_lost is the
 friction of the rotor, against its rotation: it changes its sign with that of om, and holds the rotor where T is within
 T_lost of v Q/leak. Above that the string turns the rotor backwards, and the motor pumps; without flow, too.
+
+A maker's chart replaces the line by a `MotorCurve` at each of some flows: T + T_lost, over the speed, is a monotone
+cubic through its points, and goes on straight beyond them.
 """
 
 import math
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Annotated, Any
 
 import numpy as np
+from scipy.interpolate import PchipInterpolator, PPoly
+from scipy.optimize import brentq
 
 from cosserat_fenicsx.checks import call, instance, number, refuse, store, warn
 from cosserat_fenicsx.parts import (
@@ -24,8 +30,10 @@ from cosserat_fenicsx.parts import (
     Inertia,
     Length,
     Number,
+    Part,
     Time,
     Torque,
+    Values,
     at_least,
     positive,
 )
@@ -38,6 +46,8 @@ from cosserat_fenicsx.well.components import Collar, DrillString
 
 # Inner diameter of a housing over the outer one, where it is not given.
 _BORE = 0.6
+# Largest speeds over that of a motor without load, at which its curve is inverted.
+_REACH = 1e3
 # Larger ones than tools have: displacement a revolution (m^3), flow (m^3/s), stroke (m).
 _MOST_A_TURN, _MOST_FLOW, _LONGEST_STROKE = 0.2, 0.2, 0.1
 
@@ -76,6 +86,39 @@ class _Tool(InWords, Collar):
         yield self.sentence(units)
 
 
+@dataclass(frozen=True)
+class MotorCurve(Part):
+    """What a maker's chart says of a motor at one flow, from no load to where it stalls.
+
+    Args:
+        flow: m^3/s. speeds: of the rotor, rad/s, falling to 0, where the motor stalls.
+        torques: on the bit at these speeds, N m, rising from 0.
+        pressures: in place of the torques, Pa: over the motor, less the pressure without load, rising from 0; the
+            torque is displacement/(2 pi) times them.
+
+    Raises:
+        SceneError: fewer than two points, speeds that do not fall to 0, others that do not rise from 0, or torques and
+            pressures, or neither.
+    """
+
+    flow: Annotated[float, Number("flow", positive("the flow of a curve"))]
+    speeds: Annotated[tuple[float, ...], Values(Number("angular velocity", at_least(0)))]
+    torques: Annotated[tuple[float, ...], Values(Number("moment", at_least(0)))] | None = None
+    pressures: Annotated[tuple[float, ...], Values(Number("pressure", at_least(0)))] | None = None
+
+    def validate(self):
+        """Refuse a table that is no curve from no load to stall."""
+        if (self.torques is None) == (self.pressures is None):
+            refuse(self, "torques", self.torques, "either torques (N m) or pressures (Pa), one for each speed")
+        if len(self.speeds) < 2 or self.speeds[-1] != 0 or not (np.diff(self.speeds) < 0).all():
+            refuse(self, "speeds", self.speeds, "two speeds or more (rad/s), which fall from that without load to 0, "
+                   "where it stalls")  # fmt: skip
+        name = "torques" if self.pressures is None else "pressures"
+        load = getattr(self, name)
+        if len(load) != len(self.speeds) or load[0] != 0 or not (np.diff(load) > 0).all():
+            refuse(self, name, load, f"{len(self.speeds)} {name}, one for each speed, which rise from 0")
+
+
 @dataclass(frozen=True, kw_only=True)
 class MudMotor(_Tool):
     """A positive-displacement motor, which turns what is below it in the string against its housing.
@@ -87,19 +130,24 @@ class MudMotor(_Tool):
         length, outer_diameter, inner_diameter, mass, material, name, damping_time, bend, bend_at, tool_face: as of
             `Collar`, but inner_diameter None for 0.6 of the outer one.
         displacement: V, m^3 a revolution of the rotor against the housing.
-        leakage: flow past the seals per pressure over the motor, m^3/(s Pa).
-        lost_torque: T_lost, N m, of the torque that the pressure makes.
+        leakage: flow past the seals per pressure over the motor, m^3/(s Pa); None with curves.
+        curves: a `MotorCurve` or several, of ascending flow, in place of the leakage: monotone cubics between their
+            points; at flows between two curves by speeds and torques between theirs at the same share of the torque
+            that stalls. The flow is then a number within those of the curves.
+        lost_torque: T_lost, N m, of the torque that the pressure makes; the torques of curves are those less it.
         flow: Q, m^3/s: a number, or a function of time, such as a `Table`, for `drilling.simulate`; 0 where the pumps
             stand: then friction holds the rotor up to T_lost, and beyond it turns and pumps, as without a valve.
         rotor_inertia: kg m^2, of rotor and drive shaft; None for a steel cylinder of half the inner diameter.
 
     Raises:
-        SceneError: as of `Collar`; numbers that are not positive; a negative flow. Sizes that no motor has, such as
-            litres without their unit, are taken with a warning.
+        SceneError: as of `Collar`; numbers that are not positive; a negative flow; leakage and curves, or neither; a
+            flow outside those of the curves; a speed above that of the flow without any leakage. Sizes that no
+            motor has, such as litres without their unit, are taken with a warning.
     """
 
     displacement: Annotated[float, Number("volume", positive("a displacement a revolution"))]
-    leakage: Annotated[float, Number(limits=positive("a leakage (m^3/(s Pa)), about 1e-8"))]
+    leakage: Annotated[float, Number(limits=positive("a leakage (m^3/(s Pa)), about 1e-8"))] | None = None
+    curves: tuple[MotorCurve, ...] = ()
     lost_torque: Annotated[Torque, at_least(0)] = 0.0
     flow: InTime[Annotated[float, Number("flow", at_least(0, "a flow through the motor"))]]
     rotor_inertia: Annotated[Inertia, positive()] | None = None
@@ -116,6 +164,25 @@ class MudMotor(_Tool):
         times = (0.0, *getattr(self.flow, "jumps", ()))
         flows = [self.flow_at(t) for t in times]
         _doubt_size(self, "flow", max(flows), _MOST_FLOW, "m^3/s", "2400 l/min")
+        if (self.leakage is None) != bool(self.curves):
+            refuse(self, "leakage", self.leakage, "either a leakage (m^3/(s Pa)), about 1e-8, or curves")
+        if self.curves:
+            self._check_curves()
+
+    def _check_curves(self):
+        known = [curve.flow for curve in self.curves]
+        if not (np.diff(known) > 0).all():
+            refuse(self, "curves", known, "one MotorCurve for each flow, of ascending flow (m^3/s)")
+        for curve in self.curves:
+            most = curve.flow / self.per_radian
+            if curve.speeds[0] > most * (1 + 1e-6):
+                refuse(self, "curves", curve.speeds[0], f"a speed without load of at most {most:.5g} rad/s, which "
+                       f"{curve.flow:.4g} m^3/s give without any leakage: flow over displacement/(2 pi)")  # fmt: skip
+        if callable(self.flow):
+            refuse(
+                self, "flow", self.flow, "a number (m^3/s) for a motor with curves; leakage= takes functions of time"
+            )
+        self._law(self.flow)
 
     @property
     def per_radian(self) -> float:
@@ -124,8 +191,57 @@ class MudMotor(_Tool):
 
     @property
     def slope(self) -> float:
-        """c = v^2/leak, by which the torque falls with the speed, N m s/rad."""
-        return self.per_radian**2 / self.leakage
+        """c = v^2/leak, by which the torque falls with the speed, N m s/rad; of curves where they fall most."""
+        return float(-self._slopes.min()) if self.curves else self.per_radian**2 / self.leakage
+
+    @property
+    def least_slope(self) -> float:
+        """The same of curves where they fall least."""
+        return float(max(-self._slopes.max(), 0.0)) if self.curves else self.slope
+
+    def slope_at(self, speed: float) -> float:
+        """The same at a speed of the rotor, rad/s."""
+        return float(-self.law.derivative()(speed)) if self.curves else self.slope
+
+    @cached_property
+    def law(self) -> PPoly | None:
+        """T + T_lost of a motor with curves over the speed of its rotor, N m over rad/s, at its own flow; or None."""
+        return self._law(self.flow) if self.curves else None
+
+    @cached_property
+    def _slopes(self):
+        """The slopes of the law where these are extreme: at its points, and within its cubics."""
+        steep, (a, b, *_) = self.law.derivative(), self.law.c
+        inside = -b / np.where(a == 0, np.inf, 3 * a)
+        return np.append(steep(self.law.x), steep(self.law.x[:-1] + np.clip(inside, 0, np.diff(self.law.x))))
+
+    def _law(self, flow):
+        """`law` at a flow, m^3/s."""
+        flows = [curve.flow for curve in self.curves]
+        if not flows[0] * (1 - 1e-9) <= flow <= flows[-1] * (1 + 1e-9):
+            refuse(
+                self, "flow", flow, f"a flow of the curves, {flows[0]:.4g} to {flows[-1]:.4g} m^3/s, or further curves"
+            )
+        k = min(max(int(np.searchsorted(flows, flow)), 1), max(len(flows) - 1, 1))
+        near = self.curves[k - 1 : k + 1]
+        share = (flow - near[0].flow) / (near[-1].flow - near[0].flow) if len(near) > 1 else 0.0
+        loads = [np.array(x.torques or np.array(x.pressures) * self.per_radian) for x in near]
+        kept = [(x, load) for x, load, part in zip(near, loads, (1 - share, share), strict=False) if abs(part) > 1e-9]
+        at = np.unique(np.concatenate([load / load[-1] for _, load in kept]).round(12))
+        parts = [1.0] if len(kept) == 1 else [1 - share, share]
+        torque = at * sum(part * load[-1] for part, (_, load) in zip(parts, kept, strict=True))
+        speed = sum(
+            part * PchipInterpolator(load / load[-1], x.speeds)(at) for part, (x, load) in zip(parts, kept, strict=True)
+        )
+        om, T = speed[::-1], torque[::-1] + self.lost_torque
+        ends = om[-1] * np.array([-1, 1])
+        straight = [(T[1] - T[0]) / (om[1] - om[0]), (T[-1] - T[-2]) / (om[-1] - om[-2])]
+        cubics = PchipInterpolator(om, T)
+        left, right = (
+            [[0], [0], [slope], [value]]
+            for slope, value in zip(straight, (T[0] + straight[0] * ends[0], T[-1]), strict=True)
+        )
+        return PPoly(np.hstack([left, cubics.c, right]), np.concatenate([ends[:1], om, om[-1:] + ends[1:]]))
 
     def flow_at(self, t: float) -> float:
         """The flow at a time (s), m^3/s.
@@ -153,7 +269,24 @@ class MudMotor(_Tool):
 
     def driven(self, flow: Any = None) -> Any:
         """The torque of the pressure on a rotor at rest, v Q/leak, N m; `flow` as of `stall_torque`."""
-        return self.per_radian * self._flow(flow) / self.leakage
+        return (
+            self._by_flow(flow, lambda law: law(0.0))
+            if self.curves
+            else self.per_radian * self._flow(flow) / self.leakage
+        )
+
+    def _by_flow(self, flow, function, *values):
+        """A function of the `law` at flows and of other values, for numbers and arrays."""
+        flows, *values = np.broadcast_arrays(self._flow(flow), *values)
+        found = np.empty(flows.shape)
+        for one in np.unique(flows):
+            law, at = self.law if one == self.flow else self._law(one), flows == one
+            found[at] = function(law, *(x[at] for x in values))
+        return found if found.ndim else float(found)
+
+    def torque(self, speed: float) -> float:
+        """On the bit at a speed (rad/s) of the rotor, from 0 on, at its flow at the start, N m."""
+        return float(self.law(speed) if self.curves else self.driven() - self.slope * speed) - self.lost_torque
 
     def stall_torque(self, flow: float | None = None) -> float:
         """The largest torque at which the motor turns, N m; below 0 where its flow does not turn it without load.
@@ -166,12 +299,27 @@ class MudMotor(_Tool):
     def speed(self, torque: Any, flow: float | None = None) -> Any:
         """Speed of the rotor against the housing, rad/s, under torques on the bit (N m, a number or an array); from the
         stall torque on 0 while friction holds it, and below 0 beyond. `flow` as of `stall_torque`."""
+        if self.curves:
+            return self._by_flow(flow, self._speed, torque)
         turns = self.driven(flow) - torque
         return (turns - np.clip(turns, -self.lost_torque, self.lost_torque)) / self.slope
 
     def pressure(self, torque: Any, flow: float | None = None) -> Any:
         """Pressure over the motor, Pa, see `speed`."""
-        return (self._flow(flow) - self.per_radian * self.speed(torque, flow)) / self.leakage
+        return self.pressure_at(self.speed(torque, flow), flow)
+
+    def pressure_at(self, speed: Any, flow: Any = None) -> Any:
+        """The same over speeds of the rotor, rad/s."""
+        if self.curves:
+            return self._by_flow(flow, lambda law, x: law(x), speed) / self.per_radian
+        return (self._flow(flow) - self.per_radian * speed) / self.leakage
+
+    def _speed(self, law, torques):
+        turns, lost = law(0.0) - torques, self.lost_torque
+        wanted = torques + np.clip(turns, -lost, lost)  # T + T_lost, or where friction holds that at rest
+        return np.array(
+            [brentq(lambda om, T=T: law(om) - T, *_REACH * law.x[[0, -1]], xtol=1e-13, rtol=1e-14) for T in wanted]
+        )
 
     def running(self, owner: str, torque: float) -> float:
         """The speed under a steady torque on bit (N m), rad/s.
@@ -345,6 +493,6 @@ def power_curve(motor: MudMotor, flows: Any = None, points: int = 41) -> PowerCu
     for flow in flows:
         if motor.stall_torque(flow) <= 0:
             refuse("power_curve", "flows", flow, "a flow (m^3/s) that turns the motor without load, above "
-                   f"{motor.lost_torque * motor.leakage / motor.per_radian:.3g}")  # fmt: skip
+                   f"{motor.lost_torque * (motor.leakage or 0.0) / motor.per_radian:.3g}")  # fmt: skip
     torque = np.concatenate([np.linspace(0.0, motor.stall_torque(flow), points) for flow in flows])
     return PowerCurve(motor, np.repeat(flows, points), torque)

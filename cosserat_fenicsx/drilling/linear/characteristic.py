@@ -345,13 +345,15 @@ class Steady:
             SceneError: friction holds the string; it slides and rotates at once.
         """
         walls = self.walls(weight)
-        if walls is None:
+        curved = self.scene.motor is not None and self.scene.motor.curves
+        if walls is None and not curved:
             speed = weight = None
         if (speed, weight) not in self._guides:
-            of_bit = self.speed_of_bit(speed, weight) if walls and self.scene.turned else None
+            of_bit = self.speed_of_bit(speed, weight) if curved or walls and self.scene.turned else None
+            damping = self.scene.motor.slope_at(of_bit - speed) if curved else None
             rates, scene = walls and walls.rates(speed, self.sliding, of_bit), self.scene
             turns, moves = self.cuts or self.kind == "torsion", self.cuts or self.kind == "axial"
-            found = turns and torsional(scene, rates), moves and axial(scene, rates)
+            found = turns and torsional(scene, rates, damping), moves and axial(scene, rates)
             self._guides = {(speed, weight): tuple(x for x in found if x)}  # of the last case alone
         return self._guides[speed, weight]
 

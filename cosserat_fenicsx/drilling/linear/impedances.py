@@ -357,8 +357,9 @@ def _fed(drive, first, top):
     return max(x, least / _RATIO) * _RATIO
 
 
-def torsional(scene, walls=None) -> Guide:
-    """Torsional waveguide of a `Drilling` scene; `walls`: rates of friction at the wall, see `WallDashpots`."""
+def torsional(scene, walls=None, damping=None) -> Guide:
+    """Torsional waveguide of a `Drilling` scene; `walls`: rates of friction at the wall, see `WallDashpots`;
+    `damping`: of a motor at its speed, N m s/rad, None where it does not depend on it."""
     drive, string, bit = scene.drive, scene.discs, scene.bit_inertia
     if string:
         lower = zip((*string.stiffnesses, None), (*string.dampings, 0.0), strict=True)
@@ -367,7 +368,7 @@ def torsional(scene, walls=None) -> Guide:
             for i, (J, c, (k, d)) in enumerate(zip(string.inertias, string.drags, lower, strict=True))
         )
     else:
-        parts = _uniform(scene, "torsion", walls)
+        parts = _uniform(scene, "torsion", walls, damping)
     top = _drive_top(drive, None if string else parts[0].impedance)
     return Guide("torsion", parts, bit, top, drive.inertia, _fed(drive, parts[0], top))
 
@@ -387,7 +388,7 @@ def axial(scene, walls=None) -> Guide:
     return Guide("axial", _uniform(scene, "axial", walls), scene.bit.mass if scene.bit else 0.0, top)
 
 
-def _uniform(scene, kind, walls):
+def _uniform(scene, kind, walls, damping=None):
     """The `Uniform` parts of a string, divided where the friction at the wall changes."""
     stiffness, inertia = ("GJ", "rhoJ") if kind == "torsion" else ("EA", "rhoA")
     rate, found = getattr(scene.drag, kind) if scene.drag else 0.0, []
@@ -397,5 +398,5 @@ def _uniform(scene, kind, walls):
             section = getattr(x, stiffness), getattr(x, inertia), rate + wall
             found.append(Uniform(length, *section, x.name, x.damping_time))
         parted = [x for x in scene.joints if x.segment == k and x.turns == (kind == "torsion")]
-        found += [Parted(x.damping, x.spring, x.tool.name) for x in parted]
+        found += [Parted(damping or x.damping, x.spring, x.tool.name) for x in parted]
     return tuple(found)
