@@ -284,9 +284,11 @@ sys.exit(__main__.main())"""
 
 @pytest.mark.parametrize("scene", sorted(DEMO.parent.glob("*.toml")), ids=lambda file: file.stem)
 def test_every_demo_scene(scene, tmp_path, here):
-    """explain, run and buckling; the bend and Lee's frame give the values stated in their files."""
+    """explain; and run the two whose files state values (test_gallery.py solves all of them)."""
     code, said, trouble = here("explain", scene)
     assert code == 0 and "Model: " in said, trouble
+    if scene.stem not in ("bend_45", "lees_frame"):
+        return
     code, said, trouble = here("run", scene, "--tol", "1e-4", "-o", tmp_path, "--no-picture")
     assert code == 0, trouble
     assert (tmp_path / "path.csv").is_file() and (tmp_path / "path.xdmf").is_file()
@@ -474,8 +476,10 @@ def test_a_run_up():
     assert run.jumps == (1.0, 16.0)
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
-@pytest.mark.parametrize("module", ["cosserat_fenicsx.cli.main", "dolfinx"])
+@pytest.mark.parametrize(
+    ("number", "module"),
+    [(signal.SIGINT, "cosserat_fenicsx.cli.main"), (signal.SIGTERM, "dolfinx"), (signal.SIGHUP, "dolfinx")],
+)
 def test_while_modules_are_imported(number, module):
     code = f"""
 import os, sys
