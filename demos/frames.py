@@ -36,7 +36,10 @@ def gridshell():
     scene = shell.scene([cf.Force(shell.at(k), (0, 0, -snow)) for k in np.flatnonzero(~border).tolist()])
     linear = cf.buckling(scene, count=1).load_factors[0]
     path = cf.solve(scene, (0.0, 1.2 * linear), until=lambda path: bool(path.events))
-    print(f"gridshell: {len(shell)} rods; linear buckling at {linear:.4f} times the snow, {path.events[0]}")
+    print(
+        f"gridshell: {len(shell)} rods; linear buckling at {linear:.4f} times the snow, "
+        f"exact: {path.events[0].kind} at {path.events[0].load_factor:.4f} times"
+    )
     carried = sum(path.reaction(clamp)[0][-1] for clamp in shell.supports)
     load = path.load_factors[-1] * snow * np.count_nonzero(~border)
     return path, Check("the border carries (N)", carried, [0.0, 0.0, load], 1e-3, "balance of forces")

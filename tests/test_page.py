@@ -13,6 +13,7 @@ from conftest import COMM, column
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.pictures import viewer
+from cosserat_fenicsx.results import screen
 
 TITLE = "A </script><script>alert(1)</script> & <b>title</b>"
 
@@ -215,3 +216,14 @@ def vivid(image):
 
 def changed(one, other):
     return (np.abs(one - other).max(axis=2) > 40).sum() > 50
+
+
+def test_tables_have_their_width_in_a_dumb_terminal(monkeypatch):
+    """As under mpirun, whose output is a terminal, in an editor or a service whose TERM is dumb."""
+    monkeypatch.setenv("TERM", "dumb")
+    monkeypatch.setenv("FORCE_COLOR", "1")
+    table = screen.Table()
+    for _ in range(8):
+        table.add_column("x")
+    table.add_row(*["123456789012"] * 8)
+    assert max(map(len, screen.as_text(table).splitlines())) == 121

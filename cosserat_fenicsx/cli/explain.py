@@ -156,7 +156,7 @@ def _release(joint):
     if joint.rigid:
         return " rigidly"
     ball = joint.release == "all"
-    return " by a ball" if ball else f" by a hinge about ({', '.join(f'{x:.3g}' for x in joint.release)})"
+    return " by a ball joint" if ball else f" by a hinge about ({', '.join(f'{x:.3g}' for x in joint.release)})"
 
 
 def _section(section):
@@ -184,7 +184,7 @@ def _stiffnesses(rod):
 
 def _directions(rod):
     """The directions of d_1 and d_2 at the start, which orient sections that are not circular."""
-    d1, d2 = (", ".join(f"{x:.3g}" for x in rod.curve.frame(0.0)[:, i] + 0.0) for i in (0, 1))
+    d1, d2 = (", ".join(f"{x:.3g}" for x in np.round(rod.curve.frame(0.0)[:, i], 12) + 0.0) for i in (0, 1))
     at = "" if isinstance(rod.curve, Line) else " at the start"
     for kind, across, up in ((Rectangle, "width runs", "height"), (Profile, "flanges run", "web")):
         if isinstance(rod.section_at(0.0), kind):

@@ -157,7 +157,8 @@ def _panels(found, shown, amplitude):
         plotter.subplot(1 + i // across, i % across)
         seen = shape.shown(everywhere)
         _add(plotter, pyvista, shape, shape.bodies(), seen)
-        text = f"k = {k}: {found.label(k)}{_most_at(found, k)}\n{_below(shape, shape.bodies(), seen, _WIDTH)}"
+        text = f"{_filled(f'k = {k}: {found.label(k)}{_most_at(found, k)}', _WIDTH)}\n"
+        text += _below(shape, shape.bodies(), seen, _WIDTH)
         plotter.add_text(text, position="upper_edge", color="black", font_size=11)
         frame(plotter, seen, panel=True)
     return plotter
@@ -188,7 +189,12 @@ def _below(shape, bodies, everywhere, width):
     """The lines under a title: notes on what is not to scale."""
     extent = float(np.ptp(everywhere, axis=0).max())
     notes = [shape.note, *thicker(thickening(body, extent, len(bodies)) for body in bodies)]
-    return "\n".join(textwrap.fill(note, round(width / _LETTER * 1.2)) for note in notes)
+    return "\n".join(_filled(note, width) for note in notes)
+
+
+def _filled(text, width):
+    """A text of a panel of a width, pixels, in lines that fit it."""
+    return textwrap.fill(text, round(width / _LETTER * 1.2), break_long_words=False)
 
 
 def _add(plotter, pyvista, shape, bodies, everywhere):

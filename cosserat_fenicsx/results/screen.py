@@ -128,7 +128,8 @@ def as_text(table, width=140, most=None):
         told = f"{count} of {len(table.columns)} columns: details() has more"
         shown[-1].caption = f"{table.caption}\n{told}" if table.caption else told
     # a fixed width, since the size of the terminal is unknown under mpirun
-    console = Console(width=width, color_system=None, markup=False, emoji=False)
+    # and both sizes given, since rich takes 80 columns where TERM is dumb
+    console = Console(width=width, height=LINES, color_system=None, markup=False, emoji=False)
     with console.capture() as capture:
         for part in shown:
             console.print(part)
