@@ -5,6 +5,7 @@ import pytest
 
 import cosserat_fenicsx as cf
 
+ONCE = pytest.mark.once
 L = 1.3
 ANGLE = 0.6
 #: Principal stiffnesses of a section with rotated principal axes, or with rotated directors.
@@ -114,7 +115,11 @@ def offset_and_shifted(P):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("model", "formulation"), [("determinate", "mixed"), ("spatial", "mixed"), ("spatial", "displacement")]
+    ("model", "formulation"),
+    [
+        ("spatial", "mixed"),
+        *(pytest.param(*x, marks=ONCE) for x in [("determinate", "mixed"), ("spatial", "displacement")]),
+    ],
 )
 @pytest.mark.serial
 def test_a_line_off_the_centroid_is_a_shifted_rod(model, formulation):
@@ -136,7 +141,7 @@ def test_a_line_off_the_centroid_is_a_shifted_rod(model, formulation):
 @pytest.mark.serial
 @pytest.mark.slow
 @pytest.mark.parametrize("load", [cf.Force, cf.FollowerForce])
-@pytest.mark.parametrize("formulation", ["mixed", "displacement"])
+@pytest.mark.parametrize("formulation", ["mixed", pytest.param("displacement", marks=ONCE)])
 def test_turned_principal_axes_are_turned_directors(load, formulation):
     """To rounding, step by step, with stability and reactions."""
     paths = []

@@ -206,7 +206,10 @@ STEPS = {"dt": 0.02, "elements": 3, "degree": 3}
 
 @pytest.mark.serial
 @pytest.mark.slow
-@pytest.mark.parametrize(("scheme", "model"), [("momentum", "planar"), ("momentum", "spatial"), ("energy", "spatial")])
+@pytest.mark.parametrize(
+    ("scheme", "model"),
+    [("momentum", "planar"), *(pytest.param(x, "spatial", marks=pytest.mark.once) for x in ("momentum", "energy"))],
+)
 def test_rate_of_momentum(scheme, model):
     """The scheme "energy" conserves angular momentum to second order only."""
     scene = moving_frame(model == "planar", cf.Damping(time=1e-2))
