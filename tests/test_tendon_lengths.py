@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.linalg import expm
 from scipy.optimize import brentq
 
 import cosserat_fenicsx as cf
@@ -85,6 +86,47 @@ def test_two_of_them_hold_a_column(truth):
     assert bent.argmax() == 1 and across.argmax() == 0
 
 
+MASS, J = 0.5, 1e-5  # per length: kg/m, kg m
+HEAVY = cf.Rod(ROD.curve, cf.Stiffness((GA, GA), EA, (EI, EI), GJ, mass=MASS, inertia=(J, J, 2 * J)), name="arm")
+
+
+def dense(*loads):
+    return cf.Scene([HEAVY], [cf.Clamp(HEAVY.start)], loads)
+
+
+@pytest.mark.parametrize("axial", [None, 300.0])
+def test_it_holds_small_vibrations(axial, truth):
+    """About the straight arm, a Timoshenko beam of transfer matrices: in the plane of a straight tendon a force T at
+    the end and its moment e T move what lengthens the tendon by as much as T stretches it."""
+
+    def tip(omega):
+        """Determinant of the free end's condition in bending, and the same times the rotation by a unit moment."""
+        rates = [[0, 1, 1 / GA, 0], [0, 0, 0, 1 / EI], [-MASS * omega**2, 0, 0, 0], [0, -J * omega**2, -1, 0]]
+        P = expm(LENGTH * np.array(rates))
+        return np.linalg.det(P[2:, 2:]), P[1, 3] * P[2, 2] - P[1, 2] * P[2, 3]
+
+    def held(omega):
+        wave = omega * np.sqrt(MASS / EA)
+        still, turn = tip(omega)
+        return (LENGTH / (axial or np.inf) + np.tan(wave * LENGTH) / (EA * wave)) * still + E**2 * turn
+
+    def roots(f):
+        grid = np.linspace(1.0, 100.0, 400)
+        values = [f(x) for x in grid]
+        return [brentq(f, *grid[k : k + 2], xtol=1e-13) for k in range(399) if values[k] * values[k + 1] < 0]
+
+    expected = np.sort([*roots(lambda omega: tip(omega)[0]), *roots(held)])[:3]
+    tendon = cf.Tendon(HEAVY, (E, 0), shortening=0.006, axial=axial)
+    found = cf.modes(dense(tendon), 3, load_factor=1e-7, elements=8)
+    name = f"tendons: by length, frequencies over their own, axial {axial}"
+    truth(name, found.frequencies * 2 * np.pi / expected, np.ones(3), 1e-6, of=1.0)
+    complex_too = cf.modes(dense(tendon), 3, load_factor=1e-7, elements=8, damped=True)
+    assert complex_too.eigenvalues.imag == pytest.approx(found.frequencies * 2 * np.pi, rel=1e-8)
+    slack = cf.Tendon(HEAVY, (E, 0), shortening=-0.006, axial=axial)
+    alone = cf.modes(dense(cf.Tendon(HEAVY, (E, 0), tension=0.0)), 3, elements=8)
+    assert cf.modes(dense(slack), 3, load_factor=1.0, elements=8).squares == pytest.approx(alone.squares, rel=1e-9)
+
+
 @pytest.mark.serial
 @pytest.mark.parametrize(
     ("make", "says"),
@@ -95,7 +137,8 @@ def test_two_of_them_hold_a_column(truth):
         (lambda: cf.Tendon(ROD, (E, 0), shortening=0.1, axial=0.0), "Tendon.axial"),
         (lambda: cf.Tendon(ROD, (E, 0), shortening=0.1, permanent=True), "Tendon.permanent"),
         (lambda: cf.solve(arm(cf.Tendon(ROD, (E, 0), shortening=0.3)), [1.0], elements=4), "less than the length"),
-        (lambda: cf.buckling(arm(cf.Tendon(ROD, (E, 0), shortening=0.1))), "known to `solve` alone"),
+        (lambda: cf.buckling(arm(cf.Tendon(ROD, (E, 0), shortening=0.1))), "known to `solve` and `modes` alone"),
+        (lambda: cf.modes(dense(cf.Tendon(HEAVY, (E, 0), shortening=0.01))), "neither taut nor slack"),
     ],
 )  # fmt: skip
 def test_what_is_refused(make, says):

@@ -31,7 +31,7 @@ from cosserat_fenicsx.results.records import Event
 from cosserat_fenicsx.results.queries import Sensitivity, called
 from cosserat_fenicsx.statics.path.follower import Follower, standing
 from cosserat_fenicsx.statics.path.load_control import StepControl
-from cosserat_fenicsx.statics.problem import refuse_rod_contact
+from cosserat_fenicsx.statics.problem import refuse_given_lengths, refuse_rod_contact
 from cosserat_fenicsx.statics.sensitivity import Direct, parameters_of, sensitivity
 
 # Relative differences below which load factors are equal, and the derivatives of equal ones.
@@ -166,6 +166,7 @@ _TOGETHER = 1e-5  # largest relative difference of the derivatives of a double b
 def derivatives_of(path, query, parameters):
     """See `Path.sensitivity`."""
     refuse_rod_contact("sensitivity", path.scene)
+    refuse_given_lengths("sensitivity", path.scene)
     if isinstance(query, Event):
         return _of_event(path, query, parameters)
     return replace(sensitivity(path, query, parameters), quantity=called(query))

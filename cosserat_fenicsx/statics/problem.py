@@ -40,7 +40,7 @@ def check_arguments(scene, tol, elements, bound=NAMES, *, owner="solve"):
         refuse_stages(owner, scene)
     if owner != "solve":
         refuse_rod_contact(owner, scene)
-    elif scene.stages or scene.rod_contact:
+    if owner not in ("solve", "modes") or scene.stages or scene.rod_contact:
         refuse_given_lengths(owner, scene)
     tolerance(owner, tol)
     criteria_of(bound)
@@ -73,11 +73,8 @@ def check_static(scene):
 
 
 def refuse_rod_contact(owner, scene, comm=None):
-    """Refuse (SceneError) rods that touch each other, and tendons of given length, where a function, the `owner` of the
-    message, does not have them; comm: of `solve`, which has contact of rods for scenes without stages, on one rank;
-    None elsewhere."""
-    if comm is None:
-        refuse_given_lengths(owner, scene)
+    """Refuse (SceneError) rods that touch each other where a function, the `owner` of the message, does not have them;
+    comm: of `solve`, which has them for scenes without stages, on one rank; None elsewhere."""
     if scene.rod_contact and comm is None:
         raise SceneError(
             f"{owner}: RodContact acts in `solve` and `simulate` alone: expected a scene without it, or the "
@@ -98,9 +95,9 @@ def refuse_given_lengths(owner, scene):
     for load in scene.all_loads:
         if load.shortens:
             raise SceneError(
-                f"{owner}: a {type(load).__name__} of given length is known to `solve` alone, in a scene without "
-                "stages and without rods that touch each other: expected its tension, such as that which "
-                "path.tendon(tendon).tension gives"
+                f"{owner}: a {type(load).__name__} of given length is known to `solve` and `modes` alone, in a "
+                "scene without stages and without rods that touch each other: expected its tension, such as that "
+                "which path.tendon(tendon).tension gives"
             )
 
 

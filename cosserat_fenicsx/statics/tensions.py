@@ -14,6 +14,7 @@ as many negative modes as K, less the negative eigenvalues of S (Haynsworth, Lin
 
 import numpy as np
 from dolfinx import fem
+from scipy import sparse
 
 from cosserat_fenicsx import compat
 from cosserat_fenicsx.algebra.building import Packed
@@ -22,7 +23,8 @@ from cosserat_fenicsx.errors import SceneError
 
 # Condition number of S above which it is singular.
 _SINGULAR = 1e12
-# Length over the largest one in the step below which a slack tendon is about to be taut.
+# Length over the largest one in the step below which a slack tendon is about to be taut; and, in an equilibrium, its
+# share of the tendon's length, without a tension above the same number times EI/L^2.
 _EDGE = 1e-9
 # Exchanges of tendons between slack and taut in a step, per tendon.
 _EXCHANGES = 20
@@ -51,6 +53,7 @@ class Tensions:
         found = [next(x for x in found if x[0] is action) for action in model.scene.actions if action.shortens]
         self._where = [(term._arrays[0], rows) for _, term, rows in found]
         scales, tendons, size = model.scales, [action for action, *_ in found], len(found)
+        self._tendons = tendons
         self._short = np.array([tendon.shortening for tendon in tendons]) / scales.length
         self._softness = np.array([scales.force / (tendon.axial or np.inf) for tendon in tendons])
         self.values, self._active = np.zeros(size), np.ones(size, dtype=bool)
@@ -127,8 +130,7 @@ class Tensions:
         problem, S, moved = self._problem, self._comply(), self._changes(x)
         self.undetermined = True
         if b is problem.b:
-            gaps = self._lengths(self._length) - self._left * (1 + self._softness * self.values)
-            found = self._complementary(S, moved - gaps - S @ self.values)
+            found = self._complementary(S, moved - self._gaps() - S @ self.values)
             if found is None:
                 return False
             self._step = step = self.values - found
@@ -169,6 +171,35 @@ class Tensions:
         """Subtract a share of the last step for the residual from the tensions, and add a change of the load factor
         times `slope`."""
         self.put(self.values - share * self._step + by_load * self.slope)
+
+    def _gaps(self):
+        return self._lengths(self._length) - self._left * (1 + self._softness * self.values)
+
+    def check_apart(self, owner):
+        """Refuse (SceneError) what an `owner` linearises about a state where a tendon is about to be taut or slack."""
+        for tendon, gap, left, T in zip(self._tendons, self._gaps(), self._left, self.values, strict=True):
+            if T <= _EDGE and abs(gap) <= _EDGE * left:
+                raise SceneError(
+                    f"{owner}: the {type(tendon).__name__} of {tendon.rod.name} is neither taut nor slack "
+                    f"at the load factor {self._problem.load_factor:g}, and no linear theory has it: expected a load "
+                    "factor at which it has a tension, or is longer than its way along the rod"
+                )
+
+    def border(self, K, held):
+        """The K and the held rows of `small_motions.stiffness` with what taut tendons resist: a stiffness EA/l_0 of
+        their length, or a constraint where they do not stretch; of the mixed formulation, whose tests are rotations."""
+        model = self._model
+        (variation,) = model.second_variations
+        nodal, total = model.nodal, variation.numbering.vector()
+        of_motion, on, rows = nodal[:, [0, 1, 2, 4, 5, 6]], self.values > 0, []
+        for _ in self._one_by_one():
+            of_state = np.zeros(len(model.state.x.array))
+            self._force.add_to_vector(of_state)
+            variation.numbering.add_up(of_state[of_motion].ravel(), total)
+            rows.append(np.concatenate(model.comm.allgather(total.array_r)))
+        rows, compliance = np.array(rows), self._left * self._softness
+        stretch = sparse.csr_matrix(rows[on & (compliance > 0)] / np.sqrt(compliance[on & (compliance > 0)])[:, None])
+        return K + stretch.T @ stretch, np.vstack([held, rows[on & (compliance == 0)]])
 
     def pivots(self):
         """(number of negative eigenvalues of S, logarithm of its determinant's absolute value) at the problem's
