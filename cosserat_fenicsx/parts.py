@@ -31,7 +31,7 @@ from collections.abc import Callable
 from os import PathLike
 from typing import Annotated, Any, TypeVar
 
-from cosserat_fenicsx.checks import Numbers, direction, store
+from cosserat_fenicsx.checks import Numbers, direction
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.kinds import (
     FAMILIES,
@@ -103,7 +103,9 @@ class Part(metaclass=_Readable):
 
     def __post_init__(self):
         for name, kind in fields_of(type(self)).items():
-            store(self, **{name: kind.check(self, name, getattr(self, name))})
+            given = getattr(self, name)
+            if (value := kind.check(self, name, given)) is not given:
+                object.__setattr__(self, name, value)
         self.validate()
 
     def validate(self):

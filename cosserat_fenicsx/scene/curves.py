@@ -161,7 +161,7 @@ def _across(v, t):
 def level_axis(t):
     """The horizontal direction d1 normal to t such that t x d1 points upwards (along z); x for a vertical t."""
     across = np.array([0.0 - t[1], t[0], 0.0])
-    return across if np.linalg.norm(across) > 1e-6 else np.array([1.0, 0.0, 0.0])
+    return across if math.hypot(t[0], t[1]) > 1e-6 else np.array([1.0, 0.0, 0.0])
 
 
 def exponential(w):
@@ -414,6 +414,9 @@ class Line(Curve):
 
     def position(self, s: float | Numbers) -> np.ndarray:
         """Inertial points at the arc lengths s (n,), m; shape (n, 3)."""
+        if isinstance(s, float):  # one point, as joints ask: without arrays
+            x = s / self.length
+            return np.array([(1 - x) * a + x * b for a, b in zip(self.start, self.end, strict=True)])
         x = np.asarray(s, dtype=float)[..., None] / self.length
         return (1 - x) * self.start + x * self.end
 

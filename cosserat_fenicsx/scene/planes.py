@@ -80,9 +80,9 @@ def independent_in(plane, ties):
 
 def _find(scene):
     tangents = [_sample(rod) for rod in scene.rods]
-    chords = [rod.curve.position(0.0) - scene.origin(rod) for rod in scene.rods]
-    chords = [a for a, rod in zip(chords, scene.rods, strict=True) if np.linalg.norm(a) > 1e-9 * rod.length]
-    drawn = _units([*(frame[:, 2] for _, frames in tangents for frame in frames), *chords])
+    chords = np.array([rod.curve.position(0.0) - scene.origin(rod) for rod in scene.rods])
+    chords = chords[np.linalg.norm(chords, axis=1) > 1e-9 * np.array([rod.length for rod in scene.rods])]
+    drawn = _units(np.concatenate([*(frames[:, :, 2] for _, frames in tangents), chords]))
     acting = [_vectors(scene, load) for load in scene.loads]
     normal = _normal_of(drawn)
     if normal is None:
@@ -122,8 +122,9 @@ def _sample(rod):
 
 def _units(vectors):
     """(k, 3) unit vectors along those vectors that are not zero."""
-    sizes = [np.linalg.norm(v) for v in vectors]
-    return np.array([v / size for v, size in zip(vectors, sizes, strict=True) if size > 0]).reshape(-1, 3)
+    vectors = np.reshape(vectors, (-1, 3))
+    sizes = np.linalg.norm(vectors, axis=1)
+    return vectors[sizes > 0] / sizes[sizes > 0, None]
 
 
 def _vectors(scene, load):

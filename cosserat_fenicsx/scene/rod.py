@@ -342,7 +342,10 @@ def with_names(where, item, rods):
     none; a SceneError of `where` if there is none of that name, or the part refuses it."""
     if isinstance(item, type) or not dataclasses.is_dataclass(item):  # refused by `Scene`
         return item
-    given = {name: (getattr(item, name), kind) for name, kind in fields_of(type(item)).items()}
+    kinds = fields_of(type(item))
+    if not any(isinstance(getattr(item, name), str) for name in kinds):
+        return item
+    given = {name: (getattr(item, name), kind) for name, kind in kinds.items()}
     found = {
         name: _look_up(f"{where}.{name}", value, kind if isinstance(kind, ByName) else _OF_ACTIONS[name], rods)
         for name, (value, kind) in given.items()

@@ -7,6 +7,7 @@ A vessel, a shaking table or a robot's flange is recorded as three displacements
 on it moves by the displacement of its own point, which the angles change where it is off the body's reference point.
 """
 
+import math
 from collections import namedtuple
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -208,9 +209,9 @@ class Joint(Part):
     def _check_place(self):
         if (self.first.rod, self.first.s) == (self.second.rod, self.second.s):
             refuse(self, "second", self.second, f"another station than first = {self.first}")
-        a, b = (end.rod.curve.position(end.s) for end in (self.first, self.second))
-        apart = float(np.linalg.norm(a - b))
-        if apart > 1e-9 * max(self.first.rod.length, self.second.rod.length, np.abs(a).max()):
+        a, b = (end.rod.curve.position(end.s).tolist() for end in (self.first, self.second))
+        apart = math.dist(a, b)
+        if apart > 1e-9 * max(self.first.rod.length, self.second.rod.length, *map(abs, a)):
             raise SceneError(
                 f"Joint of {self.first} at ({_point(a)}) with {self.second} at ({_point(b)}): they are {apart:.3g} m "
                 "apart: expected stations that touch"
