@@ -203,14 +203,17 @@ def test_what_is_refused(do, words):
 
 
 @pytest.mark.once
-def test_a_rotation_in_radians_per_second_is_doubted():
+def test_a_rotation_in_radians_per_second_and_a_friction_above_1_are_doubted():
     for operation in (cf.well.Ream, cf.well.BackReam):
         words = rf"{operation.__name__}.rpm = 8.37758 .* revolutions a minute, not in rad/s.* 8.37758 rad/s are 80$"
         with pytest.warns(cf.SceneWarning, match=words):
             operation(0.15, 80 * cf.units.rpm)
+    with pytest.warns(cf.SceneWarning, match=r"HoleSection.friction = 3 is more than the wall of a well has"):
+        cf.well.HoleSection(1000.0, 0.2159, 3.0)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         cf.well.Ream(0.15, 20)
+        cf.well.HoleSection(1000.0, 0.2159, 0.6)
 
 
 @pytest.mark.once

@@ -55,7 +55,7 @@ class HoleSection(Part):
             raise SceneError(f"{problem}{told}") from None
 
     def validate(self):
-        """Find the diameter of a casing; warn of one that is probably in another unit."""
+        """Find the diameter of a casing; warn of one that is probably in another unit, and of a friction above 1."""
         if self.casing is not None:
             known = standard_size("Casing", self.casing)
             inside = known["inner_diameter"]
@@ -65,6 +65,8 @@ class HoleSection(Part):
         if self.diameter is None:
             refuse(self, "diameter", None, "a diameter (m), or the size of a casing, casing='9 5/8 in 47 lb/ft'")
         doubt_width(self, "diameter")
+        if self.friction > 1:
+            warn(f"HoleSection.friction = {self.friction:g} is more than the wall of a well has (0.1 to 0.5)")
 
 
 def _depth(i, depth, unit):
