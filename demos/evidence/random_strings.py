@@ -163,7 +163,8 @@ def off_in_small_motions(scene, speed):
 
 def off_in_growth(steady, speed):
     """How far the growth of a small disturbance is from that of `stability`. The modes that lead are fitted to the
-    second half of a motion, long enough for others to fade by exp(-10); where they make up 95 % of it, they count."""
+    second half of a motion, long enough for others to fade by exp(-10), or exp(-16) where the bit cuts: a drive hardly
+    disturbs axial modes; where they make up 95 % of it, they count."""
     found = D.stability(steady, [speed])
     growth, frequency = found.growth[0, 0], found.frequency[0, 0]
     order = np.argsort(np.where(np.isfinite(growth), -growth, np.inf))
@@ -172,9 +173,10 @@ def off_in_growth(steady, speed):
         return
     fades = np.append(growth[1 : MODES + 1], growth[0] - 2)[:MODES]  # of all but the first, the first two, ...
     slowest = np.minimum.accumulate(np.where(frequency < 0.05, 1.0, frequency))[: len(fades)]
-    durations = 2 + np.maximum(10 / np.maximum(growth[0] - fades, 1e-9), 4 / slowest)
+    apart = 16 if steady.bit and steady.bit.law.drills else 10
+    durations = 2 + np.maximum(apart / np.maximum(growth[0] - fades, 1e-9), 4 / slowest)
     until, count = durations.min(), int(durations.argmin()) + 1
-    if until > LONGEST or not -14 < growth[0] * until < 25:
+    if until > LONGEST or not -14 < growth[0] * until < 30:
         return
     share = min(1e-3, 1e-3 * math.exp(-growth[0] * until))
     for again in (True, False):  # what is left at the end decides how large the disturbance may be
