@@ -86,6 +86,39 @@ def test_two_of_them_hold_a_column(truth):
     assert bent.argmax() == 1 and across.argmax() == 0
 
 
+def test_shortenings_that_reach_a_point(truth):
+    """Derivatives by shortenings, a stiffness and an offset are those of differences, and lead to given shortenings."""
+    names = ["loads[0].shortening", "loads[1].shortening", "loads[0].axial", "loads[1].offset[1]"]
+
+    def tip(path):
+        return path.position(ROD.end)[-1]
+
+    def wound(first, second, axial=300.0, offset=E):
+        slack = cf.Tendon(ROD, (-E, 0), shortening=-1e-2)
+        pair = cf.Tendon(ROD, (E, 0), shortening=first, axial=axial), cf.Tendon(ROD, (0, offset), shortening=second)
+        return cf.solve(arm(*pair, slack, cf.Force(ROD.end, (0, 0.02, 0))), [0.5, 1.0], elements=4)
+
+    at = np.array([0.006, 0.004, 300.0, E])
+    path = wound(*at)
+    found = path.sensitivity(tip, names)
+    slopes = np.column_stack([found[name] for name in names])
+    steps = 1e-4 * np.diag(at)
+    sides = [[tip(wound(*(at + sign * step))) for sign in (1, -1)] for step in steps]
+    differences = [(a - b) / (2 * step.max()) for (a, b), step in zip(sides, steps, strict=True)]
+    sizes = np.abs(slopes).max(axis=0)
+    truth("tendons: by length, derivatives of the tip", slopes / sizes, np.transpose(differences) / sizes, 1e-6, of=1.0)
+    assert path.tendon(path.scene.loads[2]).slack.all()
+    tension = path.sensitivity(lambda path: path.tendon(path.scene.loads[0]).tension[-1], names[:1])[names[0]]
+    more, less = (x.tendon(x.scene.loads[0]).tension[-1] for x in (wound(0.0061, 0.004), wound(0.0059, 0.004)))
+    assert tension == pytest.approx((more - less) / 2e-4, rel=1e-3)
+    wanted, short = tip(path)[:2], np.array([0.003, 0.003])
+    for _ in range(4):
+        path = wound(*short)
+        found = path.sensitivity(lambda path: tip(path)[:2], names[:2])
+        short = short + np.linalg.solve(np.column_stack([found[x] for x in names[:2]]), wanted - tip(path)[:2])
+    assert short == pytest.approx(at[:2], rel=1e-6)
+
+
 MASS, J = 0.5, 1e-5  # per length: kg/m, kg m
 HEAVY = cf.Rod(ROD.curve, cf.Stiffness((GA, GA), EA, (EI, EI), GJ, mass=MASS, inertia=(J, J, 2 * J)), name="arm")
 
@@ -137,7 +170,7 @@ def test_it_holds_small_vibrations(axial, truth):
         (lambda: cf.Tendon(ROD, (E, 0), shortening=0.1, axial=0.0), "Tendon.axial"),
         (lambda: cf.Tendon(ROD, (E, 0), shortening=0.1, permanent=True), "Tendon.permanent"),
         (lambda: cf.solve(arm(cf.Tendon(ROD, (E, 0), shortening=0.3)), [1.0], elements=4), "less than the length"),
-        (lambda: cf.buckling(arm(cf.Tendon(ROD, (E, 0), shortening=0.1))), "known to `solve` and `modes` alone"),
+        (lambda: cf.buckling(arm(cf.Tendon(ROD, (E, 0), shortening=0.1))), "known to `solve`, `modes` and"),
         (lambda: cf.modes(dense(cf.Tendon(HEAVY, (E, 0), shortening=0.01))), "neither taut nor slack"),
     ],
 )  # fmt: skip

@@ -76,8 +76,8 @@ class Tendon(Load, LineAction):
             `Along` or `AlongTable` with three components, along d_1, d_2, d_3.
         tension: N, not negative; or a function of time.
         shortening: instead of a tension, how much shorter the tendon gets, m, from its length in the reference at the
-            load factor 0; negative to slacken it. In `solve` and `modes`. A tendon does not push: where it would, its
-            tension is zero, and it is shorter along the rod than its length.
+            load factor 0; negative to slacken it. In `solve`, `modes` and derivatives of states. A tendon does not
+            push: where it would, its tension is zero, and it is shorter along the rod than its length.
         axial: of a tendon of given length, its stiffness EA, N; None where it does not stretch.
         jumps: times where a function of time is not smooth, s.
         permanent: whether it acts in full, before all that the load factor multiplies.

@@ -322,7 +322,7 @@ class DataDerivative:
 
     def __init__(self, model):
         self._model, symbols = model, model.forms.symbols
-        live = (*symbols.unknowns, *model.carried)
+        live = (*symbols.unknowns, *model.carried, *model.actions.tensions)
         self._data = [f for f in symbols.balance.coefficients() if f not in live]
         self._directions = [fem.Function(f.function_space) for f in self._data]
         pairs = list(zip(self._data, self._directions, strict=True))

@@ -166,8 +166,8 @@ _TOGETHER = 1e-5  # largest relative difference of the derivatives of a double b
 def derivatives_of(path, query, parameters):
     """See `Path.sensitivity`."""
     refuse_rod_contact("sensitivity", path.scene)
-    refuse_given_lengths("sensitivity", path.scene)
     if isinstance(query, Event):
+        refuse_given_lengths("sensitivity of an event", path.scene)
         return _of_event(path, query, parameters)
     return replace(sensitivity(path, query, parameters), quantity=called(query))
 

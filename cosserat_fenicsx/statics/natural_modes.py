@@ -263,7 +263,7 @@ def _on_mesh(scene, layout, count, load_factor, degree, comm, damped, near, rota
         K, rows, held = stiffness(problem)
         soft = softness(problem, K)
         if problem.tensions:
-            problem.tensions.check_apart("modes")
+            problem.tensions.keep("modes")
             K, held = problem.tensions.border(K, held)
         unit = max(float(rod.profile.range[1].mass) for rod in scene.rods)
         bodies, time = Bodies(model, unit), math.sqrt(unit * scales.length**2 / scales.force)

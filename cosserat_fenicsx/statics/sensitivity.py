@@ -205,7 +205,8 @@ class Direct:
         return found
 
     def _data_changes(self, scenes, parameter):
-        """For every point the derivatives of the data, and of the constraint equations' part of the residual."""
+        """For every point the derivatives of the data, of the constraint equations' part of the residual, and of the
+        gaps of tendons of given length."""
         step = STEP * parameter.size
 
         def smooth(arrays):
@@ -226,11 +227,12 @@ class Direct:
                 if self._refreshes:  # data that depend on the position
                     self.put(point, point[1], 0.0)
                     data = self._by_data.data()
-                near[-1].append((data, self._of_ties(point[0], point[1][0])))
+                near[-1].append((data, self._of_ties(point[0], point[1][0]), self._of_lengths(point)))
         for at_point in zip(*near, strict=True):
+            data, *others = zip(*at_point, strict=True)
             if whole is None or self._refreshes:
-                whole = [smooth(arrays) for arrays in zip(*(data for data, _ in at_point), strict=True)]
-            found.append((whole, smooth([ties for _, ties in at_point])))
+                whole = [smooth(arrays) for arrays in zip(*data, strict=True)]
+            found.append((whole, *map(smooth, others)))
         return found
 
     def _of_ties(self, load_factor, x):
@@ -240,11 +242,20 @@ class Direct:
             problem.ties.add_residual(found, load_factor)
         return found
 
+    def _of_lengths(self, point):
+        tensions = self.problem.tensions
+        if not tensions:
+            return np.zeros(0)
+        self.put(point, point[1], 0.0)
+        return tensions.gaps()
+
     def factor(self, load_factor, numbers):
         """Go to a state, and factorise the tangent there."""
         problem = self.problem
         problem.set_load_factor(load_factor)
         problem.put(numbers)
+        if problem.tensions:
+            problem.tensions.keep("sensitivity")
         problem.function(problem.x, problem.b)
         problem.factor()
 
@@ -257,13 +268,13 @@ class Direct:
         found.array_w[:] += of_ties
         return found, clamped
 
-    def _rate(self, data, of_ties):
+    def _rate(self, data, of_ties, of_lengths):
         """The change of the numbers with data and constraint equations; data that depend on the position follow by
         iteration, since the tangent need not contain their change."""
-        rate = self._response(*self.residual_change(data, of_ties))
+        rate = self._response(*self.residual_change(data, of_ties), of_lengths)
         for _ in range(_FOLLOWED if self._refreshes else 0):
             moved = [a + b for a, b in zip(data, self._data_along(rate), strict=True)]
-            before, rate = rate, self._response(*self.residual_change(moved, of_ties))
+            before, rate = rate, self._response(*self.residual_change(moved, of_ties), of_lengths)
             if self.model.largest(rate[0] - before[0]) <= _SETTLED * self.model.largest(rate[0]):
                 return before
         if self._refreshes:
@@ -287,10 +298,13 @@ class Direct:
         found = self._response(problem.load_derivative(problem.x).copy(), np.zeros_like(self.model.state.x.array))
         return [found[0], *(carried + problem.rate_by_law() for carried in found[1:])]
 
-    def _response(self, residual, moved):
-        """The change of the numbers that balances a change of the residual, with the clamped nodes' moves `moved`."""
+    def _response(self, residual, moved, gaps=0.0):
+        """The change of the numbers that balances a change of the residual, and of the gaps of tendons of given length,
+        with the clamped nodes' moves `moved`."""
         problem, model, rate = self.problem, self.model, self.problem.numbering.vector()
         residual.scale(-1.0)
+        if problem.tensions:
+            problem.tensions.wanted = -gaps
         if not problem.solve(residual, rate) or not np.isfinite(rate.norm()):
             raise NotConverged(
                 f"sensitivity: the tangent is singular at the load factor {problem.load_factor:.6g}, where the path "
@@ -299,7 +313,10 @@ class Direct:
         problem.numbering.to_local(rate, moved)
         contact = self._by_data.contact(moved)
         carried = [] if contact is None else [contact]
-        return [rate.array_r.copy(), *carried, *(np.zeros_like(x.x.array) for x in model.carried[len(carried) :])]
+        others = [np.zeros_like(x.x.array) for x in model.carried[len(carried) :]]
+        if problem.tensions:
+            others.append(problem.tensions.change)
+        return [rate.array_r.copy(), *carried, *others]
 
     # -- results -----------------------------------------------------------------------------------------------------
 

@@ -33,8 +33,9 @@ _EXCHANGES = 20
 class Tensions:
     """The tensions of the tendons of given length of a `Problem`; values: (tendons,) in the order of the scene,
     dimensionless; undetermined: whether the last solution failed since lengths do not determine them; slope: (tendons,)
-    their change with the load factor, from the last solution for `Problem.load_derivative`; threads_of: see
-    `models.compiled`."""
+    their change with the load factor, from the last solution for `Problem.load_derivative`; wanted, change: (tendons,)
+    gaps for the next solution for forces other than these and the residual, and the change of the tensions from it;
+    threads_of: see `models.compiled`."""
 
     def __init__(self, problem, threads_of):
         self._problem, self._model = problem, problem.model
@@ -57,7 +58,7 @@ class Tensions:
         self._short = np.array([tendon.shortening for tendon in tendons]) / scales.length
         self._softness = np.array([scales.force / (tendon.axial or np.inf) for tendon in tendons])
         self.values, self._active = np.zeros(size), np.ones(size, dtype=bool)
-        self.undetermined, self.slope = False, np.zeros(size)
+        self.undetermined, self.slope, self.wanted = False, np.zeros(size), np.zeros(size)
         self._step = np.zeros(size)
         self._columns = [problem.numbering.vector() for _ in tendons]
         self._responses = [problem.numbering.vector() for _ in tendons]
@@ -125,22 +126,25 @@ class Tensions:
 
     def complete(self, b, x):
         """Complete x = K^-1 b to the solution of the bordered system: with the gaps, or their derivative by the load
-        factor, where b is the problem's residual or its derivative, and with none for other forces. Slack tendons
+        factor, where b is the problem's residual or its derivative, and with `wanted` for other forces. Slack tendons
         remain slack, except in a step for the residual. False where S is singular."""
         problem, S, moved = self._problem, self._comply(), self._changes(x)
         self.undetermined = True
         if b is problem.b:
-            found = self._complementary(S, moved - self._gaps() - S @ self.values)
+            found = self._complementary(S, moved - self.gaps() - S @ self.values)
             if found is None:
                 return False
             self._step = step = self.values - found
         else:
             of_load = problem.is_load_derivative(b)
-            gaps = self._short * (1 + self._softness * self.values) if of_load and not problem.begins else 0.0
+            gaps = self.wanted
+            if of_load:
+                gaps = 0.0 if problem.begins else self._short * (1 + self._softness * self.values)
             on, step = self._active, np.zeros(len(moved))
             if not self._regular(S[np.ix_(on, on)]):
                 return False
             step[on] = np.linalg.solve(S[np.ix_(on, on)], (moved - gaps)[on])
+            self.change = step
             if of_load:
                 self.slope = -step
         for response, share in zip(self._responses, step, strict=True):
@@ -172,12 +176,15 @@ class Tensions:
         times `slope`."""
         self.put(self.values - share * self._step + by_load * self.slope)
 
-    def _gaps(self):
+    def gaps(self):
+        """(tendons,) g."""
         return self._lengths(self._length) - self._left * (1 + self._softness * self.values)
 
-    def check_apart(self, owner):
-        """Refuse (SceneError) what an `owner` linearises about a state where a tendon is about to be taut or slack."""
-        for tendon, gap, left, T in zip(self._tendons, self._gaps(), self._left, self.values, strict=True):
+    def keep(self, owner):
+        """For what an `owner` linearises about the state: tendons remain taut or slack. A SceneError where one is about
+        to be either."""
+        self._active = self.values > 0
+        for tendon, gap, left, T in zip(self._tendons, self.gaps(), self._left, self.values, strict=True):
             if T <= _EDGE and abs(gap) <= _EDGE * left:
                 raise SceneError(
                     f"{owner}: the {type(tendon).__name__} of {tendon.rod.name} is neither taut nor slack "
