@@ -12,9 +12,6 @@ enum { FAILED = 1 };
    this many times larger than before may have stopped for another reason, such as an old tangent. */
 static const double FADES = 0.9, RISES = 10;
 
-/* Steps after which the compliance of nodes that touch is judged again; that takes a substitution. */
-enum { JUDGED_AFTER = 8 };
-
 static int python_hook(void *self, int what, double *a, double *b);
 
 static int hook(const problem *p, int what, double *a, double *b)
@@ -172,7 +169,7 @@ static int respond_exactly(problem *p, double *change)
     if (!(size > c->rounding)) return 0;
     c->missing = fmax(missed / size, c->least);
     c->usual = fmin(c->usual, c->missing);
-    c->stale = c->missing > c->worse * c->usual, c->unjudged = 0;
+    c->stale = c->missing > c->worse * c->usual;
     return 0;
 }
 
@@ -210,8 +207,7 @@ static int meet(problem *p, const double *x, double *change, int first)
     memcpy(c->free, c->moved, size), memcpy(c->last, c->force, size), c->omitted = 0;
     settle(c);
     if (memcmp(c->last, c->force, size) == 0) return 0;
-    c->unjudged += first;
-    if (c->exact || (first && c->unjudged > JUDGED_AFTER)) return respond_exactly(p, change);
+    if (first || c->exact) return respond_exactly(p, change);
     respond_nearby(c, change);
     return 0;
 }
