@@ -157,6 +157,24 @@ station = "rod1@1.0"
 force = [0, 0, -2e3]
 """
 
+SUPPORTS = """[[supports]]
+type = "Pin"
+station = "rod1@1.0"
+
+[[supports]]
+type = "Pin"
+station = "XX"
+
+[[loads]]"""
+
+OF_ITS_OWN = """[[rods]]
+name = "BEAM"
+curve = { type = "Line", start = [0, 0, 0], end = [0, 0, -1] }
+section = { type = "Circle", diameter = 0.1 }
+material = { E = 210e9 }
+
+[[loads]]"""
+
 
 def test_a_scene_file_takes_the_rods_of_a_mesh_and_its_names(tmp_path):
     file = Path(__file__).parent / "reference" / "portal.inp"
@@ -172,9 +190,12 @@ def test_a_scene_file_takes_the_rods_of_a_mesh_and_its_names(tmp_path):
     for given, other, words in (
         ('"FEET"', '"FOOT"', r"line 5, column 1: .*no points are named 'FOOT': did you mean 'FEET'\?"),
         ('"BEAM"\n', '"BEAMS"\n', r"line 15, column 1: Scene.loads\[1\].rod = 'BEAMS'"),
+        ("[[loads]]", SUPPORTS, r"line 14, column 1: Scene.supports\[1\].station = 'XX'"),
+        ("[[loads]]", OF_ITS_OWN, "rods = 'BEAM': expected another name"),
+        ('"LEGS"', '"BEAM"', r"\['BEAM', 'BEAM'\]: expected each group once"),
         ("groups = [", "section = { type = 'Circle', diameter = 0.1 }\ngroups = [", "either a section of all rods, or"),
     ):
-        (tmp_path / "scene.toml").write_text(IN_A_FILE.replace(given, other), encoding="utf-8")
+        (tmp_path / "scene.toml").write_text(IN_A_FILE.replace(given, other, 1), encoding="utf-8")
         with pytest.raises(cf.SceneError, match=words):
             cf.read(tmp_path / "scene.toml")
 

@@ -169,6 +169,17 @@ def test_a_motor_by_its_chart(model, dt):
     assert rows[1].stalled[-1] and "THE MOTOR STALLS" in str(rows[1])
 
 
+def test_the_ends_of_a_chart():
+    """Between two flows it is steepest where it ends; from the torque of a stall on it is straight, however flat."""
+    pair = [MotorCurve(0.03, [7, 6, 0], [0, 3e3, 6e3]), MotorCurve(0.04, [9, 8, 0], [0, 3.1e3, 7e3])]
+    tool = motor(leakage=None, curves=pair, flow=0.035)
+    speeds = np.linspace(0, 1.5 * tool.speed(0.0), 10001)
+    slopes = -np.diff(tool.law(speeds)) / np.diff(speeds)
+    assert tool.slope >= slopes.max() and tool.slope == pytest.approx(slopes.max(), rel=1e-2)
+    flat = motor(leakage=None, curves=[MotorCurve(GIVEN["Q"], [9, 8, 0], [0, 9999.0, 1e4])])
+    assert flat.speed(2e4) == pytest.approx(-8 * (1e4 - 2 * GIVEN["Tf"]), rel=1e-9)
+
+
 def test_small_motions_take_the_slope_of_a_motors_curve():
     """As that of the linear motor with this slope, at the same speed of the bit."""
     tool = motor(leakage=None, curves=CHART)

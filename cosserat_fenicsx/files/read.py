@@ -459,9 +459,12 @@ class RodScene(Part):
         if self.mesh:
             if self.stages:
                 refuse(self, "stages", self.stages, "none beside a [mesh]; Frame.scene(loads, stages=...) has both")
+            for rod in self.rods:
+                if self.mesh.frame.places_of("rod", rod.name):
+                    refuse(self, "rods", rod.name, "another name, since it is that of a group of lines of the [mesh]")
             given |= {name: self.mesh.everywhere(given[name]) for name in ("supports", "loads", "velocities")}
             for name in ("rods", "joints", "supports"):
-                given[name] = [*getattr(self.mesh.frame, name), *given[name]]
+                given[name] = [*given[name], *getattr(self.mesh.frame, name)]  # messages count those of the file
         store(self, scene=Scene(**given))
 
     @property

@@ -387,6 +387,9 @@ class Mesh(Part):
     def validate(self):
         if (self.section is None) == (not self.groups):
             refuse(self, "section", self.section, "either a section of all rods, or groups with a section each")
+        names = [group.name for group in self.groups]
+        if len(set(names)) < len(names):
+            refuse(self, "groups", names, "each group once")
         store(self, file=str(Path(self.file).absolute()))
         section = {group.name: group.section for group in self.groups} or self.section
         material = {group.name: group.material or self.material for group in self.groups} or self.material

@@ -46,8 +46,6 @@ from cosserat_fenicsx.well.components import Collar, DrillString
 
 # Inner diameter of a housing over the outer one, where it is not given.
 _BORE = 0.6
-# Largest speeds over that of a motor without load, at which its curve is inverted.
-_REACH = 1e3
 # Larger ones than tools have: displacement a revolution (m^3), flow (m^3/s), stroke (m).
 _MOST_A_TURN, _MOST_FLOW, _LONGEST_STROKE = 0.2, 0.2, 0.1
 
@@ -210,10 +208,10 @@ class MudMotor(_Tool):
 
     @cached_property
     def _slopes(self):
-        """The slopes of the law where these are extreme: at its points, and within its cubics."""
-        steep, (a, b, *_) = self.law.derivative(), self.law.c
-        inside = -b / np.where(a == 0, np.inf, 3 * a)
-        return np.append(steep(self.law.x), steep(self.law.x[:-1] + np.clip(inside, 0, np.diff(self.law.x))))
+        """The slopes of the law where these are extreme: at both ends of its cubics, and within them."""
+        (a, b, c, _), width = self.law.c, np.diff(self.law.x)
+        inside = np.clip(-b / np.where(a == 0, np.inf, 3 * a), 0, width)
+        return np.concatenate([(3 * a * x + 2 * b) * x + c for x in (0, inside, width)])
 
     def _law(self, flow):
         """`law` at a flow, m^3/s."""
@@ -317,9 +315,14 @@ class MudMotor(_Tool):
     def _speed(self, law, torques):
         turns, lost = law(0.0) - torques, self.lost_torque
         wanted = torques + np.clip(turns, -lost, lost)  # T + T_lost, or where friction holds that at rest
+        ends = law.x[[0, -1]]
+        most, least = loads = law(ends)
+        straight = ends + (wanted[:, None] - loads) / law.c[2, [0, -1]]
         return np.array(
-            [brentq(lambda om, T=T: law(om) - T, *_REACH * law.x[[0, -1]], xtol=1e-13, rtol=1e-14) for T in wanted]
-        )
+            [om[0] if T >= most else om[1] if T <= least
+             else brentq(lambda om, T=T: law(om) - T, *ends, xtol=1e-13, rtol=1e-14)
+             for T, om in zip(wanted, straight, strict=True)]
+        )  # fmt: skip
 
     def running(self, owner: str, torque: float) -> float:
         """The speed under a steady torque on bit (N m), rad/s.
