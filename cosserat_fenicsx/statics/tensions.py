@@ -14,7 +14,6 @@ as many negative modes as K, less the negative eigenvalues of S (Haynsworth, Lin
 
 import numpy as np
 from dolfinx import fem
-from scipy import sparse
 
 from cosserat_fenicsx import compat
 from cosserat_fenicsx.algebra.building import Packed
@@ -205,6 +204,8 @@ class Tensions:
             variation.numbering.add_up(of_state[of_motion].ravel(), total)
             rows.append(np.concatenate(model.comm.allgather(total.array_r)))
         rows, compliance = np.array(rows), self._left * self._softness
+        from scipy import sparse  # slow to import, and equilibria do without
+
         stretch = sparse.csr_matrix(rows[on & (compliance > 0)] / np.sqrt(compliance[on & (compliance > 0)])[:, None])
         return K + stretch.T @ stretch, np.vstack([held, rows[on & (compliance == 0)]])
 
