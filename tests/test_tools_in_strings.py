@@ -186,10 +186,10 @@ def test_small_motions_take_the_slope_of_a_motors_curve():
     scene = above(tool, law=Rising(6.5e3 - 20 * (GIVEN["Om"] + 7), 20.0), length=1000.0)
     slope = tool.slope_at(7.0)
     line = motor(leakage=tool.per_radian**2 / slope, flow=(6.5e3 + GIVEN["Tf"] + 7 * slope) / slope * tool.per_radian)
-    growth, same = (
-        cf.drilling.stability(x, [GIVEN["Om"]], up_to=2.0).growth
-        for x in (scene, replace(scene, string=DrillString([line, pipe(1000.0)])))
-    )
+    both = scene, replace(scene, string=DrillString([line, pipe(1000.0)]))
+    growth, same = (cf.drilling.stability(x, [GIVEN["Om"]], up_to=2.0).growth for x in both)
+    critical, alike = (cf.drilling.critical_slopes(x, 2.0, GIVEN["Om"])[1] for x in both)
+    assert critical == pytest.approx(alike, rel=1e-6)
     assert growth == pytest.approx(same, rel=1e-8) and tool.least_slope < slope < tool.slope
 
 
