@@ -383,8 +383,9 @@ def _of_constant(stiffness):
 
 def _bounds(rows):
     """Whether rows have a matrix; and the least and the largest of every stiffness, see `Sections`."""
-    both = tuple(_split(bound(rows[:, :_DIAGONAL], axis=0), False) for bound in (np.min, np.max))
-    return bool(np.isfinite(rows[:, _DIAGONAL:]).any()), both
+    both = np.stack([bound(rows[:, :_DIAGONAL], axis=0) for bound in (np.min, np.max)])
+    both.flags.writeable = False  # rods share them
+    return bool(np.isfinite(rows[:, _DIAGONAL:]).any()), tuple(_split(row, False) for row in both)
 
 
 def _is_law(section):

@@ -150,11 +150,7 @@ class WellPath(Part):
 
     def curvature(self, md: float | Numbers) -> np.ndarray:
         """(..., 3) derivative of the tangent by md, 1/m; at a station, in the section below it."""
-        i, x = self._place(md)
-        k = self.sections.curvature[i]
-        size = np.sqrt((k * k).sum(axis=-1))
-        angle = size * x
-        return np.cos(angle)[..., None] * k - (size * np.sin(angle))[..., None] * self.sections.tangent[i]
+        return self._at(*self._place(md))[2]
 
     def inclination_at(self, md: float | Numbers) -> np.ndarray:
         """(...) inclination at measured depths (m), rad."""
