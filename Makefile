@@ -93,7 +93,7 @@ tutorials: setup
 # pytest's cache directory is off in parallel: the ranks would write it all at once.
 test: setup
 	$(PYTHON) -m pytest -n 2 --dist worksteal
-	$(MPIRUN) -n 2 $(PYTHON) -m pytest -p no:cacheprovider --color=no -m "not serial"
+	$(MPIRUN) -n 2 $(PYTHON) -m pytest -p no:cacheprovider --color=no -m "not serial and not ranks"
 	$(MPIRUN) -n 4 $(PYTHON) -m pytest -p no:cacheprovider --color=no -m ranks
 
 tables: setup

@@ -52,6 +52,16 @@ def pytest_xdist_setupnodes():
         os.putenv(name, value)
 
 
+def pytest_ignore_collect(collection_path, config):
+    """True, or None: nothing is imported of a file that was not asked for by name and whose tests are all skipped."""
+    named = any(collection_path.name in argument for argument in config.args)
+    if COMM.size > 1 and collection_path.match("test_*.py") and not named:
+        text = collection_path.read_text(encoding="utf-8")
+        serial = re.search(r"^pytestmark = .*\.serial\b", text, re.M)
+        return bool(serial or COMM.size > 2 and "mark.ranks" not in text) or None
+    return None
+
+
 def pytest_collection_modifyitems(config, items):
     if config.getoption("--truths"):
         items[:] = [item for item in items if "truth" in item.fixturenames]
