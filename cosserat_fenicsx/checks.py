@@ -7,6 +7,7 @@ does not have.
 import dataclasses
 import functools
 import inspect
+import itertools
 import math
 import numbers
 import re
@@ -149,8 +150,13 @@ def finite_array(owner, field, value, expected):
     in a list, of the dimension of the first one in the parentheses of `expected`."""
     if isinstance(value, str):
         value = _in_si(owner, field, value, _unit_of(expected))
-    if isinstance(value, list | tuple) and any(isinstance(x, str) for x in value):
-        value = [_in_si(owner, f"{field}[{i}]", x, _unit_of(expected)) for i, x in enumerate(value)]
+    if isinstance(value, list | tuple):
+        rows = (x if isinstance(x, list | tuple) else (x,) for x in value)
+        kinds = set(map(type, itertools.chain.from_iterable(rows)))
+        if bool in kinds:
+            refuse(owner, field, value, expected)
+        if str in kinds:
+            value = [_in_si(owner, f"{field}[{i}]", x, _unit_of(expected)) for i, x in enumerate(value)]
     try:
         array = np.asarray(value)
     except ValueError:

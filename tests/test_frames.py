@@ -203,7 +203,9 @@ def test_a_scene_file_takes_the_rods_of_a_mesh_and_its_names(tmp_path):
 @pytest.mark.parametrize(("changed", "words"), [
     ({"edges": [[0, 1], [1, 5]]}, r"edges\[1\] = \[1, 5\]: expected numbers of points from 0 to 4"),
     ({"edges": [[0, 1], [1, 0]]}, r"\[0, 1\] occurs twice"),
-    ({"edges": [[0.0, 1.0]]}, r"expected \(rods, 2\) whole numbers"),
+    ({"edges": [[0.0, 1.0]]}, r"edges\[0\] = \[0.0, 1.0\]: expected whole numbers"),
+    ({"d1": (0, 0, 2)}, r"frame: 'rod0', from point 0 to 1: Line.d1 = \(0.0, 0.0, 2.0\): expected"),
+    ({"points": [(True, 0.0, 0.0), *PORTAL[1:]]}, r"frame.points = .*: expected rows of three numbers"),
     ({"edges": [[0, 0]]}, "a point apart from start"),
     ({"points": [[0, 0], [1, 1]]}, r"expected \(points, 3\)"),
     ({"section": [THICK, THIN]}, "frame.section has 2 values: expected one, or 3"),

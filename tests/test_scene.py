@@ -41,6 +41,7 @@ REFUSED = {
     "infinite bending": (lambda: cf.Stiffness((1, 1), 1, (inf, 1), 1), "Stiffness.bending = inf"),
     "line of no length": (lambda: cf.Line((1, 2, 3), (1, 2, 3)), "Line.end = (1.0, 2.0, 3.0): expected a point apart"),
     "line of two numbers": (lambda: cf.Line((0, 0), (0, 1)), "Line.start = (0, 0): expected 3 finite numbers"),
+    "line of true": (lambda: cf.Line((0, 0, 0), (True, 0, 1.0)), "Line.end = (True, 0, 1.0): expected 3 finite"),
     "d1 along the line": (lambda: cf.Line((0, 0, 0), (0, 0, 1), d1=(0, 0, 2)), "Line.d1"),
     "rod without material": (lambda: cf.Rod(LINE, cf.Circle(0.1)), "Rod.material = None"),
     "rod with a place": (lambda: cf.Rod(LINE, cf.Circle(0.1), STEEL, name="b@2"), "a name without '@'"),

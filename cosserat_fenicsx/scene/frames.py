@@ -159,8 +159,10 @@ def frame(
     if points.ndim != 2 or points.shape[1] != 3 or not len(points):
         raise SceneError(f"frame.points has the shape {points.shape}: expected (points, 3)")
     ends = np.asarray(edges)
-    if ends.ndim != 2 or ends.shape[1] != 2 or not len(ends) or not np.issubdtype(ends.dtype, np.integer):
+    if ends.ndim != 2 or ends.shape[1] != 2 or not len(ends):
         raise SceneError(f"frame.edges has the shape {ends.shape}: expected (rods, 2) whole numbers of points")
+    if not np.issubdtype(ends.dtype, np.integer):
+        raise SceneError(f"frame.edges[0] = {ends[0].tolist()}: expected whole numbers of points, such as [0, 1]")
     wrong = np.flatnonzero(((ends < 0) | (ends >= len(points))).any(axis=1))
     if len(wrong):
         edge, last = ends[wrong[0]].tolist(), len(points) - 1
@@ -171,17 +173,19 @@ def frame(
     sections, materials = _one_each("section", section, len(ends)), _one_each("material", material, len(ends))
     names = [f"rod{i}" for i in range(len(ends))] if names is None else _one_each("names", list(names), len(ends))
     places = [tuple(x) for x in points.tolist()]
-    rods = tuple(
-        Rod(Line(places[a], places[b], d1=d1), sections[i], materials[i], name=names[i])
-        for i, (a, b) in enumerate(ends.tolist())
-    )
+    try:
+        rods = []
+        for i, (a, b) in enumerate(ends.tolist()):
+            rods.append(Rod(Line(places[a], places[b], d1=d1), sections[i], materials[i], name=names[i]))
+    except SceneError as problem:
+        raise SceneError(f"frame: {names[i]!r}, from point {a} to {b}: {problem}") from None
     given = {"clamped": clamped, "pinned": pinned, "hinged": hinged}
     held, pins, loose = (_numbers(field, value, len(points)) for field, value in given.items())
     meet = np.bincount(ends.ravel(), minlength=len(points))
     alone = next((k for k in loose if meet[k] < 2), None)
     if alone is not None:
         raise SceneError(f"frame.hinged: {meet[alone]} rods meet point {alone}: expected points where two or more do")
-    return Frame(points, ends, rods, {Clamp: held, Pin: pins}, loose)
+    return Frame(points, ends, tuple(rods), {Clamp: held, Pin: pins}, loose)
 
 
 def _one_each(field, value, count):

@@ -180,7 +180,7 @@ class MudMotor(_Tool):
             refuse(
                 self, "flow", self.flow, "a number (m^3/s) for a motor with curves; leakage= takes functions of time"
             )
-        self._law(self.flow)
+        self.law  # refuses a flow outside the curves
 
     @property
     def per_radian(self) -> float:
