@@ -274,23 +274,24 @@ def shaken(f):
 
 
 def test_tool_with_viscous_drag(truth):
-    """By exact waves, and one of the motions by elements: hook load, velocity of the lower end, power."""
+    """By exact waves, and one of the motions by elements, once its start has died down by exp(-0.4 t): hook load,
+    velocity of the lower end, power."""
     rows, force = VISCOUS["truth"], VISCOUS["input"]["F"]
     answer = cf.drilling.frequency_response(shaken(1.0), [row["f"] for row in rows], kind="axial", speed=0.0)
     ends = [answer.transfer("tool force", x) for x in ("hook load", "bit velocity")]
     known = [[row[f"{x} amplitude"] for row in rows] for x in ("hook load", "lower end velocity")]
     truth("oscillation tool, viscous drag, by waves: hook load, lower end", np.abs(ends) * force, known, 1e-6)
     (row, *_), f = rows, rows[0]["f"]
-    found = cf.drilling.simulate(shaken(f), 18.0, dt=1e-3, elements=320, progress=False)
-    late = found.mean_times > 16.0
+    found = cf.drilling.simulate(shaken(f), 24.0, dt=1e-3, elements=320, progress=False)
+    late = found.mean_times > 22.0
     waves = np.exp(2j * np.pi * f * found.mean_times[late])
     waves = np.column_stack([np.ones_like(waves.real), waves.real, waves.imag])
     got = [np.hypot(*np.linalg.lstsq(waves, x[late], rcond=None)[0][1:]) for x in (found.hook_load, found.bit_velocity)]
-    start = np.searchsorted(found.times, 16.0)
+    start = np.searchsorted(found.times, 22.0)
     power = np.diff(found.work_of_tools[[start, -1]]) / np.diff(found.times[[start, -1]])
     truth("oscillation tool, viscous drag, in motion at 5 Hz: hook load, lower end, power", [*got, *power],
           [row[x] for x in ("hook load amplitude", "lower end velocity amplitude", "mean power fed in (W)")],
-          1e-3, most=2e-3)  # fmt: skip
+          1e-3)  # fmt: skip
 
 
 def test_tool_that_halves_the_pull(truth):
