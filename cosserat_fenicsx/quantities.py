@@ -358,6 +358,11 @@ def in_si(where, value, dimension):
     number, unit = float(found[1]), found[2]
     if parts:
         number, unit = int(parts[1] or 0) + int(parts[2]) / int(parts[3]), parts[4]
+    if unit.startswith(","):
+        raise SceneError(
+            f"{where} = {value!r}: expected a number without commas, such as '12000.5 {list(known)[-1]}': decimals "
+            "stand behind a point, and nothing between thousands"
+        )
     if not unit or not math.isfinite(number):
         raise SceneError(f"{where} = {value!r}: expected a unit after the number, or the number without quotes ({si})")
     if unit in _TONS and dimension == "force":

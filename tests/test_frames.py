@@ -189,8 +189,12 @@ def test_a_scene_file_takes_the_rods_of_a_mesh_and_its_names(tmp_path):
     assert to_data(cf.read(tmp_path / "again.toml").scene) == to_data(found.scene)
     for given, other, words in (
         ('"FEET"', '"FOOT"', r"line 5, column 1: .*no points are named 'FOOT': did you mean 'FEET'\?"),
-        ('"BEAM"\n', '"BEAMS"\n', r"line 15, column 1: Scene.loads\[1\].rod = 'BEAMS'"),
-        ("[[loads]]", SUPPORTS, r"line 14, column 1: Scene.supports\[1\].station = 'XX'"),
+        ('"BEAM"\n', '"BEAMS"\n', r"line 15, column 1: Scene.loads\[1\].rod = 'BEAMS'.*mean 'BEAM'.*lines BEAM, LEGS;"),
+        (
+            "[[loads]]",
+            SUPPORTS,
+            r"line 14, column 1: Scene.supports\[1\].station = 'XX'.*points DECK, FEET; its rods are",
+        ),
         ("[[loads]]", OF_ITS_OWN, "rods = 'BEAM': expected another name"),
         ('"LEGS"', '"BEAM"', r"\['BEAM', 'BEAM'\]: expected each group once"),
         ("groups = [", "section = { type = 'Circle', diameter = 0.1 }\ngroups = [", "either a section of all rods, or"),

@@ -289,11 +289,11 @@ def test_refusals():
         return cf.solve(cf.Scene([other], supports, [cf.Force(other.end, (0, 0, 1))]), [1.0])
 
     cases = {
-        "rod 'other' can turn about its own axis: expected at one end of each rod that spins what holds it about its "
-        "axis: a Clamp or a Hinge in the place of a Pin, a joint without release or with an axis across the rod":
+        "rod 'other' can turn about its own axis: expected a Hinge with axis = (0, 1, 0) in the place of the "
+        "Pin at other.start, other.end, if all acts in the x-z plane: in space a Pin":
             lambda: free(cf.Pin(other.start), cf.Pin(other.end)),
         "rod 'other' can turn about its own axis, and rod 'other' can turn about the axis (0, 0, 1) through (0, 0, 0) "
-        "m: expected supports": lambda: free(cf.Pin(other.start), cf.Roller(other.end, (0, 0, 1))),
+        "m: expected a Hinge with axis": lambda: free(cf.Pin(other.start), cf.Roller(other.end, (0, 0, 1))),
         "and rod 'other' can move along (0, 0, 1): expected": lambda: free(cf.Roller(other.start, (1, 0, 0))),
         "supports[0] (Clamp at other.start) and supports[1] (Prescribed at other.start) hold the same motion twice":
             lambda: cf.Scene([other], [cf.Clamp(other.start), cf.Prescribed(other.start, displacement=(1, 0, 0))]),

@@ -73,6 +73,8 @@ SURVEYS = {
                      "line 1 is no row of a .csv file"),
     "a number of Python's": ('survey = "s.csv"', "MD,Inc,Azi\n0,0,0\n10_00,10,0\n",
                              "line 3, '10_00,10,0': expected num"),
+    "from the bottom up": ('survey = "s.csv"', "MD,Inc,Azi\n1000,10,0\n500,5,0\n0,0,0\n",
+                           r"md\[1\] = 500.0: expected more than the station before, 1000 m, from the surface down"),
     "an endless device": ('survey = "/dev/zero"', "", "/dev/zero: no plain file: expected a survey as .csv"),
     "a folder": ('survey = "."', "", "Is a directory"),
     "a null character": (r'survey = "s\u0000.csv"', "", "cannot be read .*null"),
@@ -163,6 +165,7 @@ def test_scenes_may_come_from_a_pipe():
     ({"weight": 6e300}, r"Component.weight = 6e\+300: expected a number from -1e\+06 to 1e\+06 \(N/m\)"),
     ({"on_bit": 6e303}, r"TripOut.weight = 6e\+303: expected a finite number \(N\), of at most 1e\+10 N"),
     ({"on_bit": -1e11}, "of at most 1e"),
+    ({"on_bit": '"25,000 lbs"'}, "TripOut.weight = '25,000 lbs': expected a number without commas"),
     ({"more": "length = 1e7, "},
      r"Component.length = 10000000.0: expected a positive number \(m\), of at most 1e\+06 m"),
 ])  # fmt: skip

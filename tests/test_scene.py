@@ -488,3 +488,19 @@ def test_moduli_that_no_metal_has_are_asked_about_and_soft_ones_are_not():
     assert "is more than" in doubts(210e12, 7850.0)[0]
     for E, density in ((210e9, 7850.0), (2e6, 1100.0), (200e6, 1050.0), (110e9, 4500.0), (16e9, 11340.0)):
         assert doubts(E, density) == ()
+
+
+@pytest.mark.serial
+def test_profiles_that_nobody_turned_into_the_plane_are_asked_about():
+    """A post of a plane frame bends about its weak axis by default; not a bar that no load bends, nor one with d1."""
+    steel = cf.Material(210e9)
+
+    def doubts(force, top=(0, 0, 3), **d1):
+        rod = cf.Rod(cf.Line((0, 0, 0), top, **d1), cf.Profile("HEA 160"), steel, name="post")
+        return cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Force(rod.end, force)]).doubts
+
+    (doubt,) = doubts((1e3, 0, -1e3))
+    assert "weaker axis in the x-z plane: 'post': d1 = (0, 1, 0) of the curve" in doubt
+    assert doubts((0, 0, -1e3)) == doubts((1e3, 0, 0), d1=(1, 0, 0)) == doubts((1e3, 0, 0), d1=(0, 1, 0)) == ()
+    assert doubts((0, 0, 1.0), top=(3, 0, 0)) == ()  # a beam stands upright
+    assert "'post' of HEA 160 is 3000 m long: are all lengths in m?" in doubts((0, 0, 1.0), top=(3000, 0, 0))[0]

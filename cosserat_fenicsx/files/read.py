@@ -462,7 +462,7 @@ class RodScene(Part):
             for rod in self.rods:
                 if self.mesh.frame.places_of("rod", rod.name):
                     refuse(self, "rods", rod.name, "another name, since it is that of a group of lines of the [mesh]")
-            given |= {name: self.mesh.everywhere(given[name]) for name in ("supports", "loads", "velocities")}
+            given |= {x: self.mesh.everywhere(x, given[x], self.rods) for x in ("supports", "loads", "velocities")}
             for name in ("rods", "joints", "supports"):
                 given[name] = [*given[name], *getattr(self.mesh.frame, name)]  # messages count those of the file
         store(self, scene=Scene(**given))

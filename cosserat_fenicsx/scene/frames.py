@@ -1,6 +1,7 @@
 """Frames: straight rods between points, joined where they meet, from arrays or from a file with a mesh of lines."""
 
 import copy
+import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -86,6 +87,10 @@ class Frame:
         if kind == "station":
             return [self.at(int(k)) for k in self._points_of.get(name, ())]
         return self.rods_in(name) if name in self._rods_of else ()
+
+    def names_of(self, kind):
+        """The names that `places_of` knows of a kind, as texts in alphabetical order."""
+        return sorted(map(str, self._points_of if kind == "station" else self._rods_of))
 
     @cached_property
     def _ends(self):
@@ -400,13 +405,23 @@ class Mesh(Part):
         held = {name: getattr(self, name) for name in ("clamped", "pinned", "hinged", "scale", "d1")}
         store(self, frame=frame_from(self.file, section, material, **held))
 
-    def everywhere(self, items):
-        """Loads, supports or velocities; one whose station or rod is a name of the mesh at each place of that name: at
-        the first in its own place of the list, which messages count by, at the others behind all."""
+    def everywhere(self, field, items, others):
+        """Loads, supports or velocities (`field`); one whose station or rod is a name of the mesh at each place of that
+        name: at the first in its own place of the list, which messages count by, at the others behind all. Refuses a
+        name that neither the mesh nor one of its rods or of `others`, a list of rods, has."""
         found, more = list(items), []
+        rods = {rod.name for rod in (*self.frame.rods, *others)}
         for i, item in enumerate(items):
             key = next((key for key in ("station", "rod") if isinstance(getattr(item, key, None), str)), None)
-            places = self.frame.places_of(key, getattr(item, key)) if key else ()
+            name = getattr(item, key) if key else ""
+            places = self.frame.places_of(key, name) if key else ()
+            if key and not places and re.sub(r"(@[^@]*|\.(start|end))$", "", name) not in rods:
+                known = self.frame.names_of(key)
+                raise SceneError(
+                    f"Scene.{field}[{i}].{key} = '{name}': no name of a rod or of the mesh: {_known(name, known)} (the "
+                    f"mesh names {'points' if key == 'station' else 'groups of lines'} {', '.join(known) or 'none'}; "
+                    f"its rods are '{self.frame.rods[0].name}' to '{self.frame.rods[-1].name}')"
+                )
             copies = [copy.copy(item) for _ in places]
             for one, place in zip(copies, places, strict=True):
                 store(one, **{key: place})

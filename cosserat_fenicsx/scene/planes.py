@@ -11,6 +11,7 @@ import numpy as np
 from cosserat_fenicsx.scene.action import describe, is_axial
 from cosserat_fenicsx.scene.curves import Line
 from cosserat_fenicsx.scene.rod import mass_arm
+from cosserat_fenicsx.scene.rolled import Profile
 from cosserat_fenicsx.scene.signals import at, sample_times
 from cosserat_fenicsx.scene.statical import rows_of
 from cosserat_fenicsx.scene.supports import PositionTie, TurnTie
@@ -53,6 +54,22 @@ def find_plane(scene):
         return _find(scene), ""
     except _Leaves as reason:
         return None, str(reason)
+
+
+def bent_weakly(scene):
+    """([rods], `Plane`): rods of rolled profiles that bend about their weaker axis in the plane of the scene, as `Line`
+    turns a section where no `d1` is given; ([], None) where there are none, or loads along one line show no plane."""
+    rods = [x for x in scene.rods if isinstance(x.curve, Line) and x.curve.d1 is None]
+    rods = [rod for rod in rods if isinstance(rod.section_at(0.0), Profile)]
+    plane = find_plane(scene)[0] if rods else None
+    if plane is None:
+        return [], None
+    along = scene.rods[0].curve.frame(0.0)[:, 2]
+    acting = [vector for load in scene.loads for part in _vectors(scene, load) for vector in _units(part)]
+    shown = [*acting, *(_sample(rod)[1][0, :, 2] for rod in scene.rods)]
+    if all(np.linalg.norm(np.cross(along, vector)) < _PARALLEL for vector in shown):
+        return [], None
+    return [rod for rod in rods if abs(rod.curve.frame(0.0)[:, 1] @ plane.axes[2]) > 1 - _SMALLEST_ANGLE], plane
 
 
 class _Leaves(Exception):

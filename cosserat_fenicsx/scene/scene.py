@@ -16,7 +16,7 @@ from cosserat_fenicsx.checks import instance, store, warn
 from cosserat_fenicsx.errors import SceneError, nearest
 from cosserat_fenicsx.parts import Items, Object, Part, concerning
 from cosserat_fenicsx.scene.action import Action, describe, powers, some_of
-from cosserat_fenicsx.scene.planes import find_plane
+from cosserat_fenicsx.scene.planes import bent_weakly, find_plane
 from cosserat_fenicsx.scene.profiles import Stiffnesses
 from cosserat_fenicsx.scene.rod import Rod, Station, StationOrName, station_named, with_names
 from cosserat_fenicsx.scene.rolled import Profile
@@ -113,6 +113,8 @@ _ALONG_TENDON = 33
 _STEEL, _METAL = (7000.0, 8200.0), (5e10, 5e11)
 # Solid bars of metal that are thicker, m, are probably given in mm.
 _THICKEST = 1.5
+# Rolled profiles that are longer, over their heights, are probably given in mm.
+_LONGEST = 500
 _PARTS = {
     "supports": (Support, "a support such as Clamp(rod.start)"),
     "joints": (Joint, "a Joint(one.end, other.start)"),
@@ -362,7 +364,7 @@ class Scene(Part):
     @cached_property
     def doubts(self):
         """Warnings about probable mistakes in the scene, sentences."""
-        return (*self._softness(), *self._thickness(), *self._unjoined())
+        return (*self._softness(), *self._thickness(), *self._turned(), *self._unjoined())
 
     def warn(self):
         """Raise a `SceneWarning` for each of `doubts`, on behalf of the caller of the function that calls this."""
@@ -420,6 +422,8 @@ class Scene(Part):
         """Warnings about dimensions that may be in wrong units."""
         for rod in self.rods:
             section = rod.section_at(0.0)
+            if isinstance(section, Profile) and rod.length > _LONGEST * section.height:
+                yield f"rod '{rod.name}' of {section.name} is {rod.length:g} m long: are all lengths in m?"
             across = max(getattr(section, name, 0.0) for name in ("diameter", "outer_diameter", "width", "height"))
             size = f"rod '{rod.name}' is {across:g} m across and {rod.length:g} m long"
             if across >= rod.length:
@@ -427,6 +431,17 @@ class Scene(Part):
             elif across > _THICKEST and isinstance(section, Circle | Rectangle):
                 if rod.material is not None and _METAL[0] <= rod.material.E <= _METAL[1]:
                     yield f'{size}, of solid metal: are all lengths in m (or texts, such as "20 mm")?'
+
+    def _turned(self):
+        """A warning about rolled profiles that stand across the plane of the scene because nobody turned them."""
+        rods, plane = bent_weakly(self)
+        if rods:
+            names = some_of(f"'{rod.name}'" for rod in rods)
+            d1 = ", ".join(f"{x:.4g}" for x in np.round(plane.axes[2], 12) + 0.0)
+            yield (
+                f"rolled profiles bend about their weaker axis in {plane.words}: {names}: d1 = ({d1}) of the curve "
+                "puts their webs into the plane; any d1 that you give ends this warning"
+            )
 
     def _unjoined(self):
         """Warnings about ends of different structures that lie at one point, unless both have supports."""

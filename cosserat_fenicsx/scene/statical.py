@@ -11,10 +11,12 @@ from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.numerics import svd
 from cosserat_fenicsx.scene.curves import Line
 from cosserat_fenicsx.scene.action import some_of
-from cosserat_fenicsx.scene.supports import Clamp, Joint, PositionTie, TurnTie
+from cosserat_fenicsx.scene.supports import Clamp, Hinge, Joint, Pin, PositionTie, TurnTie
 
 # Free motions that a message names; parts of a motion that are rounding.
 _TOLD, _FREE = 5, 1e-6
+# Places along a rod at which it lies in a plane or not.
+_ALONG = 9
 # What rods that spin do, one or several, and what holds them.
 _SPIN = ("turn about its own axis", "each turn about its own axis")
 _HOLD_SPIN = (
@@ -238,7 +240,28 @@ def check_no_mechanism(scene):
         )
     if len(rest) > most:
         told.append(f"{'' if complete else 'at least '}{len(rest) - most} more motion(s) are free")
-    raise SceneError(f"Scene is a mechanism: {', and '.join(told)}: expected {'; and '.join(remedies)}")
+    expected = _hinges_for_pins(scene) or "; and ".join(remedies)
+    raise SceneError(f"Scene is a mechanism: {', and '.join(told)}: expected {expected}")
+
+
+def _hinges_for_pins(scene):
+    """What to do where rods lie in a coordinate plane and are held once their pins are hinges about its normal; else
+    empty. Of two such planes, that of rods along one line, the upright one."""
+    pinned = [x for x in scene.supports if isinstance(x, Pin)]
+    tangents = [rod.curve.frame(np.linspace(0.0, rod.length, _ALONG))[:, :, 2] for rod in scene.rods if pinned]
+    for i, plane in ((1, "x-z"), (0, "y-z"), (2, "x-y")):
+        if not pinned or np.abs(np.concatenate(tangents)[:, i]).max() > _FREE:
+            continue
+        axis = np.eye(3)[i]
+        supports = [Hinge(x.station, axis) if isinstance(x, Pin) else x for x in scene.supports]
+        with contextlib.suppress(SceneError):  # some of them may hold a motion twice
+            if not len(free_motions(dataclasses.replace(scene, supports=supports))[0]):
+                return (
+                    f"a Hinge with axis = ({_numbers(axis)}) in the place of the Pin at "
+                    f"{some_of(str(x.station) for x in pinned)}, if all acts in the {plane} plane: in space a Pin "
+                    "lets a rod turn about every axis"
+                )
+    return ""
 
 
 def _spin(scene, k):

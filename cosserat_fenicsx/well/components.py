@@ -78,7 +78,8 @@ def standard_size(kind, name):
     known = standard_sizes()[kind]
     plain = {_plain(size): size for size in known}
     if not isinstance(name, str) or _plain(name) not in plain:
-        raise SceneError(f"{kind}.size = {name!r}: {_sizes_near(name, known)}")
+        own = "" if kind == "Casing" else "; outer_diameter and inner_diameter may stand in the place of size"
+        raise SceneError(f"{kind}.size = {name!r}: {_sizes_near(name, known)}{own}")
     return known[plain[_plain(name)]]
 
 

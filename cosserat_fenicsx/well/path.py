@@ -309,6 +309,10 @@ def checked_survey(md, inc, azi, degrees):
         if len(columns[name]) != len(columns["md"]):
             refuse(who, name, values, f"{len(columns['md'])} numbers, as many as there are measured depths")
     md, inc, azi = columns.values()
+    if (np.diff(np.sort(md)) >= 1e-6).all() and (np.diff(md) < 0).any():
+        i = int(np.argmax(np.diff(md) < 0)) + 1
+        rows = "the surface down: sort the stations by depth"
+        refuse(who, f"md[{i}]", float(md[i]), f"more than the station before, {md[i - 1]:g} m, from {rows}")
     if md[0] != 0:
         refuse(who, "md[0]", float(md[0]), "0 m: add the station (0, 0, azimuth) where the well starts vertically")
     if md[-1] > 1e6:
