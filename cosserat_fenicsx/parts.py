@@ -137,6 +137,14 @@ class Part(metaclass=_Readable):
         return next((make for make in others if (arguments_of(make).keys() - own) & set(names)), cls)
 
 
+class Settings(Part):
+    """Base of tables of arguments of a function; None for its own defaults."""
+
+    def given(self) -> dict[str, Any]:
+        """The arguments that are given."""
+        return {name: value for name, value in self.arguments().items() if value is not None}
+
+
 class FunctionOfTime(
     Part,
     family="function of time",

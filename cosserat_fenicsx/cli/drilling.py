@@ -6,7 +6,7 @@ from argparse import Namespace
 from dataclasses import replace
 from functools import partial
 
-from cosserat_fenicsx.cli.output import DONE, deliver, given, refuse_of_rods, say, units_of
+from cosserat_fenicsx.cli.output import DONE, charted, deliver, given, refuse_of_rods, say, units_of
 from cosserat_fenicsx.drilling.choose import chosen, model_of
 from cosserat_fenicsx.drilling.motion import KIND, check_arguments
 from cosserat_fenicsx.drilling.scenefile import SimulateDrilling
@@ -40,15 +40,11 @@ def run(options, found, tables):
                           "fit": found.fit and found.fitted}  # fmt: skip
     if "duration" in found.settings or not any(others.values()):
         code = deliver_motion(lambda: found.run(folder=options.folder), options, tables)
-    of_output = Namespace(output=options.output, scene=options.scene, units=options.units)
+    of_output = Namespace(**{**vars(options), "animate": None, "folder": None, "station": None})
     for name, computed in others.items():
         if code == DONE and computed:
-
-            def files_of(answer, name=name):
-                chart = not options.no_picture and partial(answer.plot, units=options.units or "SI")
-                return {f"{name}.csv": partial(answer.write, units=options.units or "SI"), f"{name}.png": chart}
-
-            code = deliver(computed, of_output, (f"{name}.csv", f"{name}.png"), files_of, tables)
+            files = (f"{name}.csv", f"{name}.png")
+            code = deliver(computed, of_output, files, partial(charted, name, options), tables)
     return code
 
 

@@ -6,6 +6,7 @@ import sys
 import tempfile
 import warnings
 from contextlib import contextmanager, nullcontext
+from functools import partial
 from pathlib import Path
 
 from cosserat_fenicsx.errors import (
@@ -51,6 +52,15 @@ def refuse_of_rods(options, kind):
     """Refuse options of rods for another kind of scene, such as "a well"."""
     for name in given(options, [name for name in _OPTIONS if name not in _TAKEN[kind]]):
         raise SceneError(f"--{name.replace('_', '-')} is for rods, and this scene is {kind}")
+
+
+def charted(stem, options, result, *, beside=()):
+    """The files of a result with a table and a chart, for `deliver`: `stem`.csv, with which those whose names end in
+    `beside` are written, and `stem`.png where pictures are wanted and it has a chart."""
+    asked = {"units": units_of(options)}
+    chart = not options.no_picture and len(result) and getattr(result, "plot", None)
+    files = {f"{stem}.csv": partial(result.write, **asked)} | {f"{stem}{ending}.csv": True for ending in beside}
+    return files | {f"{stem}.png": chart and partial(chart, **asked)}
 
 
 def deliver(computed, options, names, files_of, tables=None, *, moving=False, obeys=True):

@@ -4,7 +4,7 @@ import sys
 from dataclasses import replace
 from functools import partial
 
-from cosserat_fenicsx.cli.output import DONE, deliver, given, output_of, refuse_of_rods, say, units_of
+from cosserat_fenicsx.cli.output import DONE, charted, deliver, given, output_of, refuse_of_rods, say, units_of
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.quantities import Units
 from cosserat_fenicsx.ranks import on_first, world
@@ -12,12 +12,11 @@ from cosserat_fenicsx.storage.store import discard
 from cosserat_fenicsx.well.buckled import LockUp
 from cosserat_fenicsx.well.scenefile import TorqueAndDragSettings
 
-# Ends of the names of files of an operation, and names of those of a sweep.
-_ENDINGS = (".csv", "_contacts.csv", ".png", "_3d.png")
-_OF_STRENGTH = ("_strength.csv", "_strength.png", "_overpull.csv", "_weight_on_bit.csv")
-_OF_SWEEPS = ("depth_sweep.csv", "depth_sweep", "depth_sweep.png")
-# Ends of the names of files of rates of build.
+# Ends of the names of files of an operation, and of rates of build; names of those of a sweep.
+_ENDINGS = (".csv", "_contacts.csv", ".png", "_3d.png", "_strength.csv", "_strength.png", "_overpull.csv",
+            "_weight_on_bit.csv")  # fmt: skip
 _OF_BUILDS = (".csv", "_holes.csv", ".png")
+_OF_SWEEPS = ("depth_sweep.csv", "depth_sweep", "depth_sweep.png")
 
 
 def _scene(options, scene):
@@ -29,27 +28,27 @@ def _scene(options, scene):
 
 def run(options, scene, tables):
     """`cosserat run` of a `WellScene` and the tables of its file; returns the exit code."""
-    scene, stems, picture = _scene(options, scene), _stems(scene.operations), not options.no_picture
-    units = units_of(options)
-    names = [f"{stem}{ending}" for stem in stems for ending in _ENDINGS + _OF_STRENGTH] + list(_OF_SWEEPS)
+    scene, stems = _scene(options, scene), _stems(scene.operations)
     of_builds = ["build_rate"] if len(scene.drilling) == 1 else [f"build_rate_{x}" for x in _stems(scene.drilling)]
+    names = [f"{stem}{ending}" for stem in stems for ending in _ENDINGS] + list(_OF_SWEEPS)
     names += [f"{stem}{ending}" for stem in of_builds for ending in _OF_BUILDS]
     out = output_of(options, names, tables)
     if scene.title:
         say(scene.title, file=sys.stdout)
+    for computed, files_of in _results(options, scene, stems, of_builds, out):
+        code = deliver(computed, options, names, files_of, tables, obeys=False)
+        if code != DONE:
+            return code
+    return DONE
+
+
+def _results(options, scene, stems, of_builds, out):
+    """(a function that computes a result, one of the result that returns its files) of all that the file asks for."""
+    units = units_of(options)
 
     def files_of(stem, answer):
-        csv, contacts, chart, in_space = (f"{stem}{ending}" for ending in _ENDINGS)
-        return {
-            csv: partial(answer.write, units=units),
-            contacts: True,
-            chart: picture and partial(answer.plot, units=units),
-            in_space: picture and partial(answer.plot_3d, units=units),
-        }
-
-    def files_of_strength(stem, found):
-        files = {f"{stem}.csv": partial(found.write, units=units)}
-        return files | ({f"{stem}.png": partial(found.plot, units=units)} if picture and hasattr(found, "plot") else {})
+        in_space = not options.no_picture and partial(answer.plot_3d, units=units)
+        return charted(stem, options, answer, beside=["_contacts"]) | {f"{stem}_3d.png": in_space}
 
     for operation, stem in zip(scene.operations, stems, strict=True):
         answers = []
@@ -58,26 +57,11 @@ def run(options, scene, tables):
             answers.append(_solved(scene, operation, Units(units)))
             return answers[0]
 
-        code = deliver(solved, options, names, partial(files_of, stem), tables, obeys=False)
-        if code != DONE:
-            return code
+        yield solved, partial(files_of, stem)
         for name, found in scene.strength.of(answers[0]).items() if scene.strength else ():
-            files = partial(files_of_strength, f"{stem}_{name}")
-            code = deliver(lambda found=found: found, options, names, files, tables, obeys=False)
-            if code != DONE:
-                return code
+            yield lambda found=found: found, partial(charted, f"{stem}_{name}", options)
     for operation, stem in zip(scene.drilling if scene.build_rate else (), of_builds, strict=False):
-
-        def files_of_builds(found, stem=stem):
-            csv, holes, chart = (f"{stem}{ending}" for ending in _OF_BUILDS)
-            drawn = picture and partial(found.plot, units=units)
-            return {csv: partial(found.write, units=units), holes: True, chart: drawn}
-
-        code = deliver(partial(scene.builds, operation), options, names, files_of_builds, tables, obeys=False)
-        if code != DONE:
-            return code
-    if scene.depth_sweep is None:
-        return DONE
+        yield partial(scene.builds, operation), partial(charted, stem, options, beside=["_holes"])
     folder = None if out is None else out / "depth_sweep"
 
     def swept():
@@ -86,11 +70,8 @@ def run(options, scene, tables):
             on_first(world(), lambda: discard(folder))
         return sweep
 
-    def files_of_sweep(sweep):
-        chart = picture and len(sweep) and partial(sweep.plot, units=units)
-        return {"depth_sweep.csv": partial(sweep.write, units=units), "depth_sweep.png": chart}
-
-    return deliver(swept, options, names, files_of_sweep, tables, obeys=False)
+    if scene.depth_sweep is not None:
+        yield swept, partial(charted, "depth_sweep", options)
 
 
 def _solved(scene, operation, shown):

@@ -62,6 +62,7 @@ from cosserat_fenicsx.parts import (
     Frequency,
     Number,
     Part,
+    Settings,
     Time,
     Values,
     at_least,
@@ -96,7 +97,7 @@ class SoftSpeed(_Tuned):
 
 
 @dataclass(frozen=True)
-class SimulateDrilling(Part):
+class SimulateDrilling(Settings):
     """Arguments of `simulate` in a scene file; None for its own defaults.
 
     Args:
@@ -322,8 +323,7 @@ class DrillingScene(InWords, Part):
     @property
     def settings(self) -> dict[str, Any]:
         """Arguments of `simulate`."""
-        given = self.simulate.arguments() if self.simulate else {}
-        return {name: value for name, value in given.items() if value is not None}
+        return self.simulate.given() if self.simulate else {}
 
     @property
     def speeds(self) -> tuple[float, ...]:
@@ -356,11 +356,7 @@ class DrillingScene(InWords, Part):
         Raises:
             SceneError, NotConverged: see `stability`.
         """
-        if not self.speeds:
-            return None
-        return stability(
-            self.scene, self.speeds, self.weights or None, up_to=self.stability.up_to, kind=self.stability.kind
-        )
+        return stability(self.scene, **self.stability.arguments()) if self.stability else None
 
     def respond(self) -> FrequencyResponse | None:
         """The `frequency_response` of the file; None where it asks for none.

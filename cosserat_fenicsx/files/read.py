@@ -79,6 +79,7 @@ from cosserat_fenicsx.parts import (
     Object,
     Part,
     Reading,
+    Settings,
     Time,
     made,
     misplaced,
@@ -359,16 +360,8 @@ def schema_of_files() -> dict:
     }
 
 
-class _Settings(Part):
-    """Base of tables of arguments of a function; None for its own defaults."""
-
-    def given(self) -> dict[str, Any]:
-        """The arguments that are given."""
-        return {name: value for name, value in self.arguments().items() if value is not None}
-
-
 @dataclass(frozen=True)
-class Solve(_Settings):
+class Solve(Settings):
     """Arguments of `solve` in a scene file, see there.
 
     Args:
@@ -400,7 +393,7 @@ class Solve(_Settings):
 
 
 @dataclass(frozen=True)
-class Simulate(_Settings):
+class Simulate(Settings):
     """Arguments of `simulate` in a scene file, see there.
 
     Args:

@@ -55,7 +55,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 
 from cosserat_fenicsx.checks import File, refuse
-from cosserat_fenicsx.parts import Depth, Number, Part, Values, between, concerning, positive
+from cosserat_fenicsx.parts import Depth, Number, Part, Settings, Values, between, concerning, positive
 from cosserat_fenicsx.quantities import Units
 from cosserat_fenicsx.results.result import Result
 from cosserat_fenicsx.results.screen import InWords
@@ -84,7 +84,7 @@ _MODELS = {
 
 
 @dataclass(frozen=True)
-class TorqueAndDragSettings(Part):
+class TorqueAndDragSettings(Settings):
     """Arguments of `torque_and_drag` in a scene file; None for its own defaults.
 
     Args:
@@ -100,7 +100,7 @@ class TorqueAndDragSettings(Part):
 
 
 @dataclass(frozen=True)
-class DepthSweepSettings(Part):
+class DepthSweepSettings(Settings):
     """Arguments of `depth_sweep` in a scene file; None for its own defaults.
 
     Args:
@@ -157,12 +157,6 @@ class BuildRateSettings(Part):
     anisotropy: Annotated[float, between(0, 10)] = 0.1
 
     called = "build_rate"
-
-
-def _given(settings):
-    if settings is None:
-        return {}
-    return {name: value for name, value in settings.arguments().items() if value is not None}
 
 
 @dataclass(frozen=True)
@@ -261,13 +255,12 @@ class WellScene(InWords, Part):
     @property
     def settings(self) -> dict[str, Any]:
         """Arguments of `torque_and_drag`."""
-        return _given(self.torque_and_drag)
+        return self.torque_and_drag.given() if self.torque_and_drag else {}
 
     @property
     def sweep(self) -> dict[str, Any]:
         """Arguments of `depth_sweep` beside these, empty where the file asks for none."""
-        found = _given(self.depth_sweep)
-        return found | {"depths": np.array(found["depths"])} if found else found
+        return self.depth_sweep.given() | {"depths": np.array(self.depth_sweep.depths)} if self.depth_sweep else {}
 
     def answer(self, operation: Operation) -> TorqueAndDrag:
         """The answer of `torque_and_drag` for an operation."""
