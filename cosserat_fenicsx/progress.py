@@ -10,7 +10,7 @@ from cosserat_fenicsx.ranks import are_apart
 _PATIENCE = 2.0  # s before a bar appears
 _LINE_EVERY = 10.0  # s between plain lines
 _REDRAWN = 0.5  # s between texts of `_Clocked` in a terminal
-_PLANNED = 1.0  # s before a plan is told, and so before a bar
+_PLANNED = 1.0  # s before a plan is printed, and so before a bar
 
 
 def _shown(wanted, comm):
@@ -60,7 +60,7 @@ class Progress:
             self._draw()
         elif now - self._last >= _LINE_EVERY or (self._now and self._last == self._began):
             self._last = now
-            # a path that turns back is longer than its targets tell
+            # a path that turns back is longer than its targets suggest
             share = f"{100 * self._done / self._way:.0f} %" if self._done <= 1.001 * self._way else "it turns back"
             print(f"{self._what}: {self._quantity} {self._eta:.6g}, {share}", file=sys.stderr)
 
@@ -181,7 +181,8 @@ class MeshProgress(StageProgress):
         self._tol = tol
 
     def on(self, elements, reached):
-        """The computation begins on a mesh of at most so many elements per rod; reached: the estimated error so far."""
+        """The computation begins on a mesh of at most `elements` elements per rod; reached: the estimated error so
+        far."""
         error = f", estimated error {reached:.1e} of {self._tol:g}" if math.isfinite(reached) else ""
         self.at(f"{elements} elements per rod{error}")
 

@@ -250,7 +250,7 @@ typedef struct {
     double *A, *front, *x;
 } lock_step;
 
-/* Sweeps that go on in lock step, each for itself where `together` is 0. */
+/* Sweeps that advance in lock step, each for itself where `together` is 0. */
 typedef struct {
     int count;
     sweep *sweep[LANES];

@@ -128,7 +128,7 @@ static void assemble_lanes(const chain *s, int t, const vector *A, vector *restr
 }
 
 /* Eliminate the first m unknowns of F (n, n + 1), the last column of which is the right side; inverse pivots take the
-   place of these. Lanes whose pivots are not acceptable are told in `bad`. */
+   place of these. `bad` marks lanes whose pivots are not acceptable. */
 static void reduce_lanes(vector *restrict F, int n, int m, const chain *s, int share, int first, int *bad)
 {
     vector whole[m], zero = {0};

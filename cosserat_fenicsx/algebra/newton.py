@@ -242,8 +242,8 @@ class BorderedNewton(Newton):
         return (1 / work if work else math.inf), moved / (size or 1.0)
 
     def softest(self, count):
-        """The changes of the unknowns (owned entries) of so many motions that the tangent at the problem's x and load
-        factor resists least, by inverse iteration."""
+        """The changes of the unknowns (owned entries) of the `count` motions that the tangent at the problem's x and
+        load factor resists least, by inverse iteration."""
         numbers, nodes = np.random.default_rng(self.problem.model.comm.rank), self.problem.model.numbering.nodes
         motions, changes = list(numbers.standard_normal((count, nodes, 6))), [None] * count
         for _ in range(_INVERSE):

@@ -322,7 +322,7 @@ static void attempt(const group *g, int *judged, const double *goal)
     }
 }
 
-/* Record the load factors that a sweep has reached. Returns whether it goes on, to `goal`; else `why` not. */
+/* Record the load factors that a sweep has reached. Returns whether it continues, to `goal`; else `why` not. */
 static int find_goal(sweep *s, double *goal, int *why)
 {
     while (s->next < s->count) {

@@ -103,7 +103,7 @@ def of_the_scene(scene):
 
 
 def _alike(rods, told):
-    """(names, [rods]) of every rod; of a large frame, of the rods of which the same is told."""
+    """(names, [rods]) of every rod; of a large frame, of rods with the same description."""
     groups = {}
     for rod in rods:
         groups.setdefault(told(rod) if len(rods) > _MANY else rod.name, []).append(rod)

@@ -75,7 +75,7 @@ def _results(options, scene, stems, of_builds, out):
 
 
 def _solved(scene, operation, shown):
-    """The answer of an operation; a lock-up is told in the units that are shown."""
+    """The answer of an operation; the message of a lock-up has the units that are shown."""
     try:
         return scene.answer(operation)
     except LockUp as locked:
@@ -83,7 +83,7 @@ def _solved(scene, operation, shown):
 
 
 def _stems(operations):
-    """Names of files; operations of one kind are told apart by numbers."""
+    """Names of files; operations of one kind are numbered."""
     names = [operation.name.replace(" ", "_") for operation in operations]
     return [name + (f"_{names[:i].count(name) + 1}" if name in names[:i] else "") for i, name in enumerate(names)]
 

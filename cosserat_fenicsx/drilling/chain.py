@@ -91,7 +91,7 @@ _NO_WALL = Wall(*[np.zeros(0, dtype=np.int32)] * 3, *[np.zeros(0)] * 8)
 
 
 def usual_step(scene, elements: int | None, axial: bool) -> float:
-    """The time step (s) of a `Drilling` for so many elements, where none is asked for."""
+    """The default time step (s) of a `Drilling` for a number of elements."""
     longest = min(_SET.longest, _SET.impact * time_of_impact(scene), period_of_tools(scene) / _SET.period[0])
     longest = longest if axial else _SET.longest
     if scene.discs:
@@ -109,7 +109,7 @@ def _travel_time(scene):
 
 
 def chain_of(scene, dt: float, elements: int | None, axial: bool) -> Chain:
-    """The `Chain` of a `Drilling` for steps of `dt` (s), of about so many elements, or None for the usual number."""
+    """The `Chain` of a `Drilling` for steps of `dt` (s), of about `elements` elements; None for the usual number."""
     if scene.discs:
         return _chain_of_discs(scene.discs, axial, static_weight(scene) if axial else 0.0)
     if elements is None:

@@ -276,7 +276,7 @@ def draw_energy(history):
     return ledger(history.times, stored, list(curves.values()), history.balance, f"{title_of(history)}: energy", about)
 
 
-# At most so many depths are drawn; the colour of places that stick.
+# Largest number of depths that are drawn; colour of places that stick.
 _DEPTHS, _STICKS = 500, "0.8"
 # Part of the height in which a bit at rest is marked.
 _BIT = 0.03

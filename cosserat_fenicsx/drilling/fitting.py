@@ -40,8 +40,9 @@ _SAMPLES, _FITTED, _GOOD = 64, 4, 1.5
 _ROUGH, _FINE = {"xtol": 1e-4, "ftol": 1e-4, "gtol": 1e-4, "max_nfev": 12}, {"xtol": 1e-8, "ftol": 1e-9, "gtol": 1e-9}
 # Error of derivatives, over their size, above which they are doubted.
 _ROUGHLY = 0.05
-# Misfit above which scene or readings are wrong; correlation above which two unknowns are not told apart; the least
-# effect of an unknown over its range, in standard deviations of one reading; residual (sd) where no motion exists.
+# Misfit above which scene or readings are wrong; correlation above which two unknowns cannot be distinguished; the
+# least effect of an unknown over its range, in standard deviations of one reading; residual (sd) where no motion
+# exists.
 _BAD, _ALIKE, _SILENT, _NONE = 3.0, 0.95, 1e-3, 1e4
 
 

@@ -55,7 +55,7 @@ _QUANTITIES = by_name(
 # Quantities of the table beside the time; its rows in `details`.
 _SHOWN = ("drive_speed", "bit_speed", "surface_torque", "torque_on_bit", "hook_load", "weight_on_bit", "bit_advance")
 _ROWS = 16
-# A motion grows without bound at so many times the speed asked for, and at least this one (rad/s).
+# Speed, over the one asked for, above which a motion counts as unbounded; smallest speed asked for, rad/s.
 _BEYOND, _USUAL = 100.0, 10.0
 # Beginnings of the sentences of `why` that are part of the answer.
 _LOUD = ("APPROXIMATE", "CAUTION", "UNSTABLE")
@@ -249,7 +249,7 @@ class DrillingHistory(ChartedBetween):
         t, values = self.mean_times, getattr(self, name)
         first = t[-1] - periods / frequency if len(t) else 0.0
         if not len(t) or first < t[0]:
-            refuse("mean", "periods", periods, f"a motion that holds so many, {periods / frequency:g} s")
+            refuse("mean", "periods", periods, f"a motion that is longer than these, {periods / frequency:g} s")
         inside = t > first
         t, values = np.append(first, t[inside]), np.append(np.interp(first, t, values), values[inside])
         return float(np.diff(t) @ (values[1:] + values[:-1]) / 2 / (t[-1] - first))

@@ -37,7 +37,7 @@ _WALL = 1e8
 _ELEMENT, _FEWEST = 6.0, 8
 # Default damping of the wall in motions, s/m.
 _DAMPING = 10.0
-# Speed (m/s) for which the rebound from the wall is told.
+# Speed (m/s) for which the rebound from the wall is reported.
 _TOUCH = 0.03
 _DOWN = np.array([0.0, 0.0, 1.0])
 

@@ -146,7 +146,7 @@ class StringModel(Pointers):
         return self.steps * self.dt
 
     def advance(self, steps: int) -> np.ndarray:
-        """Do up to so many steps.
+        """Do up to `steps` steps.
 
         Returns:
             (n, 1 + len(SERIES) + len(LEDGER)): the time and the values of SERIES and LEDGER at the end of each.
@@ -178,7 +178,7 @@ class StringModel(Pointers):
         raise NotImplementedError
 
     def _record(self, steps, rows):
-        """Do up to so many steps, count them, and write their `rows`, see `advance`, but for the times."""
+        """Do up to `steps` steps, count them, and write their `rows`, see `advance`, except the times."""
         raise NotImplementedError
 
     def profile(self) -> np.ndarray:

@@ -37,7 +37,7 @@ class BitAtEnd(PointAction):
     does not give way, the weight on bit is constant. At rest it exerts the static weight. In `simulate` alone does the
     rest act, in the spatial model. It is not multiplied by the load factor. What the bit takes from the rod is counted
     as dissipated in the energy balance; what rock of a stiffness stores too, until it gives it back.
-    `history.far_end(action)` tells the mean velocity, weight, rotation and torque on bit between saved states.
+    `history.far_end(action)` has the mean velocity, weight, rotation and torque on bit between saved states.
 
     Args:
         station: `rod.start` or `rod.end`; the rock lies beyond.

@@ -107,8 +107,8 @@ def _delays(steps):
 
 
 def _step(times, dt, period=None):
-    """The step from 0.75 dt to dt for which travel times of so many seconds are nearest to whole numbers of steps; a
-    whole part of a period (s) if there is one."""
+    """The step from 0.75 dt to dt for which travel times (s) are nearest to whole numbers of steps; an integer fraction
+    of the period (s) if there is one."""
     times = np.array([time for time in times if time >= _SET.shortest * dt])
     tried = [dt] if period is None else [period / math.ceil(period / dt * (1 - 1e-12))]
     for time in times if period is None else [period]:

@@ -219,7 +219,7 @@ static void press(waves *w, double load)
     w->slide[n] = law.other ? w->hold[n] : w->per_weight[1] * load;
 }
 
-/* Do so many steps, of given mean speeds and, where these change, weights on bit; each writes a row, its first number
+/* Do `steps` steps, of given mean speeds and, where these change, weights on bit; each writes a row, its first number
    left to the time. Returns how many were done: fewer where a number is not finite. */
 int advance_waves(waves *w, int steps, const double *speeds, const double *weights, double *rows)
 {

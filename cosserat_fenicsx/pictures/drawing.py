@@ -111,7 +111,7 @@ def at_rest(scene):
 
 
 def places(rods):
-    """(n,) arc lengths over a rod's length at which its sections are drawn where there are so many rods."""
+    """(n,) arc lengths over a rod's length at which its sections are drawn, by the number of rods."""
     return np.linspace(0, 1, max(_FEWEST_PIECES, min(_PIECES, _ALL_PIECES // rods)) + 1)
 
 
@@ -153,7 +153,7 @@ def _resampled(outline, corners):
 
 def thickening(body, size, rods=1):
     """The factor by which the sections of a `Body`, or of anything with a `radius` (m), are enlarged in a drawing of
-    extent `size`, m, with so many rods: less where they would hide each other."""
+    extent `size`, m, with a number of rods: less where they would hide each other."""
     smallest = size * _SMALLEST_RADIUS / max(1.0, math.sqrt(rods / _FEW_RODS))
     return max(1.0, smallest / body.radius)
 

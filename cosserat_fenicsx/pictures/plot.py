@@ -324,7 +324,7 @@ _PIECES, _FEWEST, _GAP = 600, 8, 0.18
 
 
 def tangled(shapes, right, above):
-    """Whether shapes cross each other so often in the picture that they cannot be told apart.
+    """Whether shapes cross each other so often in the picture that they cannot be distinguished.
 
     Args:
         shapes: of each shape the list of the centrelines of its rods, (n, 3), m.

@@ -139,7 +139,7 @@ def signs_of(pyvista, scene, shapes, everywhere, span):
 
 
 def sign_size(span, count):
-    """The size of a sign, m, in a drawing of extents `span` (3,), m, with so many of them."""
+    """The size of a sign, m, in a drawing of extents `span` (3,), m, with `count` signs."""
     return _SIZE * float(span.max()) * max(_SMALLEST, min(1.0, (_MANY / max(count, 1)) ** 0.5))
 
 

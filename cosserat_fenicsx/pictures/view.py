@@ -311,7 +311,7 @@ class Axis:
 
 
 def axes_of(points, most=_INTERVALS):
-    """The three `Axis` of a drawing of points (n, 3), m, with at most so many intervals on the longest one."""
+    """The three `Axis` of a drawing of points (n, 3), m, with at most `most` intervals on the longest one."""
     low, high = points.min(axis=0), points.max(axis=0)
     size = float((high - low).max())
     unit, scale = chosen_unit("m")

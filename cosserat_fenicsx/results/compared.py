@@ -276,7 +276,7 @@ def _squares(vectors):
 
 def held_by_law(scene, layout, rule, scales, without, count):
     """(2, count) the largest force and moment, dimensionless, that would hold sections to their strains in the
-    reference in so many states; without infinite stiffnesses. without: function of a rod and arc lengths s (n,), m:
+    reference in `count` states; without infinite stiffnesses. without: function of a rod and arc lengths s (n,), m:
     what `action.without_stress` adds in every state, curvature and strain (count, 2, n, 3)."""
     sizes = np.zeros((2, count))
     for rod, x in zip(scene.rods, layout.node_s(rule.nodes), strict=True):

@@ -22,7 +22,7 @@ _DEEPER = 2.0
 _SHALLOW = 0.1
 # Gap over the rod's length up to which a rod that does not press touches: rounding.
 _GRAZES = 1e-13
-# Share of an obstacle's pressure along rods from which on a sentence tells it.
+# Smallest share of an obstacle's pressure along rods that a sentence mentions.
 _SLANTED = 0.02
 # A friction force below this times the limit of friction is one at which the surface sticks.
 _STICKS = 1 - 1e-9

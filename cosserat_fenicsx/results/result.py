@@ -234,7 +234,7 @@ class Result:
         return ()
 
     def _table(self, units: Units, rows: int):
-        """The table of `summary`, of at most so many rows."""
+        """The table of `summary`, of at most `rows` rows."""
         known = self.quantities
         names = self._on_screen or [x.name for x in known.values() if x.axes == (self._rows_axis,)]
         given = [(known[name], known[name].of(self)) for name in names]

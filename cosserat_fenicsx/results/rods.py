@@ -509,7 +509,7 @@ class RodResult(Result, Extremes, Reactions, Stresses, States):
 
     @property
     def _reasons(self):
-        """What `details` tells of `why`."""
+        """The sentences of `why` that `details` prints."""
         return self.why
 
     # -- files and pictures ------------------------------------------------------------------------------------------

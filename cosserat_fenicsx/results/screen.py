@@ -27,7 +27,7 @@ _TEXT, _BETWEEN, _EDGE = 40, 3, 1
 
 
 def rows_of(count, most):
-    """Indices of at most so many of `count` rows, with the first and the last."""
+    """Indices of at most `most` of `count` rows, with the first and the last."""
     return np.unique(np.linspace(0, count - 1, min(most, count)).round().astype(int)) if count else np.arange(0)
 
 

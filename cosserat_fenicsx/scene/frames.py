@@ -194,7 +194,7 @@ def frame(
 
 
 def _one_each(field, value, count):
-    """One value for every edge, from one or from so many."""
+    """A value for every edge, from one value for all or from a list."""
     if not isinstance(value, list | tuple):
         return [value] * count
     if len(value) != count:

@@ -136,7 +136,7 @@ class Scene(Part):
             your own.
         joints: each a `Joint` between stations that touch; rods without a joint are independent of each other.
         velocities: each an `InitialVelocity`, at most one per rod; rods without one start at rest. For motions only.
-        stages: each a `Stage`, which goes on from where the scene's own loads and the stages before have led. For
+        stages: each a `Stage`, which starts from where the scene's own loads and the stages before have led. For
             `solve` only.
         title: for tables and pictures.
 

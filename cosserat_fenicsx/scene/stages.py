@@ -1,6 +1,6 @@
 """Loads and supports in stages: what each stage ramps, releases and leaves, and the scene of a stage.
 
-A stage is solved as a scene of its own that goes on from a state. What stages before have applied is permanent there; a
+A stage is solved as a scene of its own that starts from a state. What stages before have applied is permanent there; a
 support holds its station where it is, or moves it on from there; a released support is replaced by its reaction, and
 what is released is ramped down. So one load factor moves at a time, and all that is known of scenes serves a stage too.
 """

@@ -165,13 +165,13 @@ def _turning(scene):
 
 @per_scene
 def first_layout(scene, degree, elements=FIRST_ELEMENTS):
-    """The first mesh, of at least so many elements per rod."""
+    """The first mesh, of at least `elements` elements per rod."""
     return resolving(scene, Layout.of(scene, elements), degree, 4 if elements >= FIRST_ELEMENTS else 1)
 
 
 def resolving(scene, layout, degree, parts=4):
-    """The mesh, refined locally where it does not resolve the curvature of the axis (by so many equal parts of an
-    element), or sections and loads that are functions of s, whose local changes quadrature points may miss."""
+    """The mesh, refined locally where it does not resolve the curvature of the axis (sampled at `parts` equal parts of
+    an element), or sections and loads that are functions of s, whose local changes quadrature points may miss."""
     along = {}
     for action in scene.actions:
         loads = [value for value in vars(action).values() if isinstance(value, FunctionAlong)]
@@ -208,7 +208,7 @@ def _varying(rod, loads):
 
 
 def _too_long(rod, functions, breaks, degree, parts):
-    """(elements,) of bool: the elements to be halved: all until so many equal parts of them are almost straight, then
+    """(elements,) of bool: the elements to be halved: all until their `parts` equal parts are almost straight, then
     those in which the Gauss points do not integrate the functions."""
     long_enough = np.diff(breaks) > 1.01 / _FIRST.shortest
     ends = (breaks[:-1, None] + np.diff(breaks)[:, None] * np.arange(parts) / parts).ravel()
@@ -226,7 +226,7 @@ def _unresolved(values, breaks, degree):
     x, weights = np.polynomial.legendre.leggauss(degree)
 
     def integrals(counts):
-        """(elements, m) by so many equal parts of each element."""
+        """(elements, m) by `counts` equal parts of each element."""
         owner = np.repeat(np.arange(len(counts)), counts)
         sizes = (np.diff(breaks) / counts)[owner]
         inner = np.arange(len(owner)) - np.concatenate([[0], np.cumsum(counts)])[owner]

@@ -33,8 +33,8 @@ _LONGEST, _OF_LENGTH, _WIDEST = 10.0, 1e-4, 0.5
 _ROUGH, _CAREFUL, _ENOUGH, _ROUNDING = 0.1, 1e-7, 1e-8, 1e-13
 _FREE = 50.0  # factor on these where the rod is free to turn as a whole: rounding turns it
 _MOST = 60  # Newton steps of a stage
-# Newton's method alternates between two contacts where steps do not shrink by this factor, so many times; then shares
-# of steps are taken.
+# Newton's method counts as alternating between two contacts where steps do not shrink by this factor this number of
+# times in a row; these shares of steps are then taken.
 _SLOW, _STALLED, _SHARES = 0.6, 2, (0.5, 0.35, 0.7)
 _BALANCED = 1e-6  # residual force of a node at equilibrium, over the norm of the loads
 

@@ -1,6 +1,6 @@
 """`solve`: the equilibrium path of a scene, on a mesh that is fine enough for the requested accuracy.
 
-The stages of a scene are scenes that each go on from the end of the one before. What a stage holds and releases follows
+The stages of a scene are scenes that each start from the end of the one before. What a stage holds and releases follows
 from the state at its begin, which is computed anew on every mesh: two meshes differ by the error of the whole history.
 """
 
@@ -236,7 +236,7 @@ def solve(
             a double bifurcation the first mode); None to stay on it, stable or not.
         until: called with the Path after every recorded point; the path ends where it returns True. Only with a tuple
             (a, b) of load factors.
-        start: a Path of the same scene with fewer stages, or none, to go on from; it is not followed again.
+        start: a Path of the same scene with fewer stages, or none, to start from; it is not computed again.
         progress: True, False, or None for a progress bar on long runs in a terminal.
         comm: MPI communicator; default all ranks. Every rank calls, every rank gets the same Path.
 
@@ -367,7 +367,7 @@ def solve(
 
 
 def _keep_in_space(legs):
-    """Follow in space what goes on from a state in space, or in another plane."""
+    """Follow the path in space from a state in space, or in another plane."""
     for before, leg in itertools.pairwise(legs):
         models, planes = (before.choice.model, leg.choice.model), (before.scene.plane, leg.scene.plane)
         if leg.choice.promoted and ("spatial" in models or planes[0] != planes[1]):
@@ -375,7 +375,7 @@ def _keep_in_space(legs):
 
 
 def _followed_before(scene, start, legs, degree):
-    """{stage: its `Path`} of the path that is to go on."""
+    """{stage: its `Path`} of the path to continue."""
     for leg, following in itertools.pairwise(legs):
         if leg.leg.load_factors is None and leg.load_factors[-1] != 1:
             raise SceneError(

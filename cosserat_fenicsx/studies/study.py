@@ -195,8 +195,8 @@ def study(
         folder: keeps every outcome as it comes, whatever ends the run; the same call continues from there, on any
             number of ranks, and computes what is missing. All ranks must see it. None keeps none.
         retry: whether cases that have failed before, by `folder`, are computed again. By default they remain failures.
-        workers: compute the cases in so many new processes instead of here, as where there is no mpirun: a notebook
-            uses the cores of its machine. Each takes about two seconds to start.
+        workers: compute the cases in this number of new processes instead of here, as where there is no mpirun:
+            a notebook uses the cores of its machine. Each takes about two seconds to start.
         executor: compute them by this one: any `concurrent.futures.Executor`, or a dask `Client`. The folder, progress
             and what is returned stay here. The task and its cases must be such as `pickle` takes: a function of a
             module, not of a notebook (`ProcessPoolExecutor`; dask takes both). With `mpi4py.futures` one rank calls.

@@ -10,7 +10,7 @@ The bit is on the axis without a moment. A stabiliser touches at a point, the bo
 sides are found. Where the string lies down on the wall for good, theta' = 0 decides on the place. Elements are cubic
 with shear (J. S. Przemieniecki, Theory of Matrix Structural Analysis, 1968, sec. 5.6), exact at their ends but for F.
 
-`build_rate`: the rate at which it builds inclination, by criteria that are in use; they differ, and all are told.
+`build_rate`: the rate at which it builds inclination, by the criteria in use; they differ, and all are reported.
 """
 
 import math

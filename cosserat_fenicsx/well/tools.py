@@ -10,7 +10,7 @@ friction of the rotor, against its rotation: it changes its sign with that of om
 T_lost of v Q/leak. Above that the string turns the rotor backwards, and the motor pumps; without flow, too.
 
 A maker's chart replaces the line by a `MotorCurve` at each of some flows: T + T_lost, over the speed, is a monotone
-cubic through its points, and goes on straight beyond them.
+cubic through its points, and a straight line beyond them.
 """
 
 import math

@@ -142,7 +142,7 @@ def _cpu():
     return names[0] if names else platform.processor() or platform.machine()
 
 
-# -- files that a later run goes on from -------------------------------------------------------------------------------
+# -- files that a later run continues from -----------------------------------------------------------------------------
 
 
 def resumed(file, data, keys, fresh):
@@ -175,7 +175,7 @@ def command(about, main, quick, *, fresh=False, one=None, **more):
 
     Args:
         about: the docstring of the command. quick: arguments of `main` with `--quick`.
-        fresh: whether `main` goes on from an earlier run unless it is told not to.
+        fresh: whether `main` continues an earlier run, unless `--fresh` is given.
         one: a function of a number that `--one` calls instead in a process of its own; its result is printed as JSON.
         more: further options of `main`, with their arguments of `ArgumentParser.add_argument`.
     """

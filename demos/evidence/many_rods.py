@@ -25,7 +25,7 @@ ALL, MEMORY = 15.0, 1500.0  # of 10 000 rods, s and MB
 
 
 def lattice(columns, storeys):
-    """The `Frame` of a building with so many columns along each side, clamped at its feet."""
+    """The `Frame` of a building with a number of columns along each side, clamped at its feet."""
     number = np.arange(columns**2 * (storeys + 1)).reshape(storeys + 1, columns, columns)
     points = 3.0 * np.argwhere(number >= 0)[:, ::-1]
     pairs = [(number[:-1], number[1:]), (number[1:, :-1], number[1:, 1:]), (number[1:, :, :-1], number[1:, :, 1:])]

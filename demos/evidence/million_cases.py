@@ -1,7 +1,7 @@
 """A million cases of stick-slip on a thousand cores, on paper: what it costs and what ends first, from measured parts.
 
-    python demos/evidence/million_cases.py            100 000 cases in the parent, two minutes; writes out/million_cases.md
-    python demos/evidence/million_cases.py --quick    2000 cases
+    python demos/evidence/million_cases.py            100 000 cases in the parent, two minutes; writes
+    out/million_cases.md python demos/evidence/million_cases.py --quick    2000 cases
 
 Measured: a case (120 s of drilling, the map of demos/strings_map.py), the start of a process, and what a case costs the
 parent of a study over an executor: processor time, memory, and bytes in its folder. The parent is measured with cases
@@ -48,8 +48,9 @@ def start():
 
 
 def parent(count):
-    """Of a study of so many cases, for each: {"seconds" and "reading": processor time of the parent, and of reading the
-    folder again; "memory" and "stored": bytes of the parent and in the folder}; and its number of "files"."""
+    """Of a study of `count` cases, for each case: {"seconds" and "reading": processor time of the parent, and of
+    reading the folder again; "memory" and "stored": bytes of the parent and in the folder}; and its number of
+    "files"."""
     cases = {"speed": [1.0], "weight": [float(k) for k in range(count)]}
     with tempfile.TemporaryDirectory() as place:
         folder = Path(place) / "kept"

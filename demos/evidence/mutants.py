@@ -9,7 +9,7 @@ statement. It is killed when a test fails that passes without it, or when the te
 should. Which tests run which lines, and how long each takes, is measured once, file by file of the tests, with coverage
 (`pip install pytest-cov`). A mutant then meets the tests that run its line, the quickest first, then those that run
 another line of its file (in C: of the folder's Python), up to the first that fails or to half a minute of tests: the
-share of the whole suite is this or more. All in one process at a time. A run that was broken off goes on where it was.
+share of the whole suite is this or more. All in one process at a time. An interrupted run continues where it was.
 
 Writes to out/: mutants_coverage.json, mutants.jsonl (each outcome, by seed and state of the code), mutants.md.
 """
@@ -57,8 +57,8 @@ IN_C = {
 }  # fmt: skip
 #: Tests of what lies around the code, or of all of it at once: they run no line of their own, or take long.
 LEFT_OUT = (
-    "site", "published", "docs", "release", "ci", "services", "typing", "evidence", "gallery", "rank_fails", "animation",
-    "demos", "house", "chart_layout",
+    "site", "published", "docs", "release", "ci", "services", "typing", "evidence", "gallery", "rank_fails",
+    "animation", "demos", "house", "chart_layout",
 )  # fmt: skip
 #: The tests of a mutant may take this many times what they take without it, and as many seconds more.
 TIMES, SECONDS = 5, 60

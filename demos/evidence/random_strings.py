@@ -234,7 +234,7 @@ def tried(seed):
 
 
 def main(quick=False, count=200, first=0, out="out"):
-    """Try so many strings from the seed `first` on, print what is off, and write random_strings.md.
+    """Try a number of strings from the seed `first` on, print what is off, and write random_strings.md.
 
     Returns:
         [(seed, what, ratio to its limit)], and [what was refused].

@@ -34,7 +34,7 @@ def measure(elements):
 
 
 def under_mpirun(ranks, elements):
-    """What `measure` found on so many ranks."""
+    """The result of `measure` on a number of ranks."""
     program = "/usr/bin/mpirun" if Path("/usr/bin/mpirun").exists() else shutil.which("mpirun")
     # not bound to cores: one of them may be busy with something else, and the other ranks would wait
     words = [program, "--oversubscribe", "--bind-to", "none", "-n", str(ranks)]

@@ -74,7 +74,7 @@ def well(name):
 
 
 def solved(hole, operation, centred, elements=None, **settings):
-    """The `InHole` of the rod, at the default settings or on so many elements."""
+    """The `InHole` of the rod, at the default settings or on a fixed number of elements."""
     end = hole.length
     return solve_in_hole(
         hole.path, [end], STIFFNESS, WEIGHT, RADIUS, radius=RADIUS + CLEARANCE, friction=FRICTION,
@@ -121,7 +121,7 @@ def measure(hole, operation, centred, runs, fine):
 
 
 def broomstick(hole, operation, depths):
-    """Processor time, s, of a sweep over so many depths of the bit, and the largest estimated error in it."""
+    """Processor time, s, of a sweep over a number of depths of the bit, and the largest estimated error in it."""
     pipe = cf.well.DrillString([cf.well.Component(None, STIFFNESS, WEIGHT, RADIUS, name="pipe")])
     where = np.linspace(SHALLOWEST, 1.0, depths) * hole.length
     sweep, seconds = timed(lambda: cf.well.depth_sweep(hole, pipe, operation, where, model="rod", progress=False))
@@ -141,7 +141,7 @@ def spent(*asked, **settings):
 
 
 def random_operations(count):
-    """`spent` of each operation in so many random wells with assemblies."""
+    """`spent` of each operation in a number of random wells with assemblies."""
     sys.path.append(str(TESTS))
     import random_wells
 

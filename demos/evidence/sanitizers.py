@@ -45,7 +45,7 @@ def environment(out):
     if not cache.is_dir() and code_cache.folder().is_dir():
         own = shutil.ignore_patterns("cosserat_*", "*.lock", "*.part-*")
         shutil.copytree(code_cache.folder(), cache / "fenics", ignore=own, copy_function=linked)
-    for old in cache.glob("fenics/cosserat_*"):  # their names do not tell what the compiler below adds
+    for old in cache.glob("fenics/cosserat_*"):  # their names do not depend on the flags that the compiler below adds
         shutil.rmtree(old) if old.is_dir() else old.unlink()  # a folder: a compilation that was broken off
     out.mkdir(parents=True, exist_ok=True)
     compiler.write_text(COMPILER.format(flags=FLAGS), encoding="utf-8")

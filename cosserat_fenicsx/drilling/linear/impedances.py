@@ -109,7 +109,7 @@ class Uniform(_Section):
         return scale * move, scale * (2 * s + self.drag - self.damping * move / give), self.stiffness * give
 
     def along(self, s, state, points, places):
-        """Places (m) below the upper end, w there, and twice the kinetic energy by Gauss's rule with so many points."""
+        """Places (m) below the upper end, w there, and twice the kinetic energy by Gauss's rule of `points`."""
         nodes, weights = np.polynomial.legendre.leggauss(points)
         x = np.concatenate([self.length * (1 + nodes) / 2, np.linspace(0.0, self.length, places)])
         found = self.through(s, state, x)

@@ -87,7 +87,7 @@ class ModeShape:
 
 
 def shape_of(equation, s, points=200):
-    """The `ModeShape` of a root of a characteristic function, at about so many points."""
+    """The `ModeShape` of a root of a characteristic function, sampled at about `points` points."""
     motions, energies = {}, {}
     for guide, amplitude in zip(equation.guides, equation.motion(s), strict=True):
         depth, w, energy = _along(guide, s, points)
@@ -469,7 +469,7 @@ def steady_of(owner, scene, kind):
 
 
 def highest(scene, modes, up_to, kind="torsion"):
-    """Hz: `up_to`, or half way from the last of so many modes to the next one."""
+    """Highest frequency, Hz: `up_to`, or half way from the last of the first `modes` modes to the next one."""
     if modes is None:
         return positive("stability", "up_to", up_to, "Hz")
     count = int(number("stability", "modes", modes, "a number from 1", lambda x: x >= 1 and x == int(x)))

@@ -19,7 +19,7 @@ from cosserat_fenicsx.statics.path.track import PathPoint
 
 @dataclass(frozen=True)
 class Tolerances:
-    """Settings that tell events from each other, and from what is none."""
+    """Settings that distinguish events from each other, and from rounding."""
 
     # Two eigenvalues vanish at the same point where one is below this times its size at the ends of the chord while the
     # other vanishes.

@@ -200,7 +200,7 @@ class Track:
         return point
 
     def _negative_modes(self, *, neutral=False):
-        """See `NegativeModes.count`; of rods that touch, those of motions in which they go on to touch."""
+        """See `NegativeModes.count`; of rods that touch, of motions in which they remain in contact."""
         found = self.stability.count(neutral=neutral)
         return found + self.touching.removed if self.touching and found >= 0 else found
 

@@ -131,7 +131,7 @@ class Work:
         self._seconds, self.left = seconds, _STEPS * seconds
 
     def spend(self, elements):
-        """Count a Newton step on so many elements.
+        """Count a Newton step on a mesh of `elements` elements.
 
         Raises:
             NotConverged: it is one too many.
@@ -271,7 +271,7 @@ def _on_mesh(string, layout, stages, factor, start, before, job):
 
 
 def _in_walls(string, problem, stability, stages, factor, steps, job):
-    """[`InHole`] of the stages that are solved precisely, in walls of stiffnesses times a factor, after so many Newton
+    """[`InHole`] of the stages that are solved precisely, in walls of stiffnesses times a factor, after `steps` Newton
     steps on this mesh."""
     model, records = problem.model, {}
     decades = [k for k, stage in enumerate(stages[:-1]) if stage in DECADES]

@@ -6,10 +6,10 @@ _BLOCK = 0.45  # half width of the square block in the middle, in radii
 
 
 def half_disc(radius, refinement=1):
-    """Nine-node quadrilaterals of the half disc y >= 0, a block in the middle and a ring around it, with so many along
-    an eighth of the circle: points (n, 2), the first of them the centre; cells (m, 3, 3), indices by position (first,
-    second direction). The ring's outer nodes lie on a circle whose radius is a little larger, by less than 4e-4, so
-    that the second moment of the area between the quadratic arcs is that of the circle."""
+    """Nine-node quadrilaterals of the half disc y >= 0, a block in the middle and a ring around it, with `refinement`
+    along an eighth of the circle: points (n, 2), the first of them the centre; cells (m, 3, 3), indices by position
+    (first, second direction). The ring's outer nodes lie on a circle whose radius is a little larger, by less than
+    4e-4, so that the second moment of the area between the quadratic arcs is that of the circle."""
     halves = 2 * refinement
     span = np.linspace(-1, 1, 2 * halves + 1)
     block = _BLOCK * np.stack(np.meshgrid(span, np.linspace(0, 1, halves + 1), indexing="ij"), axis=-1)
