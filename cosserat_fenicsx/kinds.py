@@ -234,7 +234,7 @@ def _plain(value, writing):
 
 @dataclasses.dataclass(frozen=True)
 class Kind:
-    """What a field takes; this one takes anything."""
+    """The values that a field accepts; this kind accepts any."""
 
     def check(self, owner, field, value):
         """The value in its normal form; refused where it does not fit: 'Owner.field = value: expected ...'."""
@@ -258,7 +258,7 @@ class Kind:
 
     @property
     def words(self):
-        """What is expected."""
+        """A description of the expected values."""
         return "any value"
 
 
@@ -283,7 +283,7 @@ class Limits:
         return low and value <= self.high and (self.infinite or math.isfinite(value))
 
     def words(self, unit):
-        """What is expected, with the unit."""
+        """The expected range, with the unit."""
         what, unit = self.what or "a number", f" ({unit})" if unit else ""
         if self.high < math.inf:
             low = f"above {self.low:g} and up to" if self.above else f"from {self.low:g} to"
@@ -551,7 +551,7 @@ class Optional(Kind):
 
 @dataclasses.dataclass(frozen=True)
 class Either(Kind):
-    """What another kind takes, or an object of some classes, functions of time among them."""
+    """Values of another kind, or objects of some classes, such as functions of time."""
 
     inner: Kind = Kind()
     classes: tuple = ()

@@ -5,7 +5,7 @@ from os import path
 
 
 def public(package, file):
-    """What a package's `__init__.py` needs.
+    """Lazy public names for a package's `__init__.py`.
 
     Args:
         package, file: its __name__ and __file__.

@@ -126,7 +126,7 @@ class Part(metaclass=_Readable):
 
     @classmethod
     def constructors(cls):
-        """What makes objects from tables: the class, and other methods that have arguments of their own."""
+        """Constructors for tables: the class, and class methods with other arguments."""
         return (cls,)
 
     @classmethod

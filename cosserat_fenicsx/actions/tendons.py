@@ -174,7 +174,7 @@ class InLaw(Load, LineAction):
     work, in_law = None, True
 
     def without_stress(self, rod, s):
-        """What sections at arc lengths s (n,), m, have without stress beyond the reference: curvature and twist
+        """Stress-free strains of sections at arc lengths s (n,), m, beyond the reference: curvature and twist
         u_0 - u_R, 1/m, and strain v_0 - v_R, material, (3,) or (n, 3) each."""
         raise NotImplementedError
 

@@ -288,7 +288,7 @@ static inline lanes lanes_{name}({arguments})
 
 
 class _Symbol(ctypes.Structure):
-    """What the system's loader says of an address: `Dl_info`."""
+    """The system loader's record of an address: `Dl_info`."""
 
     _fields_ = [("file", ctypes.c_char_p), ("base", ctypes.c_void_p), ("name", ctypes.c_char_p),
                 ("address", ctypes.c_void_p)]  # fmt: skip

@@ -1,4 +1,4 @@
-/* Elements and elimination along the rods. Nothing here knows a formula of the rod: FFCx's kernels do. */
+/* Elements and elimination along the rods. The formulas of the rod are in FFCx's kernels alone. */
 #include "chain.h"
 
 #include <math.h>

@@ -90,7 +90,7 @@ typedef struct {
     void *self;                     /* for the hook that finds `test` and `turned`, or 0 */
 } ties;
 
-/* What ties add to a part of the second variation. */
+/* Contribution of ties to a part of the second variation. */
 typedef struct {
     ties *ties;
     int size;                       /* unknowns of a node */
@@ -213,7 +213,7 @@ typedef struct {
                                            the last one was accepted */
 } step_control;
 
-/* What to do with a step (the last three reject it), and why a sweep returned. */
+/* Verdicts on a step (the last three reject it), and reasons why a sweep returned. */
 enum { ACCEPTED, UNSURE, REJECTED, TOO_FAR, OPPOSITE };
 enum { DONE, LEFT, LATER, FULL, GOING };
 
@@ -265,7 +265,7 @@ typedef struct {
     int count;
 } written;
 
-/* What the unknowns of a model are: theta, q, (r, theta) or (r, q). */
+/* Unknowns of a model: theta, q, (r, theta) or (r, q). */
 enum { IN_PLANE, IN_SPACE, PLANAR, SPATIAL };
 
 /* A mesh of rods that clamps and rigid joints hold, without couplings of strains, and its last state. Elements and

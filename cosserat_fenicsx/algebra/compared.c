@@ -1,5 +1,5 @@
 /* Many cases of one scene: the numbers of a few are written at a time, each on two meshes of its own; they are swept
-   from rest on the first, corrected on the second, and judged by both. What is not decided here is left to Python.
+   from rest on the first, corrected on the second, and judged by both. Cases not decided here are left to Python.
 
    Two meshes of a case: the state of the finer one from that of the coarser, the error estimate of both, and queries.
    What is compared, and with what margins, is said in results/compared.py and results/accuracy.py, contact forces at

@@ -1,6 +1,6 @@
 /* Constraint equations of supports and joints: reactions, their tangent and their second variation, in blocks of the
-   nodes that they tie, and the small dense system of the interface to which they belong. FFCx's kernels know the
-   equations (forms/ties.py). */
+   nodes that they tie, and the small dense system of the interface to which they belong. The equations (forms/ties.py)
+   are in FFCx's kernels. */
 #include "chain.h"
 
 #include <math.h>

@@ -41,7 +41,7 @@ def given(options, names):
 
 
 def units_of(options):
-    """What --units asks for: "SI", also without it, or "field"."""
+    """The value of --units: "SI", which is the default, or "field"."""
     asked = getattr(options, "units", None)
     if asked not in (None, "SI", "field"):
         raise SceneError(f"--units {asked}: expected SI or field (ft, in, klbf, ft-lbf, ppg, rpm, psi)")

@@ -297,8 +297,8 @@ class BitOnRock(Part):
         mass: the same for axial motion, kg.
         rock_stiffness: of the rock below a bit with a weight, N/m: weight on bit per depth by which the bit presses
             into the rock, which pushes it back but does not pull. Infinite for rigid rock, where a bit that comes down
-            is stopped by an impulse and not by a force. What the rock stores counts as lost at the bit until it gives
-            it back. `Cutting` has the depth of cut in the place of this stiffness.
+            is stopped by an impulse and not by a force. Energy stored in the rock counts as lost at the bit until it is
+            returned. `Cutting` has the depth of cut in the place of this stiffness.
 
     Raises:
         SceneError: an unknown law, a weight that is missing, or a negative number; a stiffness of rock beside

@@ -49,7 +49,7 @@ static inline friction law_on_wall(const model *m, int i)
     return f;
 }
 
-/* What a linear control of the drive gives in a step of the length h, with the mean speed asked for. The factor on the
+/* Output of a linear control of the drive in a step of the length h, with the mean speed asked for. The factor on the
    speed follows from h alone. */
 static void command_drive(model *m, double h, double asked)
 {

@@ -40,7 +40,8 @@ class Joint:
     lost: float = 0.0
 
     def steady(self, rate: float) -> float:
-        """What drives both sides apart at a rate (rad/s, or m/s) from 0 on, without the damper, N m or N."""
+        """Torque or force (N m or N), without the damper, that drives both sides apart at a rate (rad/s or m/s) from 0
+        on."""
         curved = self.turns and self.tool.curves
         return self.tool.torque(rate) + self.damping * rate if curved else self.force(0.0) - self.lost
 

@@ -123,7 +123,7 @@ class MixedScene(InWords):
                                          progress=progress, comm=comm))  # fmt: skip
 
     def as_drilling(self, history: History) -> DrillingHistory:
-        """What happens at the surface and at the bit in a motion of `scene`, as of other models of strings: its charts,
+        """Series at the surface and at the bit of a motion of `scene`, as of other models of strings: its charts,
         tables, stick-slip, and files. Rows are the saved states but the first.
 
         Speeds, torques, hook load and weight on bit are means between states, in which the bit must turn by less than a

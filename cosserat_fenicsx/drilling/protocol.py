@@ -174,7 +174,7 @@ class StringModel(Pointers):
         return rows
 
     def _seen(self) -> Sample:
-        """What sampled controls see, but for the speed asked for."""
+        """Inputs of sampled controls, except the speed asked for."""
         raise NotImplementedError
 
     def _record(self, steps, rows):

@@ -34,7 +34,7 @@ READ = {
 
 @dataclass(frozen=True, eq=False)
 class Readings:
-    """What a rig read over time.
+    """Readings of a rig over time.
 
     Args:
         times: (n,) s, ascending, at any distances.

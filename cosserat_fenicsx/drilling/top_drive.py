@@ -167,7 +167,7 @@ class TorqueOverTime(SampledControl):
 
 
 class Sample(NamedTuple):
-    """What a control that is called once a sample sees.
+    """Inputs of a sampled control.
 
     Attributes:
         time: s. asked, speed: speed asked for and speed of the drive, rad/s. angle: of the drive, rad.

@@ -420,5 +420,5 @@ def _check(scene):
     instance("TorsionWaves", "scene.string", scene.string, DrillString, "a DrillString; discs have no waves")
     if scene.bit is not None and scene.bit.law.drills:
         refuse("TorsionWaves", "scene.bit.law", scene.bit.law, "a Stribeck law, or another one of the torque over the "
-               "speed: torsion alone knows no depth of cut")  # fmt: skip
+               "speed: torsion alone has no depth of cut")  # fmt: skip
     check_bit(scene)

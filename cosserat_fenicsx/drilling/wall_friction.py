@@ -138,7 +138,7 @@ def static_weight(scene) -> float:
 
 
 class _Drills(RotaryDrilling):
-    """What a bit does, which is doubted by the bit's own names."""
+    """The effect of a bit, about which messages use the bit's own names."""
 
     def validate(self):
         pass

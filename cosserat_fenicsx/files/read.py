@@ -314,7 +314,7 @@ def read_with_tables(file):
 
 
 def from_tables(tables, folder):
-    """What `read` returns, from the tables of a file in a folder, a Path."""
+    """The object that `read` returns, from the tables of a file in a folder (a Path)."""
     tables = dict(tables)
     use(tables.pop("use", ()))
     materials = tables.pop("materials", {})

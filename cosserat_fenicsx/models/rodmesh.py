@@ -90,7 +90,7 @@ class Layout:
 
     @cached_property
     def keys(self):
-        """What is equal for rods whose elements end at the same shares of their lengths."""
+        """A key that is equal for rods whose elements end at the same fractions of their lengths."""
         return [b.tobytes() for b in self.breaks]
 
     def _with(self, numbers):

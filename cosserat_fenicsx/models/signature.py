@@ -28,7 +28,7 @@ _SLENDER = 1e-4
 
 @dataclass(frozen=True)
 class Signature:
-    """What determines the compiled code and the mesh; scenes with equal signatures can use the same model.
+    """Key of the compiled code and the mesh; scenes with equal signatures can use the same model.
 
     Attributes:
         model: "spatial", "planar" or "determinate".

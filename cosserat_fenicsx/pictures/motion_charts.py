@@ -54,7 +54,7 @@ def draw_energy(history):
 
 
 def energies_of(history):
-    """What is stored, and works and losses, see `draw_energies`."""
+    """Curves of stored energies, and of works and losses."""
     return [[(label, getattr(history, name), *style) for name, label, *style in curves] for curves in (_STORED, _DONE)]
 
 

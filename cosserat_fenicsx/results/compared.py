@@ -86,8 +86,8 @@ def compared(coarse, fine, rule):
 
 @lru_cache(maxsize=16)
 def transferred(coarse, fine, rule):
-    """What takes a state to another mesh: of all its nodes the nodes around them on the coarse mesh with their weights,
-    and of all its Gauss points the coarse elements with the weights of their Gauss points."""
+    """Interpolation of a state on another mesh: of all its nodes the nodes around them on the coarse mesh with their
+    weights, and of all its Gauss points the coarse elements with the weights of their Gauss points."""
     at_nodes, at_gauss = [], []
     xs, insides, of_rods = fine.node_s(rule.nodes), fine.inside(rule.gauss), cell_nodes(coarse, len(rule.nodes) - 1)
 
@@ -202,7 +202,7 @@ def stored_criteria(names):
 
 
 def words_of(name):
-    """What a criterion compares, in words."""
+    """A description of the quantity that a criterion compares."""
     return (name in CRITERIA and CRITERIA[name].words) or name
 
 

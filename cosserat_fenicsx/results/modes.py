@@ -293,7 +293,7 @@ class Modes(Shapes):
         """The sense in which mode k turns the axis of a rod (default the first), as seen by an inertial observer.
 
         The sections move along ellipses across the axis of the steady rotation, or, without one, across the rod at its
-        middle. What is counted is the mean of the enclosed areas.
+        middle. The mean of the enclosed areas decides.
 
         Returns:
             1 forward (right-handed about that axis, so with the rotation), -1 backward, 0 where no section moves along

@@ -281,7 +281,7 @@ class Stresses(OnNodes):
 
     @property
     def knows_stresses(self) -> bool:
-        """Whether a section of any rod knows its shape; else `fields` and files have no stresses."""
+        """Whether the shape of a section of any rod is known; else `fields` and files have no stresses."""
         return any(rod.profile.shaped for rod in self.scene.rods)
 
 

@@ -210,7 +210,7 @@ class Result:
         return self.summary()
 
     def summary(self, units: str | Mapping = "SI") -> str:
-        """What `print` shows, in some units: the answer in sentences, then one table; at most 30 lines of 100
+        """The text that `print` shows, in some units: the answer in sentences, then one table; at most 30 lines of 100
         characters."""
         units = Units(units)
         return screen.page(self._answer(units), lambda rows: self._table(units, rows))
@@ -261,7 +261,7 @@ class Result:
         return world()
 
     def _about(self) -> dict[str, Any]:
-        """What the result is, as texts, numbers and lists of these."""
+        """Attributes that describe the result: texts, numbers and lists of these."""
         return {"kind": type(self).__name__}
 
     def _variables(self, units: Units) -> dict[str, Variable]:

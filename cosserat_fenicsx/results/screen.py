@@ -158,13 +158,13 @@ def page(answer, table_of=None):
 
 
 class InWords:
-    """What is printed as sentences: a part of a scene, or a whole one. Subclasses have `sentences`."""
+    """Base of scenes and parts of scenes that are printed as sentences; subclasses define `sentences`."""
 
     def __str__(self) -> str:
         return self.summary()
 
     def summary(self, units="SI") -> str:
-        """What `print` shows, in some units (see `Result`): sentences, at most 30 lines of 100 characters.
+        """The text that `print` shows, in some units (see `Result`): sentences, at most 30 lines of 100 characters.
 
         Raises:
             SceneError: unknown units.

@@ -153,7 +153,7 @@ def start_frame(owner, d3, default):
 
 
 def _across(v, t):
-    """What is left of a vector v across a unit vector t, three numbers each."""
+    """The component of a vector v normal to a unit vector t, three numbers each."""
     along = math.fsum(a * b for a, b in zip(v, t, strict=True))
     return [a - along * b for a, b in zip(v, t, strict=True)]
 

@@ -345,7 +345,7 @@ def _points_named(where, names, sets):
 
 
 def _known(name, known):
-    """What a message says about names that a mesh has."""
+    """The end of a message on a name that a mesh does not have."""
     if not known:
         return "the mesh names none"
     return nearest(name, [str(x) for x in known])

@@ -293,7 +293,7 @@ class Sections:
 
     @cached_property
     def alike(self):
-        """What is equal for the same constant sections; for others the object itself."""
+        """A key that is equal for equal constant sections; for others the object itself."""
         return self._fixed.tobytes() if self.constant else self
 
     def section(self, s, side):

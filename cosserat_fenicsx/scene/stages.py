@@ -96,7 +96,7 @@ Named = namedtuple("Named", "place item value")
 
 @dataclass(frozen=True, eq=False)
 class Leg:
-    """What acts in a stage.
+    """The loads and supports of a stage.
 
     Attributes:
         stage: its index among the stages of the scene; -1 for the scene's own loads.
@@ -142,9 +142,9 @@ def refuse_stages(owner, scene):
     """Refuse (SceneError) a scene with stages where a function, `owner`, would leave them out."""
     if scene.stages:
         raise SceneError(
-            f"Scene.stages: {owner} knows no stages: expected `solve`, whose path.events tell where a stage loses its "
-            "stability (also beyond its loads, Stage(load_factors=(0, 5))), path.part(stage).modes() for vibrations, "
-            "or the scene without stages, dataclasses.replace(scene, stages=())"
+            f"Scene.stages: {owner} does not support stages: expected `solve`, whose path.events show where a stage "
+            "loses its stability (also beyond its loads, Stage(load_factors=(0, 5))), path.part(stage).modes() for "
+            "vibrations, or the scene without stages, dataclasses.replace(scene, stages=())"
         )
 
 

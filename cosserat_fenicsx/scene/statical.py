@@ -17,7 +17,7 @@ from cosserat_fenicsx.scene.supports import Clamp, Hinge, Joint, Pin, PositionTi
 _TOLD, _FREE = 5, 1e-6
 # Places along a rod at which it lies in a plane or not.
 _ALONG = 9
-# What rods that spin do, one or several, and what holds them.
+# Words for one and for several spinning rods, and for what holds them.
 _SPIN = ("turn about its own axis", "each turn about its own axis")
 _HOLD_SPIN = (
     "at one end of each rod that spins what holds it about its axis: a Clamp or a Hinge in the place of a Pin, a joint "

@@ -4,7 +4,7 @@ The equilibrium at one load factor is found as `solve` finds it where two meshes
 the first mesh, Newton's method on the one of elements half as long, and an error estimate from both. The problems of
 both meshes stay loaded. In fixed units the numbers that C reads are linear functions of the loads, found once from
 several scenes; those of the law follow from the sections and materials of the cases. Where neither describes a scene
-exactly, each case is loaded by itself. What cannot be decided this way goes to `solve`.
+exactly, each case is loaded by itself. Cases that cannot be decided this way are solved by `solve`.
 """
 
 import itertools
@@ -329,7 +329,7 @@ class CompiledScene:
         self._pair.load(self._reference)
 
     def _kind_of(self, scene):
-        """What decides on meshes and compiled code: (first mesh, usual one, mesh for turns, choice, signatures)."""
+        """Key of meshes and compiled code: (first mesh, usual one, mesh for turns, choice, signatures)."""
         layout, usual = (
             x and turning_in_law(scene, x, [self._load_factor]) for x in meshes_for(scene, _DEGREE, self._tol, False)
         )

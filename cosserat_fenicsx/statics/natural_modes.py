@@ -187,14 +187,14 @@ def _result(scene, found, error, comm, point=0.0):
 
 
 def _slowed(scene):
-    """What resists or follows velocities smoothly, in words."""
+    """Descriptions of what depends smoothly on velocities."""
     damped = [rod for rod in scene.rods if rod.damping is not None and np.any(rod.damping.sizes)]
     acting = [x for x in scene.actions if not (x.touches or x.resists) and traits_of(x, scene.rods).rates]
     return (*(f"Damping of {rod.name}" for rod in damped), *map(describe, acting))
 
 
 def _at_kinks(scene):
-    """What resists velocities with a kink at rest, so that no linear theory has it, in words."""
+    """Descriptions of resistances with a kink at rest, which no linear theory covers."""
     return tuple(describe(x) for x in scene.actions if x.touches or x.resists)
 
 

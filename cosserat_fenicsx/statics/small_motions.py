@@ -56,7 +56,7 @@ def stiffness(problem, bounds=1.0):
 
 
 def softness(problem, K):
-    """What bounds in place of infinite stiffnesses take from K (sparse), to first order in their inverse: they are in
+    """The loss of K (sparse) by bounds in place of infinite stiffnesses, to first order in their inverse: they are in
     series with the others, so that twice the bound takes half of it. None where all stiffnesses are finite."""
     if np.isfinite(problem.model.section.K).all():
         return None

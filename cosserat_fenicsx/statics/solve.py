@@ -42,7 +42,7 @@ from cosserat_fenicsx.statics.problem import Promoted, check_arguments, check_st
 from cosserat_fenicsx.statics.refinement import refine
 
 
-# What is added to messages of stages that release supports.
+# Added to messages of stages that release supports.
 _RELEASED = (
     " A released support is replaced by its reaction, a dead load under which the structure may be unstable: then "
     "release it where the reaction is small, or in a motion, simulate(scene, duration, start=path)."
@@ -269,7 +269,7 @@ def solve(
         raise SceneError("until: expected a function of the Path, with a pair of load factors (a, b)")
 
     def followed(leg):
-        """What is to be followed of a scene without stages (None), or of a `Leg`."""
+        """The scene to be followed, without stages (None) or of a `Leg`."""
         part, factors, any_between = (scene if leg is None else scene.of_leg(leg)), load_factors, free
         if leg is not None and leg.load_factors is not None:
             factors, any_between = _requested(leg.load_factors)
@@ -290,7 +290,7 @@ def solve(
 
     if scene.stages and (remembers := next((load for load in scene.all_loads if load.memory), None)):
         raise SceneError(
-            f"Scene.stages: {describe(remembers)} has a memory, which stages do not hand on: expected loads and "
+            f"Scene.stages: {describe(remembers)} has a memory, which stages do not pass on: expected loads and "
             "obstacles without friction or another memory, or a scene without stages"
         )
     legs = [followed(leg) for leg in scene.legs] if scene.stages else [followed(None)]

@@ -44,7 +44,7 @@ _TOLD = {"count": 0, files.CHECKSUM: 0}
 
 @dataclass(frozen=True)
 class Kind:
-    """What one kind of computation stores, in words and data; all kinds share `Store`.
+    """Description of the files of one kind of computation; all kinds share `Store`.
 
     Attributes:
         what: its name, such as "motion", also in stored.json.
@@ -469,7 +469,7 @@ class Store(Nowhere):
 
 
 def _data(as_data):
-    """What a function returns as data, or why it cannot."""
+    """The data that a function returns, or why it cannot."""
     try:
         return as_data()
     except NotData as problem:
@@ -481,7 +481,7 @@ def _marked(scene, times):
 
 
 def holds(place):
-    """What a folder holds, the `Kind.what`; None where it is no folder that this release reads."""
+    """The kind of a folder, its `Kind.what`; None where it is no folder that this release reads."""
     with contextlib.suppress(SceneError):
         return _head(Path(place))["holds"]
 
@@ -557,6 +557,6 @@ def resume(
 
 
 def read(folder: File, scene: Any = None, *, comm: "MPI.Comm | None" = None) -> Any:
-    """What a folder holds so far; another process may still be computing it. Arguments and errors: see `resume`."""
+    """The results in a folder so far; another process may still be computing it. Arguments and errors: see `resume`."""
     store = Store(folder, None, comm).open()
     return store.home.read(store, scene)

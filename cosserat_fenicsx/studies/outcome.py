@@ -12,7 +12,7 @@ from cosserat_fenicsx.quantities import Quantity, Units
 from cosserat_fenicsx.results import screen
 from cosserat_fenicsx.results.result import Result, import_library
 
-# What a task may return.
+# Types that a task may return.
 _EXPECTED = "a number, a text, an array of numbers or of texts, None, or a dict of these by name"
 
 

@@ -84,7 +84,7 @@ def standard_size(kind, name):
 
 
 def _sizes_near(name, known):
-    """What a message says of an unknown size: the known ones of its diameter, or the nearest name."""
+    """The end of a message on an unknown size: the known ones of its diameter, or the nearest name."""
     alike = _of_its_diameter(name, known)
     return f"known of this diameter: {', '.join(alike)}" if alike else nearest(name, known)
 

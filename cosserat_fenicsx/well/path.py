@@ -368,7 +368,7 @@ class Tortuosity(Part):
     called = "tortuosity"
 
     def in_words(self, units):
-        """What it makes of a plan, in some units."""
+        """Its effect on a plan, in some units."""
         how = "a helix, without a seed" if self.seed is None else f"seed {self.seed}"
         return f"amplitude {self.amplitude:g} degrees, period {units.told(self.period, 'm')}, {how}"
 

@@ -1,4 +1,4 @@
-"""What a string bears beyond its loads: overpull of a stuck string, and the largest weight on bit."""
+"""Reserves of strength of a string: overpull when stuck, and the largest weight on bit."""
 
 from dataclasses import dataclass, fields, replace
 from functools import cache, partial
@@ -258,7 +258,7 @@ def _by_rod(answer, start, strengths, safety, buckling, progress):
         else:
             raise NotConverged(
                 f"most_weight_on_bit: {_MOST_SOLVED} equilibria of the rod in contact leave it between {low[0]:.4g} "
-                f"and {high[0]:.4g} N: expected a model='buckled', or a string that bears more"
+                f"and {high[0]:.4g} N: expected a model='buckled', or a stronger string"
             )
     names = list(dict.fromkeys((*limits, *low[1], *high[1])))
     first = min(high[1], key=lambda x: high[1][x][0])

@@ -74,7 +74,7 @@ _SOFT = (
     "the soft string by a differential equation along the axis, and what that leaves out is estimated with each answer."
 )
 _ROD = "the exact rod in contact with the wall, stiff and with its clearance, on meshes that are refined until tol."
-#: What the models of `torque_and_drag` solve.
+#: Descriptions of the models of `torque_and_drag`.
 _MODELS = {
     "soft": _SOFT,
     "buckled": f"{_SOFT[:-1]}; with the wall force of a helix where it is one.",
@@ -119,7 +119,7 @@ class DepthSweepSettings(Settings):
 
 @dataclass(frozen=True)
 class StrengthSettings(Part):
-    """What is asked of the strength of a string in a scene file.
+    """Settings for the strength of a string in a scene file.
 
     Args:
         grade, wear: of the drill pipe, or tables by names of components, see `TorqueAndDrag.utilisation`.

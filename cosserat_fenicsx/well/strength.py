@@ -1,4 +1,4 @@
-"""What the body of a pipe bears, in closed form: API RP 7G and API Bulletin 5C3, with the numbers of their tables.
+"""Strength of the body of a pipe, in closed form: API RP 7G and API Bulletin 5C3, with the numbers of their tables.
 
 - Tension Y A; torque 0.577 Y J/r, and with a tension t 0.577 (Y^2 - (t/A)^2)^(1/2) J/r: API RP 7G, appendix A.9.
 - Burst: 2 Y t/D of the thinnest wall, 7/8 of a new one (Barlow), with the new pipe's D.
@@ -256,7 +256,7 @@ def usual_yield(part):
 
 @dataclass(frozen=True)
 class PipeStrength(InWords, Part):
-    """What the body of a pipe bears.
+    """Strength of the body of a pipe.
 
     Args:
         pipe: a component with diameters.

@@ -38,7 +38,7 @@ _ANGLES = {
 _UNITS = {*_LENGTHS, *_ANGLES}
 # The arguments that give the units of the columns where headings do not.
 _SAY = ("length_unit, in m or by its name", "degrees (True or False)", "degrees (True or False)")
-# What else stands in brackets: units with words behind them, such as what depths are below, and the north of azimuths.
+# Other texts in brackets: units followed by words, such as the datum of depths, and the north of azimuths.
 _SPELT = (
     (r"(us|u\.s\.)[ -]*(survey)?[ -]*(ft|foot|feet)|survey (ft|foot|feet)", "usft"),
     (r"ft(?!us)", "ft"),

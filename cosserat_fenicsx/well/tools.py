@@ -86,7 +86,7 @@ class _Tool(InWords, Collar):
 
 @dataclass(frozen=True)
 class MotorCurve(Part):
-    """What a maker's chart says of a motor at one flow, from no load to where it stalls.
+    """The curve of a maker's chart for a motor at one flow, from no load to stall.
 
     Args:
         flow: m^3/s. speeds: of the rotor, rad/s, falling to 0, where the motor stalls.
