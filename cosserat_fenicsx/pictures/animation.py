@@ -151,7 +151,7 @@ def record(make_stage, file, times, fps, progress):
 
 
 class _Stage:
-    """The scene of the film: constant parts are drawn once, meshes of the rods are moved for every frame."""
+    """The scene of the film: constant parts are drawn once, the mesh of the rods is moved for every frame."""
 
     def __init__(self, history, times, magnify, enlarged, size, pace, colour):
         pyvista = load_pyvista()
@@ -168,10 +168,7 @@ class _Stage:
         self._scale, _ = suited(peak, colour.unit)
         self._plotter = stage(pyvista, size)
         self._factors = [thickening(body, extent, len(bodies[0])) for body in bodies[0]]
-        self._meshes = [
-            add_bodies(self._plotter, pyvista, [body], [factor], peak, colour, moving=True)
-            for body, factor in zip(bodies[0], self._factors, strict=True)
-        ]
+        self._mesh = add_bodies(self._plotter, pyvista, bodies[0], self._factors, peak, colour, moving=True)
         drawn = zip(history.scene.rods, bodies[0], self._factors, strict=True)
         radii = {rod: factor * body.radius for rod, body, factor in drawn}
         add_tubes(self._plotter, pyvista, history.scene, radii, enlarged.factor)
@@ -193,8 +190,7 @@ class _Stage:
 
     def at(self, t):
         """(height, width, 3) the picture at t (s)."""
-        for mesh, body, factor in zip(self._meshes, self._bodies(t), self._factors, strict=True):
-            move(mesh, body, factor, "value", body.values / self._scale)
+        move(self._mesh, self._bodies(t), self._factors, self._scale)
         text = f"{self._head}: t = {t:.{self._digits}f} s ({self._pace}){self._notes}"
         self._plotter.add_text(
             plain("\n".join(textwrap.fill(line, self._letters) for line in text.split("\n"))),

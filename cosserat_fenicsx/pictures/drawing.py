@@ -80,9 +80,8 @@ def stage(pyvista, size, smooth="msaa", **panels):
 
 
 def add_lines(plotter, pyvista, lines, color="grey"):
-    """Draw lines (n, 3), m, such as rods at rest."""
-    for line in lines:
-        plotter.add_mesh(pyvista.lines_from_points(line), color=color, line_width=2)
+    """Draw lines (n, 3), m, such as rods at rest, as one mesh."""
+    plotter.add_mesh(together([pyvista.lines_from_points(line) for line in lines]), color=color, line_width=2)
 
 
 def thicker(factors):
@@ -181,6 +180,18 @@ def together(surfaces):
     return surfaces[0].append_polydata(*surfaces[1:]) if len(surfaces) > 1 else surfaces[0]
 
 
+def coloured(pyvista, bodies, factors, scale=1.0):
+    """The surfaces of `Body`s as one mesh, with their values over `scale` as "value"; factors: of each, see
+    `surface_of`."""
+    surface = together([surface_of(pyvista, body, factor) for body, factor in zip(bodies, factors, strict=True)])
+    surface["value"] = _at_points(bodies, scale)
+    return surface
+
+
+def _at_points(bodies, scale):
+    return np.concatenate([np.repeat(body.values / scale, body.outline.shape[1]) for body in bodies])
+
+
 def add_bodies(plotter, pyvista, bodies, factors, peak, colour, moving=False):
     """Draw the surfaces of `Body`s, closed at both ends, coloured by their values, as one mesh, which is returned;
     factors: of each, what enlarges its sections; peak: the largest size of the values in the picture, which the colours
@@ -190,10 +201,7 @@ def add_bodies(plotter, pyvista, bodies, factors, peak, colour, moving=False):
     low, high = colour.limits(math.ceil(peak / scale / step - 1e-9) * step)
     unit = "zero" if peak == 0 else "" if colour.unit == "1" else f"({name})"
     words = "\n".join(filter(None, [*textwrap.wrap(colour.words, _BAR_LETTERS), unit]))
-    surfaces = [surface_of(pyvista, body, factor) for body, factor in zip(bodies, factors, strict=True)]
-    for surface, body in zip(surfaces, bodies, strict=True):
-        surface["value"] = np.repeat(body.values / scale, body.outline.shape[1])
-    surface = together(surfaces)
+    surface = coloured(pyvista, bodies, factors, scale)
     plotter.add_mesh(
         surface,
         scalars="value",
@@ -217,10 +225,10 @@ def colour_bar(title, font, numbers, step, box):
     return {"title": f"{title}\n", "n_labels": numbers, "fmt": _format(step), **place, **fonts}
 
 
-def move(surface, body, factor, name, values):
-    """Move the mesh of a `Body` to where it is now, with the values (n,) of its sections."""
-    surface.points[:] = points_of(body, factor)
-    surface[name][:] = np.repeat(values, body.outline.shape[1])
+def move(surface, bodies, factors, scale=1.0):
+    """Move a mesh of `coloured` to where its `Body`s are now, with their values."""
+    surface.points[:] = np.concatenate([points_of(*each) for each in zip(bodies, factors, strict=True)])
+    surface["value"][:] = _at_points(bodies, scale)
     surface.GetPoints().Modified()
     surface.GetPointData().GetScalars().Modified()
 

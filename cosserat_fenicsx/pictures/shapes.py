@@ -12,11 +12,12 @@ from cosserat_fenicsx.pictures.animation import MOST_FRAMES, check_name, frame_r
 from cosserat_fenicsx.pictures.drawing import (
     add_lines,
     body_of,
+    coloured,
     frame,
     load_pyvista,
     move,
+    places,
     stage,
-    surface_of,
     thickening,
     thicker,
 )
@@ -36,8 +37,8 @@ _SEEN, _MOVES = 0.02, 0.2
 _MEMORY = 200_000_000
 # Phases, as exp(i phase), that a picture has to hold.
 _EXTREMES = (1, -1, 1j, -1j)
-# Pieces along a rod; mean width of a letter of the titles, pixels.
-_PIECES, _LETTER = 200, 15
+# Mean width of a letter of the titles, pixels.
+_LETTER = 15
 
 
 def draw(found, file, which, amplitude):
@@ -78,8 +79,10 @@ class Drawn:
     displacements and rotations; note: how large they are drawn, in words."""
 
     def __init__(self, found, k, amplitude):
-        self._found, self._k = found, k
-        self.lines = [found.equilibrium.sample(rod, np.linspace(0, 1, 201))[0] for rod in found.scene.rods]
+        rods, self._x = found.scene.rods, places(len(found.scene.rods))
+        self._rest = [(rod, *found.equilibrium.sample(rod, self._x)) for rod in rods]
+        self._motions = [found.equilibrium.between(rod, self._x, found.shapes[k]) for rod in rods]
+        self.lines = [line for _, line, _ in self._rest]
         size = float(np.ptp(np.concatenate(self.lines), axis=0).max())
         moved, turned = (np.linalg.norm(found.shapes[k, :, part], axis=1).max() for part in (slice(0, 3), slice(3, 6)))
         self.factor = min(amplitude * size / (moved or 1e-300), _STEEPEST / (turned or 1e-300))
@@ -99,15 +102,13 @@ class Drawn:
         """The `Body` of every rod, displaced by `share` of the amplitude, from -1 to 1, or exp(i phase) of a complex
         mode. Its values, in the place of the bending moment, are displacements (rotations, where nothing is displaced),
         1 at most."""
-        equilibrium, shape, made = self._found.equilibrium, self._found.shapes[self._k], []
-        x = np.linspace(0, 1, _PIECES + 1)
-        for rod in self._found.scene.rods:
-            line, frames = equilibrium.sample(rod, x)
-            motion = np.real(share * equilibrium.between(rod, x, shape))
+        made = []
+        for (rod, line, frames), whole in zip(self._rest, self._motions, strict=True):
+            motion = np.real(share * whole)
             moved, turned = motion[:, :3], motion[:, 3:]
             values = np.linalg.norm(turned if self._by_turning else moved, axis=1) / self._peak
             directors = _turned(frames, self.factor * turned)
-            made.append(body_of(rod, x, line + self.factor * moved, directors, values))
+            made.append(body_of(rod, self._x, line + self.factor * moved, directors, values))
         return made
 
     def shown(self, everywhere):
@@ -156,9 +157,10 @@ def _panels(found, shown, amplitude):
     for i, (k, shape) in enumerate(zip(shown, drawn, strict=True)):
         plotter.subplot(1 + i // across, i % across)
         seen = shape.shown(everywhere)
-        _add(plotter, pyvista, shape, shape.bodies(), seen)
+        bodies = shape.bodies()
+        _add(plotter, pyvista, shape, bodies, seen)
         text = f"{_filled(f'k = {k}: {found.label(k)}{_most_at(found, k)}', _WIDTH)}\n"
-        text += _below(shape, shape.bodies(), seen, _WIDTH)
+        text += _below(shape, bodies, seen, _WIDTH)
         plotter.add_text(text, position="upper_edge", color="black", font_size=11)
         frame(plotter, seen, panel=True)
     return plotter
@@ -198,15 +200,13 @@ def _filled(text, width):
 
 
 def _add(plotter, pyvista, shape, bodies, everywhere):
-    """Draw the equilibrium as grey lines, and rods whose surfaces are returned."""
-    extent, surfaces = float(np.ptp(everywhere, axis=0).max()), []
-    for body in bodies:
-        surface = surface_of(pyvista, body, thickening(body, extent, len(bodies)))
-        surface["values"] = np.repeat(body.values, body.outline.shape[1])
-        plotter.add_mesh(surface, scalars="values", cmap="viridis", clim=(0, 1), show_scalar_bar=False)
-        surfaces.append(surface)
+    """Draw the equilibrium as grey lines, and rods; returns the mesh of the rods and what enlarges each of them."""
+    extent = float(np.ptp(everywhere, axis=0).max())
+    factors = [thickening(body, extent, len(bodies)) for body in bodies]
+    surface = coloured(pyvista, bodies, factors)
+    plotter.add_mesh(surface, scalars="value", cmap="viridis", clim=(0, 1), show_scalar_bar=False)
     add_lines(plotter, pyvista, shape.lines)
-    return surfaces
+    return surface, factors
 
 
 class _Stage:
@@ -218,9 +218,7 @@ class _Stage:
         self._everywhere = self._shape.shown(self._shape.everywhere())
         bodies = self._shape.bodies()
         self._plotter = stage(pyvista, size)
-        self._surfaces = _add(self._plotter, pyvista, self._shape, bodies, self._everywhere)
-        extent = float(np.ptp(self._everywhere, axis=0).max())
-        self._factors = [thickening(body, extent, len(bodies)) for body in bodies]
+        self._surface, self._factors = _add(self._plotter, pyvista, self._shape, bodies, self._everywhere)
         below = _below(self._shape, bodies, self._everywhere, size[0])
         text = f"{_head(found, size[0])}\nk = {k}: {found.label(k)}{_most_at(found, k)}\n{below}"
         self._plotter.add_text(text, position="upper_edge", color="black", font_size=10)
@@ -228,8 +226,7 @@ class _Stage:
         self.at = lru_cache(maxsize=max(1, _MEMORY // (3 * size[0] * size[1])))(self._draw)
 
     def _draw(self, share):
-        for surface, body, factor in zip(self._surfaces, self._shape.bodies(share), self._factors, strict=True):
-            move(surface, body, factor, "values", body.values)
+        move(self._surface, self._shape.bodies(share), self._factors)
         self._plotter.render()
         return self._plotter.screenshot(return_img=True)
 
