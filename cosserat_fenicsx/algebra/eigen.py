@@ -19,8 +19,9 @@ _PROJECTED = 400
 # Tolerance where eigenvalues of the other sign may lie much nearer to zero: their rounding limits the accuracy.
 _COARSE = 1e-9
 # Fewest unknowns of a matrix whose factors are kept for later ones; the relative residual of a solution with factors of
-# an earlier matrix, and the iterations that cost less than new factors.
-_KEPT, _REUSED, _MOST_REUSES = 2000, 1e-10, 12
+# an earlier matrix, also where Newton's method corrects what it leaves, and the iterations that cost less than new
+# factors.
+_KEPT, _REUSED, _CORRECTED, _MOST_REUSES = 2000, 1e-10, 1e-7, 12
 # % extra memory for fill-in, too little of which fails without a message, where pivots are exchanged and where not; and
 # the smallest pivot of a matrix with a diagonal of ones that is positive definite beyond doubt.
 _EXCHANGE, _NO_EXCHANGE, _SURELY = 200, 20, 1e-9
@@ -337,7 +338,7 @@ class RepeatedFactors:
         ksp = PETSc.KSP().create(PETSc.COMM_SELF)
         ksp.setType("gmres")
         ksp.setPCSide(PETSc.PC.Side.RIGHT)
-        ksp.setTolerances(rtol=_REUSED, atol=0.0, max_it=_MOST_REUSES)
+        ksp.setTolerances(atol=0.0, max_it=_MOST_REUSES)
         ksp.setOperators(self._matrix)
         return ksp
 
@@ -365,20 +366,25 @@ class RepeatedFactors:
             raise MemoryError(f"MUMPS cannot factorise the equations where rods meet (its error {failure})")
         return failure >= 0
 
-    def solve(self, b):
-        """The solution (rows,) for a right-hand side; not a number where the matrix is singular after all."""
+    def solve(self, b, corrected=False):
+        """The solution (rows,) for a right-hand side; not a number where the matrix is singular after all. corrected:
+        whether Newton's method corrects what it leaves."""
+
+        def found(ksp):
+            ksp.setTolerances(rtol=_CORRECTED if corrected else _REUSED)
+            ksp.solve(self._b, self._x)
+            return ksp.getConvergedReason() > 0
+
         self._b.array_w[:] = b
         if self._taken:
-            self._by_near.solve(self._b, self._x)
-            if self._by_near.getConvergedReason() > 0:
+            if found(self._by_near):
                 return self._x.array_r
             self._near.leave()
             self._taken = False
             if self._old is None and not self._renewed():
                 return np.full(len(b), np.nan)
         if self._old:
-            self._ksp.solve(self._b, self._x)
-            if self._ksp.getConvergedReason() > 0:
+            if found(self._ksp):
                 return self._x.array_r
             if not self._renewed():
                 return np.full(len(b), np.nan)

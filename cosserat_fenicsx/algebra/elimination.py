@@ -5,6 +5,7 @@ rods meet other than end to start, and of nodes that several ranks share; and th
 segments of rods, and all ranks solve the whole interface, with the same numbers.
 """
 
+import contextlib
 import functools
 
 import numpy as np
@@ -240,6 +241,15 @@ class Interface:
         """Replace a right-hand side (unknowns,) by the solution, from the last factors."""
         self._solver.solve(b)
 
+    @contextlib.contextmanager
+    def corrected(self):
+        """Within this context solutions of large systems are less accurate: Newton's method corrects what they leave."""
+        self._solver.corrected = True
+        try:
+            yield
+        finally:
+            self._solver.corrected = False
+
     def signs(self, of_nodes):
         """(negative, zero) numbers of eigenvalues of the system, which is symmetric, and the logarithm of the product
         of the absolute values of those that are not zero (of large systems NaN where some are)."""
@@ -316,9 +326,10 @@ class _Near:
 
 
 class _Sparse:
-    """A system by its rows, with factors by MUMPS; near: a `_Near` or None; counts: how often signs were counted."""
+    """A system by its rows, with factors by MUMPS; near: a `_Near` or None; counts: how often signs were counted;
+    corrected: see `Interface.corrected`."""
 
-    near, counts = None, 0
+    near, counts, corrected = None, 0, False
 
     def __init__(self, size):
         self._size = size
@@ -350,7 +361,7 @@ class _Sparse:
         return bool(np.isfinite(values).all()) and self._factors.factor(values)
 
     def solve(self, b):
-        b[:] = self._factors.solve(b)
+        b[:] = self._factors.solve(b, self.corrected)
 
     @functools.cached_property
     def _symmetric(self):
