@@ -1,6 +1,7 @@
 """Assembled matrices: their eigenvalues by SLEPc, which no other file imports, and the direct solver for each kind."""
 
 import math
+import threading
 from pathlib import Path
 
 import numpy as np
@@ -253,10 +254,15 @@ class RepeatedInertia:
     """Eigenvalues' signs of symmetric matrices of one pattern on this rank, with a diagonal of ones or zeros; the
     symbolic analysis is made once. Factors with pivots of two rows too are made from the first matrix on that is not
     surely positive definite. Arguments: see `RepeatedFactors` and `constrained_factors`. regular: whether there are
-    factors, of a matrix without null pivots."""
+    factors, of a matrix without null pivots; counts: how many matrices there were. Problems and threads may share it,
+    see `inertia_of`."""
+
+    # without a __dict__, so that the pool, which takes one problem apart, leaves it to the others
+    __slots__ = ("regular", "counts", "_definite", "_null", "_pattern", "_matrix", "_b", "_x", "_pc", "_scale", "_lock")
 
     def __init__(self, starts, columns, null):
-        self.regular, self._definite, self._null = False, True, null
+        self.regular, self.counts, self._definite, self._null = False, 0, True, null
+        self._lock = threading.Lock()
         self._pattern = starts.astype(PETSc.IntType), columns.astype(PETSc.IntType)
         size, entries = len(starts) - 1, np.ones(len(columns))
         self._matrix = PETSc.Mat().createAIJ((size, size), csr=(*self._pattern, entries), comm=PETSc.COMM_SELF)
@@ -283,7 +289,12 @@ class RepeatedInertia:
         """(negative, zero) numbers of eigenvalues of the matrix of these entries, and the logarithm of the absolute
         value of its determinant, NaN where it is singular; scale: (rows,) what its rows and columns were multiplied by,
         for `solve`."""
+        with self._lock:
+            return self._of(values, scale)
+
+    def _of(self, values, scale):
         self.regular, self._scale = False, scale
+        self.counts += 1
         self._matrix.setValuesCSR(*self._pattern, values)
         self._matrix.assemble()
         factor, negative, zero = self._factored()
@@ -298,9 +309,25 @@ class RepeatedInertia:
 
     def solve(self, b):
         """The solution (rows,) of the last matrix, before it was scaled; only where it is `regular`."""
-        self._b.array_w[:] = b * self._scale
-        self._pc.apply(self._b, self._x)
-        return self._x.array_r * self._scale
+        with self._lock:
+            self._b.array_w[:] = b * self._scale
+            self._pc.apply(self._b, self._x)
+            return self._x.array_r * self._scale
+
+
+_LAST = {}  # {(pattern, null): `RepeatedInertia`}, at most one
+
+
+def inertia_of(starts, columns, null):
+    """The `RepeatedInertia` for a pattern, that of the last one where it is the same: the equations where rods meet are
+    those of a coarser mesh, whose factors serve on a finer one."""
+    key = starts.tobytes(), columns.tobytes(), null
+    found = _LAST.get(key)
+    if found is None:
+        found = RepeatedInertia(starts, columns, null)
+        _LAST.clear()
+        _LAST[key] = found
+    return found
 
 
 class RepeatedFactors:

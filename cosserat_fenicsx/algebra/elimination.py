@@ -243,7 +243,7 @@ class Interface:
 
     @contextlib.contextmanager
     def corrected(self):
-        """Within this context solutions of large systems are less accurate: Newton's method corrects what they leave."""
+        """Context manager: solutions of large systems are less exact, as Newton's method corrects what they leave."""
         self._solver.corrected = True
         try:
             yield
@@ -326,10 +326,9 @@ class _Near:
 
 
 class _Sparse:
-    """A system by its rows, with factors by MUMPS; near: a `_Near` or None; counts: how often signs were counted;
-    corrected: see `Interface.corrected`."""
+    """A system by its rows, with factors by MUMPS; near: a `_Near` or None; corrected: see `Interface.corrected`."""
 
-    near, counts, corrected = None, 0, False
+    near, corrected = None, False
 
     def __init__(self, size):
         self._size = size
@@ -365,7 +364,12 @@ class _Sparse:
 
     @functools.cached_property
     def _symmetric(self):
-        return eigen.RepeatedInertia(self._starts, self._columns, _ROUNDING)
+        return eigen.inertia_of(self._starts, self._columns, _ROUNDING)
+
+    @property
+    def counts(self):
+        """How often signs were counted, of this system or one that shares the factors."""
+        return self._symmetric.counts
 
     @property
     def inverse(self):
@@ -373,7 +377,6 @@ class _Sparse:
         return self._symmetric.solve if self._symmetric.regular else None
 
     def signs(self, values):
-        self.counts += 1
         rows = np.repeat(np.arange(self._size), np.diff(self._starts))
         scale = _scale(values[rows == self._columns])
         negative, zero, logarithm = self._symmetric.of(values * scale[rows] * scale[self._columns], scale)

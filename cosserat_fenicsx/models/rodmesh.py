@@ -306,7 +306,11 @@ class Numbering:
         self.space, self.comm, self.block = space, comm, node_dofs.shape[1]
         dofmap = space.dofmap
         self._blocked = dofmap.index_map_bs > 1
-        lead = np.array([leaders.get(slot, slot) for slot in slots.tolist()], dtype=np.int64)
+        followers, leads = np.array([*leaders.items()], dtype=np.int64).reshape(-1, 2).T
+        leader = np.arange(max(x.max(initial=-1) for x in (slots, followers, leads)) + 1)
+        leader[followers] = leads
+        lead, leading = leader[slots], np.zeros(len(leader), dtype=bool)
+        leading[leads] = True
         free = ~np.isin(lead, list(clamped))
         own = np.zeros(len(slots), dtype=bool)
         own[:owned] = (free & (lead == slots))[:owned]
@@ -314,7 +318,9 @@ class Numbering:
         # sizes of vectors and matrices in node blocks must be multiples of them
         self._blocked = self._blocked and not multipliers
         dofs = dofmap.index_map.size_local * dofmap.index_map_bs
-        others = np.setdiff1d(np.arange(dofs), node_dofs[:owned].ravel())
+        other = np.ones(dofs, dtype=bool)
+        other[node_dofs[:owned].ravel()] = False
+        others = np.flatnonzero(other)
         last = comm.rank == comm.size - 1
         self.multipliers = multipliers
         self.size = self.nodes * self.block + len(others) + multipliers * last
@@ -329,19 +335,19 @@ class Numbering:
         numbers[others] = first + self.nodes * self.block + np.arange(len(others))
         rows.x.scatter_forward()
         self.rows = rows.x.array.astype(PETSc.IntType)
-        self._share(slots, lead, own, node_dofs, set(leaders.values()))
+        self._share(slots, lead, own, node_dofs, leading)
         self.rows[node_dofs[~free]] = -1
         self._connect(own.sum() != free[:owned].sum())
 
     def _share(self, slots, lead, own, node_dofs, leading):
         """Give every rank the indices of the nodes whose unknowns others share."""
-        here = {int(slots[i]): self.rows[node_dofs[i]] for i in np.flatnonzero(own) if int(slots[i]) in leading}
-        everywhere = {}
-        for part in self.comm.allgather(here):
-            everywhere.update(part)
-        for i in np.flatnonzero(np.isin(lead, list(leading))):
-            if int(lead[i]) in everywhere:
-                self.rows[node_dofs[i]] = everywhere[int(lead[i])]
+        here = np.flatnonzero(own & leading[slots])
+        shared = self.comm.allgather((slots[here], self.rows[node_dofs[here]]))
+        at, rows = (np.concatenate(parts) for parts in zip(*shared, strict=True))
+        place = np.full(len(leading), -1)
+        place[at] = np.arange(len(at))
+        follows = np.flatnonzero(leading[lead] & (place[lead] >= 0))
+        self.rows[node_dofs[follows]] = rows[place[lead[follows]]]
 
     def _connect(self, shared):
         """Prepare the transfer between the solver's vector and dolfinx's local degrees of freedom."""
