@@ -5,15 +5,18 @@ import datetime
 import json
 import os
 import platform
+import statistics
 import subprocess
 import sys
 import threading
 import time
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 from cosserat_fenicsx import compat
+from cosserat_fenicsx.pictures.charts import draw_both, draw_chart
 from cosserat_fenicsx.ranks import launched
 
 #: The heads of the cells of `judged`, after that of the number found.
@@ -25,6 +28,12 @@ def timed(task, clock=time.process_time):
     began = clock()
     found = task()
     return found, clock() - began
+
+
+def repeated(task, runs):
+    """(what a task returns at last, its median processor time (s) of some runs)."""
+    found = [timed(task) for _ in range(runs)]
+    return found[-1][0], statistics.median(spent for _, spent in found)
 
 
 def in_turns(tasks, runs):
@@ -103,6 +112,11 @@ def judged(found, most, form=None):
     verdict = "-" if found is None else "met" if found <= most else "missed"
     number = "-" if found is None else format(found, form) if form else share(found)
     return " | ".join((number, f"{most:g}" if form else share(most), verdict))
+
+
+def drawn(make, file):
+    """Write the Figure that `make()` returns to a file, for wide pages and for narrow ones."""
+    draw_both(partial(draw_chart, make), file)
 
 
 # -- the machine -------------------------------------------------------------------------------------------------------

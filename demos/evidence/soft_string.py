@@ -11,16 +11,15 @@ the stations as they are and a tolerance. Times are processor times of one warm 
 """
 
 import statistics
-from functools import partial
 from pathlib import Path
 
 import numpy as np
-from harness import command, in_words, table, timed, write
+from harness import command, drawn, in_words, repeated, table, write
 from peers.environments import Missing
 from peers.process import Peer
 
 import cosserat_fenicsx as cf
-from cosserat_fenicsx.pictures.charts import beside, draw_both, draw_chart, legend
+from cosserat_fenicsx.pictures.charts import beside, legend
 
 SCENES = Path(__file__).resolve().parents[1] / "wells"
 #: Hook loads out and in, N, by a differential equation at 1e-13.
@@ -38,13 +37,13 @@ def ours(path, tol):
     """(error, s) of this package: the largest relative error of both hook loads, the processor time of one."""
     hole = cf.well.Borehole(path, cf.well.HoleSection(path.length, 0.2159, FRICTION))
     string = cf.well.DrillString([cf.well.Component(weight=WEIGHT, contact_radius=RADIUS)])
-    loads, seconds = [], []
-    for operation in (cf.well.TripOut(), cf.well.TripIn()):
-        for _ in range(SAMPLES):
-            answer, spent = timed(lambda op=operation: cf.well.torque_and_drag(hole, string, op, model="soft", tol=tol))
-            seconds.append(spent)
-        loads.append(answer.hook_load)
-    return loads, statistics.median(seconds)
+
+    def both():
+        return [cf.well.torque_and_drag(hole, string, operation, model="soft", tol=tol).hook_load
+                for operation in (cf.well.TripOut(), cf.well.TripIn())]  # fmt: skip
+
+    loads, seconds = repeated(both, SAMPLES)
+    return loads, seconds / 2
 
 
 def theirs(peer, path, spacing):
@@ -126,7 +125,7 @@ def main(install=True, out="out"):
     """
     rows, silent = measure(install)
     print(write("soft_string", lines(rows, silent), out))
-    draw_both(partial(draw_chart, lambda: chart(rows)), Path(out) / "soft_string.png")
+    drawn(lambda: chart(rows), Path(out) / "soft_string.png")
     return rows
 
 

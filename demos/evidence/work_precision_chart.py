@@ -5,11 +5,12 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
+from harness import drawn
 from peers.environments import OWN
 from peers.problems import TITLES
 from work_precision_table import answered, median
 
-from cosserat_fenicsx.pictures.charts import SMALL, draw_both, draw_chart, empty_figure, legend
+from cosserat_fenicsx.pictures.charts import SMALL, empty_figure, legend
 
 #: (problem, file, subtitle, whether only the spatial model of this package is shown).
 _VIEWS = (
@@ -39,10 +40,10 @@ def draw(found, rows, out, stem):
             silent = sorted({r["peer"] for r in rows if r["problem"] == problem} - {r["peer"] for r in here})
             absent = f"; no answer from {', '.join(silent)}" if silent else ""
             title = f"{TITLES[problem]}\n{subtitle}{absent}"
-            draw_both(partial(draw_chart, partial(_chart, here, title, problem)), Path(out) / names[-1])
+            drawn(partial(_chart, here, title, problem), Path(out) / names[-1])
     if any(row["wall"] for row in found.waits):
         names.append(f"{stem}_waiting.png")
-        draw_both(partial(draw_chart, lambda: _bars(found.waits)), Path(out) / names[-1])
+        drawn(lambda: _bars(found.waits), Path(out) / names[-1])
     return names
 
 

@@ -9,10 +9,9 @@ Writes to out/: work_precision_motion.json (every sample), .md (the table), .png
 (peers/motions.py).
 """
 
-from functools import partial
 from pathlib import Path
 
-from harness import HEADS, command, in_words, judged, table
+from harness import HEADS, command, drawn, in_words, judged, table
 from matplotlib.ticker import LogLocator
 from peers import motions
 from peers.environments import OWN
@@ -20,7 +19,7 @@ from work_precision import SAMPLES, Panel, Record, concluded, run
 from work_precision_chart import in_time, plot
 from work_precision_table import answered, at_accuracies, cheapest, median, milliseconds
 
-from cosserat_fenicsx.pictures.charts import SMALL, beside, draw_both, draw_chart, legend
+from cosserat_fenicsx.pictures.charts import SMALL, beside, legend
 
 PANEL = Panel(
     motions.PEERS, motions.problems, motions.error, motions.configurations, motions.kind, motions.model, 1, False
@@ -59,18 +58,10 @@ def text(found, rows):
     lines = [
         f"{in_words(found.about['machine'])}. Random seed of the order {found.about['seed']}.",
         "",
-        (
-            f"Processor time of one thread, warm, medians of up to {found.about['samples']} samples (of {least} or more"
-            " in the first table), peers in alternation. What is timed: here the whole"
-        ),
-        (
-            "call of `simulate` in space, and the query of the ends; for Exudyn `SolveDynamic`, its model built before."
-            " The error is"
-        ),
-        (
-            "the distance of the ends from their true places, over the length of a rod; mesh and step the best measured"
-            " of each."
-        ),
+        f"Processor time of one thread, warm, medians of up to {found.about['samples']} samples (of {least} or more in "
+        "the first table), peers in alternation. Timed are, here, the whole call of `simulate` in space and the query "
+        "of the ends; of Exudyn `SolveDynamic`, its model built before. The error is the distance of the ends from "
+        "their true places, over the length of a rod; mesh and step are the best measured of each.",
         *(f"\n{peer} is missing: {why}" for peer, why in found.missing.items()),
         "",
     ]
@@ -105,16 +96,10 @@ def draw(rows):
         for name, members in _groups(answered(rows, problem)).items():
             ours, kind = members[0]["peer"] == OWN, members[0]["kind"]
             scheme = kind.removesuffix(", by tol") if ours else members[0]["configuration"]["node"]
-            others = [
-                s for s in sorted({r["configuration"].get("scheme", "momentum") for r in rows}) if s not in _COLOURS
-            ]
+            others = sorted({r["configuration"].get("scheme", "momentum") for r in rows} - _COLOURS.keys())
             colours = {**_COLOURS, **dict(zip(others, _OTHERS, strict=False)), **_THEIRS}
-            style = {
-                "color": colours.get(scheme, "0.4"),
-                "marker": "o" if ours else "s",
-                "ls": ":" if "tol" in kind else "-",
-            }
-            plot(axes, members, name, 2.2 if ours else 1.5, **style)
+            style = {"marker": "o" if ours else "s", "ls": ":" if "tol" in kind else "-"}
+            plot(axes, members, name, 2.2 if ours else 1.5, color=colours.get(scheme, "0.4"), **style)
         _, _, share = ratio(rows, problem)
         axes.axvline(ASKED_AT, color="0.5", lw=1, ls="--")
         if share:
@@ -148,7 +133,7 @@ def main(out="out", quick=False, fresh=False, peers=motions.PEERS, wanted=None):
     budgets = {name: BUDGET * k / len(motions.TITLES) for k, name in enumerate(motions.TITLES, 1)}  # a share for each
     rows = run(found, peers, budgets, quick=quick, wanted=wanted, limits=limits)
     concluded(found, rows, text)
-    draw_both(partial(draw_chart, lambda: draw(rows)), out / f"{stem}.png")
+    drawn(lambda: draw(rows), out / f"{stem}.png")
     print(f"\nwritten: {found.file}, {stem}.md, {stem}.png")
     return found
 

@@ -11,20 +11,19 @@ characteristics on three meshes. The upwind scheme is that of the open literatur
 are processor times of a whole computation, in C all three, on one thread: medians of 5.
 """
 
-import statistics
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
 import numpy as np
-from harness import command, in_words, table, timed, write
+from harness import command, drawn, in_words, repeated, table, write
 from peers import upwind_torsion
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.drilling.elements import AxialTorsional
 from cosserat_fenicsx.drilling.protocol import SERIES
 from cosserat_fenicsx.drilling.torsion import TorsionWaves
-from cosserat_fenicsx.pictures.charts import SMALL, draw_both, draw_chart, empty_figure, legend, room_for
+from cosserat_fenicsx.pictures.charts import SMALL, empty_figure, legend, room_for
 
 #: Mean of the last four periods (s), largest speed of the bit after 60 s (rad/s); and how far these may be wrong, as
 #: relative errors: the differences of meshes, and of the levels at which a period is measured.
@@ -73,8 +72,7 @@ class Sampled(cf.drilling.SampledControl):
 def with_control(samples):
     """Median processor time (s) of the string with a control in Python, through the public face."""
     drilling = replace(scene(), drive=cf.drilling.TopDrive(60 * cf.units.rpm, 2900.0, Sampled()))
-    times = [timed(lambda: cf.drilling.simulate(drilling, DURATION, progress=False))[1] for _ in range(samples)]
-    return statistics.median(times)
+    return repeated(lambda: cf.drilling.simulate(drilling, DURATION, progress=False), samples)[1]
 
 
 def solved(drilling, method, cells):
@@ -104,11 +102,8 @@ def measure(cases, samples):
     for method, counts in cases.items():
         solved(drilling, method, counts[0])  # what is compiled at first use
         for cells in counts:
-            seconds = []
-            for _ in range(samples):
-                found, spent = timed(lambda: solved(drilling, method, cells))  # noqa: B023 called at once
-                seconds.append(spent)
-            rows.append((method, cells, errors(*found), statistics.median(seconds)))
+            found, seconds = repeated(partial(solved, drilling, method, cells), samples)
+            rows.append((method, cells, errors(*found), seconds))
     return rows
 
 
@@ -138,25 +133,16 @@ def chart(rows):
     titles = {"period": "period of stick-slip", "peak": "largest speed of the bit"}
     for panel, (name, title) in zip(panels, titles.items(), strict=True):
         panel.axhspan(KNOWN[name] / 100, KNOWN[name], color="0.9", zorder=0)
-        panel.text(
-            0.99,
-            KNOWN[name] * 0.9,
-            "not known better ",
-            transform=panel.get_yaxis_transform(),
-            fontsize=SMALL,
-            color="0.4",
-            ha="right",
-            va="top",
-        )
+        style = {"transform": panel.get_yaxis_transform(), "fontsize": SMALL, "color": "0.4", "ha": "right"}
+        panel.text(0.99, KNOWN[name] * 0.9, "not known better ", va="top", **style)
         for method, colour in colours.items():
             here = [(cells, off[name], seconds) for by, cells, off, seconds in rows if by == method]
             cells, off, seconds = zip(*here, strict=True)
             shown = np.maximum(off, KNOWN[name] / 5)
             panel.loglog(1e3 * np.array(seconds), shown, "o-", color=colour, label=method)
             for x, y, n in zip(seconds, shown, cells, strict=True):
-                panel.annotate(
-                    f"{n}", (1e3 * x, y), xytext=(4, 4), textcoords="offset points", fontsize=SMALL, color=colour
-                )
+                style = {"textcoords": "offset points", "fontsize": SMALL, "color": colour}
+                panel.annotate(f"{n}", (1e3 * x, y), xytext=(4, 4), **style)
         panel.set(xlabel="processor time of 120 s of motion (ms), one thread", ylim=(KNOWN[name] / 8, 5e-3))
         panel.set_ylabel(f"relative error, {title}")
         panel.margins(x=0.12)
@@ -170,7 +156,7 @@ def main(out="out", quick=False):
     rows = measure(QUICK if quick else CASES, 1 if quick else SAMPLES)
     stem = "work_precision_string_quick" if quick else "work_precision_string"
     print(write(stem, lines(rows, with_control(1 if quick else SAMPLES)), out))
-    draw_both(partial(draw_chart, lambda: chart(rows)), Path(out) / f"{stem}.png")
+    drawn(lambda: chart(rows), Path(out) / f"{stem}.png")
     return rows
 
 

@@ -11,16 +11,8 @@ WAITS = {("cosserat run", "warm"): 1.0, ("cosserat run", "cold"): 8.0}  # s of w
 CLOSE = 1.25  # times the smallest time: a row may turn out to be the fastest
 
 
-def everything(row):
-    return True
-
-
 def spatial(row):
     return row["spatial"]
-
-
-def planar(row):
-    return not row["spatial"]
 
 
 def automatic(row):
@@ -34,10 +26,11 @@ def planar_exudyn(row):
 
 #: (requirement, which rows of this package, which rows of the peers, {accuracy: largest ratio of times}).
 ASKED = (
-    ("planar sweep against the fastest peer", everything, everything, {1e-3: 1 / 2, 1e-5: 1 / 5, 1e-7: 1 / 12}),
+    ("planar sweep against the fastest peer", bool, bool, {1e-3: 1 / 2, 1e-5: 1 / 5, 1e-7: 1 / 12}),
     ("sweep forced to spatial against the fastest spatial peer", spatial, spatial,
      {1e-3: 1 / 25, 1e-5: 1 / 40, 1e-7: 1 / 40}),
-    ("sweep forced to spatial against the fastest planar peer", spatial, planar, {1e-3: 1.0, 1e-5: 1.0, 1e-7: 1.0}),
+    ("sweep forced to spatial against the fastest planar peer", spatial, lambda row: not row["spatial"],
+     {1e-3: 1.0, 1e-5: 1.0, 1e-7: 1.0}),
     ('`model="auto"` by `tol`, error estimate included, against Exudyn\'s fastest planar element', automatic,
      planar_exudyn, {1e-3: 1.0, 1e-5: 1 / 2, 1e-7: 1 / 3}),
 )  # fmt: skip
@@ -130,16 +123,14 @@ def _head(found):
     lines = [
         f"{in_words(about['machine'])}. Peers: {told or 'none'}. Random seed of the order {about['seed']}.",
         "",
-        f"Processor time of one thread, warm, medians of {about['samples']} samples (of {about['deciding']} where a"
-        " ratio depends on them, of fewer for some of what takes over 0.5 s), peers in",
-        "alternation. What is timed: here the whole call of `solve` and the tip's position, with the stability count (a"
-        " scene that was solved before is at hand); for Exudyn `SolveStatic`, for",
-        "OpenSeesPy the analysis (the model of both is built before and not counted); for PyElastica the whole"
-        " relaxation; for CalculiX the whole program. Time at an accuracy: the cheapest",
-        "configuration measured whose error, against the truth of its own mechanical model, is below it (with `tol` too"
-        " the true one, not the estimate). The error is that of delta, largest",
-        "over the load factors, on the eccentric cantilever, and of the position of the tip, over its displacement,"
-        " elsewhere.",
+        f"Processor time of one thread, warm, medians of {about['samples']} samples (of {about['deciding']} where a "
+        "ratio depends on them, of fewer for some of what takes over 0.5 s), peers in alternation. Timed are, here, "
+        "the whole call of `solve` and the tip's position, with the stability count (the scene was solved before); of "
+        "Exudyn `SolveStatic`, of OpenSeesPy the analysis (the models of both are built before and not counted); of "
+        "PyElastica the whole relaxation; of CalculiX the whole program. Time at an accuracy: that of the cheapest "
+        "configuration measured whose error, against the truth of its own mechanical model, is below it (with `tol`, "
+        "too, the true one, not the estimate). The error is the largest of delta over the load factors, on the "
+        "eccentric cantilever, and of the position of the tip, over its displacement, elsewhere.",
     ]
     missing = [f"- {peer} is missing: {why}" for peer, why in found.missing.items()]
     return [*lines, *(["", *missing] if missing else [])]

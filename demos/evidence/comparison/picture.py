@@ -1,13 +1,12 @@
 """The chart of Figure 3: the whole path, the part below eta = 1, and the differences of the models."""
 
-from functools import partial
-
 import numpy as np
+from harness import drawn
 
 from comparison.column import Column
 from comparison.curves import MANY, exact
 from cosserat_fenicsx import analytic
-from cosserat_fenicsx.pictures.charts import SMALL, draw_both, draw_chart, empty_figure, room_for
+from cosserat_fenicsx.pictures.charts import SMALL, empty_figure, room_for
 
 _GREEN = {"1": "#98d594", "2": "#4daf4a", str(MANY): "#1b7837"}
 # Width, inches, for panels beside each other.
@@ -17,7 +16,7 @@ _ETA = r"load factor $\eta = F/P_{cr}$ (-)"
 
 def draw(data, file):
     """Draw the curves of figure3.json into `file`."""
-    draw_both(partial(draw_chart, lambda: _figure(data["curves"])), file)
+    drawn(lambda: _figure(data["curves"]), file)
 
 
 def _figure(curves):

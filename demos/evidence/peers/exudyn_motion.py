@@ -28,7 +28,8 @@ def prepare(problem, configuration):
     ends = {"start": rods[0][0][0], "end": rods[0][0][-1]}
     _load(mbs, problem, ends[problem["loaded"]])
     if problem["clamped"]:
-        _clamp(mbs, ends["start"], configuration["node"])
+        # the scalar Euler parameter has its own equation
+        hold(mbs, ends["start"], range(6) if configuration["node"] == "LG" else (0, 1, 2, 4, 5, 6))
     mbs.Assemble()
     settings = _settings(configuration, problem["duration"])
     watched = {"start": rods[0][0][0], "end": rods[-1][0][-1]}
@@ -94,10 +95,9 @@ def _load(mbs, problem, node):
             mbs.AddLoad(load(markerNumber=marker, loadVector=problem[key], loadVectorUserFunction=scaled))
 
 
-def _clamp(mbs, node, kind):
+def hold(mbs, node, coordinates):
+    """Hold coordinates of a node at 0."""
     ground = mbs.AddMarker(item.MarkerNodeCoordinate(nodeNumber=mbs.AddNode(item.NodePointGround()), coordinate=0))
-    for coordinate in (
-        range(6) if kind == "LG" else (0, 1, 2, 4, 5, 6)
-    ):  # the scalar Euler parameter has its own equation
+    for coordinate in coordinates:
         held = mbs.AddMarker(item.MarkerNodeCoordinate(nodeNumber=node, coordinate=coordinate))
         mbs.AddObject(item.ObjectConnectorCoordinate(markerNumbers=[ground, held]))

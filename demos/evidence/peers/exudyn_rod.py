@@ -7,7 +7,7 @@ residual is either too coarse or below its rounding error.
 Measured on the column, what makes it fastest: loads by symbolic functions, which never call Python (a fifth of the time
 on few elements); Eigen's dense factors up to a hundred unknowns (a third to a half), its sparse ones with their pattern
 analysed once (a seventh) beyond. No faster or slower, or less accurate: modified Newton, tolerances on residuals or for
-each coordinate, numerical derivatives, fixed steps, loads on coordinates, memory kept between calls, one thread by name.
+each coordinate, numerical derivatives, fixed steps, loads on coordinates, memory kept between calls, one thread.
 """
 
 import math
@@ -124,10 +124,7 @@ def _rod(mbs, problem, configuration):
                 )
             )  # fmt: skip
     held = {"planar ANCF cable": (0, 1, 3), "spatial 2-node": range(6), "spatial 2-node EP": (0, 1, 2, 4, 5, 6)}
-    ground = mbs.AddMarker(item.MarkerNodeCoordinate(nodeNumber=mbs.AddNode(item.NodePointGround()), coordinate=0))
-    for coordinate in held.get(element, range(3)):
-        clamp = mbs.AddMarker(item.MarkerNodeCoordinate(nodeNumber=nodes[0], coordinate=coordinate))
-        mbs.AddObject(item.ObjectConnectorCoordinate(markerNumbers=[ground, clamp]))
+    exudyn_motion.hold(mbs, nodes[0], held.get(element, range(3)))
     return nodes[-1]
 
 

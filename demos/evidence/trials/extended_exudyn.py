@@ -9,6 +9,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "peers"))
 import exudyn as exu
 import numpy as np
 from exudyn import itemInterface as item
+from exudyn_motion import hold
 from exudyn_rod import DISPLACEMENT, NODES, _rod, _settings, load
 from speak import Stopped, serve
 
@@ -35,10 +36,7 @@ def _solve(problem, configuration):
 
     load(mbs, problem, tip, loaded(0), loaded(1))
     if problem.get("guided"):
-        ground = mbs.AddMarker(item.MarkerNodeCoordinate(nodeNumber=mbs.AddNode(item.NodePointGround()), coordinate=0))
-        for coordinate in (0, 2, 4, 5, 6) if element.endswith("EP") else (0, 2):
-            held = mbs.AddMarker(item.MarkerNodeCoordinate(nodeNumber=tip, coordinate=coordinate))
-            mbs.AddObject(item.ObjectConnectorCoordinate(markerNumbers=[ground, held]))
+        hold(mbs, tip, (0, 2, 4, 5, 6) if element.endswith("EP") else (0, 2))
     sensor = mbs.AddSensor(item.SensorNode(nodeNumber=tip, storeInternal=True, outputVariableType=DISPLACEMENT))
     mbs.Assemble()
     solver = "EigenSparse" if configuration["elements"] * NODES[element] > 16 else "EXUdense"
