@@ -21,14 +21,14 @@ import numpy as np
 from scipy.linalg import solve_banded
 from scipy.optimize import brentq
 
-from cosserat_fenicsx.checks import instance, number, refuse
+from cosserat_fenicsx.checks import number, refuse
 from cosserat_fenicsx.errors import NotConverged, SceneError
 from cosserat_fenicsx.quantities import Quantity
 from cosserat_fenicsx.results.result import Charted, by_name
 from cosserat_fenicsx.well.components import DrillString, in_columns
 from cosserat_fenicsx.well.hole import Borehole, Mud
 from cosserat_fenicsx.well.operations import Operation
-from cosserat_fenicsx.well.pieces import bend_of, pieces_of, rings_of
+from cosserat_fenicsx.well.pieces import bend_of, checked_depth, pieces_of, rings_of
 
 
 # Length that lies on the wall up to the upper end of what is solved at least, m.
@@ -426,13 +426,8 @@ def build_rate(
             that does not fit the hole.
         NotConverged: the string does not lie down on the wall near the bit of a straight hole.
     """
-    instance("build_rate", "hole", hole, Borehole, "a Borehole")
-    instance("build_rate", "string", string, DrillString, "a DrillString")
-    instance("build_rate", "operation", operation, Operation, "an operation, such as Sliding(80e3)")
-    instance("build_rate", "mud", mud, (Mud, type(None)), "Mud(density), or None where weights are in mud")
+    depth = checked_depth("build_rate", hole, string, operation, mud, depth, "Sliding(80e3)")
     anisotropy = number("build_rate", "anisotropy", anisotropy, "a number from 0 to 10", lambda x: 0 <= x <= 10)
-    depth = hole.length if depth is None else depth
-    depth = number("build_rate", "depth", depth, "a measured depth (m), positive", lambda x: x > 0)
     if not operation.weight > 0:
         refuse("build_rate", "operation", operation, "an operation with weight on bit (N), such as Sliding(80e3)")
     _, laid = pieces_of(hole, string, operation, mud, depth)

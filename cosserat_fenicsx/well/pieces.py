@@ -11,9 +11,11 @@ from itertools import pairwise
 
 import numpy as np
 
-from cosserat_fenicsx.checks import warn
+from cosserat_fenicsx.checks import instance, number, warn
 from cosserat_fenicsx.errors import SceneError
-from cosserat_fenicsx.well.components import weight_in_mud
+from cosserat_fenicsx.well.components import DrillString, weight_in_mud
+from cosserat_fenicsx.well.hole import Borehole, Mud
+from cosserat_fenicsx.well.operations import Operation
 
 #: Arrays over the components of a string, from the bit up; NaN where unknown. EI (N m^2), EA (N), GJ
 #: (N m^2), poisson; outer, inner: radii of the body (m).
@@ -160,6 +162,17 @@ def _span(length, largest, clearance):
 #: direction; t, n: downward components of tangent and normal at the bottom, b: of the binormal (constant); curvature:
 #: its size (1/m).
 Pieces = namedtuple("Pieces", "top bottom component weight friction radius hole axial around t n b curvature")
+
+
+def checked_depth(owner, hole, string, operation, mud, depth, such="TripOut()"):
+    """The measured depth (m) of the lower end of a string, None for the bottom of its hole; refused with arguments of
+    other kinds; owner: the function in messages, which takes an operation such as `such`."""
+    instance(owner, "hole", hole, Borehole, "a Borehole")
+    instance(owner, "string", string, DrillString, "a DrillString")
+    instance(owner, "operation", operation, Operation, f"an operation, such as {such}")
+    instance(owner, "mud", mud, (Mud, type(None)), "Mud(density), or None where weights are in mud")
+    depth = hole.length if depth is None else depth
+    return number(owner, "depth", depth, "a measured depth (m), positive", lambda x: x > 0)
 
 
 def pieces_of(hole, string, operation, mud, depth):

@@ -27,7 +27,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cosserat_fenicsx.checks import instance, number, refuse
+from cosserat_fenicsx.checks import number, refuse
 from cosserat_fenicsx.errors import InstallationError, NotConverged, SceneError
 from cosserat_fenicsx.progress import Plan
 from cosserat_fenicsx.ranks import world
@@ -38,7 +38,7 @@ from cosserat_fenicsx.well.buckled import LockUp, buckled_string, earliest_helix
 from cosserat_fenicsx.well.components import DrillString
 from cosserat_fenicsx.well.hole import Borehole, Mud
 from cosserat_fenicsx.well.operations import Operation
-from cosserat_fenicsx.well.pieces import free_span, pieces_of, prying, rings_of, sections_of
+from cosserat_fenicsx.well.pieces import checked_depth, free_span, pieces_of, prying, rings_of, sections_of
 from cosserat_fenicsx.well.rod.rod_answer import longest, rod_in_contact
 from cosserat_fenicsx.well.softstring import Chain, chain_of, soft_string
 from cosserat_fenicsx.well.tools import MudMotor
@@ -303,14 +303,8 @@ def torque_and_drag(
             place), or one that is no rod in contact where `model` is "rod".
         NotConverged: the tolerance was not reached.
     """
-    instance("torque_and_drag", "hole", hole, Borehole, "a Borehole")
-    instance("torque_and_drag", "string", string, DrillString, "a DrillString")
-    instance("torque_and_drag", "operation", operation, Operation, "an operation, such as TripOut()")
-    instance("torque_and_drag", "mud", mud, (Mud, type(None)), "Mud(density), or None where weights are in mud")
+    depth = checked_depth("torque_and_drag", hole, string, operation, mud, depth)
     tol = check_settings(model, tol, torque_convention)
-    if depth is None:
-        depth = hole.length
-    depth = number("torque_and_drag", "depth", depth, "a measured depth (m), positive", lambda x: x > 0)
     pieces, laid = pieces_of(hole, string, operation, mud, depth)
     given = hole, string, operation, mud, depth
     flexible, why = _flexible(given, model, tol, torque_convention, pieces, laid)
