@@ -2,6 +2,7 @@
 
 import math
 import time
+import warnings
 
 import numpy as np
 import pytest
@@ -120,6 +121,14 @@ def test_a_survey_from_a_file(tmp_path):
         assert cf.well.WellPath.from_csv(file).md[2] == pytest.approx(2000 * 0.3048006096, rel=1e-10)
     file.write_text("MD (mRKB),Inc (rad),Azi\n0,0,0\n900,0.3,0.2\n", encoding="utf-8")
     assert cf.well.WellPath.from_csv(file).inclination[1] == 0.3
+    file.write_text("MD,Inc,Azi\n0,0,0\n9000,30,0\n", encoding="utf-8")
+    with pytest.warns(
+        cf.SceneWarning, match="'MD' names no unit, so that the deepest station is at 9000 m: if these are"
+    ):
+        assert cf.well.WellPath.from_csv(file).length == 9000
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert cf.well.WellPath.from_csv(file, length_unit="m").length == 9000
 
 
 def test_a_survey_from_a_workbook(tmp_path):

@@ -355,6 +355,10 @@ def test_the_command_line(tmp_path, capsys):
     assert "largest inclination 53.43 degrees" in told and "String, drill pipe: md 0 to 3227.7 m" in told
     assert main(["run", str(VOLVE), "-o", str(tmp_path), "--no-picture", "--tol", "1e-3", "--model", "soft"]) == 0
     told = capsys.readouterr().out
+    together = told.partition("surface loads of all operations")[2]
+    assert [name in together for name in ("trip out", "trip in", "rotary drilling", "utilisation")] == [True] * 3 + [
+        False
+    ]
     assert "NOT ENOUGH for tol = 0.001: " in told and "rotary drilling, friction" not in told.splitlines()[0]
     names = {"depth_sweep.csv", *(f"{name}{end}.csv" for name in ("trip_out", "trip_in", "rotary_drilling")
                                   for end in ("", "_contacts"))}  # fmt: skip

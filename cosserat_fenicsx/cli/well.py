@@ -11,6 +11,7 @@ from cosserat_fenicsx.ranks import on_first, world
 from cosserat_fenicsx.storage.store import discard
 from cosserat_fenicsx.well.buckled import LockUp
 from cosserat_fenicsx.well.scenefile import TorqueAndDragSettings
+from cosserat_fenicsx.well.tables import of_operations
 
 # Ends of the names of files of an operation, and of rates of build; names of those of a sweep.
 _ENDINGS = (".csv", "_contacts.csv", ".png", "_3d.png", "_strength.csv", "_strength.png", "_overpull.csv",
@@ -50,16 +51,19 @@ def _results(options, scene, stems, of_builds, out):
         in_space = not options.no_picture and partial(answer.plot_3d, units=units)
         return charted(stem, options, answer, beside=["_contacts"]) | {f"{stem}_3d.png": in_space}
 
+    answers, uses = [], []
     for operation, stem in zip(scene.operations, stems, strict=True):
-        answers = []
 
-        def solved(operation=operation, answers=answers):
+        def solved(operation=operation):
             answers.append(_solved(scene, operation, Units(units)))
-            return answers[0]
+            return answers[-1]
 
         yield solved, partial(files_of, stem)
-        for name, found in scene.strength.of(answers[0]).items() if scene.strength else ():
+        for name, found in scene.strength.of(answers[-1]).items() if scene.strength else ():
+            uses += [found] if name == "strength" else []
             yield lambda found=found: found, partial(charted, f"{stem}_{name}", options)
+    if len(answers) > 1:
+        say(of_operations(answers, uses, Units(units)), file=sys.stdout)
     for operation, stem in zip(scene.drilling if scene.build_rate else (), of_builds, strict=False):
         yield partial(scene.builds, operation), partial(charted, stem, options, beside=["_holes"])
     folder = None if out is None else out / "depth_sweep"

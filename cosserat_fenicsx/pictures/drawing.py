@@ -292,7 +292,7 @@ def frame(
     view = View.of(shown, span, window, panel, title)
     texts = labels(view) if labels else Labels(view)
     font = min(_PANEL_LETTERS, round(window[0] / 28)) if panel else letters(plotter)
-    draw_axes(plotter, load_pyvista(), axes, view, texts, font)
+    draw_axes(plotter, load_pyvista(), axes, view, texts, font, () if more is None else more)
     if labels is None:
         texts.draw(plotter, load_pyvista())
     view.place(plotter)

@@ -206,7 +206,8 @@ def of_modes(found, seen, orders):
         for order in orders:
             above.plot(over / size, order * over / (2 * np.pi) / of_frequency, ":", color=GREY, lw=0.8)
             end = min(over[-1], 2 * np.pi * top * of_frequency / order)
-            above.annotate(f"{order} x", (end / size, order * end / (2 * np.pi) / of_frequency), color=GREY)
+            at = end / size, order * end / (2 * np.pi) / of_frequency
+            above.annotate(f"{order} x", at, (-6, 2), textcoords="offset points", ha="right", va="bottom", color=GREY)
     above.set(ylabel=heading, ylim=(0, top or 1.0))
     below.set(ylabel=scale(known["growth_rate"], growth)[0], xlabel=along)
     handles, labels = above.get_legend_handles_labels()

@@ -139,6 +139,11 @@ class Labels:
         """Keep labels that come later off these lines (n, 3), m, too, where possible."""
         self._covered = np.maximum(self._covered, self._cells(lines))
 
+    def part(self, ends):
+        """Let labels, and lines from them to their points, cross the line between two points (2, 3), m, as little as
+        those of other labels."""
+        self._leaders.append(tuple(self._view.pixels(ends)))
+
     def reserve(self, low, high):
         """Keep a rectangle free of labels: its lower left and upper right corners, pixels."""
         self._placed.append((*low, *high))
@@ -327,9 +332,10 @@ def axes_of(points, most=_INTERVALS):
     return tuple(axes)
 
 
-def draw_axes(plotter, pyvista, axes, view, labels, font=None):
+def draw_axes(plotter, pyvista, axes, view, labels, font=None, signs=()):
     """Draw the edges of the box that carry ticks, outside in the picture: z at the left, x and y below; and the floor
-    of a box that is not flat. axes: three `Axis`; labels: the `Labels` that its texts join; font: pixels."""
+    of a box that is not flat. axes: three `Axis`; labels: the `Labels` that its texts join; font: pixels; signs: points
+    (n, 3), m, of arrows and other signs, which axes lie outside of."""
     font = font or max(9, round(view.window[1] / 55))
     corner = {(i, end): getattr(axes[i], end) for i in range(3) for end in ("low", "high")}
     lines = []
@@ -351,8 +357,13 @@ def draw_axes(plotter, pyvista, axes, view, labels, font=None):
             continue
         out = np.array([along[1], -along[0]]) / np.linalg.norm(along)
         out *= np.sign(out @ (view.pixels(edge).mean(axis=0) - middle)) or 1.0
-        edge = edge + view.offset(*(_ASIDE * out))
+        ends = view.pixels(edge)
+        places = view.pixels(np.reshape(signs, (-1, 3))) - ends[0]
+        inside = np.abs(places @ along / (along @ along) - 0.5) < 0.5 + _TICK / np.linalg.norm(along)
+        edge = edge + view.offset(*(max(_ASIDE, _ASIDE / 2 + (places[inside] @ out).max(initial=0.0)) * out))
         lines.append(edge)
+        if i == 2:  # where labels beside a drawing would have their lines cross it
+            labels.part(edge)
         longest = max(len(text) for _, text in axis.ticks)
         room = font * (0.28 * longest * abs(out[0]) + 0.55 * abs(out[1]))
         points = np.repeat(edge[:1], len(axis.ticks), axis=0)

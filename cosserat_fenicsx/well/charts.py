@@ -313,7 +313,7 @@ def string_in_hole(panel, answer, rows, depth):
     for y, middle, name in zip(_apart(middles, panel), middles, names, strict=True):
         panel.plot([0.8 * most, 1.35 * most], [middle, y], color=GREY, linewidth=0.5)
         panel.text(1.4 * most, y, name, fontsize=SMALL, va="center", clip_on=True)
-    panel.set_xticks([-most, 0, most], [f"{x:.5g}" for x in (-most, 0, most)], fontsize=SMALL)
+    panel.set_xticks([-most, 0, most], [f"{x:.3g}" for x in (-most, 0, most)], fontsize=SMALL)
     panel.set_xlabel(f"south ← → north ({unit})" if vertical else f"low side ← → high side ({unit})")
     panel.grid(visible=False)
 

@@ -256,5 +256,5 @@ def _add_title(plotter, answer, enlarge, title, labels):
     lines, (width, height) = [title, how + straight], plotter.window_size
     wide = 0.62 * 1.5 * max(map(len, lines))  # pixels, of letters of the size 1
     size = round(min(0.6 * _font((width, height)), width / wide))
-    plotter.add_text("\n".join(lines), font_size=size, color="black", position="upper_left")
-    labels.reserve((0, height - 2 * 2.2 * size), (size * wide, height))
+    plotter.add_text("\n".join(lines), font_size=size, color="black", position="upper_edge")
+    labels.reserve((0, height - 2 * 2.2 * size), (width, height))

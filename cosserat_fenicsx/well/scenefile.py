@@ -242,6 +242,12 @@ class WellScene(InWords, Part):
         if sweep:
             low, high = (units.told(x, "m") for x in (sweep["depths"].min(), sweep["depths"].max()))
             yield f"Sweep over {len(sweep['depths'])} depths of the bit, {low} to {high}."
+        if self.strength is not None:
+            asked = self.strength
+            yield (
+                f"Strength: grade {asked.grade}, wear {asked.wear}; margin of overpull, and the most weight on bit "
+                f"where there is one, with a safety factor of {asked.safety:g} and {asked.buckling} buckling."
+            )
         if self.build_rate is not None:
             yield f"Rates of build by several criteria, anisotropy {self.build_rate.anisotropy:g}."
         model, tol = settings.get("model", "auto"), settings.get("tol", 1e-4)

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from cosserat_fenicsx import checks, units
-from cosserat_fenicsx.checks import bytes_of, instance, positive, text_of
+from cosserat_fenicsx.checks import bytes_of, instance, positive, text_of, warn
 from cosserat_fenicsx.quantities import size_of
 from cosserat_fenicsx.errors import SceneError, nearest
 from cosserat_fenicsx.results.result import import_library
@@ -36,6 +36,8 @@ _ANGLES = {
     **dict.fromkeys(("rad", "radian", "radians"), False),
 }
 _UNITS = {*_LENGTHS, *_ANGLES}
+# Depths without a unit that are larger, m, are probably in feet: few wells are as long.
+_DEEP = 5000.0
 # The arguments that give the units of the columns where headings do not.
 _SAY = ("length_unit, in m or by its name", "degrees (True or False)", "degrees (True or False)")
 # Other texts in brackets: units followed by words, such as the datum of depths, and the north of azimuths.
@@ -94,7 +96,7 @@ def read_columns(who, file, names, degrees, length_unit, sheet=None):
                 f"{file}: '{heading[column].strip()}': unit '{unit}' is not known: expected {', '.join(known)}; or say "
                 f"it by {field}"
             )
-    depth = depth * _length_unit(who, file, heading[columns[0]], says[0], length_unit)
+    depth = depth * _length_unit(who, file, heading[columns[0]], says[0], length_unit, depth.max())
     return depth, inclination, azimuth, _degrees(file, [heading[x] for x in columns[1:]], says[1:], degrees)
 
 
@@ -212,8 +214,8 @@ def _is_number(cell):
         return False
 
 
-def _length_unit(who, file, heading, says, given):
-    """The unit (m) of measured depths: as given, or as the heading says."""
+def _length_unit(who, file, heading, says, given, deepest):
+    """The unit (m) of measured depths: as given, or as the heading says; deepest: the largest number there."""
     if isinstance(given, str):
         given = size_of(f"{who}.length_unit", given, "length")
     says = _LENGTHS.get(says)
@@ -224,6 +226,11 @@ def _length_unit(who, file, heading, says, given):
                 f"{file}: '{heading}' says a unit of {says:g} m, and length_unit {given:g} m: expected one of them, or "
                 "none given"
             )
+    if given is None and says is None and deepest > _DEEP:
+        warn(
+            f"{file}: '{heading.strip()}' names no unit, so that the deepest station is at {deepest:g} m: if these are "
+            "feet, say length_unit = 'ft', or 'MD (ft)' there; length_unit = 'm' ends this warning"
+        )
     return given or says or 1.0
 
 

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from cosserat_fenicsx.quantities import Quantity
 from cosserat_fenicsx.results import screen
 from cosserat_fenicsx.well import criteria
 from cosserat_fenicsx.well.components import Bit, DrillPipe
@@ -97,16 +98,45 @@ def answer_in_words(answer, units):
             yield units.sentence(f"{line}.")
 
 
+# Signs of the forces of a bit on the wall and of the tilts of its axis, in words; a force across that is rounding, over
+# that towards the high or low side.
+_SIDES, _ROUNDED = (("high side", "low side"), ("right", "left")), 1e-6
+
+
+def _sided(told, value, sides):
+    return f"{told} to the {sides[value < 0]}"
+
+
+def of_operations(answers, uses, units):
+    """Text: a table of the surface loads of several operations and, where there are any, their `Utilisation`."""
+    known = answers[0].quantities
+    given = [
+        (Quantity("operation"), [answer.operation.name for answer in answers]),
+        *((known[name], np.array([getattr(x, name) for x in answers])) for name in ("hook_load", "surface_torque")),
+        (Quantity("model"), [answer.words for answer in answers]),
+        (Quantity("enough for tol"), ["yes" if answer.enough else "NO" for answer in answers]),
+    ]
+    if uses:
+        given.append((Quantity("utilisation", digits=3), np.array([use.largest for use in uses])))
+    return screen.as_text(screen.table(given, units, len(answers), "surface loads of all operations"))
+
+
 def more_in_words(answer, units):
     """Contacts of the bottom-hole assembly, and sentences: what follows from the loads, contacts, all reasons."""
     yield from _at_the_lower_end(answer, units)
     yield from _on_bit(answer, units)
     if np.isfinite(answer.bit_side_force).all():
-        build, turn = (answer._told("hook_load", units, float(x), ".5g") for x in answer.bit_side_force)
-        up, right = np.degrees(answer.bit_tilt)
+        up, across = (float(x) for x in answer.bit_side_force)
+        told = [answer._told("hook_load", units, abs(x), ".5g") for x in (up, across)]
+        tilts = [
+            _sided(f"{abs(x):.4g} deg", x, sides) for x, sides in zip(np.degrees(answer.bit_tilt), _SIDES, strict=True)
+        ]
+        across = 0.0 if abs(across) < _ROUNDED * abs(up) else across
+        tilts = tilts[: 2 if across else 1]
+        forces = [_sided(told[0], up, _SIDES[0]), _sided(told[1], across, _SIDES[1])][: len(tilts)]
         yield (
-            f"the bit presses with {build} to the high side and {turn} to the right of it, looking down the hole; its "
-            f"axis is {up:.4g} deg off the hole's to the high side and {right:.4g} deg to the right"
+            f"the bit presses with {' and '.join(forces)}{', looking down the hole' if across else ''}; its axis is "
+            f"{' and '.join(tilts)} off the hole's"
         )
     more = [f"{name} {told}" for name, value, told in (
         ("stretch", answer.stretch, answer._told("stretch", units)),
