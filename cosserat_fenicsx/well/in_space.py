@@ -254,7 +254,7 @@ def _add_title(plotter, answer, enlarge, title, labels):
     how = f"radii and clearance {enlarge:g} times as large" if enlarge != 1 else "radii and clearance as they are"
     straight = "; its helix is drawn straight" if answer.model != "rod" and answer.helical.any() else ""
     lines, (width, height) = [title, how + straight], plotter.window_size
-    wide = 0.62 * 1.5 * max(map(len, lines))  # pixels, of letters of the size 1
-    size = round(min(0.6 * _font((width, height)), width / wide))
+    wide = 0.62 * 2.2 * max(map(len, lines))  # pixels, of letters of the size 1
+    size = round(min(0.45 * _font((width, height)), width / wide))
     plotter.add_text("\n".join(lines), font_size=size, color="black", position="upper_edge")
     labels.reserve((0, height - 2 * 2.2 * size), (width, height))
