@@ -1,5 +1,5 @@
-"""Rods that touch planes, cylinders and spheres, without and with friction: closed forms and solutions of boundary value
-problems by another program."""
+"""Rods that touch planes, cylinders and spheres, without and with friction: closed forms and solutions of boundary
+value problems by another program."""
 
 import dataclasses
 import math
@@ -78,8 +78,9 @@ class TestNothingPassesUnseen:
 
 
 def test_a_bar_is_pulled_and_released(truth):
-    """An elastic bar on a rough plane under F, then 0: it slides over F/(mu w), its end moves by F^2/(2 EA mu w), and half
-    of that remains; the elastic slip adds its half."""
+    """An elastic bar on a rough plane under F, then 0: it slides over F/(mu w), its end moves by F^2/(2 EA mu w), and
+    half of that remains. The edge of slip is at an end of an element under F; on its way back it is inside elements,
+    and pushes what is at its bound before it."""
     w, mu, EA, F = 10.0, 0.5, 2e4, 20.0
     rod = cf.Rod(cf.Line((0, 0, 0), (8.0, 0, 0)), cf.Stiffness((1e4, 1e4), EA, (2.0, 2.0), 2.0))
     floor = cf.Plane((0, 0, 0), (0, 0, 1), friction=mu, contact_radius=0.0)
@@ -87,22 +88,20 @@ def test_a_bar_is_pulled_and_released(truth):
     scene = cf.Scene([rod], [cf.Prescribed(rod.start, rotation=(0, 0, 0))], loads)
     path = cf.solve(scene, [0.5, 1.0, 0.0], elements=40, model="planar")
     moved = F**2 / (2 * EA * mu * w)
-    slip = mu * w / (floor.stiffness / 100) / 2
-    np.testing.assert_allclose(path.displacement(rod.end)[:, 0], [moved / 4 + slip, moved + slip, moved / 2 - slip],
-                               atol=2e-7)  # fmt: skip
-    ends = np.array([moved / 4, moved, moved / 2])
-    truth("bar pulled over a rough plane and released, end", path.displacement(rod.end)[:, 0], ends, 1e-6, of=moved,
-          most=3e-3)  # fmt: skip
+    ends = path.displacement(rod.end)[:, 0]
+    truth("bar pulled over a rough plane, end", ends[:2], np.array([moved / 4, moved]), 1e-6, of=moved)
+    truth("bar pulled over a rough plane and released, end", ends[2], moved / 2, 1e-6, of=moved, most=4e-4)
+    assert path[2].iterations < 3000
     touch = path.contacts(floor)
-    np.testing.assert_allclose(touch.force[:, 0], [-F / 2, -F, 0], atol=1e-8)
+    np.testing.assert_allclose(touch.force[:, 0] / F, [-0.5, -1, 0], atol=1e-8)
     assert touch.sticks[1, touch.s < 3.9].all() and not touch.sticks[1, touch.s > 4.1].any()
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("a", "ratio"), [(0.0, 1.834657811985932), (0.01, 1.7383388423482828)])
 def test_a_stiff_rope_on_a_bollard(a, ratio):
-    """Half a turn around a cylinder: it slips at T_2/T_1, less than exp(pi mu), because it is stiff and because friction
-    acts on its surface (shooting, with the stiff parts at both ends)."""
+    """Half a turn around a cylinder: it slips at T_2/T_1, less than exp(pi mu), because it is stiff and because
+    friction acts on its surface (shooting, with the stiff parts at both ends)."""
     mu, R, EI, half, tail = 0.2, 0.1, 0.001, math.pi / 2, 0.4
     ends = [np.array((s * (R + a), 0, 0)) for s in (-1, 1)]
     down = np.array((0, 0, -tail))
@@ -160,8 +159,8 @@ class TestWhatAResultLeavesOpen:
         assert cf.buckling(pressed, 1, elements=4).load_factors[0] > 20  # as long as it presses
 
     def test_a_post_beside_the_nodes(self):
-        """A bent cantilever on a thin post: the force is across the rod, at 0.22 rad (shooting: 0.19849, 0.88747 N); that
-        of a node beside the place has another direction by up to h/2R."""
+        """A bent cantilever on a thin post: the force is across the rod, at 0.22 rad (shooting: 0.19849, 0.88747 N);
+        that of a node beside the place has another direction by up to h/2R."""
         rod = cf.Rod(cf.Line((0, 0, 0.1), (1, 0, 0.1)), cf.Stiffness((1e4, 1e4), 1e4, (1.0, 1.0), 1.0))
         post = cf.Cylinder((0.7, 0, 0), (0, 1, 0), 0.02, contact_radius=0.0)
         scene = cf.Scene([rod], [cf.Clamp(rod.start)], [post, cf.Force(rod.end, (0, 0, -1.0))])
@@ -173,13 +172,15 @@ class TestWhatAResultLeavesOpen:
         assert "pushes along" not in str(path)
 
     def test_stiffness_of_the_surface(self):
-        """A rod under its weight: depth w/k, elastic slip F/(L stick)."""
+        """A rod under its weight, at a depth of w/k, and pulled by less than friction holds: it does not move."""
         floor = dataclasses.replace(self.floor, stiffness=1e4, friction=0.5)
         level = cf.Prescribed(self.rod.start, rotation=(0, 0, 0))
         scene = cf.Scene([self.rod], [level], [floor, cf.LineForce(self.rod, (2.0, 0, -10.0), permanent=True)])
-        told = " ".join(str(cf.solve(scene, 1.0, elements=4, model="planar")).split())
-        assert "Plane lets rods in by up to 0.001 m and slip by up to 0.02 m before it gives way" in told
+        path = cf.solve(scene, 1.0, elements=4, model="planar")
+        told = " ".join(str(path).split())
+        assert "Plane lets rods in by up to 0.001 m, 1 of the largest displacement: its stiffness" in told
         assert "estimated errors do not contain it" in told and "may lift off" not in told
+        assert abs(path.displacement(self.rod.end)[-1, 0]) < 1e-10 and path.stable.all()
 
 
 def test_a_motion_does_not_start_inside_an_obstacle():

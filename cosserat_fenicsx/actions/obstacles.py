@@ -127,13 +127,18 @@ class Obstacle(Pressing, LineAction):
 
     @property
     def sticks(self):
-        """Friction force per length over the elastic slip, N/m^2."""
+        """Friction force per length over the elastic slip in motions, N/m^2."""
         return self.stiffness * _STICKS if self.stick is None else self.stick
 
     @property
     def memory(self):
         """See `Action`: of friction."""
         return tuple(action.vector(np.zeros(3), unit) for unit in ("m", "1", "N/m")) if self.friction else ()
+
+    @property
+    def finds_friction(self):
+        """See `Action`."""
+        return bool(self.friction)
 
     @property
     def evolve(self):
@@ -172,16 +177,16 @@ class Plane(Obstacle):
     penetration (per unit of reference length), and friction with its moment about the centreline. It is not multiplied
     by the load factor. A rod that touches at rest is held there from the start.
 
-    Friction depends on the path: the surface sticks, but for an elastic slip, until the friction force reaches
-    `friction` times the pressure. Loads are then applied in their order, and steps of the load factor must be short
-    enough to follow the slip.
+    Friction depends on the path: the surface sticks until the friction force reaches `friction` times the pressure.
+    Loads are then applied in their order, and steps of the load factor must be short enough to follow the slip.
 
     Args:
         point: a point of the plane, m, inertial.
         normal: towards the side where rods are, inertial.
         friction: coefficient of friction.
         stiffness: N/m^2: the penetration is the force per length over it.
-        stick: N/m^2: the elastic slip is the friction force per length over it; None for `stiffness`/100.
+        stick: N/m^2, of what sticks: in motions the elastic slip is the friction force per length over it; equilibria
+            have none, and it is what stability and modes see there. None for `stiffness`/100.
         rod: the rod that it acts on; None for all rods of the scene.
         contact_radius: of the rods' surfaces, m; None for that of their sections, which are `Circle` or `Tube`.
         law: None, or a `ContactLaw` in place of the pressure in proportion to the penetration, without friction.

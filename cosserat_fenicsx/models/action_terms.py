@@ -167,6 +167,16 @@ class ActionTerms:
         for term in self.terms:
             term.follow(delayed)
 
+    @property
+    def sticking(self):
+        """The terms with friction that is found with the state (`Action.finds_friction`)."""
+        return [term for term in self.terms if term.finds_friction]
+
+    def forget_friction(self):
+        """Return to the friction of the last accepted state."""
+        for term in self.sticking:
+            term.held[:] = term.accepted
+
     def commit(self):
         """Update the actions' memory to the state, which has been accepted."""
         for term in self.terms:
@@ -180,7 +190,7 @@ class Term:
     weight: Function: 1 where distributed actions act; 2 over the element length at the station of a point action,
     because the end-point rule gives each end half that length; 0 elsewhere. moves: whether any data depend on time;
     compiled_evolution: the compiled `evolution`; None without memory; acting: (action, rod) of those that depend on
-    time, with their values at the time of the last `put`.
+    time, with their values at the time of the last `put`; accepted: `held` of the last accepted state, or None.
     """
 
     def __init__(self, rods, signature, nodes, kind):
@@ -278,6 +288,7 @@ class Term:
         for k, function in enumerate(self.memory):
             for action, rod, rows, *_ in self._where:
                 function.x.array.reshape(-1, action.memory[k].size)[rows] = self._scaled(action.memory[k], rod)
+        self.accepted = self.held.copy() if self.finds_friction else None
         if self._rest is not None:
             self._rest.x.array.reshape(-1, 3)[numbers] = self._interpolated(model.reference[model.slots]) @ model.axes.T
         if self._frame is not None:
@@ -354,9 +365,37 @@ class Term:
 
     def commit(self):
         """Store the memory evaluated at the state."""
+        self._store(self.memory)
+        self.accepted = self.held.copy() if self.finds_friction else None
+
+    @property
+    def finds_friction(self):
+        return self._where[0][0].finds_friction
+
+    @property
+    def held(self):
+        """The array of the friction that is found with the state; writable."""
+        return self.memory[-1].x.array
+
+    def find_friction(self):
+        """Store the friction of the state, and no other memory; returns the largest elastic slip that has changed it,
+        dimensionless."""
+        before = self.held.copy()
+        self._store(self.memory[-1:])
+        changed = np.abs(self.held - before).reshape(-1, 3).max(axis=1)
+        return float((changed / self._arrays[-1][:, 0]).max(initial=0.0))
+
+    def stiffen(self, share):
+        """Multiply the stiffness against slip; 1 restores it."""
+        self._values = None
+        self.put(0.0)
+        self._arrays[-1][:] *= share
+
+    def _store(self, memory):
         sizes, cells = self.kind.memory, self._model._local_cells
         values = compat.evaluate(self.compiled_evolution, self._rods.mesh, cells).reshape(len(cells), -1, sum(sizes))
-        for function, part in zip(self.memory, np.split(values, np.cumsum(sizes)[:-1], axis=2), strict=True):
+        parts = np.split(values, np.cumsum(sizes)[:-1], axis=2)[-len(memory) :]
+        for function, part in zip(memory, parts, strict=True):
             function.x.array.reshape(-1, part.shape[2])[compat.cell_nodes(function.function_space)] = part
 
 

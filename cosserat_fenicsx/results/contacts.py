@@ -140,8 +140,8 @@ def _shares(path, i):
 
 
 def contacts_in_words(path):
-    """Sentences on what a result of obstacles leaves open: how far their stiffness lets rods in and slip, which is no
-    part of estimated errors; and what touches without pressing, which may lift off."""
+    """Sentences on what a result of obstacles leaves open: how far their stiffness lets rods in, which is no part of
+    estimated errors; and what touches without pressing, which may lift off."""
     if path.scene.stages:
         for stage, part in path.parts.items():
             yield from (f"{path.stage_label(stage)}: {sentence}" for sentence in contacts_in_words(part))
@@ -150,23 +150,15 @@ def contacts_in_words(path):
     for obstacle in path.scene.actions:
         if obstacle.gaps is None or not len(path):
             continue
-        told, depth = [], 0.0
+        depth = 0.0
         for rod, x in zip(path.scene.rods, path.layout.node_s(path.rule.nodes), strict=True):
             if obstacle.acts_on(rod):
                 gap, _ = _gaps(path, obstacle, rod, x)
                 depth = max(depth, -gap.min())
-        if obstacle.law is None and depth > 0:
-            told.append(f"lets rods in by up to {depth:.2g} m")
-        if obstacle.friction and path.counts_modes and obstacle.law is None:
-            slip = (
-                np.nanmax(np.linalg.norm(contacts_of(path, obstacle).friction, axis=2), initial=0.0) / obstacle.sticks
-            )
-            told.append(f"slip by up to {slip:.2g} m before it gives way")
-            depth = max(depth, slip)
-        if told and largest:
+        if depth > 0 and obstacle.law is None and largest:
             yield (
-                f"{describe(obstacle)} {' and '.join(told)}, {depth / largest:.1g} of the largest displacement: its "
-                "stiffness makes that, and estimated errors do not contain it."
+                f"{describe(obstacle)} lets rods in by up to {depth:.2g} m, {depth / largest:.1g} of the largest "
+                "displacement: its stiffness makes that, and estimated errors do not contain it."
             )
         yield from slanted(path, obstacle)
     yield from lifting(path)

@@ -98,6 +98,8 @@ class Action(Part, family="load or action", homes=("cosserat_fenicsx.scene.loads
         memory: internal variables, kept from one accepted state to the next: a `Datum` each, its initial value, passed
             to `work` after `data`.
         evolve: a static method ``(point, *data, *memory)`` -> a list of UFL expressions, the new values of the memory.
+        finds_friction: whether the last of its memory is a friction force that statics find with the state, by the
+            method of multipliers (`statics.path.track`). The last of its `data` is then the stiffness against slip.
         delayed: None; or a method that returns what depends on the earlier motion of its `station`, made for one
             motion: an object with `longest`, the longest step that it allows (s), `begin` (motion) at the time 0,
             `at` (t) -> {attribute: value}, of the action at a time in the next step, `accept` (t, h, motion) after a
@@ -136,7 +138,7 @@ class Action(Part, family="load or action", homes=("cosserat_fenicsx.scene.loads
 
     at_nodes, scaled, permanent, follows, memory, evolve, traits = False, True, False, False, (), None, None
     delayed, resists, touches, presses, gaps, in_law, is_thread = None, False, False, False, None, False, False
-    rods_touch = shortens = False
+    rods_touch = shortens = finds_friction = False
     amplitude = 1.0
 
     def acts_on(self, rod):

@@ -200,6 +200,13 @@ class Problem(Equations):
         self._residual.refresh()
         self.tangent_form.refresh()
 
+    def stiffen(self, share):
+        """Multiply the stiffness of rough obstacles against slip; 1 restores it."""
+        for term in self.model.actions.sticking:
+            term.stiffen(share)
+        self._residual.refresh()
+        self.tangent_form.refresh()
+
     def end_beginning(self):
         """Set the factor of permanent loads to 1 and the load factor to 0."""
         self.begins = False

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field, replace
 from typing import ClassVar
 
 import numpy as np
+from mpi4py import MPI
 
 from cosserat_fenicsx.algebra.building import module
 from cosserat_fenicsx.algebra.newton import LimitedNewton, Newton
@@ -20,6 +21,10 @@ NEAR = 0.1
 _SETTLED = 1e-10
 # Stiffness of obstacles over their own, in turn; tried where Newton's method does not converge.
 _STAGES = ((1.0,), (1e-4, 1e-3, 1e-2, 1e-1, 1.0))
+# Friction of obstacles: the elastic slip (rod lengths) that is none; most iterations; the factor by which the stiffness
+# against slip grows, and at most; Newton's iterations up to which the same places stick; the slip over that of a
+# failure below which the stiffness grows again; the largest factor by which a slip that falls is extrapolated.
+_STUCK, _MOST_STUCK, _STIFFER, _STIFFEST, _SAME, _CLOSER, _FALLS = 1e-11, 60, 10.0, 1e3, 2, 0.1, 0.99
 #: Motions below this are rounding (rad, rod lengths).
 NOTHING = 1e-8
 
@@ -117,6 +122,7 @@ class Track:
         """Return to the last accepted point. Always False, the result of a rejected step."""
         if self.touching:
             self.touching.recall(self.here.touches)
+        self.model.actions.forget_friction()
         self.put(self.here.numbers, self.here.load_factor)
         return False
 
@@ -132,9 +138,51 @@ class Track:
             self.iterations += solved.iterations
             self.failure = "" if solved.converged else solved.reason
             return solved
+        self.model.actions.forget_friction()
         self.put(numbers, load_factor)
         solved = self._solve(self.newton)
-        return solved if solved.converged or not self._touches else self._by_shares(numbers, load_factor, solved)
+        if not solved.converged and self._touches:
+            solved = self._by_shares(numbers, load_factor, solved)
+        return self._stuck(solved) if solved.converged and self.model.actions.sticking else solved
+
+    def _stuck(self, solved):
+        """Friction by which surfaces stick without an elastic slip, from a state with one; a `Solved`.
+
+        By the method of multipliers: the friction found with a stiffness against slip is where the next iteration
+        starts. It stays as it is where a surface that sticks has not slipped since the last accepted state and one that
+        slips has friction at its bound against the slip: the equations of Alart & Curnier (`touching.rubbing`). The
+        stiffness grows while Newton's method sees the same places stick, and falls where it fails.
+        """
+        problem, terms, first = self.problem, self.model.actions.sticking, solved.iterations
+        share, slip, refused, alike = 1.0, math.inf, math.inf, 0
+        for _ in range(_MOST_STUCK):
+            before, held, last = problem.numbers(), [term.held.copy() for term in terms], slip
+            slip = self.model.comm.allreduce(max(term.find_friction() for term in terms), op=MPI.MAX)
+            if slip < _STUCK:
+                break
+            if alike > 1 and slip < last:  # friction changes by a geometric series: its sum
+                alike, factor = 0, min(slip / last, _FALLS)
+                for term, friction in zip(terms, held, strict=True):
+                    term.held[:] += factor / (1 - factor) * (term.held - friction)
+            if solved.iterations <= _SAME and slip < _CLOSER * refused and share < _STIFFEST:
+                share, alike = share * _STIFFER, 0
+            problem.stiffen(share)
+            problem.put(before)
+            solved = self._solve(self.newton)
+            alike = alike + 1 if solved.iterations <= _SAME else 0
+            if not solved.converged:
+                if share <= 1.0:
+                    break
+                for term, friction in zip(terms, held, strict=True):
+                    term.held[:] = friction
+                share, refused, slip, alike = share / _STIFFER, slip, last, 0
+                problem.stiffen(share)
+                problem.put(before)
+        problem.stiffen(1.0)
+        if slip < _STUCK:  # what the stiffness has left of the balance of forces
+            return replace(self._solve(self.newton), iterations=first)  # those by which steps grow
+        self.failure = "friction has not settled"
+        return replace(solved, converged=False, reason=self.failure)
 
     def _by_shares(self, numbers, load_factor, failed):
         """Newton's method again where rods touch obstacles, with shares of steps where it alternates between contacts,
