@@ -1,7 +1,7 @@
 """Rods below a pipe, the pipe as a condition at their end, bits that come down on rock, and the demos."""
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -112,14 +112,70 @@ def test_linear_controls_above_a_rod():
         for name in ("drive_speed", "surface_torque"):
             true = np.interp(found.mean_times, whole.mean_times, getattr(whole, name))
             assert np.abs(getattr(found, name) - true).max() < 1e-3 * np.abs(true).max(), (name, filtered)
-    table = cf.drilling.TorqueOverTime(cf.signals.Ramp(1e3, 0.0, 1.0))
-    for control, speed, words in (
-        (cf.drilling.ZTorque(delay=0.02), 1.0, "delay = 0.02: expected 0 .s. above a rod; drilling.simulate has"),
-        (table, None, "control = .*expected one of continuous time above a rod, such as PI, .*drilling.simulate has"),
-    ):
-        drive = cf.drilling.TopDrive(speed, 100.0, control)
-        with pytest.raises(cf.SceneError, match=words):
-            cf.drilling.mixed_scene(replace(under(cf.drilling.Stiff(), 0.0), drive=drive), 250.0)
+    drive = cf.drilling.TopDrive(1.0, 100.0, cf.drilling.ZTorque(delay=0.02))
+    with pytest.raises(cf.SceneError, match="delay = 0.02: expected 0 .s. above a rod; drilling.simulate has"):
+        cf.drilling.mixed_scene(replace(under(cf.drilling.Stiff(), 0.0), drive=drive), 250.0)
+
+
+@dataclass(frozen=True)
+class HeldPI(cf.drilling.SampledControl):
+    """PI with the torque, or the speed, held over every sample, after a delay."""
+
+    by_speed: bool = False
+    sample: float = 0.04
+    delay: float = 0.016
+
+    of_speed = property(lambda self: self.by_speed)
+
+    def begin(self):
+        return (0.0,)
+
+    def torque(self, state, now):
+        summed = state[0] + self.sample * (now.asked - now.speed)
+        return 800 * (now.asked - now.speed) + 500 * summed, (summed,)
+
+    def speed(self, state, now):
+        return now.asked - now.torque / 800 - 0.01 * now.angle, state
+
+
+def test_sampled_controls_above_a_rod(tmp_path, monkeypatch):
+    """Torques and speeds of a control in Python are those of the string, and after an interruption the same digits."""
+
+    def moved(dt=2e-3, **more):
+        return cf.simulate(mixed.scene, 0.64, dt=dt, elements=2, degree=2, start=1.0, **more)
+
+    ramp = cf.drilling.TopDrive(None, 100.0, cf.drilling.TorqueOverTime(cf.signals.Ramp(3e3, 0.0, 0.4), sample=0.02))
+    pulled = replace(under(cf.drilling.Stiff(), 0.0), drive=ramp)
+    for scene in (under(HeldPI(), 100.0), under(HeldPI(True), 0.0), pulled):
+        mixed = cf.drilling.mixed_scene(scene, 250.0)
+        found, whole = mixed.as_drilling(moved()), cf.drilling.simulate(scene, 0.64, dt=1e-4, progress=False)
+        for name in ("drive_speed", "surface_torque", "bit_speed"):
+            true = np.interp(found.mean_times, whole.mean_times, getattr(whole, name))
+            assert np.abs(getattr(found, name) - true).max() < 3e-3 * np.abs(true).max(), (name, scene.drive)
+    with pytest.raises(cf.SceneError, match="sample = 0.02: expected a sample .* steps of one dt divide"):
+        moved(3e-3)
+    mixed = cf.drilling.mixed_scene(under(HeldPI(), 100.0), 250.0)
+    whole = moved()
+    stop_at(monkeypatch, 150, 0.0)
+    with pytest.raises(Stopped):
+        moved(folder=tmp_path / "kept")
+    assert np.array_equal(cf.resume(tmp_path / "kept", mixed.scene).energy, whole.energy)
+
+
+def test_an_autodriller_above_a_rod():
+    """The weight on a bit that drills rises as on the string by elements."""
+    driller = cf.drilling.Autodriller(weight=1e4, Kp=2e-7, Ki=2e-7, limits=(0, 0.02))
+    string = cf.well.DrillString((part(50.0, *COLLARS[1:]), part(250.0, *PIPE[1:])))
+    drive, bit = cf.drilling.TopDrive(lambda t: min(t, 1.0)), cf.drilling.BitOnRock(cf.drilling.RateLaw(14e6, 2e3))
+    for stiffness in (math.inf, 5e6):
+        scene = cf.drilling.Drilling(string, drive, bit, hook=cf.drilling.Hook(stiffness, autodriller=driller))
+        found = cf.drilling.mixed_scene(scene, 250.0).run(4.0, dt=4e-3, elements=2)
+        whole = cf.drilling.simulate(scene, 4.0, dt=1e-3, elements=100, progress=False)
+        assert found.weight_on_bit[-1] > 2e3
+        for name in ("hook_load", "weight_on_bit", "bit_velocity"):
+            true, late = np.interp(found.mean_times, whole.mean_times, getattr(whole, name)), found.times > 1
+            off, size = np.abs(getattr(found, name) - true)[late].max(), np.ptp(true)
+            assert off < 5e-3 * size, (name, off / size)
 
 
 def test_a_torque_that_drops_at_once():
@@ -172,14 +228,12 @@ def test_in_an_inclined_hole_it_lies_on_the_wall_and_hangs_in_the_pipe():
 def test_refusals():
     string = drilling()
     lobes = cf.drilling.BitOnRock(cf.drilling.Lobes(3, 5e-3), 2e4)
-    driller = cf.drilling.Hook(autodriller=cf.drilling.Autodriller(weight=1e4, Kp=2e-8, Ki=2e-9, limits=(0, 0.02)))
     for scene, depth, words in (
         (string, None, "depth = None: .*lowest DrillPipe"),
         (string, 3300.0, "depth = 3300.0: expected a depth .m. within the string"),
         (string, 0.0, "depth = 0.0: .*above 0 and below"),
         (replace(string, drag=cf.drilling.ViscousDrag(0.3)), 3000.0, "drag = .*the same rate"),
         (replace(string, bit=lobes), 3000.0, "rock_stiffness = inf: .*no impulses stop the end of a rod"),
-        (replace(string, hook=driller), 3000.0, "hook = .*without an autodriller"),
     ):  # fmt: skip
         with pytest.raises(cf.SceneError, match=words):
             cf.drilling.mixed_scene(scene, depth)

@@ -63,7 +63,6 @@ class MixedScene(InWords):
     why: tuple
     drilling: Drilling
     _string: StringScene | None = field(default=None, repr=False)
-    _hook_load: float = 0.0
 
     def sentences(self, units: Units):
         """On the rod, what the model leaves out, and the drill-string that it was made of, in some units."""
@@ -147,7 +146,7 @@ class MixedScene(InWords):
             "times": times[1:], "drive_speed": far[:, 2], "drive_angle": np.cumsum(far[:, 2] * dt),
             "surface_torque": far[:, 3], "bit_speed": turned / dt, "bit_angle": np.cumsum(turned),
             "torque_on_bit": on_bit[:, 3],
-            "hook_load": self._hook_load - far[:, 1], "bit_velocity": moved / dt, "bit_advance": np.cumsum(moved),
+            "hook_load": self.above.at_rest[0] - far[:, 1], "bit_velocity": moved / dt, "bit_advance": np.cumsum(moved),
             "weight_on_bit": on_bit[:, 1],
         }  # fmt: skip
         ends = np.array([0.0, self.depth, self.drilling.bit_depth])
@@ -177,7 +176,7 @@ def mixed_scene(drilling: Drilling, depth: float | None = None, *, wall_damping:
 
     Raises:
         SceneError: discs, a depth outside the string, a bent housing below the depth, drags of torsion and of axial
-            motion that differ, a start in steady rotation, an autodriller, or what `BitAtEnd` refuses.
+            motion that differ, a start in steady rotation, or what `BitAtEnd` refuses.
     """
     instance("mixed_scene", "drilling", drilling, Drilling, "a Drilling")
     if not hasattr(drilling.string, "components"):
@@ -185,8 +184,6 @@ def mixed_scene(drilling: Drilling, depth: float | None = None, *, wall_damping:
     for joint in drilling.joints:
         refuse("mixed_scene", "drilling.string", joint.tool, "a string without MudMotor and OscillationTool, which "
                "part it: a Collar in its place; drilling.simulate has them")  # fmt: skip
-    if drilling.hook is not None and drilling.hook.autodriller is not None:
-        refuse("mixed_scene", "drilling.hook", drilling.hook, "a Hook without an autodriller, in motions of a rod")
     if drilling.start != "rest":
         refuse("mixed_scene", "drilling.start", drilling.start, "'rest', from which the rod starts")
     top = _depth(drilling, depth)
@@ -213,9 +210,10 @@ def mixed_scene(drilling: Drilling, depth: float | None = None, *, wall_damping:
     whole = [np.array([0.0, *(place.bottom for place, _ in parts)]), np.array([top, *(part[1] for part in below)])]
     heights = [np.diff(_axis(drilling, md)[0][:, 2]) for md in whole]
     hanging = float(weight @ heights[1]) - on_bit
+    hook_load = float(np.array([x.weight for _, x in parts]) @ heights[0]) - on_bit
     rough = drilling.hole and (drilling.friction or any(x.friction for x in drilling.hole.sections))
     pipe = PipeAbove(rod.start, tuple(above), drilling.drive, drilling.hook, hanging, drilling.drag,
-                     drilling if rough else None, follows_the_bit(drilling))  # fmt: skip
+                     drilling if rough else None, follows_the_bit(drilling), (hook_load, on_bit))  # fmt: skip
     resting = replace(pipe, follows=False)
     weights = LineForce(rod, AlongPieces(weights) if len(weights) > 1 else weights[0][1])
     thrust = [Force(rod.end, tuple(-on_bit * along))] if on_bit else []
@@ -231,10 +229,7 @@ def mixed_scene(drilling: Drilling, depth: float | None = None, *, wall_damping:
         wall, *rings = still
         string = StringScene(drilling.hole.path, at_rest, rod, None, wall, tuple(rings), tuple(sections), ends, weight,
                              -on_bit * along, wall.clearance, 0.0, "at rest without friction", top)  # fmt: skip
-    hook_load = float(np.array([x.weight for _, x in parts]) @ heights[0]) - on_bit
-    return MixedScene(
-        scene, at_rest, rod, pipe, bit, top, tuple(_why(drilling, top, damping)), drilling, string, hook_load
-    )
+    return MixedScene(scene, at_rest, rod, pipe, bit, top, tuple(_why(drilling, top, damping)), drilling, string)
 
 
 def _section(part, segment):

@@ -13,16 +13,17 @@ them, which amplifies no wave where steps are even (Laakso et al., IEEE Signal P
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 import ufl
 
 from cosserat_fenicsx.checks import positive, refuse, store
 from cosserat_fenicsx.drilling.linear_control import arrays_of, check_answer
-from cosserat_fenicsx.drilling.wall_friction import PipeFriction, ViscousDrag
 from cosserat_fenicsx.drilling.scene import Drilling, Segment, segment_of
-from cosserat_fenicsx.drilling.top_drive import DriveControl, Hook, StateSpace, TopDrive
+from cosserat_fenicsx.drilling.signals import ScalarSignal
+from cosserat_fenicsx.drilling.top_drive import DriveControl, Gains, Hook, Sample, Sampler, StateSpace, TopDrive
+from cosserat_fenicsx.drilling.wall_friction import PipeFriction, ViscousDrag
 from cosserat_fenicsx.parts import ForceSize
 from cosserat_fenicsx.scene.action import PointAction, scalar, vector
 from cosserat_fenicsx.scene.rod import Station, StationOrName, is_known
@@ -31,6 +32,8 @@ from cosserat_fenicsx.well.components import Laid, StringPart
 # Drag and friction act at nodes, so many in the pipe (errors of 3e-4 at a rate of 0.3 per s in 3000 m), or one in each
 # of these lengths (m) of a short one.
 _BEADS, _APART = 64, 15.0
+# Parts of a sample to which the delay of a control is rounded.
+_FINE = 1000
 
 
 @dataclass(frozen=True)
@@ -44,7 +47,8 @@ class PipeAbove(PointAction):
     energy balance it counts as work of the loads. At rest it is the spring of the pipe between the rod and a held top.
 
     The steps are at most half the travel time of a wave through the shortest part of the pipe; longer ones are halved.
-    Only the schemes that step forwards can take it, and only the spatial model.
+    Only the schemes that step forwards can take it, and only the spatial model. A control that is called once a sample,
+    of the drive or an autodriller of the hook, needs steps of one `dt` that its sample and its delay are multiples of.
 
     Args:
         station: `rod.start` or `rod.end`; the pipe continues from there, away from the rod.
@@ -60,6 +64,7 @@ class PipeAbove(PointAction):
             a pipe without a wall. Curvature of the hole does nothing else to its waves.
         follows: whether the load of the hook stays as at the start, so that the string follows a bit that drills;
             without a hook.
+        at_rest: hook load and weight on bit in the reference, N, which controls that are called once a sample see.
 
     Raises:
         SceneError: a part of the wrong kind, a station inside the rod, or a number out of range.
@@ -73,6 +78,7 @@ class PipeAbove(PointAction):
     drag: ViscousDrag | None = None
     rubs: Drilling | None = None
     follows: bool = False
+    at_rest: tuple[float, float] = (0.0, 0.0)
 
     scaled = False
 
@@ -93,7 +99,7 @@ class PipeAbove(PointAction):
 
     def _found_numbers(self):
         """Further numbers that the motion depends on, for the fingerprint of a scene; functions of time by samples."""
-        hook, drag = self.hook or Hook(), self.drag or ViscousDrag()
+        hook, drag, control = self.hook or Hook(), self.drag or ViscousDrag(), self.drive.control
         gains = _gains(self.drive, self.segments[0].torsional_impedance)
         found = [x for part in self.segments for x in (part.length, part.GJ, part.rhoJ, part.EA, part.rhoA)]
         found += [
@@ -102,7 +108,13 @@ class PipeAbove(PointAction):
         if gains.linear is not None:
             found += [*np.concatenate([x.ravel() for x in arrays_of(gains.linear)]), gains.linear.of_speed]
             found.append(gains.linear.level or 0.0)
-        for signal in (self.drive.signal(), hook.signal()):
+        signals = [self.drive.signal(), hook.signal()]
+        for called in filter(None, (control if control.sampled else None, hook.autodriller)):
+            given = (getattr(called, x.name) for x in fields(called))
+            found += [y for x in given for y in np.ravel(x).tolist() if isinstance(y, int | float)]
+        if hook.autodriller is not None:
+            signals.append(hook.autodriller.signal())
+        for signal in signals:
             found += [signal(t) for t in (0.0, 1.0, 10.0)]
         return tuple(found)
 
@@ -161,14 +173,24 @@ class _InMotion:
             count = np.ceil(lengths / apart - 1e-9).astype(int)
         axial = [(x.axial_impedance, x.length / x.axial_speed) for x in parts]
         torsional = [(x.torsional_impedance, x.length / x.torsional_speed) for x in parts]
-        self._lines = (
-            _lines(axial, count, drag.axial, TopEnd(None) if pipe.follows else _hook_end(pipe.hook or Hook())),
-            _lines(torsional, count, drag.torsion, _drive_end(pipe.drive, parts[0].torsional_impedance)),
+        hook, control = pipe.hook or Hook(), pipe.drive.control
+        self._samplers = {}
+        if control.sampled:
+            name = "speed" if control.of_speed else "torque"
+            self._samplers["drive"] = _sampler(control, name, pipe.drive.signal())
+        if hook.autodriller is not None:
+            self._samplers["hook"] = _sampler(hook.autodriller, "speed", ScalarSignal(hook, "speed", 0.0, "m/s"))
+        ends = (
+            TopEnd(None) if pipe.follows else _hook_end(hook, self._samplers.get("hook")),
+            _drive_end(pipe.drive, parts[0].torsional_impedance, self._samplers.get("drive")),
         )
+        rates = drag.axial, drag.torsion
+        self._lines = [_lines(x, count, *more) for *more, x in zip(rates, ends, (axial, torsional), strict=True)]
         depths = np.append(0.0, np.cumsum(np.repeat(lengths / count, count)))
         self._friction = PipeFriction(rubs, depths) if rubs else None
         self._damping = tuple(line.dashpot for line in self._lines)
-        self.longest = min(line.longest for line in self._lines)
+        samples = (x.sample / 2 for x in (control, hook.autodriller) if x and x.sampled)
+        self.longest = min(*(line.longest for line in self._lines), *samples)
 
     def begin(self, motion):
         # the pipe starts in the equilibrium of its springs, with the motion of its end
@@ -179,6 +201,19 @@ class _InMotion:
         torsional.begin(self._about(motion), -c * (motion.rotation @ self._down))
         if self._friction:
             self._friction.begin(thrust)
+        for name, sampler in self._samplers.items():
+            (speed, force), of_speed = self._lines[name == "drive"].at_top, sampler.of_speed
+            sampler.start(speed if of_speed else force)
+        self._sample(0.0)
+
+    def _sample(self, t):
+        """Let controls take the samples that are due at a time (s)."""
+        self._before = {name: sampler.memory() for name, sampler in self._samplers.items()}
+        (velocity, thrust), (_, torque) = (line.at_top for line in self._lines)
+        (hook_load, weight), turning = self._pipe.at_rest, self._lines[1]
+        seen = Sample(t, 0.0, turning.speed, turning.passed, torque, hook_load - thrust, weight + thrust, velocity)
+        for sampler in self._samplers.values():
+            sampler.reach(t, lambda: seen)
 
     def _about(self, motion):
         return motion.angular_velocity @ (motion.R @ self._down)
@@ -197,6 +232,7 @@ class _InMotion:
             line.advance(t, h, speed, force)
         if self._friction:
             self._friction.take(self._lines[0].inner)
+        self._sample(t + h)
 
     def far_end(self):
         return np.ravel([line.at_top for line in self._lines])
@@ -209,12 +245,14 @@ class _InMotion:
     def undo(self):
         for part in self._parts.values():
             part.undo()
+        for name, sampler in self._samplers.items():
+            sampler.recall(self._before[name])
 
     def memory(self):
-        return {name: part.memory() for name, part in self._parts.items()}
+        return {name: part.memory() for name, part in (self._parts | self._samplers).items()}
 
     def recall(self, memory):
-        for name, part in self._parts.items():
+        for name, part in (self._parts | self._samplers).items():
             part.recall(memory[name])
 
 
@@ -226,25 +264,31 @@ def _lines(parts, pieces, rate, end):
     return DelayLines(impedance, time, np.append(half, 0.0) + np.append(0.0, half), end)
 
 
-def _hook_end(hook):
+def _sampler(control, name, asked):
+    return Sampler(control, name, control.sample / _FINE, asked)
+
+
+def _hook_end(hook, sampler):
+    """The hook, whose autodriller, if it has one, commands the speed downwards by a `Sampler`."""
     mean, rigid = hook.signal().mean, math.isinf(hook.stiffness)
-    return TopEnd(lambda start, end: -mean(start, end), stiff=rigid, Ki=0.0 if rigid else hook.stiffness)
+    down = sampler.mean if sampler else lambda start, end: -mean(start, end)
+    return TopEnd(down, stiff=rigid, Ki=0.0 if rigid else hook.stiffness)
 
 
 def _gains(drive, impedance):
     control = drive.control
     if control.sampled:
-        refuse("TopDrive", "control", control, "one of continuous time above a rod, such as PI, Matched, ZTorque or "
-               "LinearControl; drilling.simulate has those that are called once a sample")  # fmt: skip
+        return Gains(rigid=control.of_speed)
     if control.late:
         refuse(control, "delay", control.late, "0 (s) above a rod; drilling.simulate has controls that act late")
     return control.gains(impedance)
 
 
-def _drive_end(drive, impedance):
+def _drive_end(drive, impedance, sampler):
     rigid, given, Kp, Ki, linear = _gains(drive, impedance)
-    return TopEnd(drive.signal().mean, stiff=rigid, inertia=drive.inertia, Kp=Kp, Ki=Ki, given=given,
-                  control=drive.control, linear=linear)  # fmt: skip
+    asked = sampler if sampler and rigid else drive.signal()
+    return TopEnd(asked.mean, stiff=rigid, inertia=drive.inertia, Kp=Kp, Ki=Ki, given=given,
+                  control=drive.control, linear=linear, sampler=sampler)  # fmt: skip
 
 
 # Samples of an interpolation; least travel time of a part over the step, so that all of them are known.
@@ -261,7 +305,8 @@ class TopEnd:
 
     Args:
         mean: function (start, end) of times (s) that gives the mean of the speed Om asked for; None for the force of
-            the start. inertia: I. given: M0. linear: a `StateSpace` of the control; None for Kp and Ki.
+            the start. inertia: I. given: M0. linear: a `StateSpace` of the control; None for Kp and Ki. sampler: of a
+            control that is called once a sample, whose torque comes in the place of M0.
     """
 
     mean: Callable[[float, float], float] | None
@@ -272,6 +317,7 @@ class TopEnd:
     given: float = 0.0
     control: DriveControl | None = None
     linear: StateSpace | None = None
+    sampler: Sampler | None = None
 
     def rest(self, speed, force):
         """(om, phi) at the beginning of a motion, for a speed and a force handed down; phi balances that force without
@@ -297,7 +343,8 @@ class TopEnd:
         if self.stiff:
             return asked, (asked, 0.0)
         inert, turned = 2 * self.inertia / h, self.Ki * h / 2
-        push = inert * om + self.Ki * phi + self.given - wave + (self.Kp + turned) * asked
+        given = self.sampler.command if self.sampler else self.given
+        push = inert * om + self.Ki * phi + given - wave + (self.Kp + turned) * asked
         mean = push / (inert + self.Kp + turned + impedance)
         return mean, (2 * mean - om, phi + h * (asked - mean))
 
@@ -326,8 +373,6 @@ class DelayLines:
             nodes. top: a `TopEnd`.
     """
 
-    at_top = (math.nan, math.nan)
-
     def __init__(self, impedance, time, drag, top):
         self._Z, self._time, self._drag = (np.array(x, dtype=float) for x in (impedance, time, drag))
         self._top, self._parts = top, len(self._Z)
@@ -346,8 +391,15 @@ class DelayLines:
         down, up = force + self._Z * speed, force - self._Z * speed
         self._first = np.concatenate([down, up])
         self._state = self._top.rest(speed, force)
+        #: speed and force of the upper end, means over the last step, and the integral of the speed since the start
+        self.at_top, self.passed = (speed, force), 0.0
         self._take(np.empty(0), np.empty((0, 2 * self._parts)))
-        self._before = self._state
+        self._before = self._state, self.at_top, self.passed
+
+    @property
+    def speed(self):
+        """Of the upper end, at the end of the last step if a body is there, else its mean in it."""
+        return self._state[0] if self._top.inertia and not self._top.stiff else self.at_top[0]
 
     def arriving(self, t):
         """The wave at the lower end at a time (s): the force there is this minus `dashpot` times its speed."""
@@ -384,12 +436,13 @@ class DelayLines:
         """Accept a step from t to t + h (s) with this mean speed of the lower end; held: friction at inner nodes."""
         above, below = self._arrived(t, h)
         Z, speeds = self._Z, np.empty(self._parts + 1)
-        self._before = self._state
+        self._before = self._state, self.at_top, self.passed
         speeds[0], self._state = self._top.step(self._state, t, t + h, Z[0] + self._drag[0], below[0])
         speeds[1:-1] = (above[:-1] - below[1:] - held) / (Z[:-1] + Z[1:] + self._drag[1:-1])
         speeds[-1] = speed
-        #: speed and force of the upper end; forces at the inner nodes, means of both sides
         self.at_top = speeds[0], below[0] + (Z[0] + self._drag[0]) * speeds[0]
+        self.passed += h * speeds[0]
+        #: forces at the inner nodes, means of both sides
         self.inner = (above[:-1] + below[1:] + (Z[1:] - Z[:-1]) * speeds[1:-1]) / 2
         self._append(t + h / 2, np.concatenate([below + 2 * Z * speeds[:-1], above - 2 * Z * speeds[1:]]))
 
@@ -409,16 +462,19 @@ class DelayLines:
     def undo(self):
         """Take back the last step."""
         self._count -= 1
-        self._state = self._before
+        self._state, self.at_top, self.passed = self._before
 
     def memory(self):
         """All that later steps depend on."""
         n = self._count
-        arrays = {"times": self._times[:n], "values": self._values[:n], "first": self._first}
-        return {name: np.array(x) for name, x in (arrays | {"state": self._state, "before": self._before}).items()}
+        arrays = {"times": self._times[:n], "values": self._values[:n], "first": self._first, "state": self._state,
+                  "before": self._before[0], "top": [*self.at_top, self.passed]}  # fmt: skip
+        return {name: np.array(x) for name, x in arrays.items()}
 
     def recall(self, memory):
         """Restore the result of `memory`."""
         self._take(memory["times"], memory["values"])
         self._first = memory["first"].copy()
-        self._state, self._before = (tuple(memory[name].tolist()) for name in ("state", "before"))
+        *self.at_top, self.passed = memory["top"].tolist()
+        self._state, before = (tuple(memory[name].tolist()) for name in ("state", "before"))
+        self._before = before, self.at_top, self.passed

@@ -194,18 +194,22 @@ class Sampler:
         asked: the `ScalarSignal` of the speed asked for.
 
     Attributes:
-        every: steps between samples. command: the one that acts.
+        every: steps between samples. command: the one that acts. of_speed: whether it is a speed.
     """
 
     constant, jumps = False, ()
 
     def __init__(self, control, name, dt, asked, first=0.0):
-        self._control, self._name, self._signal = control, name, asked
-        self._dt, self.command = dt, first
-        self.every = round(control.sample / dt)
+        self._control, self._name, self._signal, self._dt = control, name, asked, dt
+        self.every, self.of_speed = round(control.sample / dt), name == "speed"
         self._whole, self._after = divmod(round(control.delay / dt), self.every)
+        self.start(first)
+
+    def start(self, first: float) -> None:
+        """Begin anew, with the command before the first one acts."""
+        self.command, self._next = first, 0
         self._waiting, self._line = [], (0.0, first, 1.0, first)
-        self._state = self._numbers("begin", control.begin())
+        self._state = self._numbers("begin", self._control.begin())
 
     def left(self, step: int) -> int:
         """Steps from a step on to the next one at which a sample is taken or a command begins to act."""
@@ -224,6 +228,21 @@ class Sampler:
             start = step * self._dt
             self._line = start, self(start), start + self.every * self._dt, self._waiting[0]
             self.command = self._waiting.pop(0)
+
+    def reach(self, t: float, now) -> None:
+        """Take what samples, and let what commands act, are due at a time (s) at which a step ends, in motions whose
+        steps are not those of `dt`; `now` as of `at`.
+
+        Raises:
+            SceneError: as of `at`; or one was due within the step.
+        """
+        while (late := t - self._next * self._dt) >= -1e-3 * self._dt:
+            if late > 1e-3 * self._dt:
+                where = f", at t = {self._next * self._dt:g} s"
+                refuse(self._control, "sample", self._control.sample, "a sample (s), and a delay, that steps of one dt "
+                       f"divide: here a step goes beyond one{where}; or another dt, without tol")  # fmt: skip
+            self.at(self._next, now)
+            self._next += self.left(self._next)
 
     def __call__(self, t: float) -> float:
         """The speed at a time (s), linear from one command to the next."""
@@ -253,12 +272,13 @@ class Sampler:
     def memory(self) -> dict:
         """All that later samples depend on."""
         now = {"state": self._state.copy(), "waiting": np.array(self._waiting), "line": np.array(self._line)}
-        return now | {"command": self.command}
+        return now | {"command": self.command, "next": self._next}
 
     def recall(self, memory: dict) -> None:
         """Restore the result of `memory`."""
         self._state, self.command = memory["state"].copy(), float(memory["command"])
         self._waiting, self._line = memory["waiting"].tolist(), tuple(memory["line"].tolist())
+        self._next = int(memory["next"])
 
 
 def divided(control, dt: float, given: bool) -> float | None:
