@@ -169,6 +169,30 @@ def test_a_motor_by_its_chart(model, dt):
     assert rows[1].stalled[-1] and "THE MOTOR STALLS" in str(rows[1])
 
 
+@pytest.mark.parametrize(("model", "dt"), [("torsion", 2e-4), ("axial and torsional", 4e-4)])
+def test_a_motor_by_its_chart_whose_flow_changes(model, dt):
+    """From its steady state at one flow to that at another; by charts of the linear motor as that one, step by step."""
+    ramp = cf.signals.Table((0.0, 0.1, 0.3), (GIVEN["Q"], GIVEN["Q"], 0.03))
+    law, drag = Rising(1e3, 200.0), ViscousDrag(torsion=40.0)
+
+    def moved(tool, until):
+        scene = above(tool, law=law, drag=drag, start="steady")
+        return cf.drilling.simulate(scene, until, model=model, dt=dt, progress=False)
+
+    found = moved(motor(leakage=None, curves=CHART, flow=ramp), 2.5)
+    still = moved(motor(leakage=None, curves=CHART, flow=0.03), 0.01)
+    for name, near in (("motor_speed", 1e-9), ("pressure", 1e-8), ("torque_on_bit", 1e-9)):  # which the curve amplifies
+        assert getattr(found, name)[-1] == pytest.approx(getattr(still, name)[0], rel=near), name
+    assert found.motor_speed[0] > 1.2 * still.motor_speed[0]
+    assert abs(found.balance[-1]) < 1e-6 * found.work_of_tools[-1]
+    line, charts = motor(flow=ramp), []
+    for q in (0.03, 0.035, GIVEN["Q"]):
+        ends = replace(line, flow=q)
+        charts.append(MotorCurve(q, [ends.speed(0.0), 0.0], [0.0, ends.stall_torque()]))
+    rows = [moved(x, 0.5) for x in (line, motor(leakage=None, curves=charts, flow=ramp))]
+    assert rows[1].motor_speed == pytest.approx(rows[0].motor_speed, rel=1e-7)
+
+
 def test_the_ends_of_a_chart():
     """Between two flows it is steepest where it ends; from the torque of a stall on it is straight, however flat."""
     pair = [MotorCurve(0.03, [7, 6, 0], [0, 3e3, 6e3]), MotorCurve(0.04, [9, 8, 0], [0, 3.1e3, 7e3])]
@@ -327,7 +351,7 @@ def test_tool_that_halves_the_pull(truth):
     (lambda: motor(leakage=0.0), "MudMotor.leakage"),
     (lambda: motor(curves=CHART), "MudMotor.leakage = .*: expected either a leakage"),
     (lambda: motor(leakage=None, curves=CHART, flow=0.05), "MudMotor.flow = 0.05: .*, 0.02 to 0.04 m.3/s"),
-    (lambda: motor(leakage=None, curves=CHART, flow=Switched(0.04, 0.03, 1.0)), "MudMotor.flow = .*: .* a number"),
+    (lambda: motor(leakage=None, curves=CHART, flow=Switched(0.04, 0.01, 1.0)), "MudMotor.flow = 0.01: .*0.02 to"),
     (lambda: motor(leakage=None, curves=CHART[::-1]), "MudMotor.curves = .*of ascending flow"),
     (lambda: motor(leakage=None, curves=[MotorCurve(0.04, [10.0, 0.0], [0.0, 1e4])]), "at most 9.37.* without any"),
     (lambda: MotorCurve(0.04, [9.0, 7.0, 8.0, 0.0], [0.0, 1e3, 2e3, 3e3]), "MotorCurve.speeds = .*which fall .* to 0"),

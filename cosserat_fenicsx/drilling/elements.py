@@ -182,7 +182,7 @@ class AxialTorsional(StringModel):
         m.pairs = len(joints)
         m.motor = next((p for p, (_, _, joint) in enumerate(joints) if joint.turns), -1)
         if m.motor >= 0:
-            self._put_curve(m.drives, self.scene.motor)
+            self._of_motor = self._put_curve(m.drives, self.scene.motor)
         for name, values in (("pair", [x[0] for x in joints]), ("pair_dof", [x[1] for x in joints])):
             self._array(m, name, np.array(values, dtype=np.int32))
         for name in ("damping", "lost"):
@@ -319,10 +319,12 @@ class AxialTorsional(StringModel):
         varying = [(p, joint.force) for p, (*_, joint) in enumerate(self._chain.joints) if not joint.force.constant]
         begin = [] if not varying else self._begin(parts)
         for p, force in varying:  # of forces the means, as they oscillate
-            means = [force.mean(t, t + length) for t, length in zip(begin, parts[:, 0], strict=True)]
             for column in (1 + self._dofs + p, 1 + self._dofs + p + len(self._signals)):
-                parts[:, column] = means
-        for part in [parts] if self.end is None else parts[:, None]:
+                parts[:, column] = _means(force, begin, parts)
+        flow = next((force.flow for p, force in varying if p == self._m.motor), None)
+        curves, _ = self._of_intervals = self._put_curves(_means(flow, begin, parts) if flow else ())
+        for k, part in enumerate([parts] if self.end is None else parts[:, None]):
+            self._m.over = curves + k if curves else curves
             if self.end is not None:
                 self._take(self.end.begin(self, part[0, 0]))
             cast, out = self._ffi.cast, rows[self.steps - start :]
@@ -440,6 +442,11 @@ class AxialTorsional(StringModel):
             yield from _of_rock(scene, self.depths, self.dt)
         if follows_the_bit(scene):
             yield "without a Hook its load stays the same: the string follows the bit that drills"
+
+
+def _means(signal, begin, parts):
+    """Means of a signal over parts of steps, rows of which the first number is a length, s, and that begin at times."""
+    return [signal.mean(t, t + length) for t, length in zip(begin, parts[:, 0], strict=True)]
 
 
 def _of_rock(scene, depths, dt):

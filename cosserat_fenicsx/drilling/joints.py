@@ -81,7 +81,8 @@ class _Driven(ScalarSignal):
 
     def __init__(self, motor, *flow):
         super().__init__(motor, *flow)
-        self._motor = motor
+        #: m^3/s
+        self.flow, self._motor = ScalarSignal(motor, *flow), motor
 
     def __call__(self, t):
         return self._motor.driven(self._motor.flow_at(t))
@@ -92,7 +93,9 @@ def fastest_rotor(scene) -> float:
     joint = next((x for x in scene.joints if x.turns), None)
     if joint is None:
         return 0.0
-    return joint.tool.speed(0.0) if joint.tool.curves else max(0.0, (joint.force.largest - joint.lost) / joint.damping)
+    if not joint.tool.curves:
+        return max(0.0, (joint.force.largest - joint.lost) / joint.damping)
+    return max(joint.tool.speed(0.0, joint.tool.flow_at(t)) for t in (0.0, *joint.force.jumps))
 
 
 def speed_of_bit(scene, turning, down=None, rubbed=None):

@@ -72,14 +72,27 @@ class StringModel(Pointers):
         array = self._kept[name] = np.array(values, dtype=np.int32 if whole else float, order="C")
         setattr(record, name, (self.integers if whole else self.doubles)(array))
 
-    def _put_curve(self, curve, motor):
-        """Give C the torque of a `MudMotor` with curves over the speed of its rotor, less that at rest."""
-        if motor.curves:
-            shape = motor.law.c.T.copy()
-            shape[:, 3] -= motor.driven()
-            self._array(curve, "knots", motor.law.x)
-            self._array(curve, "cubics", shape)
-            curve.count = len(shape)
+    def _put_curve(self, curve, motor, flow=None):
+        """Give C the torque of a `MudMotor` with curves over the speed of its rotor, less that at rest; flow: m^3/s,
+        None for its own at the start. Returns the arrays, which C does not own."""
+        if not motor.curves:
+            return None
+        law = motor.law if flow is None else motor.law_at(flow)
+        shape = law.c.T.copy()
+        shape[:, 3] -= law(0.0)
+        arrays = np.ascontiguousarray(law.x), np.ascontiguousarray(shape)
+        curve.knots, curve.cubics = map(self.doubles, arrays)
+        curve.count = len(shape)
+        return arrays
+
+    def _put_curves(self, flows):
+        """(curves for C, at the flows (m^3/s) of steps, and the arrays that they point to), of a `MudMotor` with curves
+        whose flow changes; None for others."""
+        motor = self.scene.motor
+        if motor is None or not motor.curves or not callable(motor.flow):
+            return self._ffi.NULL, None
+        each = self._ffi.new("curve[]", len(flows))
+        return each, [self._put_curve(one, motor, float(flow)) for one, flow in zip(each, flows, strict=True)]
 
     def _sample_torque(self, drive, top, first=0.0):
         """Take the samples of a drive's control; `top`: C's record that holds the torque `given` by the drive; `first`:

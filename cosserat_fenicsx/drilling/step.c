@@ -325,6 +325,7 @@ int advance_elements(model *m, int intervals, const double *interval, const doub
     for (int i = 0; i < intervals; i++, interval += 2 + 2 * all) {
         const double h = interval[0];
         if (weights) m->bit.weight = *weights;
+        if (m->over) m->drives = m->over[i];
         double from[2 + MOST_PAIRS], to[2 + MOST_PAIRS];
         memcpy(from, interval + 1, all * sizeof *from);
         memcpy(to, interval + 1 + all, all * sizeof *to);

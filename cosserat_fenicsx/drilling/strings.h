@@ -72,6 +72,7 @@ typedef struct {
     double slope, dragged;                   /* of a motor above the bit: torque over speed, 0: none; drag below */
     double lost;                             /* largest torque of the friction of its rotor */
     curve motor;                             /* its torque over its speed, less that at rest; empty: a line */
+    const curve *motors;                     /* the same in each of the steps asked for, where its flow changes */
     const double *driven;                    /* torque that its flow gives it at rest, in each of the steps asked for */
     double bit_angle, turned, last_turned;   /* of the bit below a motor; its speed against the housing, see `speed` */
     double tools;                            /* work of the motor since the start, J */
@@ -140,6 +141,7 @@ typedef struct {
     const double *pair_slope;       /* (pairs,) dampers, which count as tools; signals follow those of the top */
     const double *pair_lost;        /* (pairs,) largest friction between both sides */
     curve drives;                   /* torque of a motor over its speed, less that at rest; empty: a line */
+    const curve *over;              /* the same in each of the intervals asked for, where its flow changes */
     double bends, softens;          /* what it adds to that of its damper, by value at rest and slope */
     double applied[6];              /* forces of the last step, friction included */
     double rubbed[6], rubs[6];      /* friction between both sides; that which is a given force */

@@ -335,7 +335,7 @@ class TorsionWaves(StringModel):
         c.bit_inertia = self._bit_inertia
         if scene.motor is not None:
             c.slope, c.lost = scene.motor.slope, scene.motor.lost_torque
-            self._put_curve(c.motor, scene.motor)
+            self._of_motor = self._put_curve(c.motor, scene.motor)
             c.dragged = scene.drag_rates[1] * scene.turned_inertia
         self._laws = [InC(self._ffi, self._wall)]
         self._laws[0].fill(c.wall)
@@ -387,6 +387,8 @@ class TorsionWaves(StringModel):
         if self._driven is not None:
             driven = means(self._driven, self.steps, steps, dt)
             self.c.driven = buffer("double[]", driven)
+            flows = () if self._driven.constant else means(self._driven.flow, self.steps, steps, dt)
+            self.c.motors, _ = self._of_steps = self._put_curves(flows)  # which C does not own
         rows = buffer("double[]", rows, require_writable=True)
         self.steps += self._lib.advance_waves(
             self.c, steps, buffer("double[]", speeds), self._weights(self.steps, steps), rows

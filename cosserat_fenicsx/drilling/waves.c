@@ -227,6 +227,7 @@ int advance_waves(waves *w, int steps, const double *speeds, const double *weigh
     for (int k = 0; k < steps; k++) {
         double P = w->down[0], kinetic, strain;
         if (weights) press(w, weights[k]);
+        if (w->motors) w->motor = w->motors[k];
         drive(w, speeds[k]);
         w->down[0] = w->up[0] + 2 * w->below[0] * w->speed[0];
         end(w, between(w, P), w->slope > 0 ? w->driven[k] : 0);

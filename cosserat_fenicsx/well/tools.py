@@ -46,6 +46,8 @@ from cosserat_fenicsx.well.components import Collar, DrillString
 
 # Inner diameter of a housing over the outer one, where it is not given.
 _BORE = 0.6
+# Laws of a motor at so many flows are kept.
+_KEPT = 4096
 # Larger ones than tools have: displacement a revolution (m^3), flow (m^3/s), stroke (m).
 _MOST_A_TURN, _MOST_FLOW, _LONGEST_STROKE = 0.2, 0.2, 0.1
 
@@ -131,7 +133,7 @@ class MudMotor(_Tool):
         leakage: flow past the seals per pressure over the motor, m^3/(s Pa); None with curves.
         curves: a `MotorCurve` or several, of ascending flow, in place of the leakage: monotone cubics between their
             points; at flows between two curves by speeds and torques between theirs at the same share of the torque
-            that stalls. The flow is then a number within those of the curves.
+            that stalls. The flow then stays within those of the curves.
         lost_torque: T_lost, N m, of the torque that the pressure makes; the torques of curves are those less it.
         flow: Q, m^3/s: a number, or a function of time, such as a `Table`, for `drilling.simulate`; 0 where the pumps
             stand: then friction holds the rotor up to T_lost, and beyond it turns and pumps, as without a valve.
@@ -165,9 +167,9 @@ class MudMotor(_Tool):
         if (self.leakage is None) != bool(self.curves):
             refuse(self, "leakage", self.leakage, "either a leakage (m^3/(s Pa)), about 1e-8, or curves")
         if self.curves:
-            self._check_curves()
+            self._check_curves(flows)
 
-    def _check_curves(self):
+    def _check_curves(self, flows):
         known = [curve.flow for curve in self.curves]
         if not (np.diff(known) > 0).all():
             refuse(self, "curves", known, "one MotorCurve for each flow, of ascending flow (m^3/s)")
@@ -176,11 +178,8 @@ class MudMotor(_Tool):
             if curve.speeds[0] > most * (1 + 1e-6):
                 refuse(self, "curves", curve.speeds[0], f"a speed without load of at most {most:.5g} rad/s, which "
                        f"{curve.flow:.4g} m^3/s give without any leakage: flow over displacement/(2 pi)")  # fmt: skip
-        if callable(self.flow):
-            refuse(
-                self, "flow", self.flow, "a number (m^3/s) for a motor with curves; leakage= takes functions of time"
-            )
-        self.law  # refuses a flow outside the curves
+        for flow in flows:
+            self.law_at(flow)  # refuses a flow outside the curves
 
     @property
     def per_radian(self) -> float:
@@ -201,20 +200,37 @@ class MudMotor(_Tool):
         """The same at a speed of the rotor, rad/s."""
         return float(-self.law.derivative()(speed)) if self.curves else self.slope
 
-    @cached_property
+    @property
     def law(self) -> PPoly | None:
-        """T + T_lost of a motor with curves over the speed of its rotor, N m over rad/s, at its own flow; or None."""
-        return self._law(self.flow) if self.curves else None
+        """T + T_lost of a motor with curves over the speed of its rotor, N m over rad/s, at its own flow at the start;
+        or None."""
+        return self.law_at(self.flow_at(0.0)) if self.curves else None
 
     @cached_property
     def _slopes(self):
-        """The slopes of the law where these are extreme: at both ends of its cubics, and within them."""
-        (a, b, c, _), width = self.law.c, np.diff(self.law.x)
-        inside = np.clip(-b / np.where(a == 0, np.inf, 3 * a), 0, width)
-        return np.concatenate([(3 * a * x + 2 * b) * x + c for x in (0, inside, width)])
+        """The slopes of the law where these are extreme: at both ends of its cubics, and within them; where the flow
+        changes, of all curves."""
+        flows, found = [x.flow for x in self.curves] if callable(self.flow) else [self.flow], []
+        for law in map(self.law_at, flows):
+            (a, b, c, _), width = law.c, np.diff(law.x)
+            inside = np.clip(-b / np.where(a == 0, np.inf, 3 * a), 0, width)
+            found += [(3 * a * x + 2 * b) * x + c for x in (0, inside, width)]
+        return np.concatenate(found)
+
+    @cached_property
+    def _laws(self):
+        """{flow: `law_at` that flow}, of the last ones asked for."""
+        return {}
+
+    def law_at(self, flow: float) -> PPoly:
+        """`law` at a flow, m^3/s, within those of the curves."""
+        if flow not in self._laws:
+            if len(self._laws) >= _KEPT:
+                self._laws.clear()
+            self._laws[flow] = self._law(flow)
+        return self._laws[flow]
 
     def _law(self, flow):
-        """`law` at a flow, m^3/s."""
         flows = [curve.flow for curve in self.curves]
         if not flows[0] * (1 - 1e-9) <= flow <= flows[-1] * (1 + 1e-9):
             refuse(
@@ -278,7 +294,7 @@ class MudMotor(_Tool):
         flows, *values = np.broadcast_arrays(self._flow(flow), *values)
         found = np.empty(flows.shape)
         for one in np.unique(flows):
-            law, at = self.law if one == self.flow else self._law(one), flows == one
+            law, at = self.law_at(one), flows == one
             found[at] = function(law, *(x[at] for x in values))
         return found if found.ndim else float(found)
 
