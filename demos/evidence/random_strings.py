@@ -31,6 +31,7 @@ LIMITS = {
     "torque does not balance": 2e-3,  # impulse over that of the sizes of the torques
     "steady start moves": 1e-6,  # change of the bit's speed over it, before a wave has come back
     "growth differs from stability": 0.05,  # over the growth, or 0.1/s
+    "motion fits no modes": 0.05,  # what modes near those of stability leave of a motion, over it
     "response at low frequency": 1e-3,  # over the slope of the torque that turns the string
     "resumed differs": 1e-300,
     "step's error above its estimate": 1.0,  # difference from a third of the step, over the estimate and 0.1 %
@@ -170,14 +171,14 @@ def off_in_growth(steady, speed):
     order = np.argsort(np.where(np.isfinite(growth), -growth, np.inf))
     growth, frequency = (x[order][np.isfinite(growth[order])] for x in (growth, frequency))
     if not len(growth):
-        return
+        raise cf.NotConverged("growth is not compared: no modes were found")
     fades = np.append(growth[1 : MODES + 1], growth[0] - 2)[:MODES]  # of all but the first, the first two, ...
     slowest = np.minimum.accumulate(np.where(frequency < 0.05, 1.0, frequency))[: len(fades)]
     apart = 16 if steady.bit and steady.bit.law.drills else 10
     durations = 2 + np.maximum(apart / np.maximum(growth[0] - fades, 1e-9), 4 / slowest)
     until, count = durations.min(), int(durations.argmin()) + 1
     if until > LONGEST or not -14 < growth[0] * until < 30:
-        return
+        raise cf.NotConverged("growth is not compared: the leading modes are too close together, or fade too fast")
     share = min(1e-3, 1e-3 * math.exp(-growth[0] * until))
     for again in (True, False):  # what is left at the end decides how large the disturbance may be
         size = share * speed
@@ -199,7 +200,9 @@ def off_in_growth(steady, speed):
         return waves(modes) @ np.linalg.lstsq(waves(modes), y, rcond=None)[0] - y
 
     fitted = least_squares(missing, np.concatenate([growth[:count], frequency[:count]]), max_nfev=30)
-    if np.linalg.norm(fitted.fun) < 0.05 * np.linalg.norm(y):
+    left = np.linalg.norm(fitted.fun) / np.linalg.norm(y)
+    yield "motion fits no modes", left
+    if left < LIMITS["motion fits no modes"]:
         strong = np.linalg.lstsq(waves(fitted.x), y, rcond=None)[0].reshape(2, count)
         k = np.hypot(*strong).argmax()
         yield "growth differs from stability", abs(fitted.x[k] - growth[k]) / max(abs(growth[k]), 0.1)
