@@ -21,8 +21,8 @@ export PYTHONNOUSERSITE = 1
 .PHONY: help setup packages demo animation motion heap gallery well string whirl recipes test docs tutorials tables figure3 work-precision benchmarks cosseratbench failures rods-in-wells folders tangles truths random random-wells random-strings imperfect mutants sanitizers release clean
 
 help:
-	@echo "Times are those of two cores and an empty cache of compiled forms, after \`make setup\`."
-	@echo "make demo    solve the eccentric cantilever of the paper on two processes; writes out/ (a quarter of a minute)"
+	@echo "Times are those of two idle cores and an empty cache of compiled forms, after \`make setup\`; beside other work they are two to three times as long."
+	@echo "make demo    solve the eccentric cantilever of the paper on two processes; writes out/ (half a minute)"
 	@echo "make animation  the animation at the top of the README: the column far past its limit load (a quarter of a minute)"
 	@echo "make motion  seven motions, each a scene file, a picture and a number that must come out; writes out/ (half a minute)"
 	@echo "make heap    thirty rods that fall on each other and come to rest; writes out/ (two minutes)"
