@@ -146,7 +146,7 @@ def load(name):
     file = folder() / (name + SUFFIX)
     if why_unsafe(file) is not None:
         return None
-    # The system's loader maps what is there, and the process ends where a part is missing: hence a digest at the end.
+    # Loading a truncated file would end the process: hence a digest at the end of each file.
     with contextlib.suppress(FileNotFoundError, ImportError):
         content = file.read_bytes()
         if _DIGEST(content[:-_DIGEST_SIZE]).digest() == content[-_DIGEST_SIZE:]:

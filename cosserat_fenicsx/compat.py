@@ -216,7 +216,7 @@ class _NotInCache(Exception):
 
 
 def _from_cache(name, objects, folder, timeout):
-    """In place of FFCx's own, which waits for whatever has been begun, and loads whatever is there."""
+    """In place of FFCx's own function, which waits for other processes, and loads incomplete files too."""
     module = code_cache.load(name)
     if module is None:
         raise _NotInCache(name)

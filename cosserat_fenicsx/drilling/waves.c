@@ -47,7 +47,7 @@ static double turned(waves *w, int node, double F, double S, double inertia, dou
     return om;
 }
 
-/* Book the losses at a node and turn it. */
+/* Add the losses at a node to the energy ledger, and update its angle. */
 static void book(waves *w, int node, double om, double moment)
 {
     double dt = w->dt;

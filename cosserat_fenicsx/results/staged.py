@@ -105,7 +105,7 @@ class StagedPath(Path):
         return found
 
     def with_places(self, stage, place):
-        """The points at these places of the stages."""
+        """The points by their stage and their index within it, (n,) each."""
         first = {k: np.flatnonzero(self._stage == k)[0] for k in np.unique(stage)}
         return self.at_points([first[k] + i for k, i in zip(stage.tolist(), place.tolist(), strict=True)])
 

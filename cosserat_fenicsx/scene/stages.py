@@ -244,7 +244,7 @@ def legs_of(scene):
             )
         released = tuple(j for j, x in enumerate(supports) if x.place in gone)
         kept = _taken_over([x for x in supports if x.place not in gone], stage.supports)
-        begins = "moving" if legs else "fixed"  # in the reference every support is where it is
+        begins = "moving" if legs else "fixed"  # every support is in place in the reference
         added = [Named(f"stages[{i}].supports[{j}]", x, begins if x.moves else "held" if legs else "fixed")
                  for j, x in enumerate(stage.supports)]  # fmt: skip
         legs.append(

@@ -180,8 +180,8 @@ class Tensions:
         return self._lengths(self._length) - self._left * (1 + self._softness * self.values)
 
     def keep(self, owner):
-        """For what an `owner` linearises about the state: tendons remain taut or slack. A SceneError where one is about
-        to be either."""
+        """Fix which tendons are taut and which slack, for a linearisation by `owner` about the state. A SceneError
+        where a tendon is at the limit between both."""
         self._active = self.values > 0
         for tendon, gap, left, T in zip(self._tendons, self.gaps(), self._left, self.values, strict=True):
             if T <= _EDGE and abs(gap) <= _EDGE * left:

@@ -165,8 +165,8 @@ Pieces = namedtuple("Pieces", "top bottom component weight friction radius hole 
 
 
 def checked_depth(owner, hole, string, operation, mud, depth, such="TripOut()"):
-    """The measured depth (m) of the lower end of a string, None for the bottom of its hole; refused with arguments of
-    other kinds; owner: the function in messages, which takes an operation such as `such`."""
+    """The measured depth (m) of the lower end of a string, by default the bottom of its hole; a SceneError for
+    arguments of wrong types; owner, such: the function and an example of its operations, in messages."""
     instance(owner, "hole", hole, Borehole, "a Borehole")
     instance(owner, "string", string, DrillString, "a DrillString")
     instance(owner, "operation", operation, Operation, f"an operation, such as {such}")

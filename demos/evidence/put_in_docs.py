@@ -21,7 +21,7 @@ from PIL import Image
 from cosserat_fenicsx.pictures.charts import narrow
 
 ROOT = Path(__file__).resolve().parents[2]
-#: The tables that stand in a page, each with its page and pictures.
+#: The tables of the documentation, each with its page and pictures.
 PAGES = {
     "accuracy": ("evidence/accuracy.md",),
     "orders": ("evidence/accuracy.md",),

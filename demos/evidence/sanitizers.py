@@ -46,7 +46,7 @@ def environment(out):
         own = shutil.ignore_patterns("cosserat_*", "*.lock", "*.part-*")
         shutil.copytree(code_cache.folder(), cache / "fenics", ignore=own, copy_function=linked)
     for old in cache.glob("fenics/cosserat_*"):  # their names do not depend on the flags that the compiler below adds
-        shutil.rmtree(old) if old.is_dir() else old.unlink()  # a folder: a compilation that was broken off
+        shutil.rmtree(old) if old.is_dir() else old.unlink()  # an interrupted compilation leaves a folder
     out.mkdir(parents=True, exist_ok=True)
     compiler.write_text(COMPILER.format(flags=FLAGS), encoding="utf-8")
     compiler.chmod(0o755)

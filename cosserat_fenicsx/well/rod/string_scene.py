@@ -213,7 +213,7 @@ class StringScene:
         return min((ring.stage.most for ring in self.rings), default=np.inf)
 
     def leave(self, factor):
-        """Leave the walls in the state of an answer: stiffer by a factor, without springs."""
+        """Set the walls for an answer: stiffer by a factor, without springs."""
         for stage in self.stages:
             stage.wall, stage.spring, stage.friction, stage.anchor = factor, 0.0, 1.0, None
 
