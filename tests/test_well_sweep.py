@@ -112,6 +112,8 @@ def test_a_sweep_by_the_rod_is_stopped_and_goes_on(monkeypatch, tmp_path):
         with pytest.raises(cf.Interrupted, match="after 1 answer, which .* they are kept in .*sweep") as stop:
             cf.well.depth_sweep(*given, mud=MUD, model="rod", folder=file)
     assert np.isfinite(stop.value.path.hook_load[0, 0]).tolist() == [True, False, False]
+    with pytest.raises(cf.SceneError, match="resume.duration = 9.0: expected None, since .* holds a sweep"):
+        cf.resume(file, duration=9.0)
     found = cf.well.depth_sweep(*given, mud=MUD, model="rod", folder=file)
     assert (found.hook_load == cf.well.depth_sweep(*given, mud=MUD, model="rod").hook_load).all()
     assert not found.notes
