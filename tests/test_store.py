@@ -398,6 +398,19 @@ def test_damaged_files(tmp_path, monkeypatch, never_ended):
         cf.resume(folder, flying_in_space()[1])
 
 
+def test_a_table_is_cut(tmp_path):
+    table = files.Table(tmp_path / "rows.npy", _any_row)
+    table.put(np.arange(10.0).reshape(5, 2))
+    table.cut(3)
+    np.testing.assert_array_equal(table.rows, np.arange(6.0).reshape(3, 2))
+    table.put(np.full((1, 2), 7.0))
+    assert np.load(table.file)[:, 1].tolist() == [1, 3, 5, 7]
+
+
+def _any_row(dtype, shape):
+    return True
+
+
 def test_another_scene_is_told_from_the_one_of_the_motion(tmp_path, monkeypatch):
     rod, scene = flying_in_space()
     part_of("fixed", tmp_path / "motion", monkeypatch)
