@@ -1,5 +1,6 @@
 """Base of equilibrium and time step problems: residual, tangent and its inverse in C, with hooks in Python."""
 
+import contextlib
 import weakref
 from functools import cache
 
@@ -140,6 +141,10 @@ class Equations(Called):
         """x = tangent^-1 b; False where the last tangent is singular."""
         self._done(self._lib.solve(self.c, self._read(b), self._written(x)))
         return not self.c.singular
+
+    def corrected(self):
+        """Context manager: `solve` may be less exact, as Newton's method corrects what it leaves."""
+        return self.interface.corrected() if self.interface else contextlib.nullcontext()
 
     def advance(self):
         """Update the contact force that is carried at the Gauss points by the step from `model.before` to the state."""

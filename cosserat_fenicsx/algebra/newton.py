@@ -111,7 +111,8 @@ class Newton(Pointers):
 
     def _direction(self):
         """Find the step; returns the change of the load factor in it."""
-        self.problem.solve(self.problem.b, self._step)
+        with self.problem.corrected():
+            self.problem.solve(self.problem.b, self._step)
         return 0.0
 
     @cached_property

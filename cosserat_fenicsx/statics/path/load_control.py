@@ -8,7 +8,6 @@ negative mode that appears in steps of a thousandth of the path too is one of th
 `Sweep` advances in C (algebra/sweep.c) as long as every step is accepted at once, or halved.
 """
 
-import contextlib
 import itertools
 import math
 from collections import namedtuple
@@ -293,7 +292,7 @@ class Sweep(Pointers):
 
     def _calls(self, track, load_factors, counted, call):
         """Call C without end; yields why it has returned, and a `Swept` or None."""
-        load_factors, sweep, interface = np.array(load_factors, dtype=float), self.c, self._problem.interface
+        load_factors, sweep = np.array(load_factors, dtype=float), self.c
         sweep.load_factors = self._ffi.from_buffer("double[]", load_factors)
         sweep.count, sweep.next, sweep.records = len(load_factors), 0, 0
         sweep.loads, sweep.iterations, sweep.steps = track.problem.load_norm, counted, track.steps
@@ -301,7 +300,7 @@ class Sweep(Pointers):
         track.newton.c.rounding = track.model.round_off
         while True:
             before = sweep.iterations
-            with interface.corrected() if interface else contextlib.nullcontext():
+            with self._problem.corrected():
                 why = call()
             k = sweep.records
             track.iterations += int(self._recorded.iterations[:k].sum()) + sweep.iterations - before
