@@ -69,9 +69,9 @@ def estimate_error(fine, coarse, before=None, *, smooth=True):
     further criteria (see `compared.Criterion`), which add rows to all (4, n) arrays.
 
     Args:
-        smooth: of scenes with walls: False where an edge of contact lies inside elements. No gain is assumed then, and
-            the error is taken to be twice the difference, since two meshes may err in the same direction. Otherwise a
-            quarter of the gain, since the edges are found to some accuracy alone.
+        smooth: of scenes with walls: False where an edge of contact or of slip lies inside elements. No gain is assumed
+            then, and the error is taken to be twice the difference, since two meshes may err in the same direction.
+            Otherwise a quarter of the gain, since the edges are found to some accuracy alone.
 
     Returns:
         (4, n) the relative differences, which are `before` in the next halving; and (4, n) the assumed gains.

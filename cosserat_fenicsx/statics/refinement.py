@@ -105,6 +105,7 @@ class _Search:
         self._trace, self._correct, self._bar = trace, correct, bar
         self._scene, self._tol, self._degree = scene, tol, degree
         self._presses = any(action.presses for action in scene.actions)
+        self._rubs = any(action.finds_friction for action in scene.actions)
         self._usual, self._next = usual, None  # `_next`: the next mesh and its refinement factor, where it is known
         self.whole = self._few = self._which = None  # `_few`: sample points on the last mesh; `_which`: their indices
         self._apart, self._apart_of_whole = None, None  # their differences to the mesh before, and those of all points
@@ -281,7 +282,8 @@ class _Search:
             return compare(fine, coarse)
         if self._factor < 2:
             return carry_error(fine, coarse, self._factor, self._order, before)
-        smooth = not (self._presses and loose_edges(fine, contact_edges(fine)))
+        # edges of slip move through elements from state to state
+        smooth = not (self._rubs or self._presses and loose_edges(fine, contact_edges(fine)))
         apart, gain = estimate_error(fine, coarse, before, smooth=smooth)
         self._halved, self._order = (fine, coarse), order_of(gain, fine.degree)
         if np.divide(fine.layout.counts, coarse.layout.counts).max() <= 2:  # else the coarse mesh is not fine enough
