@@ -288,12 +288,14 @@ def test_strings_beside_other_methods(tmp_path):
 
 @pytest.mark.once
 def test_random_strings_quick(tmp_path):
-    """A string of 1.9 km with a PI control: every check is made, with both models, and nothing is off."""
+    """A string of 1.9 km with a PI control: nothing is off, with both models, and of the growth of small motions it is
+    told that its modes are too close together to be compared."""
     import random_strings
 
     rows, refused = random_strings.main(quick=True, out=tmp_path)
     assert {what for _, what, _ in rows} >= {"models differ", "resumed differs", "response at low frequency"}
-    assert all(ratio <= 1 for _, _, ratio in rows) and len(rows) >= 11 and not refused
+    assert all(ratio <= 1 for _, _, ratio in rows) and len(rows) >= 11
+    assert ["modes are too close together" in x for x in refused] == [True]
     assert "| resumed differs | 2 | 0 | 0 |" in (tmp_path / "random_strings.md").read_text(encoding="utf-8")
 
 
