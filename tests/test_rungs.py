@@ -335,15 +335,13 @@ def test_moments_are_of_order_2p_at_element_ends(degree, meshes):
 
 
 @pytest.mark.serial
-@pytest.mark.parametrize(
-    ("name", "degree"), [("moved", 1), ("hinge", 2), ("follower", 1), ("eccentric", 2), ("a hinge between", 2)]
-)
-def test_the_tangent_of_reactions_and_live_loads_is_their_derivative(name, degree):
+@pytest.mark.parametrize("name", ["moved", "hinge", "follower", "eccentric", "a hinge between"])
+def test_the_tangent_of_reactions_and_live_loads_is_their_derivative(name):
     """Taylor test with non-zero multipliers; n is that of the motion,
     since the tangent with a carried n is not the derivative."""
     scene = HELD[name]()
     layout = Layout.of(scene, 2)
-    signature = Signature.of(scene, layout, formulation=Multiplier(force=OF_MOTION), degree=degree)
+    signature = Signature.of(scene, layout, formulation=Multiplier(force=OF_MOTION), degree=2)
     problem = Problem(SpatialModel(MPI.COMM_SELF, signature))
     problem.load(scene, layout)
     random = np.random.default_rng(1)
