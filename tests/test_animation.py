@@ -10,7 +10,7 @@ from conftest import refused
 from moving_scenes import flying_in_space
 
 import cosserat_fenicsx as cf
-from cosserat_fenicsx.pictures import animation
+from cosserat_fenicsx.pictures import animation, drawing
 from cosserat_fenicsx.pictures.animation import Between
 from cosserat_fenicsx.pictures.drawing import EVERY
 
@@ -139,3 +139,17 @@ def test_nothing_is_loaded_before_it_is_needed():
     root = Path(__file__).parent.parent
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, encoding="utf-8", cwd=root)
     assert done.stdout.strip() == "set()", done.stderr
+
+
+def test_the_mesh_of_all_rods_moves_with_their_values():
+    """As one that is made anew; values are over the size of their unit."""
+    pyvista, made, x = drawing.load_pyvista(), [], np.linspace(0, 1, 3)
+    for height in (0.0, 0.5):
+        lines = [cf.Line((i, 0, height), (i, 2, height)) for i in range(2)]
+        rods = [cf.Rod(line, cf.Circle(0.1), cf.Material(E=1e9)) for line in lines]
+        made.append([drawing.body_of(rod, x, rod.curve.position(2 * x), rod.curve.frame(2 * x), 4 * x + height)
+                     for rod in rods])  # fmt: skip
+    mesh, new = (drawing.coloured(pyvista, bodies, [1.0, 3.0], 2.0) for bodies in made)
+    assert mesh["value"].max() == 2.0 and np.ptp(mesh.points[:, 2]) == pytest.approx(0.3, rel=1e-6)
+    drawing.move(mesh, made[1], [1.0, 3.0], 2.0)
+    assert np.array_equal(mesh.points, new.points) and np.array_equal(mesh["value"], new["value"])
