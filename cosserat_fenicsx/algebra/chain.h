@@ -158,6 +158,9 @@ typedef struct {
     dense *system;                  /* of the interface, or 0 where Python solves it */
     ties *ties;                     /* or 0 */
     const double *tie_load_factor;  /* of prescribed motions */
+    int turns;                      /* nodes whose rotation since the tangent was found is taken in, or 0 */
+    const double *now;              /* (unknowns,) of the state; with `turns` alone */
+    double *turned;                 /* (7 turns,) of them when the tangent was found */
     contact *contact;               /* nodes that may touch a wall, or 0 */
     void *self;                     /* for the hooks */
 } problem;

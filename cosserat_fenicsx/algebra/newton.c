@@ -79,9 +79,32 @@ int residual(problem *p, const double *x, double *b)
     return end_residual(p, x, b);
 }
 
+/* Turn the quaternions' parts of x, a change of the unknowns by the tangent, by each node's rotation since that was
+   found: q r with r = q_tangent^-1 q_now. By rotations in space, as moments are, an old tangent serves a rod that
+   turns about its axis. */
+static void turn_on(const problem *p, double *x)
+{
+    for (int i = 0; i < p->turns; i++) {
+        const double *o = p->turned + 7 * i + 3, *n = p->now + 7 * i + 3;
+        const double r[4] = {o[0] * n[0] + o[1] * n[1] + o[2] * n[2] + o[3] * n[3],
+                             o[0] * n[1] - o[1] * n[0] - o[2] * n[3] + o[3] * n[2],
+                             o[0] * n[2] - o[2] * n[0] - o[3] * n[1] + o[1] * n[3],
+                             o[0] * n[3] - o[3] * n[0] - o[1] * n[2] + o[2] * n[1]};
+        const double size = sqrt(r[0] * r[0] + r[1] * r[1] + r[2] * r[2] + r[3] * r[3]);
+        if (!(size > 0)) continue;
+        double *q = x + 7 * i + 3;
+        const double a = q[0] / size, b = q[1] / size, c = q[2] / size, d = q[3] / size;
+        q[0] = a * r[0] - b * r[1] - c * r[2] - d * r[3];
+        q[1] = a * r[1] + b * r[0] + c * r[3] - d * r[2];
+        q[2] = a * r[2] + c * r[0] + d * r[1] - b * r[3];
+        q[3] = a * r[3] + d * r[0] + b * r[2] - c * r[1];
+    }
+}
+
 /* Factors of the tangent at the state. */
 int tangent(problem *p)
 {
+    if (p->turns) memcpy(p->turned, p->now, 7 * p->turns * sizeof *p->now);
     if (p->matrices) {
         tabulate_all(p->tangent, p->matrices);
         if (hook(p, MATRICES, p->matrices, 0)) return FAILED;
@@ -107,6 +130,7 @@ int solve(problem *p, const double *b, double *x)
         if (p->of_interface[i] >= 0) x[p->of_interface[i]] = p->interface[i];
     if (p->singular)
         for (int i = 0; i < p->size; i++) x[i] = NAN;
+    turn_on(p, x);
     return 0;
 }
 

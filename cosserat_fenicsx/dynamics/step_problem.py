@@ -214,6 +214,9 @@ class StepProblem(Equations):
         vectors = {"x": self.x, "b": self.b, "change": self._increment}
         for name, vector in vectors.items():
             setattr(found, name, self.doubles(vector.array))
+        if self.numbering.block == 7 and not self.ties:
+            self.c.now, self._turned = found.x, np.zeros(7 * self.numbering.nodes)
+            self.c.turned, self.c.turns = self.doubles(self._turned), self.numbering.nodes
         return found
 
     def iterate(self, stepping):
@@ -276,6 +279,8 @@ class StepProblem(Equations):
         kept = {"x": self.x.array_r.copy(), "state": self._state.copy(), "fresh": bool(self.fresh)}
         if not self.fresh:
             kept["tangent"] = super().memory()
+            if self.c.turns:
+                kept["turned"] = self._turned.copy()
         for i, part in enumerate(self.touching):
             kept[f"touching {i}"] = part.memory()
         return kept
@@ -287,6 +292,8 @@ class StepProblem(Equations):
         self.fresh = bool(memory["fresh"])
         if not self.fresh:
             super().recall(memory["tangent"])
+            if self.c.turns:
+                self._turned[:] = memory["turned"]
         for i, part in enumerate(self.touching):
             part.recall(memory[f"touching {i}"])
 
