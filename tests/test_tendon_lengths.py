@@ -119,6 +119,28 @@ def test_shortenings_that_reach_a_point(truth):
     assert short == pytest.approx(at[:2], rel=1e-6)
 
 
+@pytest.mark.serial
+def test_derivatives_beside_a_point_without():
+    """At the load factor 0 the tendon is neither taut nor slack: a shortening changes nothing there, and a moment that
+    tightens it one way and slackens it the other way has no derivative."""
+
+    def pushed(moment):
+        loads = [cf.Tendon(ROD, (E, 0), shortening=0.006), cf.Force(ROD.end, (0, 0.02, 0))]
+        return arm(*loads, cf.Moment(ROD.end, (0, moment, 0), permanent=True))
+
+    path, moment = cf.solve(pushed(0.0), [0.0, 1.0], elements=4), cf.Parameter("moment", 0.0, pushed, scale=1e-3)
+    alone = cf.solve(pushed(0.0), [1.0], elements=4)
+    for parameter in ("loads[0].shortening", moment):
+        found = path.sensitivity(lambda path: path.position(ROD.end)[-1], parameter)
+        assert next(iter(found.values())) == pytest.approx(
+            next(iter(alone.sensitivity(lambda path: path.position(ROD.end)[0], parameter).values())), rel=1e-9
+        )
+    found = path.sensitivity(lambda path: path.position(ROD.end), "loads[0].shortening")
+    assert np.abs(found["loads[0].shortening"][0]).max() < 1e-9
+    with pytest.raises(cf.SceneError, match="neither taut nor slack at the load factor 0.*a query of other points"):
+        path.sensitivity(lambda path: path.position(ROD.end), moment)
+
+
 MASS, J = 0.5, 1e-5  # per length: kg/m, kg m
 HEAVY = cf.Rod(ROD.curve, cf.Stiffness((GA, GA), EA, (EI, EI), GJ, mass=MASS, inertia=(J, J, 2 * J)), name="arm")
 
@@ -170,7 +192,7 @@ def test_it_holds_small_vibrations(axial, truth):
         (lambda: cf.Tendon(ROD, (E, 0), shortening=0.1, axial=0.0), "Tendon.axial"),
         (lambda: cf.Tendon(ROD, (E, 0), shortening=0.1, permanent=True), "Tendon.permanent"),
         (lambda: cf.solve(arm(cf.Tendon(ROD, (E, 0), shortening=0.3)), [1.0], elements=4), "less than the length"),
-        (lambda: cf.buckling(arm(cf.Tendon(ROD, (E, 0), shortening=0.1))), "only `solve`, `modes` and"),
+        (lambda: cf.buckling(arm(cf.Tendon(ROD, (E, 0), shortening=0.1))), "known to `solve`, `modes`, "),
         (lambda: cf.modes(dense(cf.Tendon(HEAVY, (E, 0), shortening=0.01))), "neither taut nor slack"),
     ],
 )  # fmt: skip

@@ -76,9 +76,10 @@ class Tendon(Load, LineAction):
             `Along` or `AlongTable` with three components, along d_1, d_2, d_3.
         tension: N, not negative; or a function of time.
         shortening: instead of a tension, how much shorter the tendon gets, m, from its length in the reference at the
-            load factor 0; negative to slacken it. In `solve`, `modes` and derivatives of states. A tendon does not
-            push: where it would, its tension is zero, and it is shorter along the rod than its length.
-        axial: of a tendon of given length, its stiffness EA, N; None where it does not stretch.
+            load factor 0; negative to slacken it; or a function of time. In `solve`, `modes`, derivatives of states,
+            and motions. A tendon does not push: where it would, its tension is zero, and it is shorter along the rod
+            than its length.
+        axial: of a tendon of given length, its stiffness EA, N; None where it does not stretch, in equilibria alone.
         jumps: times where a function of time is not smooth, s.
         permanent: whether it acts in full, before all that the load factor multiplies.
 
@@ -94,7 +95,7 @@ class Tendon(Load, LineAction):
     ) = None
     jumps: Numbers = ()
     permanent: bool = False
-    shortening: Annotated[float, Number("length")] | None = None
+    shortening: Annotated[float | Callable[[float], float], VectorInTime(Number("length"))] | None = None
     axial: Annotated[float, Number("force", positive())] | None = None
 
     work, is_thread = "tendon", True

@@ -290,7 +290,7 @@ class _SampledSignal:
             try:
                 values.append(self._signal(t))
             except SceneError:  # raised again by the step that reaches this time
-                values.append(values[-1] if values else (0.0, 0.0, 0.0))
+                values.append(values[-1] if values else self._signal.size * (0.0,))
         return np.array(values)
 
 

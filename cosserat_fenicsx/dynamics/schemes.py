@@ -213,12 +213,16 @@ class CollocationProblem(StepProblem):
     def work(self):
         """See `StepProblem`: by loads at mid-step, and the mean of the reactions at both ends."""
         self._take_loads(self._middle)
-        return super().work()
+        own = self.tensions and self.tensions.halfway(self._middle)
+        done = super().work()
+        if self.tensions:
+            self.tensions.put(own)
+        return done
 
     def clamp_forces(self):
         """See `StepProblem`: at the end of the step."""
         if self.model.clamps.count:
-            self._take_loads(self._loaded_at)
+            self._take_loads(self.loaded_at)
             self._refresh(self.acting_share)
         return super().clamp_forces()
 

@@ -17,6 +17,7 @@ from cosserat_fenicsx.checks import File, instance, number, refuse, whole
 from cosserat_fenicsx.dynamics.pace import Adaptive, Fixed
 from cosserat_fenicsx.dynamics.schemes import SCHEMES
 from cosserat_fenicsx.dynamics.start import equilibrium, put_start, starts_in
+from cosserat_fenicsx.dynamics.tendons import check_stiffnesses
 from cosserat_fenicsx.dynamics.time_loop import TimeLoop, marks_of
 from cosserat_fenicsx.errors import NotConverged, SceneError, nearest
 from cosserat_fenicsx.models.base import Scales
@@ -34,7 +35,6 @@ from cosserat_fenicsx.scene.scene import Scene, check_magnitudes, check_tensions
 from cosserat_fenicsx.scene.stages import refuse_stages
 from cosserat_fenicsx.statics.meshes import turning_in_law
 from cosserat_fenicsx.statics.path.recorder import assembled
-from cosserat_fenicsx.statics.problem import refuse_given_lengths
 from cosserat_fenicsx.storage.store import Nowhere, Store
 from cosserat_fenicsx.storage.stored_history import KIND, StoredHistory
 
@@ -127,7 +127,7 @@ def simulate(
             "that applies the loads slowly"
         )
     refuse_stages("simulate", scene)
-    refuse_given_lengths("simulate", scene)
+    check_stiffnesses(scene)
     if scene.rod_contact and (scene.rod_contact.stiffness is None or comm.size > 1):
         raise SceneError(
             "simulate: rods touch each other on one process, with elastic surfaces: expected one process, and a "

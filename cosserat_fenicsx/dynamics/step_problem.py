@@ -20,6 +20,7 @@ from cosserat_fenicsx.algebra.building import Packed
 from cosserat_fenicsx.algebra.equations import COMPLIANCE, CONTACT, NODES, RESIDUAL, STATE, Equations
 from cosserat_fenicsx.algebra.tie_rows import TieRows
 from cosserat_fenicsx.dynamics.contact import NodalContact, TouchingNodes, motion_between
+from cosserat_fenicsx.dynamics.tendons import TensionsInSteps
 from cosserat_fenicsx.dynamics.touching import RodsTouching
 from cosserat_fenicsx.numerics import directors, small_rotations
 
@@ -53,7 +54,8 @@ class StepProblem(Equations):
     `Equations`; x is the state at the end of the step.
 
     fresh: whether the next iteration takes a new tangent; h: the length of the step, dimensionless; load_factor:
-    multiplies all loads and prescribed motions.
+    multiplies all loads and prescribed motions; loaded_at: time (s) of the loads of the step; tensions: the
+    `TensionsInSteps` of tendons of given length, or None.
     """
 
     ties_class = MovingTies
@@ -72,7 +74,7 @@ class StepProblem(Equations):
         self._start = model.start.x.array
         self.load_factor, self.fresh, self.contact, self.touching, self._laws = 1.0, True, None, [], []
         self._at_stations = []
-        self.rods_touching = None
+        self.rods_touching, self.tensions = None, TensionsInSteps(self) if model.actions.tensions else None
         self._hooks = self.c.hooks
         self._pack()
 
@@ -90,7 +92,9 @@ class StepProblem(Equations):
         self.contact = NodalContact(self, walls, at_end=self.acting_share == 1) if walls else None
         self._at_stations = [StationLaw(self, action) for action in scene.actions if action.resists]
         self.rods_touching = RodsTouching(self) if scene.rod_contact else None
-        self._laws = [*self._at_stations, *([self.rods_touching] if scene.rod_contact else [])]
+        if self.tensions:
+            self.tensions.load()
+        self._laws = [*filter(None, [self.tensions, *self._at_stations, self.rods_touching])]
         self.touching = [self.contact, *self._laws] if walls else self._laws
         self.c.contact = self.contact.c if walls else self._ffi.NULL
         of_contact = (COMPLIANCE | NODES * (model.comm.size > 1)) * bool(walls)
@@ -151,9 +155,9 @@ class StepProblem(Equations):
         model = self.model
         self.h = model.h.value = h / model.time
         self._start[:] = self._state
-        self._loaded_at, self._middle, self._until = t + self.loads_share * h, t + h / 2, t + h
+        self.loaded_at, self._middle, self._until = t + self.loads_share * h, t + h / 2, t + h
         self._of_law = self._work_of_law(t, self._middle)
-        self._take_loads(self._loaded_at)
+        self._take_loads(self.loaded_at)
         self._known.set(0.0)
         for law in self._at_stations:
             law.settle()
@@ -239,6 +243,10 @@ class StepProblem(Equations):
         done += self._of_law + self._work_of_law(self._middle, self._until)
         return done - sum(part.books()[0] for part in self.touching)
 
+    def multipliers_at(self, t):
+        """`multipliers`, then the tensions of tendons of given length at the state, of the time t (s)."""
+        return np.concatenate([self.multipliers(), *([self.tensions.here(t)] if self.tensions else [])])
+
     def momenta(self):
         """Linear and angular momentum of the state, see `Moving.momenta`."""
         self._local[:] = 0.0
@@ -271,7 +279,7 @@ class StepProblem(Equations):
         if not clamps.count:
             return np.empty((0, 6))
         if self._law_moves:
-            self._take_loads(self._loaded_at)
+            self._take_loads(self.loaded_at)
         return clamps.of_step() - clamps.loads(self.load_factor, self._acting_at)
 
     def memory(self):

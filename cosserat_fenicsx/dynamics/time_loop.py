@@ -188,7 +188,7 @@ class TimeLoop:
         held = {"tie_forces": ties, "clamp_forces": clamps, "far_ends": model.delays.far_ends(stepped)}
         if problem.contact:
             held["wall_forces"] = problem.contact.of_step() if stepped else np.full((problem.contact.count, 3), np.nan)
-        self.history.append(Instant(problem.load_factor, nodal, gauss, 0, iterations, problem.multipliers(), time=t,
+        self.history.append(Instant(problem.load_factor, nodal, gauss, 0, iterations, problem.multipliers_at(t), time=t,
                                     rates=rates, steps=self._steps, ledger=ledger, **held))  # fmt: skip
 
 

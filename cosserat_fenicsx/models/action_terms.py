@@ -275,7 +275,8 @@ class Term:
             elements = starts[mine], sizes[mine]
             self._where.append((action, scene.rods[rod], numbers[at_points], s[at_points], at_points, elements))
         self.weight.x.array[:] = weight
-        self.moves = any(signals_of(action) for action, _, _ in members)
+        # tensions that are found are not data
+        self.moves = not self.kind.finds_tension and any(signals_of(action) for action, _, _ in members)
         for k, function in enumerate((*self.data, *self.memory)):
             # data of one member also where none acts, so that no virtual work divides by zero there
             action, rod = self._where[0][:2]

@@ -9,6 +9,7 @@ import numpy as np
 
 from cosserat_fenicsx.numerics import conjugate_product, directors, product_conjugate
 from cosserat_fenicsx.quantities import span_in_words
+from cosserat_fenicsx.results.records import Records
 from cosserat_fenicsx.results.compared import all_cell_nodes, cell_nodes
 from cosserat_fenicsx.scene.action import without_stress
 from cosserat_fenicsx.scene.signals import at
@@ -160,6 +161,8 @@ class Threads:
 
     def __init__(self, result):
         self._result, self._records = result, result._all
+        if self._records is None:  # on a disk
+            self._records = Records.of(list(result._records))
         self._threads = [thread for thread in result.scene.actions if thread.is_thread]
 
     def at_gauss(self):

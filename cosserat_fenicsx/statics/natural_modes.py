@@ -263,7 +263,10 @@ def _on_mesh(scene, layout, count, load_factor, degree, comm, damped, near, rota
         K, rows, held = stiffness(problem)
         soft = softness(problem, K)
         if problem.tensions:
-            problem.tensions.keep("modes")
+            edges = problem.tensions.keep()
+            if edges.any():
+                expected = "a load factor at which it has a tension, or is longer than its way along the rod"
+                problem.tensions.refuse("modes", edges, expected)
             K, held = problem.tensions.border(K, held)
         unit = max(float(rod.profile.range[1].mass) for rod in scene.rods)
         bodies, time = Bodies(model, unit), math.sqrt(unit * scales.length**2 / scales.force)

@@ -13,7 +13,6 @@ from cosserat_fenicsx.algebra.pool import PROBLEMS
 from cosserat_fenicsx.algebra.tie_rows import TieRows
 from cosserat_fenicsx.checks import tolerance, whole
 from cosserat_fenicsx.errors import NotConverged, SceneError
-from cosserat_fenicsx.models.compiled import threads_of
 from cosserat_fenicsx.models.determinate import DeterminateInPlane, DeterminateInSpace
 from cosserat_fenicsx.models.spatial import PlanarModel, SpatialModel
 from cosserat_fenicsx.models.signature import Signature
@@ -95,9 +94,9 @@ def refuse_given_lengths(owner, scene):
     for load in scene.all_loads:
         if load.shortens:
             raise SceneError(
-                f"{owner}: only `solve`, `modes` and derivatives of states take a {type(load).__name__} of given "
-                "length, in a scene without stages and without rods that touch each other: expected its tension, "
-                "such as path.tendon(tendon).tension"
+                f"{owner}: a {type(load).__name__} of given length is known to `solve`, `modes`, derivatives of states "
+                "and `simulate` alone, in equilibria without stages and without rods that touch each other: expected "
+                "its tension, such as that which path.tendon(tendon).tension gives"
             )
 
 
@@ -138,7 +137,7 @@ class Problem(Equations):
         if forms.fields and model.comm.size == 1:
             size = len(forms.gauss) * forms.fields_size
             self.fields = PackedExpression(forms.fields, model.mesh, len(model.cell_dofs), size)
-        self.tensions = Tensions(self, threads_of) if model.actions.tensions else None
+        self.tensions = Tensions(self) if model.actions.tensions else None
         self._loaded, self.begins, self._hooks = None, False, self.c.hooks
 
     def load(self, scene, layout):

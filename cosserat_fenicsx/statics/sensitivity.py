@@ -50,6 +50,8 @@ def sensitivity(path, query, parameters):
             step = direct.step(parameter, rate)
             values = [_numbers(query(direct.moved(path, parameter, rate, k * step))) for k in PLACES]
             derivatives[parameter.name], errors[parameter.name] = derivative(values, step)
+            if direct.without and np.isnan(derivatives[parameter.name]).any():
+                direct.refuse_points()
     return Sensitivity.by(found, value, derivatives, errors)
 
 
@@ -94,7 +96,8 @@ def _scenes_near(scene, parameter):
 
 class Direct:
     """The direct method on one problem and path; scenes: see `_scenes_near`, for each parameter; points: [(load factor,
-    numbers, `Record`)] of the states where derivatives are taken."""
+    numbers, `Record`)] of the states where derivatives are taken; without: {load factor: (tendons,) which of given
+    length are about to be taut or slack} of those that have no derivatives by a parameter."""
 
     def __init__(self, solvers, scene, layout, parameters, scenes):
         self.problem, self.newton, self.stability = self.solvers = solvers
@@ -102,7 +105,7 @@ class Direct:
         self._parameters, self._scenes = parameters, scenes
         self._by_data = made_once(self.model, "data_derivative", DataDerivative)
         self._refreshes = bool(self.model.actions.refreshed)
-        self.points = []
+        self.points, self.without = [], {}
 
     @classmethod
     @contextlib.contextmanager
@@ -194,15 +197,25 @@ class Direct:
     # -- derivatives -------------------------------------------------------------------------------------------------
 
     def rates(self):
-        """For each parameter the derivatives of the numbers of every point (see `Problem.numbers`)."""
+        """For each parameter the derivatives of the numbers of every point (see `Problem.numbers`); None where a tendon
+        gets taut by one change and slack by the opposite one."""
         changes = [self._data_changes(*each) for each in zip(self._scenes, self._parameters, strict=True)]
         self._load(self._scene)
         found = [[] for _ in changes]
         for i, (load_factor, numbers, _) in enumerate(self.points):
-            self.factor(load_factor, numbers)
-            for rates, of_points in zip(found, changes, strict=True):
+            edges = self.factor(load_factor, numbers)
+            for rates, of_points, parameter in zip(found, changes, self._parameters, strict=True):
                 rates.append(self._rate(*of_points[i]))
+                if edges.any() and self.problem.tensions.opens(edges, parameter.size):
+                    rates[-1], self.without[load_factor] = None, edges
         return found
+
+    def refuse_points(self):
+        """Raise a SceneError for the points that have no derivatives."""
+        load_factor, edges = next(iter(self.without.items()))
+        self.problem.set_load_factor(load_factor)
+        expected = "a query of other points alone, such as lambda path: path.position(station)[-1]"
+        self.problem.tensions.refuse("sensitivity", edges, expected)
 
     def _data_changes(self, scenes, parameter):
         """For every point the derivatives of the data, of the constraint equations' part of the residual, and of the
@@ -250,14 +263,14 @@ class Direct:
         return tensions.gaps()
 
     def factor(self, load_factor, numbers):
-        """Go to a state, and factorise the tangent there."""
+        """Go to a state, and factorise the tangent there; which tendons are about to be taut or slack."""
         problem = self.problem
         problem.set_load_factor(load_factor)
         problem.put(numbers)
-        if problem.tensions:
-            problem.tensions.keep("sensitivity")
+        edges = problem.tensions.keep() if problem.tensions else np.zeros(0, dtype=bool)
         problem.function(problem.x, problem.b)
         problem.factor()
+        return edges
 
     def residual_change(self, data, of_ties):
         """(change of the residual at the state, a vector; change of the model's state array at clamped nodes)."""
@@ -322,7 +335,7 @@ class Direct:
 
     def step(self, parameter, rates):
         """A change of a parameter by which the state moves little."""
-        fastest = max(self.model.largest(rate[0]) for rate in rates)
+        fastest = max((self.model.largest(rate[0]) for rate in rates if rate is not None), default=0.0)
         return min(STEP * parameter.size, _REACH / max(fastest, 1e-300))
 
     def load_near(self, parameter, change):
@@ -330,8 +343,9 @@ class Direct:
         self._load(parameter.scene_of(parameter.value + change))
 
     def put(self, point, rate, change):
-        """Go to a state that is moved by a change times a rate."""
+        """Go to a state that is moved by a change times a rate; NaN without one."""
         load_factor, numbers, _ = point
+        rate = [np.full_like(x, np.nan) for x in numbers] if rate is None else rate
         self.problem.set_load_factor(load_factor)
         self.problem.put([a + change * b for a, b in zip(numbers, rate, strict=True)])
         if self._refreshes:

@@ -19,24 +19,26 @@ from cosserat_fenicsx import compat
 from cosserat_fenicsx.algebra.building import Packed
 from cosserat_fenicsx.compat import compiling
 from cosserat_fenicsx.errors import SceneError
+from cosserat_fenicsx.models.compiled import threads_of
+from cosserat_fenicsx.scene.action import describe
+from cosserat_fenicsx.scene.signals import at
 
 # Condition number of S above which it is singular.
 _SINGULAR = 1e12
 # Length over the largest one in the step below which a slack tendon is about to be taut; and, in an equilibrium, its
 # share of the tendon's length, without a tension above the same number times EI/L^2.
 _EDGE = 1e-9
+# Change of a gap over the tendon's length, for a change of a parameter by its size, that is rounding.
+_OPENS = 1e-7
 # Exchanges of tendons between slack and taut in a step, per tendon.
 _EXCHANGES = 20
 
 
-class Tensions:
-    """The tensions of the tendons of given length of a `Problem`; values: (tendons,) in the order of the scene,
-    dimensionless; undetermined: whether the last solution failed since lengths do not determine them; slope: (tendons,)
-    their change with the load factor, from the last solution for `Problem.load_derivative`; wanted, change: (tendons,)
-    gaps for the next solution for forces other than these and the residual, and the change of the tensions from it;
-    threads_of: see `models.compiled`."""
+class ThreadLengths:
+    """The lengths of the tendons of given length of a problem, `Problem` or `dynamics.step_problem.StepProblem`;
+    values: (tendons,) their tensions in the order of the scene, dimensionless."""
 
-    def __init__(self, problem, threads_of):
+    def __init__(self, problem):
         self._problem, self._model = problem, problem.model
         model = problem.model
         self._terms = [term for term in model.actions.terms if term.kind.finds_tension]
@@ -48,28 +50,29 @@ class Tensions:
 
     def load(self):
         """Take the tendons of the scene that the model was loaded with, in its reference configuration."""
-        problem, model = self._problem, self._model
+        model = self._model
         found = [(where[0], term, where[2]) for term in self._terms for where in term._where]
         found = [next(x for x in found if x[0] is action) for action in model.scene.actions if action.shortens]
         self._where = [(term._arrays[0], rows) for _, term, rows in found]
-        scales, tendons, size = model.scales, [action for action, *_ in found], len(found)
-        self._tendons = tendons
-        self._short = np.array([tendon.shortening for tendon in tendons]) / scales.length
-        self._softness = np.array([scales.force / (tendon.axial or np.inf) for tendon in tendons])
-        self.values, self._active = np.zeros(size), np.ones(size, dtype=bool)
-        self.undetermined, self.slope, self.wanted = False, np.zeros(size), np.zeros(size)
-        self._step = np.zeros(size)
-        self._columns = [problem.numbering.vector() for _ in tendons]
-        self._responses = [problem.numbering.vector() for _ in tendons]
+        self._tendons = [action for action, *_ in found]
+        self._softness = np.array([model.scales.force / (tendon.axial or np.inf) for tendon in self._tendons])
+        self.values = np.zeros(len(found))
+        self._columns, self._responses = ([self._problem.numbering.vector() for _ in found] for _ in range(2))
         self._force.refresh()
         self._at_rest = self._lengths(self._length)
-        for tendon, length in zip(tendons, self._at_rest * scales.length, strict=True):
-            if tendon.shortening >= length:
+
+    def left_at(self, t, load_factor):
+        """(tendons,) lengths without tension at a time (s)."""
+        short = load_factor * np.array([np.ravel(at(x, t).shortening)[0] for x in self._tendons], dtype=float)
+        short, when = short / self._model.scales.length, f", at the time t = {t:g} s" if t else ""
+        for tendon, length, less in zip(self._tendons, self._at_rest, short, strict=True):
+            if less >= length:
+                length, less = (x * self._model.scales.length for x in (length, less))
                 raise SceneError(
-                    f"Tendon.shortening = {tendon.shortening:g}: expected less than the length of the tendon, "
-                    f"{length:.6g} m"
+                    f"{describe(tendon)}: shortening = {less:g}: expected less than the length of the tendon, "
+                    f"{length:.6g} m{when}"
                 )
-        self.forget()
+        return self._at_rest - short
 
     def put(self, values):
         """Set the tensions."""
@@ -98,9 +101,25 @@ class Tensions:
         self._problem.numbering.to_local(vector, self._along.x.array)
         return self._lengths(self._change)
 
+
+class Tensions(ThreadLengths):
+    """The tensions of the tendons of given length of a `Problem`; undetermined: whether the last solution failed since
+    lengths do not determine them; slope: (tendons,) their change with the load factor, from the last solution for
+    `Problem.load_derivative`; wanted, change: (tendons,) gaps for the next solution for forces other than these and the
+    residual, and the change of the tensions from it."""
+
+    def load(self):
+        super().load()
+        size = len(self.values)
+        self._short = self._at_rest - self.left_at(0.0, 1.0)
+        self._active = np.ones(size, dtype=bool)
+        self.undetermined, self.slope, self.wanted = False, np.zeros(size), np.zeros(size)
+        self._step = np.zeros(size)
+        self.forget()
+
     @property
     def _left(self):
-        """(tendons,) lengths without tension."""
+        """(tendons,) lengths without tension, at the load factor."""
         return self._at_rest - float(self._problem.load_factor_array) * self._short
 
     def forget(self):
@@ -143,7 +162,7 @@ class Tensions:
             if not self._regular(S[np.ix_(on, on)]):
                 return False
             step[on] = np.linalg.solve(S[np.ix_(on, on)], (moved - gaps)[on])
-            self.change = step
+            self.change, self.opening = step, moved - gaps - S @ step
             if of_load:
                 self.slope = -step
         for response, share in zip(self._responses, step, strict=True):
@@ -179,17 +198,25 @@ class Tensions:
         """(tendons,) g."""
         return self._lengths(self._length) - self._left * (1 + self._softness * self.values)
 
-    def keep(self, owner):
-        """Fix which tendons are taut and which slack, for a linearisation by `owner` about the state. A SceneError
-        where a tendon is at the limit between both."""
-        self._active = self.values > 0
-        for tendon, gap, left, T in zip(self._tendons, self.gaps(), self._left, self.values, strict=True):
-            if T <= _EDGE and abs(gap) <= _EDGE * left:
-                raise SceneError(
-                    f"{owner}: the {type(tendon).__name__} of {tendon.rod.name} is neither taut nor slack "
-                    f"at the load factor {self._problem.load_factor:g}, and no linear theory has it: expected a load "
-                    "factor at which it has a tension, or is longer than its way along the rod"
-                )
+    def keep(self):
+        """For what linearises about the state: tendons remain taut or slack. (tendons,) which are about to be either;
+        they remain slack."""
+        edges = (self.values <= _EDGE) & (np.abs(self.gaps()) <= _EDGE * self._left)
+        self._active = (self.values > 0) & ~edges
+        return edges
+
+    def refuse(self, owner, edges, expected):
+        """Raise a SceneError for tendons that are about to be taut or slack."""
+        tendon = self._tendons[int(np.argmax(edges))]
+        raise SceneError(
+            f"{owner}: the {type(tendon).__name__} of {tendon.rod.name} is neither taut nor slack at the load factor "
+            f"{self._problem.load_factor:g}, and no linear theory has it: expected {expected}"
+        )
+
+    def opens(self, edges, size):
+        """Whether some of these tendons get shorter or longer than their way, as `keep` has told them, by a change of
+        the last solution for other forces times `size`."""
+        return bool((np.abs(self.opening[edges]) * size > _OPENS * self._left[edges]).any())
 
     def border(self, K, held):
         """The K and the held rows of `small_motions.stiffness` with what taut tendons resist: a stiffness EA/l_0 of
