@@ -141,6 +141,39 @@ def test_derivatives_beside_a_point_without():
         path.sensitivity(lambda path: path.position(ROD.end), moment)
 
 
+@pytest.mark.serial
+@pytest.mark.parametrize("axial", [None, 300.0])
+def test_in_stages(axial, truth):
+    """A tendon that holds while a force comes is one that comes with it; one that comes in with a stage is shortened
+    from its length there; what is released leaves what was there before."""
+    pull, push = cf.Tendon(ROD, (E, 0), shortening=0.006, axial=axial), cf.Force(ROD.end, (0, 0.05, -0.02))
+
+    def staged(first, *stages):
+        return cf.solve(cf.Scene([ROD], [cf.Clamp(ROD.start)], [first], stages=stages), [1.0], elements=4)
+
+    held, both = staged(pull, cf.Stage([push], load_factors=[0.0, 1.0])), cf.solve(arm(pull, push), [1.0], elements=4)
+    ends = held.position(ROD.end)
+    truth(f"tendons: by length in stages, axial {axial}, end (m)", ends[-1], both.position(ROD.end)[-1], 1e-8, of=1.0)
+    state, tension = held.tendon(pull), both.tendon(pull).tension
+    assert state.tension[-1] == pytest.approx(tension[-1], rel=1e-9)
+    alone = cf.solve(arm(pull), [1.0], elements=4)
+    assert ends[:2] == pytest.approx(np.tile(alone.position(ROD.end)[-1], (2, 1)), abs=1e-10)
+    part, name = held.part(0), "loads[0].shortening"
+    slopes = part.sensitivity(lambda path: path.position(ROD.end), name)[name]
+    expected = [x.sensitivity(lambda path: path.position(ROD.end)[-1], name)[name] for x in (alone, both)]
+    assert slopes == pytest.approx(np.array(expected), rel=1e-6, abs=1e-8)
+
+    steps = dict(load_factors=[0.5, 1.0])
+    came = staged(push, cf.Stage([pull], **steps), cf.Stage(release=[pull], **steps))
+    bent = cf.solve(arm(push), [1.0], elements=4)
+    short = LENGTH - came.tendon(pull).length[0] + 0.006
+    whole = cf.solve(arm(cf.Tendon(ROD, (E, 0), shortening=short, axial=axial), push), [1.0], elements=4)
+    assert came.position(ROD.end)[2] == pytest.approx(whole.position(ROD.end)[-1], abs=1e-10)
+    assert came.position(ROD.end)[-1] == pytest.approx(bent.position(ROD.end)[-1], abs=1e-10)
+    tension = came.tendon(pull).tension
+    assert tension[0] == 0 and tension[3:] == pytest.approx(tension[2] * np.array([0.5, 0.0]), rel=1e-9, abs=1e-12)
+
+
 MASS, J = 0.5, 1e-5  # per length: kg/m, kg m
 HEAVY = cf.Rod(ROD.curve, cf.Stiffness((GA, GA), EA, (EI, EI), GJ, mass=MASS, inertia=(J, J, 2 * J)), name="arm")
 

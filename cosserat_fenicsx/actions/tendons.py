@@ -26,7 +26,7 @@ from cosserat_fenicsx.scene import action
 from cosserat_fenicsx.scene.action import LineAction
 from cosserat_fenicsx.scene.loads import Load
 from cosserat_fenicsx.scene.rod import RodOrName
-from cosserat_fenicsx.scene.signals import Along, AlongPieces, VectorInTime, values_of
+from cosserat_fenicsx.scene.signals import Along, AlongPieces, VectorInTime, at, values_of
 
 # Step of differences along the rod, over its length.
 _STEP = 5e-4
@@ -129,6 +129,15 @@ class Tendon(Load, LineAction):
             action.vector(self._arm(rod, s), "m"),
             action.vector(self._slope(rod, s), "1"),
         )
+
+    def left_of(self, length, t, load_factor):
+        """Length without tension, m, at a time (s), of one that has a `length` where nothing is wound up; a SceneError
+        where there is none."""
+        short = load_factor * _number(at(self, t).shortening)
+        if short >= length:
+            when = f", at the time t = {t:g} s" if t else ""
+            refuse(self, "shortening", short, f"less than the length of the tendon, {length:.6g} m{when}")
+        return length - short
 
     def _arm(self, rod, s):
         """(n, 3) R_R p: from the axis to the tendon, inertial in the reference, m."""

@@ -17,7 +17,6 @@ from cosserat_fenicsx.checks import File, instance, number, refuse, whole
 from cosserat_fenicsx.dynamics.pace import Adaptive, Fixed
 from cosserat_fenicsx.dynamics.schemes import SCHEMES
 from cosserat_fenicsx.dynamics.start import equilibrium, put_start, starts_in
-from cosserat_fenicsx.dynamics.tendons import check_stiffnesses
 from cosserat_fenicsx.dynamics.time_loop import TimeLoop, marks_of
 from cosserat_fenicsx.errors import NotConverged, SceneError, nearest
 from cosserat_fenicsx.models.base import Scales
@@ -30,7 +29,7 @@ from cosserat_fenicsx.ranks import Alone, communicator
 from cosserat_fenicsx.results import saved
 from cosserat_fenicsx.results.history import History
 from cosserat_fenicsx.results.path import Path
-from cosserat_fenicsx.scene.action import path_dependent
+from cosserat_fenicsx.scene.action import describe, path_dependent
 from cosserat_fenicsx.scene.scene import Scene, check_magnitudes, check_tensions
 from cosserat_fenicsx.scene.stages import refuse_stages
 from cosserat_fenicsx.statics.meshes import turning_in_law
@@ -127,7 +126,7 @@ def simulate(
             "that applies the loads slowly"
         )
     refuse_stages("simulate", scene)
-    check_stiffnesses(scene)
+    _check_stiffnesses(scene)
     if scene.rod_contact and (scene.rod_contact.stiffness is None or comm.size > 1):
         raise SceneError(
             "simulate: rods touch each other on one process, with elastic surfaces: expected one process, and a "
@@ -166,6 +165,16 @@ def simulate(
             history.keep_in(store)
         motion = TimeLoop(problem, stepper, pace, history, store)
         return motion.over(marks, save_every is None, progress)
+
+
+def _check_stiffnesses(scene):
+    """Refuse (SceneError) tendons of given length that do not stretch."""
+    for load in scene.actions:
+        if load.shortens and load.axial is None:
+            raise SceneError(
+                f"simulate: {describe(load)} does not stretch, and would be taut with a blow: expected its stiffness "
+                "EA, axial= (N)"
+            )
 
 
 def pace_of(duration, *, tol=None, dt=None, scheme="momentum", save_every=None, elements=ELEMENTS):

@@ -15,19 +15,7 @@ where d is the step for the given tensions T, subtracted from the unknowns, f th
 
 import numpy as np
 
-from cosserat_fenicsx.errors import SceneError
-from cosserat_fenicsx.scene.action import describe
 from cosserat_fenicsx.statics.tensions import ThreadLengths
-
-
-def check_stiffnesses(scene):
-    """Refuse (SceneError) tendons of given length that do not stretch."""
-    for load in scene.actions:
-        if load.shortens and load.axial is None:
-            raise SceneError(
-                f"simulate: {describe(load)} does not stretch, and would be taut with a blow: expected its stiffness "
-                "EA, axial= (N)"
-            )
 
 
 class TensionsInSteps(ThreadLengths):

@@ -13,7 +13,7 @@ from cosserat_fenicsx.compat import compiling
 from cosserat_fenicsx.forms.equilibrium import Section
 from cosserat_fenicsx.forms.law import stiffness_for
 from cosserat_fenicsx.models.action_terms import ActionTerms, Densities
-from cosserat_fenicsx.models.compiled import compile_static
+from cosserat_fenicsx.models.compiled import compile_static, threads_of
 from cosserat_fenicsx.models.connections import Clamps, Ties, ties_of
 from cosserat_fenicsx.models.rod_data import (
     as_matrix,
@@ -262,6 +262,9 @@ class RodModel:
             self.comm, self.space, self.nodal, self.owned_nodes, *self._held, len(links.equations)
         )
         self.unknowns = self.numbering.total
+
+    #: see `compiled.threads_of`
+    thread_forms = threads_of
 
     def slot(self, vertex):
         """The scene's number of the node at a vertex (rod index, element end)."""

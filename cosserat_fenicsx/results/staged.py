@@ -9,6 +9,7 @@ import numpy as np
 from cosserat_fenicsx.quantities import Quantity
 from cosserat_fenicsx.results.path import Path
 from cosserat_fenicsx.results.records import Record, Records
+from cosserat_fenicsx.results.recovery import Threads
 from cosserat_fenicsx.results.result import by_name
 from cosserat_fenicsx.scene.rod import Station
 
@@ -145,8 +146,13 @@ class StagedPath(Path):
     def _tension(self, tendon):
         """See `RodResult.tendon`; the scene may be another with the same tendons, as one that was read."""
         load = min((load for load in self.scene.all_loads if load == tendon), key=lambda load: load is not tendon)
-        full = np.reshape(load.tension, -1)[0]
-        return np.array([full * self.share_of(load, k) for k in range(len(self))])
+
+        def in_part(stage, part):
+            named = (*self._legs[stage].standing, *self._legs[stage].ramped)  # loads of the stage's scene, in order
+            found = [x for x, given in zip(part.scene.loads, named, strict=False) if given.item is load]
+            return sum((Threads(part).tension(x) for x in found), np.zeros(len(part)))
+
+        return self._by_stages(in_part)
 
     @property
     def conservative(self):

@@ -131,14 +131,17 @@ class Action(Part, family="load or action", homes=("cosserat_fenicsx.scene.loads
             `data` are then the tension, N, and the arm from the axis to the thread, m, and its derivative along the
             rod, inertial in the reference.
         shortens: whether it is a thread of given length, whose tension is found (statics.tensions). It then has
-            `shortening` (m) and `axial` (N, or None), is not `scaled`, and the tension in its `data` is 0.
+            `shortening` (m) and `axial` (N, or None), is not `scaled`, and the tension in its `data` is 0. In a stage
+            it has the shares of the shortening that are done before and with the load factor, `wound`, its length in
+            the state where it came in, `base` (m; None for the reference), and its tension at the begin, `begun` (N).
         traits: None; or a dict of the fields of `models.formulation.Traits`, where it takes long to find them from
             `work`.
     """
 
     at_nodes, scaled, permanent, follows, memory, evolve, traits = False, True, False, False, (), None, None
     delayed, resists, touches, presses, gaps, in_law, is_thread = None, False, False, False, None, False, False
-    rods_touch = shortens = finds_friction = False
+    rods_touch = shortens = False
+    wound, base, begun = (0.0, 1.0), None, 0.0
     amplitude = 1.0
 
     def acts_on(self, rod):

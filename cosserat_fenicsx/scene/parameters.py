@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cosserat_fenicsx.checks import instance, number
+from cosserat_fenicsx.checks import instance, number, store
 from cosserat_fenicsx.errors import SceneError, nearest
 from cosserat_fenicsx.kinds import Number, fields_of
 from cosserat_fenicsx.scene.curves import Curve, Spline
@@ -278,13 +278,19 @@ def _put(value, keys, leaf):
     return type(value)(parts)
 
 
+# What loads of a stage's scene have beside their fields, see `stages.scene_of`.
+_OF_STAGE = ("amplitude", "scaled", "wound", "base", "begun", "given")
+
+
 def _made(item, changes):
     """A dataclass of the package, made again with other fields."""
     if isinstance(item, Station):
         return dataclasses.replace(item, **changes)
     given = item.arguments()  # in the order of the fields, whose names may differ
     names = dict(zip([x.name for x in dataclasses.fields(item) if x.init], given, strict=True))
-    return type(item)(**given | {names[field]: value for field, value in changes.items()})
+    made = type(item)(**given | {names[field]: value for field, value in changes.items()})
+    store(made, **{name: vars(item)[name] for name in _OF_STAGE if name in vars(item)})
+    return made
 
 
 class _Rebuilding:

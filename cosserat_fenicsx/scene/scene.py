@@ -96,7 +96,8 @@ def check_magnitudes(scene, load_factor):
 def check_tensions(scene, load_factors, leg=None):
     """Refuse (SceneError) load factors, of a `Leg` or a scene without stages, that give a thread negative tension."""
     for load in scene.all_loads:
-        for factor in load_factors if load.is_thread else ():
+        given = not load.shortens or (leg and leg.releases(load))
+        for factor in load_factors if load.is_thread and given else ():
             share = leg.share_of(load, factor) if leg else factor if load.scaled else 1.0
             if share < 0:
                 raise SceneError(

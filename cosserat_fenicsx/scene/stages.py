@@ -135,7 +135,12 @@ class Leg:
     @property
     def depends_on_state(self):
         """Whether its scene depends on the state at its begin."""
-        return bool(self.released) or any(x.value != "fixed" for x in self.supports)
+        moved = any(x.value != "fixed" for x in self.supports)
+        return bool(self.released) or moved or any(x.item.shortens for x in (*self.standing, *self.ramped))
+
+    def releases(self, load):
+        """Whether it ramps down a load of a stage before."""
+        return all(any(x.item is load for x in part) for part in (self.standing, self.ramped))
 
 
 def refuse_stages(owner, scene):
@@ -212,8 +217,8 @@ class Places:
 def legs_of(scene):
     """The `Leg`s of a scene with stages, in order: of its own loads, where there are such, then of its stages; a
     SceneError where a stage releases what is gone, or not all of a support; or names what no load factor multiplies."""
-    always = [Named(f"loads[{i}]", x, 1.0) for i, x in enumerate(scene.loads) if not x.scaled]
-    ramped = [Named(f"loads[{i}]", x, 1.0) for i, x in enumerate(scene.loads) if x.scaled]
+    loads = [Named(f"loads[{i}]", x, 1.0) for i, x in enumerate(scene.loads)]
+    always, ramped = ([x for x in loads if (x.item.scaled or x.item.shortens) is ramps] for ramps in (False, True))
     supports = [Named(f"supports[{i}]", x, "moving" if x.moves else "fixed") for i, x in enumerate(scene.supports)]
     legs, acts = [], bool(ramped) or any(x.value == "moving" for x in supports)
     changes = any(x.item.permanent for x in always) and (scene.stages[0].supports or scene.stages[0].release)
@@ -224,7 +229,7 @@ def legs_of(scene):
         if legs:
             always, supports = after(legs[-1])
         for j, load in enumerate(stage.loads):
-            if not (load.scaled or load.permanent):
+            if not (load.scaled or load.permanent or load.shortens):
                 raise SceneError(
                     f"{words}.loads[{j}]: a {type(load).__name__} is not multiplied by the load factor: expected a "
                     "load that is, such as a Force, and this one among the loads of the scene"
@@ -236,7 +241,8 @@ def legs_of(scene):
                 raise SceneError(f"{words}.release: {place} has been released, or replaced, before")
         ramped = [Named(f"stages[{i}].loads[{j}]", x, 1.0) for j, x in enumerate(stage.loads)]
         ramped += [x._replace(value=-x.value) for x in always if x.place in gone]
-        fixed = [x.item for x in always if x.place in gone and not (x.item.scaled or x.item.permanent)]
+        there = [x.item for x in always if x.place in gone]
+        fixed = [x for x in there if not (x.scaled or x.permanent or x.shortens)]
         if fixed:
             raise SceneError(
                 f"{words}.release: a {type(fixed[0]).__name__} is not multiplied by the load factor: expected a load "
@@ -257,12 +263,14 @@ def after(leg):
     """The loads and supports, lists of `Named`, that a stage after this one finds.
 
     Raises:
-        SceneError: a part of the reaction of a released support is left.
+        SceneError: a part of the reaction of a released support, or of the tension of a released tendon of given
+            length, is left.
     """
-    if leg.released and leg.last != 1:
+    lengths = any(x.item.shortens and leg.releases(x.item) for x in leg.ramped)
+    if (leg.released or lengths) and leg.last != 1:
         raise SceneError(
             f"{leg.words}.load_factors end at {leg.last:g}, and a stage follows: expected 1 at the end, since a "
-            "support is released in full"
+            f"{'support' if leg.released else 'tendon'} is released in full"
         )
     reached = {}
     for x in (*leg.standing, *(x._replace(value=leg.last * x.value) for x in leg.ramped)):
@@ -322,7 +330,8 @@ class _Placed(Support):
 def scene_of(scene, leg, end=None):
     """The `Scene` of a leg; end: the path up to the end of the leg before, its last state alone, on a scene by this
     function; None where the leg begins in the reference, or to check the scene there."""
-    loads = [_part(x, permanent=True) for x in leg.standing] + [_part(x, permanent=False) for x in leg.ramped]
+    loads = [_part(x, leg, end, permanent=True) for x in leg.standing]
+    loads += [_part(x, leg, end, permanent=False) for x in leg.ramped]
     supports = [_placed(x, end) for x in leg.supports]
     for i in leg.released if end else ():
         loads += _reactions(end, i)
@@ -334,8 +343,19 @@ def scene_of(scene, leg, end=None):
     return found
 
 
-def _part(named, *, permanent):
-    """A load with its amplitude, in full or times the load factor."""
+def _part(named, leg, end, *, permanent):
+    """A load with its amplitude, in full or times the load factor; end: see `scene_of`."""
+    if named.item.shortens:
+        before = [x for x in end.scene.loads if getattr(x, "given", None) is named.item] if end else []
+        tension = float(end.tendon(before[0]).tension[-1]) if before else 0.0
+        if not leg.releases(named.item):
+            part = copy.copy(named.item)
+            base = before[0].base if before else end and float(end.thread_length(part)[-1])
+            wound = (named.value, 0.0) if permanent else (0.0, named.value)
+            store(part, given=named.item, wound=wound, base=base, begun=tension)
+            return part
+        left = dataclasses.replace(named.item, shortening=None, axial=None, tension=tension)
+        named = named._replace(item=left, value=1.0 if permanent else -1.0)
     load, full = named.item, not (named.item.scaled or named.item.permanent)
     if full or (named.value == 1 and load.permanent is permanent):
         return load

@@ -39,7 +39,7 @@ def check_arguments(scene, tol, elements, bound=NAMES, *, owner="solve"):
         refuse_stages(owner, scene)
     if owner != "solve":
         refuse_rod_contact(owner, scene)
-    if owner not in ("solve", "modes") or scene.stages or scene.rod_contact:
+    if owner not in ("solve", "modes") or scene.rod_contact:
         refuse_given_lengths(owner, scene)
     tolerance(owner, tol)
     criteria_of(bound)
@@ -95,7 +95,7 @@ def refuse_given_lengths(owner, scene):
         if load.shortens:
             raise SceneError(
                 f"{owner}: a {type(load).__name__} of given length is known to `solve`, `modes`, derivatives of states "
-                "and `simulate` alone, in equilibria without stages and without rods that touch each other: expected "
+                "and `simulate` alone, in equilibria without rods that touch each other: expected "
                 "its tension, such as that which path.tendon(tendon).tension gives"
             )
 

@@ -19,9 +19,6 @@ from cosserat_fenicsx import compat
 from cosserat_fenicsx.algebra.building import Packed
 from cosserat_fenicsx.compat import compiling
 from cosserat_fenicsx.errors import SceneError
-from cosserat_fenicsx.models.compiled import threads_of
-from cosserat_fenicsx.scene.action import describe
-from cosserat_fenicsx.scene.signals import at
 
 # Condition number of S above which it is singular.
 _SINGULAR = 1e12
@@ -44,7 +41,7 @@ class ThreadLengths:
         self._terms = [term for term in model.actions.terms if term.kind.finds_tension]
         self._along = fem.Function(model.space)
         with compiling():
-            forms = compat.forms(model.mesh, threads_of(model, self._terms, self._along))
+            forms = compat.forms(model.mesh, model.thread_forms(self._terms, self._along))
         self._length, self._change, force = forms
         self._force = Packed(force, (model.state, *(term.data[0] for term in self._terms)), model.constants)
 
@@ -60,19 +57,15 @@ class ThreadLengths:
         self._columns, self._responses = ([self._problem.numbering.vector() for _ in found] for _ in range(2))
         self._force.refresh()
         self._at_rest = self._lengths(self._length)
+        came_in = [(k, x.base) for k, x in enumerate(self._tendons) if x.base is not None]
+        for k, base in came_in:
+            self._at_rest[k] = base / model.scales.length
 
     def left_at(self, t, load_factor):
         """(tendons,) lengths without tension at a time (s)."""
-        short = load_factor * np.array([np.ravel(at(x, t).shortening)[0] for x in self._tendons], dtype=float)
-        short, when = short / self._model.scales.length, f", at the time t = {t:g} s" if t else ""
-        for tendon, length, less in zip(self._tendons, self._at_rest, short, strict=True):
-            if less >= length:
-                length, less = (x * self._model.scales.length for x in (length, less))
-                raise SceneError(
-                    f"{describe(tendon)}: shortening = {less:g}: expected less than the length of the tendon, "
-                    f"{length:.6g} m{when}"
-                )
-        return self._at_rest - short
+        unit = self._model.scales.length
+        pairs = zip(self._tendons, self._at_rest * unit, strict=True)
+        return np.array([tendon.left_of(length, t, load_factor) for tendon, length in pairs]) / unit
 
     def put(self, values):
         """Set the tensions."""
@@ -110,17 +103,19 @@ class Tensions(ThreadLengths):
 
     def load(self):
         super().load()
-        size = len(self.values)
-        self._short = self._at_rest - self.left_at(0.0, 1.0)
+        size, short = len(self.values), self._at_rest - self.left_at(0.0, 1.0)
+        before, now = np.transpose([x.wound for x in self._tendons])
+        self._done, self._short = before * short, now * short
         self._active = np.ones(size, dtype=bool)
         self.undetermined, self.slope, self.wanted = False, np.zeros(size), np.zeros(size)
         self._step = np.zeros(size)
         self.forget()
+        self.put([x.begun / self._model.scales.force for x in self._tendons])
 
     @property
     def _left(self):
         """(tendons,) lengths without tension, at the load factor."""
-        return self._at_rest - float(self._problem.load_factor_array) * self._short
+        return self._at_rest - self._done - float(self._problem.load_factor_array) * self._short
 
     def forget(self):
         """The tangent has other factors."""

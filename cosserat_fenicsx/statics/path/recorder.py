@@ -189,7 +189,9 @@ class Tracing:
             return
         ((point, values, n),) = self._starts(self._start.at_points([len(self._start) - 1]))
         multipliers = np.zeros_like(self.problem.multipliers())  # the equations are linear in these
-        self._follower.begin(load_factors, (values, n, multipliers), recorded=recorded)
+        if self.problem.tensions:
+            multipliers[-len(self.problem.tensions.values) :] = self.problem.tensions.values
+        self._follower.begin(load_factors, (values, n, multipliers))
 
     def _swept_from(self, k, load_factors, free, until):
         """Advance from the k-th load factor on in C while steps are accepted; the index of the next load factor."""
