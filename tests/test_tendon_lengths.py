@@ -236,6 +236,14 @@ def test_what_is_refused(make, says):
 
 
 @pytest.mark.serial
+def test_a_way_that_does_not_get_shorter():
+    """Between two clamps a tendon along a straight rod is the shortest way, whatever its tension."""
+    scene = cf.Scene([ROD], [cf.Clamp(ROD.start), cf.Clamp(ROD.end)], [cf.Tendon(ROD, (E, 0), shortening=0.01)])
+    with pytest.raises(cf.NotConverged, match="hardly gets shorter than its way along the rod there, 0.3 m"):
+        cf.solve(scene, [1.0], elements=4)
+
+
+@pytest.mark.serial
 def test_tendons_that_determine_each_other_are_refused():
     """Four that do not stretch have the same sum on both diagonals; elastic ones share the load."""
     sides = [(E, 0), (-E, 0), (0, E), (0, -E)]

@@ -193,6 +193,20 @@ class Tensions(ThreadLengths):
         """(tendons,) g."""
         return self._lengths(self._length) - self._left * (1 + self._softness * self.values)
 
+    def too_short(self, load_factor, most):
+        """(tendon, its length, m) of one whose tension would exceed `most` on the way to a load factor, by the
+        compliance at the problem's state; or None."""
+        problem = self._problem
+        problem.function(problem.x, problem.b)
+        problem.factor()
+        if problem.c.singular:
+            return None
+        wanted = self.gaps() + (load_factor - problem.load_factor) * self._short
+        beyond = wanted - most * np.diag(self._comply())
+        k = int(np.argmax(beyond))
+        length = self._lengths(self._length)[k] * self._model.scales.length
+        return (self._tendons[k], float(length)) if beyond[k] > 0 else None
+
     def keep(self):
         """For what linearises about the state: tendons remain taut or slack. (tendons,) which are about to be either;
         they remain slack."""

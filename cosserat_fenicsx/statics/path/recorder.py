@@ -165,7 +165,7 @@ class Tracing:
                         raise Promoted(f"load control ends at the load factor {here:.4g}, because {track.failure}")
                     raise NotConverged(
                         f"no equilibrium was found beyond the load factor {here:.6g} on the way to {load_factor:g}: "
-                        f"{track.failure}. {self._advice(here, abs(load_factor) * self.problem.load_norm)}",
+                        f"{track.failure}. {self._advice(here, load_factor)}",
                         self.path,
                     )
                 if not between:
@@ -233,13 +233,22 @@ class Tracing:
         }
         self.path.extend(Records(Record, columns))
 
-    def _advice(self, here, load):
+    def _advice(self, here, load_factor):
         if not self._options["steps"].adaptive:
             return "Allow adaptive steps, or ask for load factors in between."
-        strain = load / self.model.section.K.max()
+        load, most = abs(load_factor) * self.problem.load_norm, self.model.section.K.max()
+        strain = load / most
         if strain > _ENORMOUS:
             return (
                 f"The loads are {strain:.1e} times EA there, which no rod bears: are the units those of SI (N, m, Pa)?"
+            )
+        self.track.put(self.track.here.numbers, here)
+        if self.problem.tensions and (found := self.problem.tensions.too_short(load_factor, most)):
+            tendon, length = found
+            return (
+                f"The {type(tendon).__name__} of {tendon.rod.name} hardly gets shorter than its way along the rod "
+                f"there, {length:.6g} m: its tension would exceed EA of the rod. Expected a smaller shortening, or a "
+                "tendon that stretches, axial="
             )
         scene, where = self.model.scene, "Try"
         if len(self.track.history) == 1 and self._options["control"] == "arc":
