@@ -140,7 +140,7 @@ class Action(Part, family="load or action", homes=("cosserat_fenicsx.scene.loads
 
     at_nodes, scaled, permanent, follows, memory, evolve, traits = False, True, False, False, (), None, None
     delayed, resists, touches, presses, gaps, in_law, is_thread = None, False, False, False, None, False, False
-    rods_touch = shortens = False
+    rods_touch = shortens = finds_friction = False
     wound, base, begun = (0.0, 1.0), None, 0.0
     amplitude = 1.0
 

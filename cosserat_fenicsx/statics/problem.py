@@ -94,9 +94,9 @@ def refuse_given_lengths(owner, scene):
     for load in scene.all_loads:
         if load.shortens:
             raise SceneError(
-                f"{owner}: a {type(load).__name__} of given length is known to `solve`, `modes`, derivatives of states "
-                "and `simulate` alone, in equilibria without rods that touch each other: expected "
-                "its tension, such as that which path.tendon(tendon).tension gives"
+                f"{owner}: only `solve`, `modes`, `simulate` and derivatives of states take a {type(load).__name__} of "
+                "given length, in equilibria without rods that touch each other: expected its tension, such as "
+                "path.tendon(tendon).tension"
             )
 
 

@@ -191,7 +191,7 @@ class Tracing:
         multipliers = np.zeros_like(self.problem.multipliers())  # the equations are linear in these
         if self.problem.tensions:
             multipliers[-len(self.problem.tensions.values) :] = self.problem.tensions.values
-        self._follower.begin(load_factors, (values, n, multipliers))
+        self._follower.begin(load_factors, (values, n, multipliers), recorded=recorded)
 
     def _swept_from(self, k, load_factors, free, until):
         """Advance from the k-th load factor on in C while steps are accepted; the index of the next load factor."""
