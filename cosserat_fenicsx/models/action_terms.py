@@ -172,10 +172,19 @@ class ActionTerms:
         """The terms with friction that is found with the state (`Action.finds_friction`)."""
         return [term for term in self.terms if term.finds_friction]
 
+    @property
+    def friction(self):
+        """Copies of the friction that was found with the state, of each of the terms `sticking`."""
+        return [term.held.copy() for term in self.sticking]
+
+    @friction.setter
+    def friction(self, values):
+        for term, friction in zip(self.sticking, values, strict=True):
+            term.held[:] = friction
+
     def forget_friction(self):
         """Return to the friction of the last accepted state."""
-        for term in self.sticking:
-            term.held[:] = term.accepted
+        self.friction = [term.accepted for term in self.sticking]
 
     def commit(self):
         """Update the actions' memory to the state, which has been accepted."""

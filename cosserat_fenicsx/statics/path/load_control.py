@@ -195,11 +195,12 @@ class Continuation:
     def _jumped(self, move, change):
         """Whether a step has jumped over a limit point to another part of the path: it is longer than twice the mean
         slope of its two ends times the change of the load factor."""
-        track = self.track
-        end, load_factor = track.problem.numbers(), track.problem.load_factor
+        track, actions = self.track, self.track.model.actions
+        end, load_factor, friction = track.problem.numbers(), track.problem.load_factor, actions.friction
         slopes = track.slope()
         track.restore()
         slopes += track.slope()
+        actions.friction = friction
         track.put(end, load_factor)
         return track.product(slopes, slopes) * change**2 < track.product(move, move)
 

@@ -153,10 +153,11 @@ class Track:
         slips has friction at its bound against the slip: the equations of Alart & Curnier (`touching.rubbing`). The
         stiffness grows while Newton's method sees the same places stick, and falls where it fails.
         """
-        problem, terms, first = self.problem, self.model.actions.sticking, solved.iterations
+        problem, actions, first = self.problem, self.model.actions, solved.iterations
+        terms = actions.sticking
         share, slip, refused, alike = 1.0, math.inf, math.inf, 0
         for _ in range(_MOST_STUCK):
-            before, held, last = problem.numbers(), [term.held.copy() for term in terms], slip
+            before, held, last = problem.numbers(), actions.friction, slip
             slip = self.model.comm.allreduce(max(term.find_friction() for term in terms), op=MPI.MAX)
             if slip < _STUCK:
                 break
@@ -173,8 +174,7 @@ class Track:
             if not solved.converged:
                 if share <= 1.0:
                     break
-                for term, friction in zip(terms, held, strict=True):
-                    term.held[:] = friction
+                actions.friction = held
                 share, refused, slip, alike = share / _STIFFER, slip, last, 0
                 problem.stiffen(share)
                 problem.put(before)
