@@ -19,6 +19,7 @@ from cosserat_fenicsx.drilling import (
     TopDrive,
     ViscousDrag,
 )
+from cosserat_fenicsx.drilling.joints import fastest_rotor
 from cosserat_fenicsx.drilling.linear.characteristic import Steady
 from cosserat_fenicsx.well import Bit, Collar, Component, DrillString, MotorCurve, MudMotor, OscillationTool
 
@@ -202,6 +203,15 @@ def test_the_ends_of_a_chart():
     assert tool.slope >= slopes.max() and tool.slope == pytest.approx(slopes.max(), rel=1e-2)
     flat = motor(leakage=None, curves=[MotorCurve(GIVEN["Q"], [9, 8, 0], [0, 9999.0, 1e4])])
     assert flat.speed(2e4) == pytest.approx(-8 * (1e4 - 2 * GIVEN["Tf"]), rel=1e-9)
+
+
+def test_steps_resolve_a_rotor_whose_flow_rises_smoothly():
+    """It is slow at the start, and a function of time tells no times at which its flow is largest."""
+    slow, fast = (
+        above(motor(leakage=None, curves=CHART, flow=flow))
+        for flow in (0.02, lambda t: 0.03 - 0.01 * np.cos(2 * np.pi * t))
+    )
+    assert fastest_rotor(slow) == pytest.approx(0.4 * 9.2) and fastest_rotor(fast) == pytest.approx(9.2, rel=1e-3)
 
 
 def test_small_motions_take_the_slope_of_a_motors_curve():

@@ -95,7 +95,8 @@ def fastest_rotor(scene) -> float:
         return 0.0
     if not joint.tool.curves:
         return max(0.0, (joint.force.largest - joint.lost) / joint.damping)
-    return max(joint.tool.speed(0.0, joint.tool.flow_at(t)) for t in (0.0, *joint.force.jumps))
+    flow = ScalarSignal(joint.tool, "flow", joint.tool.flow, "m^3/s").largest  # perhaps of a time after the motion
+    return joint.tool.speed(0.0, min(flow, joint.tool.curves[-1].flow))
 
 
 def speed_of_bit(scene, turning, down=None, rubbed=None):
