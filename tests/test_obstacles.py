@@ -95,6 +95,27 @@ def test_friction_is_that_of_a_long_step():
     np.testing.assert_allclose(path.contacts(floor).force[:, 0], -10.0, rtol=1e-7)
 
 
+def test_a_rod_that_an_obstacle_does_not_act_on():
+    """It lies beyond a rough plane and moves along it, in many steps."""
+    how = {"elements": 10, "steps": cf.StepControl(smallest=5e-3)}
+    scene, floor, *_, F = pulled_bar()
+    (rod,), load_factors = scene.rods, np.linspace(0.0, 1.0, 41)
+    below = cf.Rod(cf.Line((0, 1, -1), (8, 1, -1)), rod.section, name="below")
+    path = cf.solve(
+        dataclasses.replace(
+            scene,
+            rods=[rod, below],
+            supports=[*scene.supports, cf.Clamp(below.start)],
+            loads=[dataclasses.replace(floor, rod=rod), *scene.loads[1:], cf.Force(below.end, (F, 0, 0))],
+        ),
+        load_factors,
+        **how,
+    )
+    alone = cf.solve(scene, load_factors, **how)
+    np.testing.assert_allclose(path.displacement(rod.end), alone.displacement(rod.end), rtol=0, atol=1e-9)
+    np.testing.assert_allclose(path.displacement(below.end)[:, 0], load_factors * F * 8 / 2e4, rtol=1e-9, atol=1e-12)
+
+
 def test_the_estimate_covers_a_release():
     """Meshes that tol chooses do not follow the edge of slip, which goes through elements: they agree by chance."""
     scene, _, w, mu, EA, F = pulled_bar()

@@ -337,13 +337,17 @@ class Term:
     def soften(self, share):
         """See `ActionTerms`; walls whose data are refreshed have stages of their own."""
         action, rod = self._where[0][:2]
-        if not action.presses or self.kind.refreshed:
-            return
+        if action.presses and not self.kind.refreshed:
+            data = action.data(rod, np.zeros(1))
+            self._multiply([k for k, datum in enumerate(data) if datum.unit == "N/m^2"], share)
+
+    def _multiply(self, which, share):
+        """Multiply some of the data by a share, where actions act: `put` fills in no others again."""
         self._values = None
         self.put(0.0)
-        for array, datum in zip(self._arrays, action.data(rod, np.zeros(1)), strict=True):
-            if datum.unit == "N/m^2":
-                array *= share
+        for k in which:
+            for _, _, rows, *_ in self._where:
+                self._arrays[k][rows] *= share
 
     def _take(self, data, rod, rows):
         adds = self.kind.place == "law"
@@ -393,13 +397,11 @@ class Term:
         before = self.held.copy()
         self._store(self.memory[-1:])
         changed = np.abs(self.held - before).reshape(-1, 3).max(axis=1)
-        return float((changed / self._arrays[-1][:, 0]).max(initial=0.0))
+        return float((changed / self._arrays[-1][:, 0])[self.weight.x.array != 0].max(initial=0.0))
 
     def stiffen(self, share):
         """Multiply the stiffness against slip; 1 restores it."""
-        self._values = None
-        self.put(0.0)
-        self._arrays[-1][:] *= share
+        self._multiply([-1], share)
 
     def _store(self, memory):
         sizes, cells = self.kind.memory, self._model._local_cells
