@@ -359,7 +359,7 @@ def test_a_finer_mesh_begins_with_the_factors_of_a_coarse_one(monkeypatch):
     monkeypatch.setattr(eigen.RepeatedInertia, "_begin", lambda self: analysed.append(1) or begin(self))
     for shared in (eigen.inertia_of, eigen.RepeatedInertia):
         monkeypatch.setattr("cosserat_fenicsx.statics.problem.PROBLEMS", ProblemPool())
-        monkeypatch.setattr(eigen, "_LAST", {})
+        monkeypatch.setattr(eigen, "_LAST", eigen._Last())
         monkeypatch.setattr(eigen, "inertia_of", shared)
         path = cf.solve(scene, [10.0, 20.0])
         assert (len(analysed) == 1) == (not found) and not path.negative_modes.any()

@@ -603,9 +603,6 @@ def test_a_control_called_once_a_sample_in_the_linear_theory():
     blind = cf.drilling.TopDrive(6.0, 2000.0, Blind())
     with pytest.raises(cf.SceneError, match="acts in drilling.simulate, unless Blind has gains"):
         cf.drilling.stability(replace(ours, drive=blind), [6.0])
-    rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, 1.0)), COLLAR.stiffness)
-    with pytest.raises(cf.SceneError, match="drilling.simulate has those that are called once a sample"):
-        cf.drilling.PipeAbove(rod.start, PIPE, blind)
 
 
 @pytest.mark.once

@@ -55,7 +55,7 @@ def test_outliers_gaps_and_a_clock_that_is_behind(tmp_path):
     assert fit.clock == pytest.approx(0.5, abs=0.01) and fit.names[-1] == "clock" and 0.9 < fit.misfit < 1.1
     assert (np.abs(fit.values[:2] - TRUE[:2]) < 3.5 * fit.standard_error[:2]).all()
     assert fit.left_out["surface_torque"] == pytest.approx([9.6, 24.6])
-    at_readings = np.interp(readings.times + fit.clock, fit.history.mean_times, fit.history.drive_speed)
+    at_readings = np.interp(readings.times + fit.clock, fit.history.times, fit.history.drive_speed)
     np.testing.assert_array_equal(fit.computed("drive_speed"), at_readings)
     panels = fit.plot().axes
     assert [line.get_label() for line in panels[1].lines] == ["read", "read, left out", "with the numbers found"]

@@ -294,7 +294,7 @@ def test_what_is_told_and_refused():
         TorsionWaves(cf.drilling.Drilling(string_of(*laid), cf.drilling.TopDrive(1.0), bit))
     with pytest.raises(cf.SceneError, match="expected a DrillString; discs have no waves"):
         TorsionWaves(cf.drilling.Drilling(cf.drilling.Discs((1.0, 1.0), (1.0,)), cf.drilling.TopDrive(1.0)))
-    with pytest.raises(cf.SceneError, match="TorsionWaves.scene.bit.law = .*knows no depth of cut"):
+    with pytest.raises(cf.SceneError, match="TorsionWaves.scene.bit.law = .*has no depth of cut"):
         cutting = cf.drilling.BitOnRock(cf.drilling.Cutting(0.1, 60e6, 0.6, 4))
         TorsionWaves(cf.drilling.Drilling(string_of(PIPE), cf.drilling.TopDrive(1.0), cutting))
     for dt, words in ((-1, "a positive number"), (1e-9, "at least 1e-05 of the travel time")):

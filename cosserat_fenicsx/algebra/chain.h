@@ -210,7 +210,6 @@ typedef struct {
 typedef struct {
     double far, intended, slight, leap; /* distances from the predictor */
     int easy, hard;                 /* Newton iterations */
-    double first;                   /* largest growth after the first step */
     double step, smallest, largest; /* the next step; bounds */
     double shrink;                  /* factor of a step that is rejected */
     int rejections, patience, accepted; /* rejected steps without two accepted ones between, and most of them; whether

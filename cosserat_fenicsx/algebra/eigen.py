@@ -315,19 +315,22 @@ class RepeatedInertia:
             return self._x.array_r * self._scale
 
 
-_LAST = {}  # {(pattern, null): `RepeatedInertia`}, at most one
+class _Last(threading.local):
+    """The last `RepeatedInertia` of a thread, for which (pattern, null): threads at work share no factors."""
+
+    key = found = None
+
+
+_LAST = _Last()
 
 
 def inertia_of(starts, columns, null):
     """The `RepeatedInertia` for a pattern, that of the last one where it is the same: the equations where rods meet are
     those of a coarser mesh, whose factors serve on a finer one."""
     key = starts.tobytes(), columns.tobytes(), null
-    found = _LAST.get(key)
-    if found is None:
-        found = RepeatedInertia(starts, columns, null)
-        _LAST.clear()
-        _LAST[key] = found
-    return found
+    if _LAST.key != key:
+        _LAST.key, _LAST.found = key, RepeatedInertia(starts, columns, null)
+    return _LAST.found
 
 
 class RepeatedFactors:

@@ -76,10 +76,10 @@ double step_goal(const step_control *c, double here, double load_factor)
 }
 
 /* Factor from an accepted step's length to the next one's; off: distance from the predictor, whose error is of an order
-   in the length, 1 in the first step. */
+   in the length. */
 double step_growth(const step_control *c, double off, int order, int iterations)
 {
-    const double growth = fmin(fmax(pow(c->intended / fmax(off, 1e-12), 1.0 / order), 0.5), order > 1 ? 2 : c->first);
+    const double growth = fmin(fmax(pow(c->intended / fmax(off, 1e-12), 1.0 / order), 0.5), 2);
     if (iterations >= c->hard) return 0.5;
     return iterations > c->easy ? fmin(growth, 1) : growth;
 }

@@ -89,14 +89,14 @@ def motion_between(before, after):
 
 
 # Number of nodes up to which the compliance is complete; of more, neighbours on each side that it couples.
-_FEW, _NEIGHBOURS = 16, 8
+_FEW, _NEIGHBOURS = 16, 10
 # The compliance, which differs little from step to step, is updated where its relative error exceeds the second number
 # and this many times its smallest error. Responses below the third number (dimensionless) may be rounding.
 _WORSE, _MISSED, _ROUNDING = 10.0, 1e-3, 1e-9
 _NEVER = 1000  # steps for which a compliance was not judged, where it is new
 # Sweeps over the nodes: largest number, and changes of the motion that end them, over the first one (with a complete
 # compliance, and with that of neighbours alone, which the next iteration corrects) and dimensionless.
-_MOST, _SHARE, _OF_NEIGHBOURS, _SMALLEST = 200, 1e-6, 1e-3, 1e-16
+_MOST, _SHARE, _OF_NEIGHBOURS, _SMALLEST = 200, 1e-6, 0.1, 1e-16
 # Numbers of a node in C.
 _OF_NODES = "clearance", "stiffness", "friction", "damping", "arm", "multiplier"
 

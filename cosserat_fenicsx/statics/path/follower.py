@@ -22,7 +22,6 @@ from cosserat_fenicsx.statics.path.track import LIMITS, NEAR, Track, bends, betw
 #: Control parameters of the continuation, see `solve`.
 CONTROLS = ("auto", "load", "arc")
 _PATIENCE = 4  # rejected steps of load control after which arc length takes over
-_FIRST_GROWTH = 4.0  # largest growth after the first step where steps are not results
 _TRIES = 8  # largest number of halvings of the first step onto a branch
 
 
@@ -65,12 +64,10 @@ class Follower:
         """The smallest step of the load factor that was allowed."""
         return self._load.c.smallest
 
-    def begin(self, load_factors, start=None, *, recorded=True):
+    def begin(self, load_factors, start=None):
         """Begin the path over these load factors: apply the permanent loads in steps, and solve at load factor 0, from
-        the reference or from a state there (`start`, arguments of `Problem.begin_at`); recorded: whether steps between
-        them are results. Raises NotConverged."""
+        the reference or from a state there (`start`, arguments of `Problem.begin_at`). Raises NotConverged."""
         problem, track = self.track.problem, self.track
-        self._load.c.first = LIMITS.first if recorded else _FIRST_GROWTH
         self._load.reach = float(max(map(abs, load_factors))) or 1.0
         if start is not None:
             return self._begin_at(start)

@@ -39,7 +39,6 @@ class Limits:
     leap: float = 1.0  # distance over the predicted increment above which a limit point may have been jumped over
     easy: int = 5  # Newton iterations of a step beyond which the next one does not grow,
     hard: int = 9  # and from which on it is halved
-    first: float = 2.0  # largest growth after the first step; later ones at most double
 
 
 LIMITS = Limits()
