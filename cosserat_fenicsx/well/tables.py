@@ -104,7 +104,7 @@ _SIDES, _ROUNDED = (("high side", "low side"), ("right", "left")), 1e-6
 
 
 def _sided(told, value, sides):
-    return f"{told} to the {sides[value < 0]}"
+    return f"{told} to the {sides[int(value < 0)]}"
 
 
 def of_operations(answers, uses, units):
