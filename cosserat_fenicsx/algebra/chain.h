@@ -126,7 +126,6 @@ typedef struct {
     double usual, worse, least, rounding; /* error of the motion by the compliance, relative: the smallest one, at least
                                        `least`; this many times it, and the compliance is stale; smallest motions that
                                        are compared */
-    int unjudged;                   /* steps since the compliance was judged */
     double missing, omitted;        /* the last of these errors; by it, norm of what the last response leaves out */
 } contact;
 

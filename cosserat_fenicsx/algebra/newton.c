@@ -10,10 +10,7 @@ enum { STATE = 1, RESIDUAL = 2, TANGENT = 4, INTERFACE = 8, ADD_UP = 16, SUM = 3
 enum { FAILED = 1 };
 /* Increments at a wall that no longer shrink, by rounding, are measured anew after some steps without them; one that is
    this many times larger than before may have stopped for another reason, such as an old tangent. */
-static const double FADES = 0.9, RISES = 10, STALLS = 0.9;
-
-/* Steps after which the compliance of nodes that touch is judged again; that takes a substitution. */
-enum { JUDGED_AFTER = 8 };
+static const double FADES = 0.9, RISES = 10;
 
 static int python_hook(void *self, int what, double *a, double *b);
 
@@ -196,7 +193,7 @@ static int respond_exactly(problem *p, double *change)
     if (!(size > c->rounding)) return 0;
     c->missing = fmax(missed / size, c->least);
     c->usual = fmin(c->usual, c->missing);
-    c->stale = c->missing > c->worse * c->usual, c->unjudged = 0;
+    c->stale = c->missing > c->worse * c->usual;
     return 0;
 }
 
@@ -234,8 +231,7 @@ static int meet(problem *p, const double *x, double *change, int first)
     memcpy(c->free, c->moved, size), memcpy(c->last, c->force, size), c->omitted = 0;
     settle(c);
     if (memcmp(c->last, c->force, size) == 0) return 0;
-    c->unjudged += first;
-    if (c->exact || (first && c->unjudged > JUDGED_AFTER)) return respond_exactly(p, change);
+    if (first || c->exact) return respond_exactly(p, change);
     respond_nearby(c, change);
     return 0;
 }
@@ -256,20 +252,17 @@ static int motion_in(const stepping *s, const double *a, const double *b, double
     return 0;
 }
 
-/* Decide after an increment whether to stop, and whether to continue with a new tangent; `earlier`: the one before
-   `before`. */
-static void judge_increment(stepping *s, double step, double before, double earlier)
+/* Decide after an increment whether to stop, and whether to continue with a new tangent. */
+static void judge_increment(stepping *s, double step, double before)
 {
     const double rate = s->iterations > 1 ? step / before : 1;
     const contact *c = s->problem->contact;
     const int complete = !c || c->omitted <= s->enough * s->root;
-    /* at a wall increments may shrink slowly by what a response leaves out: that is no rounding */
-    const int stalled = s->iterations > 1 && rate > 0.5 && (!c || c->omitted == 0 || step > STALLS * earlier);
     if (!isfinite(step)) s->verdict = NOT_A_NUMBER;
     else if (step > s->diverged) s->verdict = GROWN;
     else if (complete && (step <= s->enough || (s->iterations > 1 && error_is_small(step, before, 0, s->enough))))
         s->verdict = CONVERGED, s->noise *= FADES;
-    else if (step <= s->rounding && stalled)
+    else if (step <= s->rounding && rate > 0.5 && s->iterations > 1)
         s->verdict = CONVERGED, s->noise = !c ? 0 : s->noise > 0 ? fmin(step, RISES * s->noise) : step;
     else if (s->iterations >= s->most) s->verdict = RAN_OUT;
     else if (s->iterations > 1) {
@@ -283,7 +276,7 @@ static void judge_increment(stepping *s, double step, double before, double earl
 int iterate(stepping *s)
 {
     problem *p = s->problem;
-    double step = 0, before = 0, earlier;
+    double step = 0, before;
     if (motion_in(s, s->x, s->start, &s->enough)) return FAILED;
     s->enough = fmax(fmax(s->smallest, s->increment * s->enough), s->of_noise * s->noise);
     s->iterations = 0, s->verdict = ITERATING;
@@ -301,9 +294,9 @@ int iterate(stepping *s)
             break;
         }
         for (int i = 0; i < p->size; i++) s->x[i] -= s->change[i];
-        earlier = before, before = step, s->iterations++;
+        before = step, s->iterations++;
         if (motion_in(s, s->change, 0, &step)) return FAILED;
-        judge_increment(s, step, before, earlier);
+        judge_increment(s, step, before);
     }
     if (p->contact && move_nodes(p, s->x, 0)) return FAILED;
     return take_state(p, s->x);

@@ -3,8 +3,8 @@
 Every Newton iteration has a tangent of the rods without contact, by whose inverse, the compliance, the nodes that may
 touch respond linearly to their forces. With it the laws of all nodes are solved exactly (algebra/contact.c) before the
 step is taken. So Newton's method sees smooth equations alone, whatever sticks, slips, touches or lifts off, and its
-tangent stays valid. Where many nodes may touch, the compliance couples neighbours alone, and is exact for forces that
-are spread evenly; the next iteration corrects the rest.
+tangent stays valid. Where many nodes may touch, the compliance couples neighbours alone; the next iteration corrects
+the rest.
 """
 
 import numpy as np
@@ -93,7 +93,6 @@ _FEW, _NEIGHBOURS = 16, 10
 # The compliance, which differs little from step to step, is updated where its relative error exceeds the second number
 # and this many times its smallest error. Responses below the third number (dimensionless) may be rounding.
 _WORSE, _MISSED, _ROUNDING = 10.0, 1e-3, 1e-9
-_NEVER = 1000  # steps for which a compliance was not judged, where it is new
 # Sweeps over the nodes: largest number, and changes of the motion that end them, over the first one (with a complete
 # compliance, and with that of neighbours alone, which the next iteration corrects) and dimensionless.
 _MOST, _SHARE, _OF_NEIGHBOURS, _SMALLEST = 200, 1e-6, 0.1, 1e-16
@@ -106,11 +105,6 @@ def perpendicular(u, t):
     u = np.where(u.any(axis=1, keepdims=True), u, np.eye(3)[np.argmin(np.abs(t), axis=1)])
     u = u - (u * t).sum(axis=1, keepdims=True) * t
     return u / np.linalg.norm(u, axis=1, keepdims=True)
-
-
-def _apart(k, n):
-    """All nodes of n with one k after them, and these."""
-    return slice(max(-k, 0), n - max(k, 0)), slice(max(k, 0), n - max(-k, 0))
 
 
 class NodalContact(Pointers):
@@ -157,7 +151,6 @@ class NodalContact(Pointers):
         self._turning = np.zeros((n, 4, 2 * reach + 1, 2), dtype=np.float32)
         self._weaker = np.concatenate([np.full((len(p.slots), 2), p.weaker) for p in touched])[order]
         self._weaker[:, 1] *= model.time / scales.length
-        self._spread = np.concatenate([p.spread for p in touched])[order]
         self._slip, self._slip_begun = np.full(n, np.nan), np.zeros(n)  # speeds of slip in the last step
         self._begun, self._law_begun = (self._vectors[name].copy() for name in ("force", "law"))
         self._at_start = self.doubles(self._law_begun)
@@ -173,7 +166,7 @@ class NodalContact(Pointers):
         for name, array in {**self._numbers, **self._vectors, **arrays}.items():
             setattr(contact, name, self.doubles(array))
         self._known_for = np.nan  # the step length for which the compliance was computed, s
-        contact.stale, contact.usual, contact.missing, contact.unjudged = True, np.inf, 1.0, _NEVER
+        contact.stale, contact.usual, contact.missing = True, np.inf, 1.0
 
     # -- a step ------------------------------------------------------------------------------------------------------
 
@@ -223,7 +216,7 @@ class NodalContact(Pointers):
 
     def find_compliance(self):
         """Find the compliance by the current tangent."""
-        self._known_for, self.c.usual, self.c.stale, self.c.unjudged = self.c.h, np.inf, False, _NEVER
+        self._known_for, self.c.usual, self.c.stale = self.c.h, np.inf, False
         nodes, n, reach, vectors = self._nodes, self.c.nodes, self.c.reach, self._vectors
         t, u, arm = vectors["tangent"], vectors["across"], self._numbers["arm"][:, None]
         v, out = cross(t, u), vectors["start"] / np.maximum(np.linalg.norm(vectors["start"], axis=1), 1e-300)[:, None]
@@ -232,14 +225,6 @@ class NodalContact(Pointers):
         pairs = (u, none), (v, none), (t, -arm * tau), (none, arm * t)
         units, about = np.stack([np.hstack(pair) for pair in pairs], axis=1), np.stack([u, v], axis=1)
         turning = small_rotations(nodes.of_local(self._problem.state)[:, 3:])
-
-        def moved_by(force):
-            """(n, 4) motions and (n, 2) rotations by forces and moments (n, 6)."""
-            found = nodes.of_vector(nodes.response(force))
-            turned = turning @ found[:, 3:, None]
-            return (units @ np.concatenate([found[:, :3, None], turned], axis=1))[..., 0], (about @ turned)[..., 0]
-
-        by = self._compliance, self._turning
         apart = min(2 * reach + 1, n)
         for first in range(apart):
             sources = np.arange(first, n, apart)
@@ -249,22 +234,11 @@ class NodalContact(Pointers):
             for component in range(4):
                 force = np.zeros((n, 6))
                 force[sources] = units[sources, component]
-                for kept, found in zip(by, moved_by(force), strict=True):
-                    kept[sources, component] = np.where(inside[..., None], found[j], 0.0)
-        if self.c.exact:
-            return
-        # what nodes beyond the reach do, if forces are spread evenly, by the outermost ones within it
-        total = np.zeros(n)
-        outermost = [(end, *_apart(end, n)) for end in (-reach, reach)]
-        for _, i, j in outermost:
-            total[j] += self._spread[i]
-        for component in range(4):
-            for kept, left in zip(by, moved_by(units[:, component] * self._spread[:, None]), strict=True):
-                for k in range(-reach, reach + 1):
-                    i, j = _apart(k, n)
-                    left[j] -= self._spread[i, None] * kept[i, component, reach + k]
-                for end, i, j in outermost:
-                    kept[i, component, reach + end] += left[j] / np.where(total > 0, total, np.inf)[j, None]
+                found = nodes.of_vector(nodes.response(force))
+                turned = turning @ found[:, 3:, None]
+                moved = units @ np.concatenate([found[:, :3, None], turned], axis=1)
+                self._compliance[sources, component] = np.where(inside[..., None], moved[j, :, 0], 0.0)
+                self._turning[sources, component] = np.where(inside[..., None], (about @ turned)[j, :, 0], 0.0)
 
     # -- books -------------------------------------------------------------------------------------------------------
 
@@ -297,7 +271,7 @@ class NodalContact(Pointers):
         kept |= {"compliance": self._compliance.copy(), "turning": self._turning.copy()}
         kept["multiplier"] = self._numbers["multiplier"].copy()
         return {**kept, "known_for": self._known_for, "usual": self.c.usual, "missing": self.c.missing,
-                "stale": bool(self.c.stale), "unjudged": self.c.unjudged}  # fmt: skip
+                "stale": bool(self.c.stale)}  # fmt: skip
 
     def recall(self, memory):
         for name in ("force", "law"):
@@ -307,20 +281,17 @@ class NodalContact(Pointers):
         self._numbers["multiplier"][:] = memory["multiplier"]
         self._known_for, self.c.usual = float(memory["known_for"]), float(memory["usual"])
         self.c.missing, self.c.stale = float(memory["missing"]), bool(memory["stale"])
-        self.c.unjudged = int(memory["unjudged"])
         for place, md in zip(self._walls, np.split(memory["md"], self._ends), strict=True):
             place.md = md
 
 
 class _Place:
-    """The nodes that may touch one wall along one rod: numbers in the scene, arc lengths (m), stiffness (N/m), and
-    forces of a load that is spread evenly."""
+    """The nodes that may touch one wall along one rod: numbers in the scene, arc lengths (m), stiffness (N/m)."""
 
     def __init__(self, wall, slots, s, lengths, origin):
         self.wall, self.slots, self.s, self.origin = wall, slots, s, origin
         self.stiffness, self.damping = wall.stiffness * lengths, np.full(len(s), wall.damping)
         self.weaker = wall.kinetic, wall.speed
-        self.spread = lengths if wall.station is None else 0 * lengths
         self.md = s + wall.begins
 
 
