@@ -2,6 +2,7 @@
 
 import math
 import threading
+import weakref
 from pathlib import Path
 
 import numpy as np
@@ -258,7 +259,8 @@ class RepeatedInertia:
     see `inertia_of`."""
 
     # without a __dict__, so that the pool, which takes one problem apart, leaves it to the others
-    __slots__ = ("regular", "counts", "_definite", "_null", "_pattern", "_matrix", "_b", "_x", "_pc", "_scale", "_lock")
+    __slots__ = ("regular", "counts", "_definite", "_null", "_pattern", "_matrix", "_b", "_x", "_pc", "_scale", "_lock",
+                 "__weakref__")  # fmt: skip
 
     def __init__(self, starts, columns, null):
         self.regular, self.counts, self._definite, self._null = False, 0, True, null
@@ -307,6 +309,11 @@ class RepeatedInertia:
         part, power = abs(factor.getMumpsRinfog(12)), factor.getMumpsInfog(34)  # the determinant: part times 2^power
         return negative, zero, math.log(part) + power * math.log(2) if part and not zero else math.nan
 
+    def serves(self, starts, columns, null):
+        """Whether matrices of a pattern are those that it was made for."""
+        given = zip(self._pattern, (starts, columns), strict=True)
+        return self._null == null and all(np.array_equal(own, other) for own, other in given)
+
     def solve(self, b):
         """The solution (rows,) of the last matrix, before it was scaled; only where it is `regular`."""
         with self._lock:
@@ -316,9 +323,10 @@ class RepeatedInertia:
 
 
 class _Last(threading.local):
-    """The last `RepeatedInertia` of a thread, for which (pattern, null): threads at work share no factors."""
+    """The last `RepeatedInertia` of a thread: threads at work share no factors. A weak reference: with the last problem
+    that has it, its factors go."""
 
-    key = found = None
+    found = staticmethod(lambda: None)
 
 
 _LAST = _Last()
@@ -327,10 +335,11 @@ _LAST = _Last()
 def inertia_of(starts, columns, null):
     """The `RepeatedInertia` for a pattern, that of the last one where it is the same: the equations where rods meet are
     those of a coarser mesh, whose factors serve on a finer one."""
-    key = starts.tobytes(), columns.tobytes(), null
-    if _LAST.key != key:
-        _LAST.key, _LAST.found = key, RepeatedInertia(starts, columns, null)
-    return _LAST.found
+    found = _LAST.found()
+    if found is None or not found.serves(starts, columns, null):
+        found = RepeatedInertia(starts, columns, null)
+        _LAST.found = weakref.ref(found)
+    return found
 
 
 class RepeatedFactors:

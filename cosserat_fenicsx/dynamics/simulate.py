@@ -126,7 +126,7 @@ def simulate(
             "that applies the loads slowly"
         )
     refuse_stages("simulate", scene)
-    _check_stiffnesses(scene)
+    _refuse_inextensible_tendons(scene)
     if scene.rod_contact and (scene.rod_contact.stiffness is None or comm.size > 1):
         raise SceneError(
             "simulate: rods touch each other on one process, with elastic surfaces: expected one process, and a "
@@ -167,7 +167,7 @@ def simulate(
         return motion.over(marks, save_every is None, progress)
 
 
-def _check_stiffnesses(scene):
+def _refuse_inextensible_tendons(scene):
     """Refuse (SceneError) tendons of given length that do not stretch."""
     for load in scene.actions:
         if load.shortens and load.axial is None:

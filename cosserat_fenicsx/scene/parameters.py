@@ -21,6 +21,7 @@ from cosserat_fenicsx.scene.curves import Curve, Spline
 from cosserat_fenicsx.scene.rod import Station
 from cosserat_fenicsx.scene.scene import Scene
 from cosserat_fenicsx.scene.sections import Tube
+from cosserat_fenicsx.scene.stages import OF_STAGE
 
 _NOTHING = 1e-6  # vector components below this, relative to the vector, are rounding errors
 _PARTS = ("rods", "materials", "supports", "loads", "joints")
@@ -278,10 +279,6 @@ def _put(value, keys, leaf):
     return type(value)(parts)
 
 
-# What loads of a stage's scene have beside their fields, see `stages.scene_of`.
-_OF_STAGE = ("amplitude", "scaled", "wound", "base", "begun", "given")
-
-
 def _made(item, changes):
     """A dataclass of the package, made again with other fields."""
     if isinstance(item, Station):
@@ -289,7 +286,7 @@ def _made(item, changes):
     given = item.arguments()  # in the order of the fields, whose names may differ
     names = dict(zip([x.name for x in dataclasses.fields(item) if x.init], given, strict=True))
     made = type(item)(**given | {names[field]: value for field, value in changes.items()})
-    store(made, **{name: vars(item)[name] for name in _OF_STAGE if name in vars(item)})
+    store(made, **{name: vars(item)[name] for name in OF_STAGE if name in vars(item)})
     return made
 
 

@@ -61,7 +61,7 @@ def bent_weakly(scene):
     turns a section where no `d1` is given; ([], None) where there are none, or loads along one line show no plane."""
     rods = [x for x in scene.rods if isinstance(x.curve, Line) and x.curve.d1 is None]
     rods = [rod for rod in rods if isinstance(rod.section_at(0.0), Profile)]
-    plane = find_plane(scene)[0] if rods else None
+    plane = scene.plane if rods else None
     if plane is None:
         return [], None
     along = scene.rods[0].curve.frame(0.0)[:, 2]

@@ -327,6 +327,10 @@ class _Placed(Support):
         return tuple(found)
 
 
+#: Attributes, beside their fields, of the loads of a leg's scene: see `Action`; given: the load of the stage.
+OF_STAGE = ("amplitude", "scaled", "wound", "base", "begun", "given")
+
+
 def scene_of(scene, leg, end=None):
     """The `Scene` of a leg; end: the path up to the end of the leg before, its last state alone, on a scene by this
     function; None where the leg begins in the reference, or to check the scene there."""

@@ -57,9 +57,9 @@ class ThreadLengths:
         self._columns, self._responses = ([self._problem.numbering.vector() for _ in found] for _ in range(2))
         self._force.refresh()
         self._at_rest = self._lengths(self._length)
-        came_in = [(k, x.base) for k, x in enumerate(self._tendons) if x.base is not None]
-        for k, base in came_in:
-            self._at_rest[k] = base / model.scales.length
+        for k, tendon in enumerate(self._tendons):
+            if tendon.base is not None:
+                self._at_rest[k] = tendon.base / model.scales.length
 
     def left_at(self, t, load_factor):
         """(tendons,) lengths without tension at a time (s)."""

@@ -1,11 +1,11 @@
 """A million cases of stick-slip on a thousand cores, on paper: what it costs and what ends first, from measured parts.
 
-    python demos/evidence/million_cases.py            100 000 cases in the parent, two minutes; writes
-    out/million_cases.md python demos/evidence/million_cases.py --quick    2000 cases
+    python demos/evidence/million_cases.py            100 000 cases in the parent, two minutes
+    python demos/evidence/million_cases.py --quick    2000 cases
 
 Measured: a case (120 s of drilling, the map of demos/strings_map.py), the start of a process, and what a case costs the
 parent of a study over an executor: processor time, memory, and bytes in its folder. The parent is measured with cases
-that return what those of the map do, and compute nothing.
+that return what those of the map do, and compute nothing. Writes to out/: million_cases.md.
 """
 
 import resource
