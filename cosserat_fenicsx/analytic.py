@@ -190,8 +190,7 @@ def planar_tip(load_factors, length, *, bending, axial=math.inf, shear=math.inf,
 
 @cache
 def _gauss(n):
-    """The n-stage Gauss method on [0, 1]: nodes and weights (n,), matrices (n, n) from values at the nodes to the
-    integrals from 0 to each node and to Legendre coefficients."""
+    """The n-stage Gauss method on [0, 1]: nodes, weights (n,), and (n, n) to integrals and Legendre's terms."""
     x, w = roots_legendre(n)
     P = np.polynomial.legendre.legvander(x, n)
     j = np.arange(n)

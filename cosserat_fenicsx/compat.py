@@ -321,8 +321,7 @@ _ELEMENTS = []
 
 @rank_0_first
 def _element(element):
-    """(compiled, module, code) of an element, for releases that compile elements: with others of its degree, since a
-    module of one takes as long as one of thirty."""
+    """(compiled, module, code) of an element, for releases that compile them: thirty take the time of one."""
     if not any(element in elements for elements, _ in _ELEMENTS):
         p = (element.degree() + 1) // 2 if element.family() == "Quadrature" else element.degree()
         usual = _usual_elements(max(1, p))

@@ -127,8 +127,7 @@ _BEGINS = re.compile(r"(\w[\w -]*?)(?:\.(\w+)|: (\w+)(?= =|\[)|:)(?:\[(\d+)\])?"
 
 
 def _concerned(message, given):
-    """The place in a file that a message on a whole scene is about, by what it begins with and by the arguments that
-    are given, {name: value}; None where that is not known."""
+    """The place in a file that a message on a whole scene is about, by its beginning and the arguments; or None."""
     found = _BEGINS.match(message)
     owner, *fields, number = found.groups() if found else ("", None, None, None)
     field = fields[0] or fields[1]

@@ -74,8 +74,7 @@ def h5py_for(file):
 
 
 class _Patient:
-    """A file that HDF5 writes to through Python. HDF5 cannot even close a file on a full disk: it prints its errors and
-    may end the process. Here the first error is kept, and everything after it is discarded."""
+    """A file that HDF5 writes to through Python: the first error is kept, what comes after it is discarded."""
 
     def __init__(self, stream):
         self._stream, self._place, self.trouble = stream, 0, None

@@ -174,8 +174,7 @@ class Strands:
         return self._apart.may_touch(self.rods[e], self.s(e, a), self.rods[f], self.s(f, b))
 
     def _moved(self, element, place, change):
-        """Elements and places after a change of the place, in elements, limited; and whether an end of a rod, or of
-        two elements that both lead back to it, stops it."""
+        """Elements and places after a limited change; and whether an end of a rod, or between elements, stops it."""
         place = place + np.clip(change, -_LONGEST, _LONGEST)
         element, stopped = element.copy(), np.zeros(len(element), dtype=bool)
         for beyond, neighbour, shift, end in ((place > 1, self._next, -1.0, 1.0), (place < 0, self._before, 1.0, 0.0)):
@@ -187,11 +186,7 @@ class Strands:
         return element, place, stopped
 
     def _nearest(self, x, element, place, fixed):
-        """The nearest points by Newton's method from (m, 2) elements and places, the first ones `fixed` or not.
-
-        Returns:
-            (elements, places, slides), (m, 2) each.
-        """
+        """(elements, places, slides), (m, 2) each, of the nearest points by Newton's method; the first `fixed`."""
         (e, f), (a, b) = element.T.copy(), place.T.copy()
         slides = np.ones((len(e), 2), dtype=bool)
         for step in range(_STEPS):

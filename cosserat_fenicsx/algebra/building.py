@@ -157,8 +157,7 @@ class _Kernel(Pointers):
         kernel.A = self.doubles(np.zeros(size))
 
     def _set(self, w, c, sources, constants):
-        """Give C the packed coefficients w (elements, width) and constants c; sources: (values, indices (elements,
-        count), first column) of those that change; constants: (array of one value, place in c)."""
+        """Give C packed coefficients w and constants c; sources: (values, indices, first column) that change."""
         kernel, ffi = self.c, self._ffi
         kernel.w, kernel.width, kernel.c = self.doubles(w), w.shape[1], self.doubles(c)
         self._sources = ffi.new("source[]", max(1, len(sources)))

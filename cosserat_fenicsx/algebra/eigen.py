@@ -32,8 +32,7 @@ _SINGULAR = (-6, -10)
 
 
 class _Inverse:
-    """The inverse of a factored matrix as a matrix, and as a preconditioner; SLEPc calls it in every iteration, and
-    signals to the process are handled there."""
+    """The inverse of a factored matrix as a matrix and a preconditioner; signals are handled where SLEPc calls it."""
 
     def __init__(self, pc):
         self._pc = pc
@@ -323,8 +322,7 @@ class RepeatedInertia:
 
 
 class _Last(threading.local):
-    """The last `RepeatedInertia` of a thread: threads at work share no factors. A weak reference: with the last problem
-    that has it, its factors go."""
+    """The last `RepeatedInertia` of a thread, by a weak reference: its factors go with the last problem of it."""
 
     found = staticmethod(lambda: None)
 

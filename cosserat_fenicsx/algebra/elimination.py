@@ -55,8 +55,7 @@ class Elimination(Pointers):
         return np.unique(np.concatenate(comm.allgather(needed))) if comm.size > 1 else needed
 
     def _arrange(self, rows, number, inverse, first, last, kept):
-        """Sort every element's unknowns: shared with the element before, its own, shared with the next, the
-        interface's."""
+        """Sort every element's unknowns: shared with the one before, its own, shared with the next, the interface's."""
         turn = np.arange(len(rows))[:, None]
         kind = np.where(last[inverse] > turn, 2, 1)
         kind[first[inverse] < turn] = 0
@@ -208,8 +207,7 @@ class Interface:
             self.dense = self._solver.adds(every, len(elimination.condensed))
 
     def _values(self, of_nodes, *others):
-        """The entries of the sum of all ranks' condensed matrices and of the constraint equations' derivatives, see
-        `TieRows.tangent_blocks`; others only where multipliers belong to the system."""
+        """The entries of all ranks' condensed matrices and of the constraint equations' derivatives."""
         values = np.concatenate([self._elimination.all_condensed(), *(part.ravel() for part in (of_nodes, *others))])
         if not self._everywhere:
             values = values[self._here[: len(values)]]
@@ -298,8 +296,7 @@ class _Dense(Pointers):
 
 
 class _Near:
-    """Nearly the inverse of a `_Sparse` system: that of the second variation, whose factors counted signs last; block:
-    unknowns of a node in the first; maps, count: see `Interface.begin_with`."""
+    """Nearly the inverse of a `_Sparse` system: that of the second variation; see `Interface.begin_with`."""
 
     def __init__(self, system, variation, block, maps, count):
         self._variation, self._maps, self._block, self._count = variation, maps, block, count

@@ -149,8 +149,7 @@ class Pencil:
 
 
 class _Factored:
-    """L^T A L as a matrix, where M = L L^T and A is the block for x of the inverse of [[K - shift M, held^T], [held,
-    0]]; its eigenvalues are 1/(lambda - shift)."""
+    """L^T A L as a matrix: M = L L^T, A the block of x of [[K - shift M, held^T], [held, 0]]^-1; 1/(lambda - shift)."""
 
     def __init__(self, matrix, L, size):
         self._L, self._size, self._pc = L, size, eigen.constrained_factors(matrix, _NO_PIVOT)
@@ -228,8 +227,7 @@ class QuadraticPencil:
         return found
 
     def _free(self, values, vectors):
-        """(n,) whether eigenvalues are those of free motions: a pair of zeros, up to the root of the rounding of K.
-        Strong damping makes eigenvalues small, too, as those of k/c, but not the work of K by their motions."""
+        """(n,) whether eigenvalues are a free motion's: zero up to the root of K's rounding, as the work of K by it."""
         sizes = np.einsum("ik,ik->k", np.abs(vectors), self._K_sizes @ np.abs(vectors))
         masses = np.einsum("ik,ik->k", vectors.conj(), self.M @ vectors).real
         works = np.abs(np.einsum("ik,ik->k", vectors.conj(), self.K @ vectors))
@@ -265,10 +263,7 @@ class QuadraticPencil:
         return factors.solve(padded, trans)[: self.size]
 
     def _nearest(self, shift, count, radius):
-        """Eigenvalues and vectors around a shift: all within the largest `radius` (values, shift) of the `count` wanted
-        ones. The operator on (x, lambda x) has the eigenvalues 1/(lambda - shift). An iteration from one vector may
-        miss copies of repeated eigenvalues: it is repeated beside the invariant subspace of what is found, until
-        nothing else lies within that distance."""
+        """Eigenpairs within the distance from `shift` of `count` wanted ones, beside those found until none follows."""
         factors, n, kind = self._factors(shift), self.size, complex if isinstance(shift, complex) else float
 
         def applied(z):
@@ -341,8 +336,7 @@ class QuadraticPencil:
     # -- accuracy ----------------------------------------------------------------------------------------------------
 
     def _polished(self, values, vectors, count, point):
-        """`Found` of the `count` eigenvalues nearest a point: by Rayleigh's quotients with left and right vectors,
-        whose errors are squares of those of the vectors."""
+        """`Found` of the `count` eigenvalues nearest a point: by Rayleigh's quotients with left and right vectors."""
         left, found = np.ones(len(values), dtype=bool), []
         free = np.flatnonzero(self._free(values, vectors))
         if len(free):

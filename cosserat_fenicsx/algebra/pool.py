@@ -122,8 +122,7 @@ def free_dropped(comm):
 
 
 def _destroy(value, seen):
-    """Destroy the PETSc objects in an object of this package, and in those that it refers to; frozen ones are data, of
-    scenes for example, and own none."""
+    """Destroy the PETSc objects in an object of this package and in those it refers to, but in frozen data."""
     if id(value) in seen or getattr(getattr(value, "__dataclass_params__", None), "frozen", False):
         return
     seen.add(id(value))

@@ -103,8 +103,7 @@ def deliver(computed, options, names, files_of, tables=None, *, moving=False, ob
 
 
 def _write(files, out, stops):
-    """Write files, see `deliver`, and say which: first all that need no library for pictures, then the pictures. With
-    `stops`, a signal ends the writing between two files by a KeyboardInterrupt."""
+    """Write files, those without pictures first, and say which; with `stops` a signal ends it between two files."""
     for pictures in (False, True):
         some = {name: write for name, write in files.items() if write and name.endswith(_PICTURES) == pictures}
         _write_some(some, out, stops)
@@ -131,8 +130,7 @@ def _write_some(files, out, stops):
 
 
 def _ended(compute, waiting):
-    """(result or partial result, the exception or None, exit code) of a function, called in a context manager; a
-    SceneError before anything was computed is raised."""
+    """(result or partial result, the exception or None, exit code) of a function called in a context manager."""
     try:
         with waiting:
             return compute(), None, DONE

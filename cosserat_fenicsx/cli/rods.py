@@ -21,8 +21,7 @@ def _refuse_units(options):
 
 
 def _asked(options, found):
-    """Whether a motion is requested, and the arguments of `simulate`, or of `solve`: options of the command line
-    replace those in the file, a `RodScene`. A SceneError for an option of a path with a motion or vice versa."""
+    """Whether a motion is requested, and the arguments of `simulate` or `solve`: options replace those of the file."""
     _refuse_units(options)
     asked, motion = given(options, (*_MOTION, *_PATH, *_BOTH)), found.motion
     moves = not options.static and bool(motion or "duration" in asked)

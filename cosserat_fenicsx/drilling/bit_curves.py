@@ -181,8 +181,7 @@ class RateLaw(BitLaw):
 
 
 class _RateEnd(EndCondition):
-    """The `EndCondition` of `RateLaw`. A bit that moved up in the last step is free: by its mean velocity in that step,
-    since the one at the end swings around it where the rock resists much."""
+    """The `EndCondition` of `RateLaw`: free after it moved up in the last step, by the mean velocity there."""
 
     def __init__(self, law):
         self._law, self._down, self._at = law, 0.0, 0.0

@@ -46,11 +46,7 @@ def chosen(scene, model="auto"):
 
 
 def _asks_for_axial(scene):
-    """Reasons for axial motion, in words; empty where there is none.
-
-    A string that hangs in its weight or stands on the rock is in equilibrium along the hole. Rotation alone slips
-    around, without a force along the hole, and leaves the weight on bit as it is.
-    """
+    """Reasons for axial motion, in words; empty where the string only turns, which leaves its equilibrium as it is."""
     hook, found = scene.hook, []
     if hook is not None and not (hook.signal().constant and hook.signal()(0.0) == 0.0):
         found.append("the hook moves")

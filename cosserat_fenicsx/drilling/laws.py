@@ -164,8 +164,7 @@ def _steepest_fall(function, values):
 
 
 def _slopes(values, h):
-    """Slopes at points of a distance h, along the first axis of values: of the fourth order where these are smooth, and
-    such that cubics are monotone where the values are."""
+    """Slopes at points a distance h apart, of the fourth order where smooth; cubics are monotone where values are."""
     secants, slopes = np.diff(values, axis=0) / h, np.empty_like(values)
     slopes[2:-2] = (8 * (values[3:-1] - values[1:-3]) - (values[4:] - values[:-4])) / (12 * h)
     ends = np.array([[-25, 48, -36, 16, -3], [-3, -10, 18, -6, 1]]) / (12 * h)

@@ -215,11 +215,7 @@ def go_on(store, scene, duration, progress):
 
 
 def _running(store, scene):
-    """The model of a motion that is continued.
-
-    Raises:
-        SceneError: it differs from the model of the stored rows.
-    """
+    """The model of a motion that is continued; a SceneError where it differs from that of the stored rows."""
     asked, head = store.head["asked"], store.head
     running = model_of(scene, asked["model"], asked["dt"], asked["elements"])
     alike = {

@@ -73,8 +73,7 @@ class StringModel(Pointers):
         setattr(record, name, (self.integers if whole else self.doubles)(array))
 
     def _put_curve(self, curve, motor, flow=None):
-        """Give C the torque of a `MudMotor` with curves over the speed of its rotor, less that at rest; flow: m^3/s,
-        None for its own at the start. Returns the arrays, which C does not own."""
+        """Give C the torque of a motor with curves over its speed, less that at rest; returns arrays C does not own."""
         if not motor.curves:
             return None
         law = motor.law if flow is None else motor.law_at(flow)
@@ -86,8 +85,7 @@ class StringModel(Pointers):
         return arrays
 
     def _put_curves(self, flows):
-        """(curves for C, at the flows (m^3/s) of steps, and the arrays that they point to), of a `MudMotor` with curves
-        whose flow changes; None for others."""
+        """(curves for C at the flows (m^3/s) of steps, their arrays) of a motor whose flow changes; None for others."""
         motor = self.scene.motor
         if motor is None or not motor.curves or not callable(motor.flow):
             return self._ffi.NULL, None
@@ -95,8 +93,7 @@ class StringModel(Pointers):
         return each, [self._put_curve(one, motor, float(flow)) for one, flow in zip(each, flows, strict=True)]
 
     def _sample_torque(self, drive, top, first=0.0):
-        """Take the samples of a drive's control; `top`: C's record that holds the torque `given` by the drive; `first`:
-        torque (N m) or speed (rad/s) before its first command acts."""
+        """Take samples of a drive's control; `first`: torque (N m) or speed (rad/s) before its first command acts."""
         control, self._top = drive.control, top
         if control.sampled:
             name = "speed" if control.of_speed else "torque"
@@ -111,8 +108,7 @@ class StringModel(Pointers):
         return None if control.sampled else control.gains(Z)
 
     def _set_linear(self, record, drive, space, impedance):
-        """Fill C's record of a linear control, a `StateSpace`, for steps of `dt`, at rest; impedance (N m s/rad): of
-        the waves below the drive, None above a body."""
+        """Fill C's record of a linear control for steps of `dt`; impedance (N m s/rad): None above a body."""
         check_late(drive.control, space, impedance, self.scene.discs is not None)
         A, B, C, D = arrays_of(space)
         n, late = len(A), round(drive.control.late / self.dt)

@@ -169,8 +169,7 @@ class _InMotion:
         self._friction = self._of_friction(given.torque)
 
     def _of_friction(self, torque):
-        """The `Resistance` of the step: a given torque (N m), or by the law, with the weight of the step before; None
-        where nothing rubs."""
+        """The `Resistance` of the step: a torque (N m), or by the law with the last weight; None without friction."""
         law, weight = self._bit.law, float(self._bears[0])
         if torque is not None:
             return Resistance(torque, torque) if torque > 0 else None

@@ -107,8 +107,7 @@ def _delays(steps):
 
 
 def _step(times, dt, period=None):
-    """The step from 0.75 dt to dt for which travel times (s) are nearest to whole numbers of steps; an integer fraction
-    of the period (s) if there is one."""
+    """The step from 0.75 dt to dt that best divides travel times (s), and the period (s) if there is one."""
     times = np.array([time for time in times if time >= _SET.shortest * dt])
     tried = [dt] if period is None else [period / math.ceil(period / dt * (1 - 1e-12))]
     for time in times if period is None else [period]:
@@ -248,8 +247,7 @@ class TorsionWaves(StringModel):
             self._hold[-1], self._slide[-1], self._decay[-1] = self._law.still, self._law.slipping, self._law.decay
 
     def _steepness(self):
-        """The largest slope of a law of friction over the impedance of its node, laws that drop at once left out; and
-        whether it is that of the bit."""
+        """The largest slope of a law of friction over its node's impedance, without jumps; whether it is the bit's."""
         slope = self._wall.steepest * self._grip * self._reach
         if self._law is not None:
             slope[-1] = self._law.steepest

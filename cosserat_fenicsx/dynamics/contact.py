@@ -319,8 +319,7 @@ def _places(model, walls):
 
 
 def _shares(breaks, nodes):
-    """The share of a rod's length that belongs to each node: weights of the quadrature rule with these points; (2,
-    nodes): of the elements that end there, and of the others."""
+    """(2, nodes) shares of a rod's length: of the elements that end at a node, and of the others."""
     sizes, p = np.diff(breaks), len(nodes) - 1
     weights, shares = sizes[:, None] * lobatto_weights(nodes), np.zeros((2, len(sizes) * p + 1))
     shares[0, p::p] = weights[:, -1]

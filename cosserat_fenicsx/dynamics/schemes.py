@@ -288,8 +288,7 @@ class GeneralisedAlpha(Stepper):
         return Solved(solved.converged, iterations + solved.iterations, solved.reason)
 
     def _settle(self, t):
-        """Before the step length changes, correct the O(h^2) errors of velocities at supports and joints, which would
-        take large accelerations in a shorter step."""
+        """Before the step changes, correct the O(h^2) errors of velocities at ties, which take large accelerations."""
         self.drive(t)
         self._start[:] = self._state
         self.problem.model.follow_velocities()

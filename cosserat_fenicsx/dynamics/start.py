@@ -150,8 +150,7 @@ def drive(model, t):
 
 
 def _driven(model, rq, rates, t=0.0):
-    """(N, 6) velocities with those of prescribed motions after the time t (s) at their nodes; else velocities and
-    reactions there would alternate from step to step without decay, by the trapezoidal rule."""
+    """(N, 6) velocities with those of prescribed motions after t (s), without which reactions alternate."""
     off, gradient, _ = _off(model, rq, rates, t)
     at = model.tied_slots
     change = np.linalg.lstsq(gradient.reshape(len(off), -1), -off, rcond=None)[0]
@@ -161,8 +160,7 @@ def _driven(model, rq, rates, t=0.0):
 
 
 def _off(model, rq, rates, t=0.0):
-    """Rates of change of the constraints of supports and joints after the time t (s), dimensionless: with velocities
-    `rates` (N, 6); their gradient; and the rates by prescribed motions alone."""
+    """Rates of the constraints of ties after t (s), by velocities `rates` (N, 6); their gradient; by motions alone."""
     load_factor, now, held = float(model.load_factor.value), rates[model.tied_slots], rq[model.tied_slots]
     c, gradients = model.ties_at(t).evaluate(held, load_factor)
     later, _ = model.ties_at(t + _DIFFERENCE * model.time).evaluate(held, load_factor)

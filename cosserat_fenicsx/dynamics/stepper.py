@@ -189,15 +189,13 @@ def _numbered(arrays):
 
 
 def _extrapolated(h, state, velocity, steps, velocities):
-    """(orders, n) extrapolations of the state by a step h, of order 1 and one more for each earlier step; steps,
-    velocities: lengths and initial velocities of up to two steps before, the last one last."""
+    """(orders, n) extrapolations of the state by a step h: of order 1, and one more for each step before."""
     return _weights(h, *steps) @ np.array([state, velocity, *velocities[::-1]])
 
 
 @lru_cache(maxsize=8)
 def _weights(h, *steps):
-    """Weights of the state and of the velocities, the current one first, in `_extrapolated`: the trapezoidal rule for
-    the velocity now and its extrapolation by a polynomial."""
+    """Weights of the state and of the velocities, the current one first, in `_extrapolated`."""
     times = [0.0, *-np.cumsum(steps[::-1])]
     weights = np.zeros((len(times), 1 + len(times)))
     weights[:, 0], weights[:, 1] = 1.0, h / 2

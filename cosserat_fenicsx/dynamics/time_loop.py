@@ -248,8 +248,7 @@ def _check_driven(scene, duration):
 
 
 def _jumps_at(signal, t, until):
-    """Whether the value of a signal, not only its slope, jumps at the time t (s): over half an interval it then changes
-    by as much. The motion ends at `until` (s)."""
+    """Whether the value of a signal, not only its slope, jumps at t (s): over half an interval it changes as much."""
     rise = _rise(signal, t, _JUMP_INTERVAL * until, until)
     if rise <= 0.75 * _rise(signal, t, 2 * _JUMP_INTERVAL * until, until):
         return False

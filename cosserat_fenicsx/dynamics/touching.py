@@ -270,24 +270,21 @@ class RodsTouching(Pointers):
         return rows.reshape(len(now), -1), self._strands.gradients(now).reshape(len(now), -1)
 
     def _by_unknowns(self, nodes, pulls):
-        """Rows (k, 1, n) and derivatives (k, parts, n) of the work of forces and moments (k, parts, nodes, 6) by the
-        unknowns."""
+        """Rows (k, 1, n) and derivatives (k, parts, n) of the work of pulls (k, parts, nodes, 6) by the unknowns."""
         turning = small_rotations((self._q0 + self._q) / 2)[nodes]
         of_q = np.einsum("kpni,knij->kpnj", pulls[..., 3:], turning)
         by = np.concatenate([pulls[..., :3], of_q], axis=3)
         return self._rows[nodes].reshape(len(nodes), 1, -1), by.reshape(*by.shape[:2], 7 * nodes.shape[1])
 
     def _slips(self, nodes, pulls, names):
-        """(k, 2) slips in the step across pairs, by the motion between both its ends; and half of those at the rates of
-        its start, by which the law's slip differs, or 0 where that is the slip in the step."""
+        """(k, 2) slips in the step across pairs, and half of those at its start's rates where the law asks, or 0."""
         turned = small_rotations((self._q0 + self._q) / 2) @ (self._q - self._q0)[:, :, None]
         motion = np.concatenate([self._x - self._start.x, turned[..., 0]], axis=1)
         slips, ahead = (np.einsum("kpni,kni->kp", pulls[:, 1:], x[nodes]) for x in (motion, self._ahead))
         return slips, np.where(self._of_step[names][:, None], 0.0, ahead)
 
     def _compliance(self, pairs, near, nodes, pulls):
-        """Motions (k parts, k parts) of contacts, of the gaps and the slips, by unit forces, and of all unknowns
-        (unknowns, k parts): those of the first contacts in the step, until others come near."""
+        """Motions of gaps and slips (k parts, k parts), and of unknowns, by unit forces of the first contacts."""
         names, parts = pairs.which[near], self._parts
         if self._near is None or not np.array_equal(self._near[0], names):
             rows = self._rows[nodes][:, :, [0, 1, 2, 4, 5, 6]]
@@ -305,8 +302,7 @@ class RodsTouching(Pointers):
 
     @staticmethod
     def _of_columns(columns, rows, by):
-        """(k, p, c) products of rows of a matrix, derivatives (k, p, n) at the unknowns `rows` (k, 1, n), and columns
-        (c, unknowns)."""
+        """(k, p, c) of derivatives (k, p, n) at the unknowns `rows` (k, 1, n) times columns (c, unknowns)."""
         k, p, n = by.shape
         rows = np.broadcast_to(rows, by.shape)
         held = np.where(rows < 0, 0.0, by).ravel()
@@ -357,8 +353,7 @@ class RodsTouching(Pointers):
         return pairs.force[pressed], friction, slips, slips - ahead
 
     def _breaks_laws(self):
-        """Whether normal forces are not those of the last iteration, or frictions are beyond their bounds, do not
-        follow from slips, or add energy."""
+        """Whether normal forces differ from the last iteration's, or frictions break their law or add energy."""
         pairs, last = self._pairs, self._now
         if np.array_equal(pairs.which, last.which):
             off = np.abs(pairs.force - last.force).max(initial=0.0)
@@ -400,8 +395,7 @@ class RodsTouching(Pointers):
 
 
 class _Polygons:
-    """Fine polygons along rods, whose distances show, independently of `Strands`, that no rod has entered another where
-    no contact is known."""
+    """Fine polygons along rods, which show, without `Strands`, that no rod has entered another."""
 
     def __init__(self, scene, layout, rule, length):
         self._scene, self._length, self._apart = scene, length, scene.rod_contact.apart(scene)

@@ -285,8 +285,7 @@ class Clamps:
         return maps
 
     def _map(self, weights, turned):
-        """The matrix to (clamped points, 6), inertial, from values (elements, points, parts, force or moment, 3) along
-        the model's axes, which are summed with weights (elements, points, parts)."""
+        """The matrix to (clamped points, 6), inertial, from weighted values (elements, points, parts, 2, 3)."""
         weights[turned] = weights[turned][:, ::-1]
         to_point = self._of_point == np.arange(self.count)[:, None]
         axes = self._model.axes.T

@@ -103,8 +103,7 @@ class Layout:
 
     @classmethod
     def _of_pieces(cls, scene, divide, keys):
-        """The layout with the element ends `divide(rod index, start, end)` of every piece, its two ends included; equal
-        for rods with equal keys and pieces."""
+        """The layout with the element ends `divide(rod index, start, end)` of every piece; equal for equal keys."""
         fixed = _fixed_ends(scene)
 
         def breaks(i):
@@ -184,8 +183,7 @@ def _finer(scene, layout, factor):
 
 @per_scene
 def _fixed_ends(scene):
-    """For every rod the element ends prescribed by supports, loads, joints and kinks, over its length, from 0 to 1; the
-    part of a rod between two of them is called a piece."""
+    """The element ends of every rod, over its length, that supports, loads, joints and kinks prescribe."""
     found = []
     for rod in scene.rods:
         stations = {station.s / rod.length for station in scene.stations(rod)}

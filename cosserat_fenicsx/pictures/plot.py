@@ -142,8 +142,7 @@ def _draw(path, points, magnify, color, side_by_side):
 
 
 def _apart(scene, shown, bodies, span, wish):
-    """{k: vector (3,), m} by which shapes are moved beside each other; empty where they stay; wish: True or False, or
-    None: where they would be tangled otherwise."""
+    """{k: vector (3,), m} by which shapes are moved apart; wish: bool, or None for where they are tangled."""
     shapes, (_, right, above, _) = [[bodies[k, rod].line for rod in scene.rods] for k in shown], view_of(span)
     if wish is None:
         wish = all(load.tube() is None for load in scene.loads) and tangled(shapes, right, above)
@@ -187,8 +186,7 @@ def _draw_scene(scene):
 
 
 def _finish(plotter, pyvista, everywhere, symbols, lines, title, label, most=6):
-    """Draw signs, axes, labels, key and title, and place the camera; lines: centrelines that labels keep off; title:
-    lines of text; label: puts the first labels into the `Labels`; most: see `drawing.frame`."""
+    """Draw signs, axes, labels, key and title, and place the camera; lines: centrelines that labels keep off."""
     symbols.draw(plotter)
     font = letters(plotter)
     lettered = [line for text in title for line in textwrap.wrap(text, _TITLE_WIDTH)]
@@ -272,8 +270,7 @@ def _coincide(bodies, shown, factors):
 
 
 def _label(labels, path, shown, bodies, span, apart, font):
-    """Label each shape (`path.label`) where the shapes lie farthest apart, or else at the end of another rod; of shapes
-    side by side above each; of one alone, which the title names, nothing."""
+    """Label each shape where shapes lie farthest apart, at the end of another rod, or above those side by side."""
     rods = path.scene.rods
     if len(shown) == 1:
         return
@@ -308,8 +305,7 @@ def _name(labels, scene, font):
 
 
 def _beyond(tangent, end):
-    """Unit vector (3,) from the rod to a label: along the tangent beyond the end (1) or before the start (-1) of a rod;
-    across the rod elsewhere (0), upwards where possible."""
+    """Unit vector (3,) from the rod to a label: along the tangent at its ends (-1, 1), else across, upwards."""
     if end:
         return end * tangent
     up = np.array([0.0, 0.0, 1.0]) if abs(tangent[2]) < 0.95 else np.array([1.0, 0.0, 0.0])

@@ -126,8 +126,7 @@ class Drawn:
 
 
 def _turned(frames, slopes):
-    """Frames (n, 3, 3) rotated about the directions of `slopes` (n, 3) by angles whose tangents are their sizes, so
-    that sections stay at right angles to a line whose displacements are drawn large, as far as they were."""
+    """Frames (n, 3, 3) rotated about `slopes` (n, 3) by angles of these tangents: sections stay across a drawn line."""
     sizes = np.linalg.norm(slopes, axis=1)
     angles = np.arctan(sizes)
     axes = slopes / np.maximum(sizes, 1e-300)[:, None]

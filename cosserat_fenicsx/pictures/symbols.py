@@ -158,8 +158,7 @@ class Symbols:
         return self._placed(mark, point, along, length, gap, pulls)
 
     def _placed(self, mark, point, along, length, gap, pulls):
-        """Draw an arrow that begins (`pulls`) or ends at a distance `gap` from a point: as wished, the other way round,
-        or beside it, wherever there is nothing else; returns the place of its label, and the direction from there."""
+        """Draw an arrow where nothing else is; returns the place of its label, and the direction from there."""
         aside = np.cross(self._view, along)
         for side, pulling in itertools.product((0.0, 1.0, -1.0), (pulls, not pulls)):
             start = point + side * (gap + 0.35 * self._size) * aside

@@ -166,8 +166,7 @@ def _small(largest, extent):
 
 
 def _choices(largest, extent, start):
-    """The factors of displacements that can be chosen: 1, 2, 5, 10 ... up to one by which the largest displacement (m)
-    is about as large as the structure (m), and the first one."""
+    """Factors of displacements, 1, 2, 5 ... until `largest` (m) is as large as the structure, and the first one."""
     found = {1.0, start}
     for decade in range(-1, 13):
         for factor in (f * 10.0**decade for f in (1, 2, 5)):

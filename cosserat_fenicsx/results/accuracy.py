@@ -199,9 +199,7 @@ def spread_error(path, few, which, coarse=None):
 
 
 def _as_positions(found, known, which):
-    """(n,) lower bounds of the errors of rotations, from the absolute errors of positions (found: (4, n); known: (4,
-    samples)) and the ratio of both at neighbouring samples: the difference of rotations on two meshes may vanish where
-    it changes its sign."""
+    """(n,) lower bounds of errors of rotations by those of positions: differences vanish where signs change."""
     usable = (known[[POSITION, ROTATION]] > ROUNDING).all(axis=0)
     if not usable.any():
         return np.zeros(found.shape[1])
@@ -210,9 +208,7 @@ def _as_positions(found, known, which):
 
 
 def _spread(indicator, sizes, errors, between, which, *, of_mesh):
-    """(n,) errors of one quantity at all points from those at the sample points (errors, of the indices `which`),
-    relative to its sizes (n,), by an indicator (n,); between: safety factor at the other points; of_mesh: whether the
-    indicator is a difference of two meshes."""
+    """(n,) errors of a quantity at all points from those at the samples `which`, by an indicator (n,)."""
     known, absolute = indicator[which], errors * sizes[which]
     usable = (known > 100 * ROUNDING) & (absolute > 0)
     if not usable.any():

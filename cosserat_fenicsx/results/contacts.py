@@ -327,8 +327,7 @@ def _strands(path):
 
 
 def _pressed(path, k, strands):
-    """The `Touches` of state k that press, with their forces (m, 3) on the second rod, and the positions (N, 3) there;
-    dimensionless. In motions forces are normal."""
+    """The `Touches` of state k that press, forces (m, 3) on the second rod, positions (N, 3); dimensionless."""
     record, elastic = path._records[k], path.scene.rod_contact.stiffness is not None
     counts = [n * path.degree + 1 for n in path.layout.counts]
     x = record.rq[:, :3] + np.repeat(path.scene.origins / path.scales.length, counts, axis=0)

@@ -90,8 +90,7 @@ class Extremes(OnNodes):
         return (breaks[:-1, None] + np.diff(breaks)[:, None] * inside) * self.scene.rods[i].length
 
     def _sizes(self, i, inside, contact, which):
-        """{quantity: (states, places)} in the elements of the i-th rod; contact: (states, elements, nodes per element,
-        6) n and m, dimensionless; which: indices of the states."""
+        """{quantity: (states, places)} in the elements of the i-th rod, of the states `which`."""
         rod, basis, s = self.scene.rods[i], self.rule.basis(inside), self._places(i, inside)
         nodes, _ = cell_nodes(self.layout, self.degree)[i]
         q = np.einsum("qj,kcji->kcqi", basis, np.array([self._records[k].rq[nodes, 3:] for k in which]))

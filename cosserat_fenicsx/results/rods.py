@@ -238,8 +238,7 @@ class RodResult(Result, Extremes, Reactions, Stresses, States):
         return found
 
     def _without_stress(self, which, rod, s):
-        """(k, 2, n, 3) curvature, 1/m, and strain without stress beyond the reference, material, at arc lengths s (n,)
-        of a rod in several states: see `action.without_stress`."""
+        """(k, 2, n, 3) curvature, 1/m, and strain without stress in several states: see `action.without_stress`."""
         records, known, found = [self._records[k] for k in which], {}, []
         for record in records:
             time = getattr(record, "time", 0.0)
@@ -477,10 +476,7 @@ class RodResult(Result, Extremes, Reactions, Stresses, States):
         return "\n".join([*text, *self._answer(units), *self._more(units)])
 
     def _most_displaced(self):
-        """The station with the largest displacement among the ends of rods and the stations of loads and supports.
-
-        If these move much less than the rest, it is the node with the largest displacement.
-        """
+        """The named station that moves most; the node that does where named ones move much less."""
 
         def moves(station):
             return round(float(np.linalg.norm(self.displacement(station), axis=1).max()), 12)

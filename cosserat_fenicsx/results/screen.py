@@ -76,8 +76,7 @@ def _least(column):
 
 
 def _widths(columns, width):
-    """Widths of columns that fit a width, with headings that break between words, in as few lines as possible; None
-    where there are none: numbers are never broken."""
+    """Widths of columns that fit a width, headings broken between words in few lines; None where there are none."""
     room = width - _EDGE - _BETWEEN * len(columns)
     for lines in range(1, max(len(column.header.split()) for column in columns) + 1):
         found = []

@@ -179,9 +179,7 @@ class Orbit(Result):
         return np.where(self.turns, (change + np.pi) % (2 * np.pi) - np.pi, 0.0)
 
     def _means(self, windows=1, least=0.0):
-        """Means over at most `windows` parts of the duration: middle (s), rate of whirl (rad/s, forward positive; NaN
-        where the angle is not counted), spin (rad/s) and radius (m), (m,) each; least: share of a part in which the
-        angle must be counted."""
+        """Means (m,) over parts of the duration: middle (s), rates of whirl and spin (rad/s), radius (m)."""
         count, lengths = len(self.times) - 1, np.diff(self.times)
         edges = np.unique(np.linspace(0, count, min(windows, count) + 1).astype(int))
 

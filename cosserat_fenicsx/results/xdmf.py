@@ -119,8 +119,7 @@ def _about(scene, units):
 
 
 def _grid(store, lines, fields, constants):
-    """The text of one state, with {k} for its number and {along} for its load factor or time; store: the name of the
-    .h5 file; lines: (elements, 2); fields: {name: (states, nodes, ...)}; constants: {name: (nodes,)} of all states."""
+    """The text of one state, with {k} for its number and {along} for its load factor or time."""
     grid, store = xml.Element("Grid", Name="point {k}", GridType="Uniform"), store.replace("{", "{{").replace("}", "}}")
 
     def item(parent, name, array):

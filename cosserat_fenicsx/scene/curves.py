@@ -268,8 +268,7 @@ class Spline(Curve):
         self._carry_frame()
 
     def _cut(self, spans):
-        """Divide the curve into panels, and store their spans (indices), midpoints and half lengths in the spline's
-        parameter, tangents at their starts, and series."""
+        """Divide the curve into panels: spans, middles and half lengths in the parameter, tangents, and series."""
         span, middle, half = np.arange(len(spans)), spans / 2, spans / 2
         done = []
         for _ in range(_MOST_HALVINGS):
@@ -346,8 +345,7 @@ class Spline(Curve):
         return first / np.linalg.norm(first, axis=-1, keepdims=True)
 
     def _locate(self, s):
-        """The panels of arc lengths s (n,), the coordinates in [-1, 1] on them, and their spans and parameters there,
-        by Newton's method, safeguarded by bisection."""
+        """Panels of arc lengths s (n,), places in [-1, 1] on them, spans and parameters: Newton with bisection."""
         s = np.clip(s, 0.0, self.length)
         panel = np.clip(np.searchsorted(self._arcs, s, side="right") - 1, 0, len(self._half) - 1)
         arc, span, middle, half = self._arc[:, panel], self._span[panel], self._middle[panel], self._half[panel]

@@ -22,8 +22,7 @@ _MomentInTime = Annotated[NumbersInTime, VectorInTime(Several("moment"))]
 
 @dataclass(frozen=True)
 class _WeightOffAxis(LineAction):
-    """The moment R a x rho A g per unit of reference length about the axis of a rod with an eccentricity; `Weight`,
-    whose gravity and permanence it has, applies the force."""
+    """The moment R a x rho A g per reference length of a rod with an eccentricity; `Weight` applies the force."""
 
     rod: Rod
     gravity: Numbers

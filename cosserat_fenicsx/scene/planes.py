@@ -182,8 +182,7 @@ def _normal_of(directions):
 
 
 def _normal_of_a_line(tangent, acting, scene):
-    """The normal of the plane where all rods lie along one line: the first load or prescribed motion that is not along
-    the line defines it; without one, the axis of the smaller bending stiffness of the first section."""
+    """The normal where all rods lie on one line: of the first load or motion off it, else of the smaller stiffness."""
     for inside, across in acting:
         for force in _units(inside):
             normal = np.cross(tangent, force)
@@ -198,8 +197,7 @@ def _normal_of_a_line(tangent, acting, scene):
 
 
 def _check_section(rod, s, frames, normal):
-    """Refuse sections that couple motions in the plane with those out of it: a principal axis of every section must be
-    the normal, unless bending and shear stiffnesses are isotropic; a stiffness matrix must not couple these strains."""
+    """Refuse sections that couple motions in the plane with others: the normal must be a principal axis."""
     if rod.profile.coupled:
         t = frames[:, :, 2]
         axes = np.stack([np.cross(normal, t), np.broadcast_to(normal, t.shape), t], axis=1) @ frames

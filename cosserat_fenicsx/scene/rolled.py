@@ -155,9 +155,7 @@ class Profile(Section):
 
 
 def _flow(pieces):
-    """The integral of S^2/t over half a section, m^5, from its edge to its axis; S: first moment of the part outside;
-    pieces: (distance of the outer end from the axis, thickness as a function of the distance, and, where it differs,
-    the thickness over which the shear flow spreads), from the edge inwards."""
+    """The integral of S^2/t over half a section, m^5; pieces: (distance, thickness, and that of the flow)."""
     rule = gauss(_POINTS)
     inner = legvander(rule.points, _POINTS) @ rule.integral
     total = moment = 0.0

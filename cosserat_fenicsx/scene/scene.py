@@ -61,8 +61,7 @@ def magnitudes(scene):
 
 
 def _sampled(item, until):
-    """A load or a support at sample times up to `until`, s. Times at which a function of time fails are left out: a
-    motion that reaches them raises the error."""
+    """A load or a support at sample times up to `until`, s, without those at which a function of time fails."""
     for t in sample_times(item, until):
         with contextlib.suppress(SceneError):
             yield at(item, t)

@@ -296,8 +296,7 @@ def _taken_over(supports, others):
 
 @dataclass(frozen=True)
 class _Placed(Support):
-    """A support that holds its station where it was at the begin of a stage (displacement_before, m, inertial;
-    rotation_before, a unit quaternion, from the reference), or moves it on from there."""
+    """A support that holds its station where it was at the begin of a stage, or moves it on from there."""
 
     support: Support
     displacement_before: tuple

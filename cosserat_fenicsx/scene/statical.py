@@ -245,8 +245,7 @@ def check_no_mechanism(scene):
 
 
 def _hinges_for_pins(scene):
-    """What to do where rods lie in a coordinate plane and are held once their pins are hinges about its normal; else
-    empty. Of two such planes, that of rods along one line, the upright one."""
+    """What to do where rods in a coordinate plane are held once their pins are hinges about its normal; else ""."""
     pinned = [x for x in scene.supports if isinstance(x, Pin)]
     tangents = [rod.curve.frame(np.linspace(0.0, rod.length, _ALONG))[:, :, 2] for rod in scene.rods if pinned]
     for i, plane in ((1, "x-z"), (0, "y-z"), (2, "x-y")):
@@ -281,8 +280,7 @@ def _spins(scene, free):
 
 
 def _plain_motions(free, spins):
-    """(m, rods, 6) a basis of the free motions without those of rods that spin: of the rod that moves most as many as
-    possible are displacements or rotations along one of x, y and z."""
+    """(m, rods, 6) a basis of the free motions, along x, y and z where possible, without those of rods that spin."""
     if spins:
         inside = np.linalg.qr(np.array([np.tensordot(free, spin, 2) for spin in spins]).T, mode="complete")[0]
         free = np.tensordot(inside[:, len(spins) :].T, free, 1)

@@ -424,10 +424,7 @@ class CompiledScene:
         return decided & admitted, values, errors
 
     def _admitted(self, array):
-        """(which cases the constructors of the scene admit, their K and J, or none of these where they do not change).
-
-        A box of numbers is admitted where its ends are, of sections and materials its corners; else each case is looked
-        at."""
+        """(cases that the scene's constructors admit, K, J or None): boxes of numbers by their corners."""
         low, high = (f(array, axis=0) for f in (np.min, np.max))
         if (low < self._box[0]).any() or (high > self._box[1]).any():
             box = np.minimum(low, self._box[0]), np.maximum(high, self._box[1])

@@ -79,8 +79,7 @@ def _buckling_modes(buckling, length):
 
 
 def _quotients(direct, energies, step):
-    """(modes,) Rayleigh's quotients at the state of a `Direct`, the critical changes of the load factor; step: of the
-    load factor, for differences."""
+    """(modes,) Rayleigh's quotients, the critical changes of the load factor; step: of it, for differences."""
     point = direct.problem.load_factor, direct.problem.numbers(), None
     direct.factor(*point[:2])
     slope, stiff = direct.slope(), energies.here()

@@ -190,8 +190,7 @@ def _critical(scene, layout, count, load_factor, tol, degree, comm):
 
 
 def _stay_at(track, at_rest):
-    """Return to the reference where it is in equilibrium: Newton's method for actions that are not scaled leaves a
-    contact force of rounded strains there."""
+    """Return to the reference where it is in equilibrium: Newton's method leaves rounded contact forces there."""
     problem = track.problem
     found = problem.numbers()
     track.put(at_rest, 0.0)
@@ -204,8 +203,7 @@ def _stay_at(track, at_rest):
 
 
 def _of_state(problem, part, vectors):
-    """(n,) relative errors of critical load factors by the rounding of the strains at the state; part: the `Part` of
-    the second variation, assembled there; vectors: modes."""
+    """(n,) relative errors of critical load factors by the rounding of strains; part: of the second variation."""
     mismatch, numbers = problem.mismatch(), problem.numbers()
     stressed = mismatch is not None and problem.model.comm.allreduce(bool(numbers[1].any()), MPI.LOR)
     if not stressed or not vectors:
@@ -251,8 +249,7 @@ def _extent(model, moved, slope, unit):
 
 
 def _below(most, values, vectors):
-    """The eigenvalues (n,), descending, and eigenvectors with critical load factors 1/value up to `most`; the others
-    are rounding errors, or negative, of the opposite load."""
+    """Eigenvalues (n,), descending, and eigenvectors of critical load factors 1/value up to `most`."""
     values = values[values * most > 1]
     return values, vectors[: len(values)]
 

@@ -208,8 +208,7 @@ def _varying(rod, loads):
 
 
 def _too_long(rod, functions, breaks, degree, parts):
-    """(elements,) of bool: the elements to be halved: all until their `parts` equal parts are almost straight, then
-    those in which the Gauss points do not integrate the functions."""
+    """(elements,) of bool: to be halved, until `parts` of each are straight and Gauss points integrate functions."""
     long_enough = np.diff(breaks) > 1.01 / _FIRST.shortest
     ends = (breaks[:-1, None] + np.diff(breaks)[:, None] * np.arange(parts) / parts).ravel()
     chords = np.diff(rod.curve.position(np.append(ends, 1.0) * rod.length), axis=0)
@@ -481,6 +480,5 @@ def _difference_before(scene, on_mesh, numbers, layout):
 
 
 def _gain(before, error, most):
-    """(n,) the assumed gain in accuracy of a halving: a part of the gain observed in two halvings, and less than the
-    2^(2 p) of the order of eigenvalues, 2^most."""
+    """(n,) assumed gain of accuracy by a halving: a part of that observed, at most the order's 2^most."""
     return np.clip((before / np.maximum(error, 1e-300) - 1) / 4, 1, max(1.0, 2.0**most))

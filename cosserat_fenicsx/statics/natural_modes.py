@@ -439,8 +439,7 @@ def _flutters(found):
 
 
 def _grows(calm):
-    """A function of `Modes` that says whether a vibration grows: by more than rounding; but by anything, where at a
-    load factor without flutter, whose `Modes` are given, all of them decay."""
+    """A function of `Modes`: does a vibration grow, by more than rounding; by anything, where `calm` ones decay?"""
     turns = calm.eigenvalues.imag > 0
     decays = bool((calm.growth_rates < -calm.unsure)[turns].all())
 
@@ -452,8 +451,7 @@ def _grows(calm):
 
 
 def _onset(path, at, k, ends, starts):
-    """The `Event` where a vibration begins to grow, or ceases to, between the points k and k + 1 of a path; at: see
-    `at_state`; ends, starts: load factors and states of both points."""
+    """The `Event` between points k and k + 1 of a path where a vibration begins to grow, or ceases to."""
 
     def between(load_factor):
         share = (load_factor - ends[0]) / (ends[1] - ends[0])
@@ -471,8 +469,7 @@ def _onset(path, at, k, ends, starts):
 
 
 def _bisected(modes_at, grows, calm, growing):
-    """(load factor, its `Modes`) of the onset of flutter between a load factor where nothing grows and one where a
-    vibration does; grows: see `_grows`."""
+    """(load factor, `Modes`) of the onset of flutter between one where nothing grows and one where it does."""
     found = modes_at(growing)
     while abs(growing - calm) > _LOCATED * max(abs(growing), abs(calm)):
         middle = (calm + growing) / 2

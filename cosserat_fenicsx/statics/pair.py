@@ -100,8 +100,7 @@ class Pair(Pointers):
         p.start = self.doubles(fine._kept["at_rest"])
 
     def _of_force(self):
-        """Which numbers of a point of the fine mesh depend on n at the Gauss points: arrays of (number, point,
-        component in the model, derivative); None where none do."""
+        """Numbers of a fine point that depend on n at Gauss points: (number, point, component, derivative); or None."""
         _, fine = self.meshes
         model, problem = fine.model, fine.problem
         if not (model.carried or model.force_is_unknown):

@@ -98,8 +98,7 @@ def refine(trace, correct, bar, scene, layout, tol, bound, degree, usual=None):
 
 
 class _Search:
-    """State of the search for a mesh; whole: the complete path on the last mesh on which all points were computed, or
-    None; accurate: the last path with accurate positions whose events differ from those of the mesh before, or None."""
+    """State of the search for a mesh; whole: the last complete path; accurate: that whose events still differ."""
 
     def __init__(self, trace, correct, bar, scene, tol, bound, degree, usual):
         self._trace, self._correct, self._bar = trace, correct, bar
@@ -224,8 +223,7 @@ class _Search:
         return layout
 
     def _found_on(self, layout):
-        """The sample points, or all points, on a mesh, with their errors where these are known; or all points on the
-        mesh before where the sample points show that it suffices."""
+        """The sample points, or all points, on a mesh with known errors; all on the mesh before where it suffices."""
         few = None if self._few is None else self._correct(layout, self._few)
         apart = None if few is None else self._judge(few, self._few, self._apart)
         if few is None or apart[POSITION].max() > _REFINEMENT.resolved:

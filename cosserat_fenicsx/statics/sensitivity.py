@@ -218,8 +218,7 @@ class Direct:
         self.problem.tensions.refuse("sensitivity", edges, expected)
 
     def _data_changes(self, scenes, parameter):
-        """For every point the derivatives of the data, of the constraint equations' part of the residual, and of the
-        gaps of tendons of given length."""
+        """For every point the derivatives of the data, of the residual of ties, and of gaps of tendons."""
         step = STEP * parameter.size
 
         def smooth(arrays):
@@ -282,8 +281,7 @@ class Direct:
         return found, clamped
 
     def _rate(self, data, of_ties, of_lengths):
-        """The change of the numbers with data and constraint equations; data that depend on the position follow by
-        iteration, since the tangent need not contain their change."""
+        """The change of the numbers with data and ties; data that depend on the position follow by iteration."""
         rate = self._response(*self.residual_change(data, of_ties), of_lengths)
         for _ in range(_FOLLOWED if self._refreshes else 0):
             moved = [a + b for a, b in zip(data, self._data_along(rate), strict=True)]
@@ -312,8 +310,7 @@ class Direct:
         return [found[0], *(carried + problem.rate_by_law() for carried in found[1:])]
 
     def _response(self, residual, moved, gaps=0.0):
-        """The change of the numbers that balances a change of the residual, and of the gaps of tendons of given length,
-        with the clamped nodes' moves `moved`."""
+        """The change of the numbers that balances changes of the residual, the gaps and the clamped nodes."""
         problem, model, rate = self.problem, self.model, self.problem.numbering.vector()
         residual.scale(-1.0)
         if problem.tensions:

@@ -128,8 +128,7 @@ def _fasten(newton, walls, stiffness):
 
 
 def _relax(newton, walls, spring, clearance, name):
-    """Let the rod move as in a viscous fluid until it rests, by an implicit scheme of one Newton step each: the spring
-    is attached to the rod's position at every step, so that it resists that step alone."""
+    """Let the rod rest as in a viscous fluid, by implicit steps of one Newton step: the spring follows the rod."""
     viscosity = spring
     for _ in range(_VISCOUS):
         obey()

@@ -158,8 +158,7 @@ class Part(Pointers):
         self.K.assemble()
 
     def _of_ties(self, stress_alone=False):
-        """The part of supports and joints, see `TieRows.second_variation`, after a count of pivots, with springs in
-        their place."""
+        """The part of ties, see `TieRows.second_variation`, after a count of pivots, with springs in their place."""
         problem, comm, diagonal = self.problem, self.model.comm, self.elimination.diagonal
         if stress_alone:
             return problem.ties.second_variation(self.variation.axes, problem.tie_load_factor)

@@ -312,8 +312,7 @@ class RodContacts:
         return np.column_stack([self.strands.s(touches.element[:, k], touches.place[:, k]) for k in (0, 1)])
 
     def _slips(self, touches, nodes, pulls):
-        """Rows of the unknowns (m, 2, 7 n), derivatives of slips across contacts by them, and (m, 2) the slips since
-        the accepted state."""
+        """Rows (m, 2, 7 n) of the unknowns, derivatives of slips by them, and (m, 2) slips since the accepted state."""
         (x, q, _), parts = self._accepted, pulls[:, 1:]
         turning = small_rotations((q + self._q) / 2)
         by = np.concatenate([parts[..., :3], np.einsum("kpni,knij->kpnj", parts[..., 3:], turning[nodes])], axis=3)

@@ -269,8 +269,7 @@ class Table:
         return self._rows
 
     def _header(self, count):
-        """The header of a .npy file of `count` rows. All headers differ in the digits of the count alone, so a header
-        that is overwritten in part can be read."""
+        """The header of a .npy file of `count` rows: equal in length, so that one overwritten in part can be read."""
         descr = self._dtype.descr if self._dtype.names else self._dtype.str
         shape = "".join(f"{n}, " for n in self._shape)
         text = f"{{'descr': {descr!r}, 'fortran_order': False, 'shape': ({count:>19}, {shape})}}".encode()

@@ -215,8 +215,7 @@ def _hash(data):
 
 
 def _code(function, seen):
-    """A function as nested tuples: its instructions, and the functions of its own module and the objects that these
-    name. Other modules, and objects that may change while it runs, are left out."""
+    """A function as nested tuples: its instructions, and what it names in its own module and that does not change."""
     if function in seen:
         return function.__qualname__
     seen.add(function)

@@ -218,9 +218,7 @@ def _begun(bands, load, s, ends, clearance, known, typical):
 
 
 def _sides_in_soft_walls(bands, load, ends, clearance, typical):
-    """(n,) sides on which nodes touch, in walls that become stiffer: Newton's method with a line search, which lowers
-    the energy until it ends. ends: sides of the two ends, which are held there; clearance: (n,) m, infinite where
-    nothing is touched; typical: size of the force of a node, N."""
+    """(n,) sides on which nodes touch, in walls that become stiffer, by Newton's method with a line search."""
     inner, x, c = slice(2, -2, 2), np.zeros(len(load)), clearance[1:-1]
     held = np.array([0, len(load) - 2, len(load) - 1])
     finite = np.where(np.isfinite(clearance), clearance, clearance[-1])
@@ -283,8 +281,7 @@ def _equations(beam, curvature, s):
 
 
 def _with_contacts(bands, load, sides, clearance):
-    """Offsets and angles (2 n,), and the forces and moments that hold them, with nodes on their sides of the wall and
-    an angle of 0 at the upper end."""
+    """Offsets and angles (2 n,), and forces and moments that hold nodes on `sides` and the upper end's angle at 0."""
     at = np.flatnonzero(sides)
     x = _with_held(bands, load, np.append(2 * at, len(load) - 1), np.append(sides[at] * clearance[at], 0.0))
     return x, _product(bands, x) - load

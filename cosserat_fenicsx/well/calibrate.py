@@ -367,8 +367,7 @@ def _left_out(readings, found):
 
 
 def _causes(readings, apart, misfit, with_block):
-    """Sentences on why readings may not fit, from their differences (n,) to the computed values; `with_block` fits the
-    block's weight too, None where it was fitted."""
+    """Sentences on why readings may not fit, by their differences (n,); `with_block`: a fit of the block's weight."""
     hooks = [(x.at, x.value - more) for x, more in zip(readings, apart, strict=True) if x.query == "hook_load"]
     sizes = sum(abs(m.hook_load) for m, _ in hooks), sum(abs(computed) for _, computed in hooks)
     if hooks and not sizes[1] / _SET.other_unit < sizes[0] < sizes[1] * _SET.other_unit:

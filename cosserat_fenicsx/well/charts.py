@@ -139,8 +139,7 @@ def sweep_figure(sweep):
 
 
 def _usual_range(loads):
-    """Ends of the axis of loads; infinite where all of them are of a usual size. Before it locks up a string may take a
-    thrust far beyond all others."""
+    """Ends of the axis of loads, which a string before lock-up may exceed by far; infinite where all are usual."""
     known = np.abs(loads[np.isfinite(loads)])
     most = 10 * np.median(known) if len(known) else np.inf
     if known.max(initial=0.0) <= most:

@@ -228,8 +228,7 @@ class Borehole(InWords, Part):
 
 @dataclass(frozen=True)
 class _Rows(Number):
-    """A number, or ascending rows of measured depth (m) and such a number; `ends`: of the lower ends of columns, which
-    are one number where all are equal."""
+    """A number, or ascending rows of measured depth (m) and one; `ends`: of the lower ends of columns."""
 
     ends: bool = False
 

@@ -121,8 +121,7 @@ def _between(low, high, step):
 
 
 def _view_of(points, axes, wanted):
-    """The `View` whose window is as large as the drawing of a box needs, or as wide as wanted (pixels); and how many
-    times as large it is."""
+    """The `View` as large as the drawing of a box needs, or as wanted (pixels); and how many times as large."""
     main = points[-1, :2] - points[0, :2]
     main = main if np.linalg.norm(main) > 1e-9 else np.array([1.0, 0.0])
     # across the main direction, whose end is at the right, turned and raised
@@ -183,11 +182,7 @@ def _add_hole(plotter, pyvista, answer, md, axis, radius):
 
 
 def _add_surroundings(plotter, pyvista, axes, axis, surface):
-    """Draw the outline of the surface, where the well begins there, and the well's shadow below.
-
-    Returns:
-        lines (n, 3), m: these, and the outline of the floor.
-    """
+    """Draw the surface's outline and the well's shadow below; returns their lines (n, 3), m."""
     (x0, x1), (y0, y1), (low, high) = ((each.low, each.high) for each in axes)
     corners = np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1], [x0, y0]])
     floor, outline = (np.column_stack([corners, np.full(5, z)]) for z in (low, high))

@@ -270,11 +270,7 @@ def _tangents(inc, azi):
 
 
 def _curvatures(inc, azi, length):
-    """Doglegs (rad) and curvature vectors (1/m), of full relative accuracy for small angles.
-
-    By the differences of the angles: the second tangent along the directions of growing inclination and azimuth at the
-    first has the size sin(dogleg).
-    """
+    """Doglegs (rad) and curvature vectors (1/m), accurate for small angles: by the size sin(dogleg) across."""
     i, a, j = inc[:-1], azi[:-1], inc[1:]
     half = np.sin(np.diff(azi) / 2)
     up = np.sin(j - i) - 2 * np.cos(i) * np.sin(j) * half**2

@@ -235,11 +235,7 @@ def most_weight_of(answer, grade, wear, safety, buckling, model, progress=None):
 
 
 def _by_rod(answer, start, strengths, safety, buckling, progress):
-    """The `MostWeightOnBit` of the rod in contact, looked for from a weight (N) on.
-
-    Raises:
-        NotConverged: the limit was not found to its accuracy with as many equilibria as are allowed.
-    """
+    """The `MostWeightOnBit` of the rod in contact, looked for from a weight (N) on; NotConverged by too many solves."""
     whole = float(answer.pieces.weight @ (answer.pieces.bottom - answer.pieces.top))
     low, high, weight = (0.0, None), (np.inf, None), min(start, whole)
     with StageProgress("most weight on bit", progress, world()) as bar:
@@ -272,8 +268,7 @@ def _by_rod(answer, start, strengths, safety, buckling, progress):
 
 
 def _between(low, high, above):
-    """The weight that is tried next, between one within all limits and one beyond: where the margin vanishes on a line,
-    and a little beyond that on the other side of the last one; in the middle where margins are no line."""
+    """The weight to try next: where the margin vanishes on a line and a little beyond; else in the middle."""
     name = min(high[1], key=lambda x: high[1][x][0])
     left, right = (found.get(name, (np.nan, 0))[0] for _, found in (low, high))
     middle, width = (low[0] + high[0]) / 2, high[0] - low[0]
@@ -308,8 +303,7 @@ def _limits_of_rod(answer, weight, strengths, safety, buckling):
 
 
 def _solved(answer, model, weight):
-    """The `TorqueAndDrag` of the flexible string with another weight on bit (N), without estimates of errors of its
-    own; or the `LockUp`."""
+    """The `TorqueAndDrag` of the flexible string with another weight on bit (N), or the `LockUp`."""
     operation = replace(answer.operation, weight=weight)
     chain = chain_of(answer.pieces, answer.torque_convention == "coulomb")
     solved = soft_string(chain, -weight, operation.torque, _ACCURATE)

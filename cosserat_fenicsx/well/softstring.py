@@ -261,8 +261,7 @@ class _Friction:
 
 
 def _integrated(slope, source, length):
-    """P with P' = slope P + source, from 0 at the lower end of the lowest piece, by its integrating factor: at the
-    ends of pieces (n + 1,) and, as slope and source, at their Gauss points."""
+    """P with P' = slope P + source from 0 at the lower end: at ends of pieces (n + 1,) and at their Gauss points."""
     A, gain = (slope @ POINTS_TO.T) * length[:, None], np.exp((slope @ WEIGHTS) * length)
     shrunk = np.exp(-A)
     decay = source * shrunk
@@ -436,8 +435,7 @@ class Differentiated:
 
 
 def _by_density(component, mud):
-    """Derivative of the weight in mud (N/m) by the mud's density, inside too where it is the same; 0 where the weight
-    in mud is given. See `components.weight_in_mud`."""
+    """Derivative of the weight in mud (N/m) by its density; 0 where given. See `components.weight_in_mud`."""
     if component.weight is not None:
         return 0.0
     bore = math.pi / 4 * component.inner_diameter**2

@@ -108,8 +108,7 @@ def model_errors(path, pieces, soft, solved, sections, rings=()):
 
 
 def _earlier(soft, solved, pieces, sections):
-    """By how much hook load and surface torque change where snakes are helices: their friction makes the string a helix
-    farther down, and the helix multiplies it on the way up."""
+    """Changes of hook load and surface torque where snakes are helices, which the friction of both brings about."""
     try:
         early = earliest_helix(soft, pieces, sections)
     except LockUp:
@@ -136,8 +135,7 @@ def _snakes(chain, solved, EI, clearance):
 
 
 def _at_rings(chain, solved, depth, clearance, EI, rings):
-    """Wall force (N) of bits and stabilisers that pry; and the part of the load of their spans (N) that turns on their
-    larger radius."""
+    """Wall force (N) of bits and stabilisers that pry; and the part of their spans' load (N) on their radius."""
     ends = depth - np.append(0.0, np.cumsum(chain.length))  # measured depths, from the lower end up
     largest = np.array([solved.side.max(axis=1) * chain.climb, np.maximum(-solved.tension.min(axis=1), 0.0),
                         chain.curvature, clearance, EI])  # fmt: skip
@@ -194,15 +192,13 @@ def _spanned(q, T, d, EI, length):
 
 
 def _hung(chain, solved, clearance, EI):
-    """Wall force (N) that is missed below the surface, where the rod hangs on the axis and comes to the wall farther
-    down."""
+    """Wall force (N) missed below the surface, where the rod hangs on the axis and comes to the wall farther down."""
     q, T = solved.side[-1, -1] * chain.climb[-1], max(solved.tension[-1, -1], 0.0)
     return _spanned(q, T, clearance, EI, chain.length.sum())
 
 
 def _edges(pieces, solved, groups, EI):
-    """Wall force (N) that is missed in pieces, from below, where friction changes with the diameter: the string spans a
-    part of what is wider, and loads the edge, on the friction there."""
+    """Wall force (N) missed in pieces: the string spans a part of what is wider, and loads the edge."""
     found, up = np.zeros(len(groups)), slice(None, None, -1)
     mu, hole = pieces.friction[up], pieces.hole[up]
     length, q = (pieces.bottom - pieces.top)[up], solved.side[groups].max(axis=1) * solved.chain.climb[groups]
@@ -216,8 +212,7 @@ def _edges(pieces, solved, groups, EI):
 
 
 def _levers(pieces, beside, solved, groups, EI, clearance):
-    """Wall force (N) that is missed at the lower ends of pieces, from below, where EI k jumps: the string takes the
-    moment by a pair of forces at a distance of sqrt(8 d/k), where they exceed the load there."""
+    """Wall force (N) missed at lower ends of pieces where EI k jumps: by a pair of forces sqrt(8 d/k) apart."""
     n = len(groups)
     wide = np.maximum(np.append(EI[1:], 0.0), np.append(0.0, EI[:-1]))  # of neighbours
     EI = np.where(pieces.bottom[::-1] - pieces.top[::-1] < _SET.short, np.minimum(EI, wide), EI) if n > 1 else EI
@@ -230,8 +225,7 @@ def _levers(pieces, beside, solved, groups, EI, clearance):
 
 
 def _jumps(path, pieces, beside, tension, EI):
-    """Wall force (N) that is missed where pieces meet, from below, and EI dk^2 (N m); beside: (2, n, 3) curvature
-    vectors just above and below the bottoms of pieces."""
+    """Wall force (N) missed where pieces meet, and EI dk^2 (N m); beside: (2, n, 3) curvatures above and below."""
     md, up = pieces.bottom[:-1], slice(None, None, -1)
     t, down = path.tangent(md), np.array([0.0, 0.0, 1.0])
     k = beside[:, :-1]
@@ -352,8 +346,7 @@ def check_settings(model=AUTO, tol=1e-4, torque_convention=CONVENTIONS[0]):
 
 
 def _flexible(given, model, tol, torque_convention, pieces, laid):
-    """The `TorqueAndDrag` of the soft string, buckled where it is a helix and `model` is not "soft"; and sentences on
-    why it is not the answer where it is not."""
+    """The `TorqueAndDrag` of the soft, or buckled, string; and sentences on why it is not the answer."""
     path, operation = given[0].path, given[2]
     sections = sections_of([place.component for place in laid])
     rings = rings_of(laid, given[0])
@@ -398,11 +391,7 @@ def _flexible(given, model, tol, torque_convention, pieces, laid):
 
 
 def _on_motor(string, operation):
-    """A sentence on a motor under the torque on bit.
-
-    Raises:
-        SceneError: it stalls.
-    """
+    """A sentence on a motor under the torque on bit; a SceneError where it stalls."""
     for motor in (part for part in string.components if isinstance(part, MudMotor)):
         speed = motor.running(type(operation).__name__, operation.torque)
         yield (

@@ -208,8 +208,7 @@ class MudMotor(_Tool):
 
     @cached_property
     def _slopes(self):
-        """The slopes of the law where these are extreme: at both ends of its cubics, and within them; where the flow
-        changes, of all curves."""
+        """The slopes of the law's cubics at their ends and extremes; of all curves where the flow changes."""
         flows, found = [x.flow for x in self.curves] if callable(self.flow) else [self.flow], []
         for law in map(self.law_at, flows):
             (a, b, c, _), width = law.c, np.diff(law.x)

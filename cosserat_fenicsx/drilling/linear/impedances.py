@@ -303,8 +303,7 @@ def _free(s):
 
 
 def _drive_top(drive, impedance):
-    """The condition of the drive: (om, M) at the top and their derivatives, free of poles. It acts late by
-    exp(-s late), where it is called once a sample by half of that and its delay."""
+    """The condition of the drive: (om, M) at the top and derivatives, free of poles; it acts late by exp(-s late)."""
     gains, inertia, late = drive.control.gains(impedance), drive.inertia, drive.control.late
     check_late(drive.control, gains.linear, impedance, impedance is None)
     if gains.rigid:

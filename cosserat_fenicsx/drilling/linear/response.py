@@ -280,8 +280,7 @@ def _from_tool(guide, s, below, place, names):
 
 
 def _ratios(guide, s, below, names):
-    """Impedance at the surface, that of the drive, and {source: {answer: ratio}} of a guide that ends in the impedance
-    `below` of bit and rock, the bit's inertia included."""
+    """Impedance at the surface, that of the drive, and {source: {answer: ratio}} of a guide that ends in `below`."""
     speed_above, load_above, speed, load = names
     sign = 1.0 if guide.kind == "torsion" else -1.0  # a hook load is minus the force handed down
     stands = np.isinf(below)

@@ -177,8 +177,7 @@ class Locator:
         return any(abs(self.track.bordered.work(other.null, crossing.null)) > _TOLERANCES.alike for other in near)
 
     def _by_count(self, chord, counts, limits):
-        """(coordinate, `PathPoint`, modes) of the eigenvalues of the second variation that change their sign, as many
-        as negative modes appear or vanish, without those of limit points."""
+        """(coordinate, `PathPoint`, modes) of eigenvalues that change their sign, without those of limit points."""
         first, last = counts
         if last - first == len(limits):
             return []
@@ -207,8 +206,7 @@ class Locator:
         return end
 
     def _softest(self, chord, counts, limits):
-        """As `_by_tangent`, where tendons of given length hold modes of the second variation: the motions that are
-        resisted least at the end with more negative modes."""
+        """As `_by_tangent`, with given lengths of tendons: the motions resisted least where negative modes are more."""
         first, last = counts
         if last - first == len(limits):
             return []
@@ -256,8 +254,7 @@ class Locator:
         return modes
 
     def _vanishing(self, chord, j, last):
-        """Where the j-th eigenvalue in ascending order vanishes: (coordinate, `PathPoint`, number of eigenvalues before
-        `last` that vanish there)."""
+        """Where the j-th eigenvalue vanishes: (coordinate, `PathPoint`, how many before `last` vanish there)."""
         track = self.track
 
         def eigenvalue(point, j=j):

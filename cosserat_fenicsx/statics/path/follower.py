@@ -191,8 +191,7 @@ class Follower:
         return not any(self._meet(crossing) for crossing in crossings)
 
     def _onto(self, fork):
-        """The first `PathPoint` on the branch at a bifurcation, displaced along the mode and corrected in the plane
-        perpendicular to it; None where none is found."""
+        """The first `PathPoint` on the branch at a bifurcation, corrected across the mode; None where none is found."""
         track = self.track
         base = fork.point
         track.history = [base]
@@ -371,8 +370,7 @@ class ArcLength:
         self._weight = self._weight or 1.0
 
     def _weigh_less(self):
-        """Reduce the weight of the load factor where the path is stiffer than before; else it would dominate the
-        metric, in which a limit point would be a sharp bend."""
+        """Reduce the weight of the load factor where the path is stiffer: limit points would be sharp bends."""
         track = self.track
         here, weight = track.here, self._weight
         if not here.rise:
@@ -386,8 +384,7 @@ class ArcLength:
             self._scale *= shrunk
 
     def _passes(self, place, a, b):
-        """Whether the step from a to b passes through an earlier point of the path, in the path's direction there: the
-        solution in the plane through that point, perpendicular to the path, must be the same state."""
+        """Whether the step from a to b passes an earlier point: the solution in the plane there is the same state."""
         track, w = self.track, self._weight
         chord, tangent = between(a, b), (place.along, place.rise)
         onward = track.dot(tangent, chord, w)
@@ -419,8 +416,7 @@ class ArcLength:
         return self.track.length(between(a, b), self._weight)
 
     def _predict(self, step):
-        """Predictor (numbers, load factor) at the arc length `step` from the last point: a polynomial through the last
-        points with the tangent at the last one; carried fields (n) without the tangent."""
+        """(numbers, load factor) at the arc length `step` from the last point, by a polynomial with its tangent."""
         history = self.track.history
         here = history[-1]
         lengths = [self._length(a, b) for a, b in itertools.pairwise(history)]

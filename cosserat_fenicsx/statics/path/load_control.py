@@ -128,8 +128,7 @@ class Continuation:
         return done
 
     def _linear_step(self):
-        """The step of the load factor that moves the linearised structure as intended, for very soft structures such
-        as a straight wire; infinite where the tangent is singular."""
+        """The step that moves the linearised structure as intended; infinite where the tangent is singular."""
         track = self.track
         try:
             moved = track.model.largest(track.slope())
@@ -193,8 +192,7 @@ class Continuation:
         return False
 
     def _jumped(self, move, change):
-        """Whether a step has jumped over a limit point to another part of the path: it is longer than twice the mean
-        slope of its two ends times the change of the load factor."""
+        """Whether a step jumped over a limit point: it is twice as long as the mean slope of its ends makes it."""
         track, actions = self.track, self.track.model.actions
         end, load_factor, friction = track.problem.numbers(), track.problem.load_factor, actions.friction
         slopes = track.slope()

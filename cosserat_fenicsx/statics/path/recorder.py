@@ -356,8 +356,7 @@ class Tracing:
         return self.path
 
     def _meet_between(self, a, b, weight, halvings=_HALVINGS):
-        """Report the events between two points of a path on a coarser mesh that were found on this one: in halves of
-        the way where they cannot be resolved in all of it."""
+        """Report events between two points of a coarser path: in halves of the way where they are not resolved."""
         scale = self.track.length(between(self.track.origin, a), weight)
         chord = Chord(self.track, a, b, weight, short=plain(self.track, a, b, weight, scale))
         try:

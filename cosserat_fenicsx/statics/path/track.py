@@ -184,8 +184,7 @@ class Track:
         return replace(solved, converged=False, reason=self.failure)
 
     def _by_shares(self, numbers, load_factor, failed):
-        """Newton's method again where rods touch obstacles, with shares of steps where it alternates between contacts,
-        and with softer obstacles first where it still does; its end is confirmed by full steps."""
+        """Newton's method with shares of steps where contacts alternate, then softer obstacles; full steps end it."""
         limited, unsolved = LimitedNewton(self.problem, LIMITS.far, LIMITS.far), ""
         for stages in _STAGES:
             self.put(numbers, load_factor)

@@ -253,8 +253,7 @@ class InHole:
         return found
 
     def _averaged(self, values):
-        """(n, k) from values of each element at its nodes (elements, nodes, k): where two elements meet, means by the
-        lengths that the node stands for in them, so that integrals do not change."""
+        """(n, k) from values (elements, nodes, k): where elements meet, means by lengths, which keeps integrals."""
         return self._summed(values * self._of_nodes[..., None]) / self.node_length[:, None]
 
     @cached_property
@@ -315,8 +314,7 @@ class InHole:
 
     @cached_property
     def _kinks(self):
-        """Arc lengths (m) at which the pressure on the wall may jump: stations of the survey, ends of sections
-        of the string and of the hole."""
+        """Arc lengths (m) where the pressure may jump: stations of the survey, ends of sections of string and hole."""
         string, length = self.string, float(self.string.ends[-1])
         stations = np.interp(string.path.md, self.md, self.s, left=np.nan, right=np.nan)
         found = np.concatenate([stations, string.ends[:-1], list(string.wall.breaks(string.rod))])
@@ -490,8 +488,7 @@ class RodErrors:
 
 
 def _changes(there, here, scales, counted):
-    """{name: relative change}, not less than the largest of those that count and of the wall force: a single quantity
-    may change little by chance."""
+    """{name: relative change}, at least the largest of those that count: one alone may change little by chance."""
     own = {name: abs(here[name] - there[name]) / scales[name] for name in NAMES}
     largest = max(own[name] for name in {*counted, "wall_force"})
     return {name: max(largest, change) for name, change in own.items()}

@@ -178,9 +178,7 @@ def _peak_alone(along, first, last):
 
 
 def _behind(along, here, peak, there, kinks):
-    """The `_Behind` of a stretch near a peak, None of one on another side or too far off.
-
-    They are one contact where a regular pressure from the force on balances them: its place is then within the peak."""
+    """The `_Behind` of a stretch near a peak, one contact where pressure from the force on balances them; or None."""
     before = there[1] < here[0]
     near, edge, outer = (there[1], here[0], here[1]) if before else (there[0], here[1], here[0])
     if np.cos(along.side[near] - along.side[edge]) < 0:
@@ -210,8 +208,7 @@ def _width(s, i, layer):
 
 
 def _resultants(along, group, kinks):
-    """The `Contact`s of one group, the forces at its two ends and the pressure between; and (n,) its regular pressure.
-    Where the group is too short to tell them apart, its regular pressure is its mean, or zero where it is one force."""
+    """The `Contact`s of a group: forces at its ends, the pressure between; and (n,) its regular pressure."""
     s, sizes, pressure, side, element, layer = along
     weight = pressure * sizes
     total, mean = float(weight.sum()), _mean_side(side, weight)
@@ -286,8 +283,7 @@ _AtEnd = namedtuple("_AtEnd", "place begins force line width error")
 
 
 def _at_end(x, along, shortest, usual, bound, jumps):
-    """The `_AtEnd` of the force at x = 0, None without one, by lengths that may hold the peak; `jumps`: ascending
-    distances of the kinks."""
+    """The `_AtEnd` of the force at x = 0, or None, by lengths that may hold the peak; `jumps`: places of kinks."""
     jump = jumps[0] if len(jumps) and jumps[0] > 0 else np.inf
     width = usual if jump >= (1 + _SET.beside) * usual else max(shortest, jump / (1 + _SET.beside))
     found = _force_at_end(x, along, width)

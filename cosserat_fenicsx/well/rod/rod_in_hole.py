@@ -177,8 +177,7 @@ def _counts(elements, pieces):
 
 
 class _Job(NamedTuple):
-    """Settings that all meshes share: the degree of the elements, whether the start is a helix, the tolerance, the
-    stiffest wall that it may need (over the first one), the progress, the work that is left, and the ranks."""
+    """Settings that all meshes share: degree, start, tolerance, stiffest wall over the first, progress, work, ranks."""
 
     degree: int
     helix: bool
@@ -229,10 +228,7 @@ def _wanted(answer):
 
 
 def _divided(string, layout, wanted, count):
-    """The layout of exactly `count` elements, or one a piece, with the density `wanted` on the elements of another.
-
-    The number does not depend on the string, so that strings of any length share compiled problems.
-    """
+    """The layout of `count` elements of the density `wanted`: equal for strings of any length, as their problems."""
     breaks, pieces = layout.breaks[0], layout.pieces(string.scene)[0]
     shares = np.array([wanted[piece].sum() for piece in pieces])
     shares *= max(count - len(pieces), 0) / shares.sum()
@@ -247,8 +243,7 @@ def _divided(string, layout, wanted, count):
 
 
 def _on_mesh(string, layout, stages, factor, start, before, job):
-    """The `InHole` on one mesh, in a wall stiffer by a factor or more, from that on another mesh, a helix or the axis,
-    with errors by that on the mesh before."""
+    """The `InHole` on one mesh, in a wall stiffer by a factor or more, with errors by the mesh before."""
     job.work.spend(0)
     with solvers_of(string.scene, layout, degree=job.degree, comm=job.comm) as (problem, _, stability):
         problem.set_load_factor(1.0)
@@ -271,8 +266,7 @@ def _on_mesh(string, layout, stages, factor, start, before, job):
 
 
 def _in_walls(string, problem, stability, stages, factor, steps, job):
-    """[`InHole`] of the stages that are solved precisely, in walls of stiffnesses times a factor, after `steps` Newton
-    steps on this mesh."""
+    """[`InHole`] of the precise stages, in walls of stiffnesses times a factor, after `steps` Newton steps here."""
     model, records = problem.model, {}
     decades = [k for k, stage in enumerate(stages[:-1]) if stage in DECADES]
     # a helix is almost free to turn as a whole, and must be found before the wall is made stiffer

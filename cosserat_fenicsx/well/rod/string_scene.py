@@ -382,8 +382,7 @@ def in_helix(string, s):
 
 
 def _untwisted(rod, s, position, tangent):
-    """Along a line (n, 3), m, with unit tangents (n, 3), without twist; at arc lengths s (n,), its bends
-    straightened."""
+    """A line (n, 3), m, without twist, whose bends are straightened, at arc lengths s (n,)."""
     q = _carried(rod.curve, tangent)
     if rod.curve.breaks:
         q = product_conjugate(q, rod.curve.turned(s))

@@ -100,8 +100,7 @@ class Program(Method):
 
 
 def _as_it_takes(problem, free, turns_clamp):
-    """The problem with numbers that a program supports. If its runner cannot rotate the clamp, only the loads are
-    rotated, about the axis of a rod with equal bending stiffnesses."""
+    """The problem in numbers that a program supports; where no clamp turns, with the loads turned about the axis."""
     found = {**problem}
     for key in ("EA", "GA"):
         if math.isinf(found[key]):
