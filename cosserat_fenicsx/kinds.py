@@ -152,10 +152,20 @@ def _names_in(part):
 @dataclasses.dataclass(frozen=True)
 class Reading:
     """Where data are read from: the folder of the scene file, to which names of files are relative (None for stored
-    data), and {name of a class: {name: object}} of objects that data may refer to by their names."""
+    data), {name of a class: {name: object}} of objects that data may refer to by their names, and the class of the
+    whole `file`, whose tables are named where a key stands in the wrong one."""
 
     folder: Path | None = None
     named: dict = dataclasses.field(default_factory=dict)
+    file: type | None = None
+
+    def tables_with(self, key):
+        """Words on the tables of the file that have a key; "" where there is none."""
+        kinds = {name: kind for name, (kind, _) in (arguments_of(self.file) if self.file else {}).items()}
+        inner = {name: kind.inner for name, kind in kinds.items() if isinstance(kind, Optional)}
+        tables = {name: kind.classes[0] for name, kind in inner.items() if isinstance(kind, Object)}
+        found = [f"[{name}]" for name, cls in tables.items() if key in arguments_of(cls)]
+        return f"which is a key of {' and '.join(found)}" if found else ""
 
 
 @dataclasses.dataclass
@@ -177,7 +187,7 @@ def made(make, data, where=(), reading=Reading()):
     known, at = arguments_of(make), ""
     if where:
         at = f"[{spoken(where)}]" if getattr(make, "called", "") else f"{spoken(where)} ({name})"
-    _check_keys(data, known, [key for key, (_, needed) in known.items() if needed], at, where)
+    _check_keys(data, known, [key for key, (_, needed) in known.items() if needed], at, where, reading)
     given = {key: known[key][0].read((*where, key), value, reading) for key, value in data.items()}
     try:
         return make(**given)
@@ -190,12 +200,13 @@ def made(make, data, where=(), reading=Reading()):
         raise misplaced((*where, field[1]) if field and field[1] in data else where, f"{at}{problem}") from None
 
 
-def _check_keys(data, known, needed, at, where=None):
+def _check_keys(data, known, needed, at, where=None, reading=Reading()):
     """Refuse unknown and missing keys of a table, which messages call `at`, "" for the file."""
     for key in data:
         if key not in known:
             place = None if where is None else (*where, key)
-            raise misplaced(place, f"{at or 'the file'}: unknown key '{key}', {nearest(key, known)}")
+            hint = reading.tables_with(key) or nearest(key, known)
+            raise misplaced(place, f"{at or 'the file'}: unknown key '{key}', {hint}")
     for key in needed:
         if key not in data:
             raise misplaced(where, f"{at}: '{key}' is missing" if at else f"[{key}] is missing")

@@ -217,6 +217,8 @@ CHANGES = {
     "unknown key": ("diameter = 0.2", "diametre = 0.2",
                     "rods[0].section (Circle): unknown key 'diametre', did you mean 'diameter'?"),
     "unknown table": ("[[supports]]", "[[suports]]", "unknown key 'suports', did you mean 'supports'?"),
+    "key of another table": ("diameter = 0.2", "diameter = 0.2, bound = 1",
+                             "(Circle): unknown key 'bound', which is a key of [solve]"),
     "unknown type": ('type = "Clamp"', 'type = "Clmap"', "supports[0].type = 'Clmap'"),
     "unknown solve key": ("tol = 1e-6", "tolerance = 1e-6", "[solve]: unknown key 'tolerance', did you mean 'tol'?"),
     "type error": ("diameter = 0.2", 'diameter = "0.2"', "Circle.diameter = '0.2': expected a unit"),

@@ -321,7 +321,8 @@ def from_tables(tables, folder):
     if not isinstance(materials, dict):
         raise misplaced(("materials",), f"materials = {materials!r}: expected tables, [materials.name]")
     named = {name: made(Material, entry, ("materials", name)) for name, entry in materials.items()}
-    found = made(class_of(kind_of(tables)), tables, (), Reading(folder, {"Material": named}))
+    cls = class_of(kind_of(tables))
+    found = made(cls, tables, (), Reading(folder, {"Material": named}, cls))
     if named and hasattr(found, "scene"):
         store(found.scene, materials=named)
     return found
