@@ -152,20 +152,12 @@ def _names_in(part):
 @dataclasses.dataclass(frozen=True)
 class Reading:
     """Where data are read from: the folder of the scene file, to which names of files are relative (None for stored
-    data), {name of a class: {name: object}} of objects that data may refer to by their names, and the class of the
-    whole `file`, whose tables are named where a key stands in the wrong one."""
+    data), {name of a class: {name: object}} of objects that data may refer to by their names, and a function that says
+    of an unknown key where else it may stand."""
 
     folder: Path | None = None
     named: dict = dataclasses.field(default_factory=dict)
-    file: type | None = None
-
-    def tables_with(self, key):
-        """Words on the tables of the file that have a key; "" where there is none."""
-        kinds = {name: kind for name, (kind, _) in (arguments_of(self.file) if self.file else {}).items()}
-        inner = {name: kind.inner for name, kind in kinds.items() if isinstance(kind, Optional)}
-        tables = {name: kind.classes[0] for name, kind in inner.items() if isinstance(kind, Object)}
-        found = [f"[{name}]" for name, cls in tables.items() if key in arguments_of(cls)]
-        return f"which is a key of {' and '.join(found)}" if found else ""
+    elsewhere: Callable[[str], str] = lambda key: ""
 
 
 @dataclasses.dataclass
@@ -205,8 +197,8 @@ def _check_keys(data, known, needed, at, where=None, reading=Reading()):
     for key in data:
         if key not in known:
             place = None if where is None else (*where, key)
-            hint = reading.tables_with(key) or nearest(key, known)
-            raise misplaced(place, f"{at or 'the file'}: unknown key '{key}', {hint}")
+            hint = f"'{key}', {reading.elsewhere(key) or nearest(key, known)}"
+            raise misplaced(place, f"{at or 'the file'}: unknown key {hint}")
     for key in needed:
         if key not in data:
             raise misplaced(where, f"{at}: '{key}' is missing" if at else f"[{key}] is missing")

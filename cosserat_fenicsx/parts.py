@@ -42,6 +42,7 @@ from cosserat_fenicsx.kinds import (
     NotData as NotData,
     Number as Number,
     Object as Object,
+    Optional as Optional,
     Reading as Reading,
     Several as Several,
     Text as Text,

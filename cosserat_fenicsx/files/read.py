@@ -67,6 +67,7 @@ import re
 import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from os import PathLike
 from pathlib import Path
 from typing import Annotated, Any
@@ -77,10 +78,12 @@ from cosserat_fenicsx.new_files import replaced
 from cosserat_fenicsx.parts import (
     Items,
     Object,
+    Optional,
     Part,
     Reading,
     Settings,
     Time,
+    arguments_of,
     made,
     misplaced,
     positive,
@@ -322,10 +325,18 @@ def from_tables(tables, folder):
         raise misplaced(("materials",), f"materials = {materials!r}: expected tables, [materials.name]")
     named = {name: made(Material, entry, ("materials", name)) for name, entry in materials.items()}
     cls = class_of(kind_of(tables))
-    found = made(cls, tables, (), Reading(folder, {"Material": named}, cls))
+    found = made(cls, tables, (), Reading(folder, {"Material": named}, partial(_tables_with, cls)))
     if named and hasattr(found, "scene"):
         store(found.scene, materials=named)
     return found
+
+
+def _tables_with(cls, key):
+    """Words on the tables of a file, read as a class, that have a key; "" where there is none."""
+    inner = {name: kind.inner for name, (kind, _) in arguments_of(cls).items() if isinstance(kind, Optional)}
+    tables = {name: kind.classes[0] for name, kind in inner.items() if isinstance(kind, Object)}
+    found = [f"[{name}]" for name, table in tables.items() if key in arguments_of(table)]
+    return f"which is a key of {' and '.join(found)}" if found else ""
 
 
 def write(scene: Part, file: File) -> None:
