@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.drilling import (
@@ -368,7 +369,6 @@ def test_tool_that_halves_the_pull(truth):
     (lambda: MotorCurve(0.04, [9.0, 0.0], [1e3, 3e3]), "MotorCurve.torques = .*: expected 2 torques, .*rise from 0"),
     (lambda: MotorCurve(0.04, [9.0, 0.0]), "either torques .N m. or pressures"),
     (lambda: above(motor(), bit=None), "Drilling.bit = None: expected a BitOnRock below mud motor"),
-    (lambda: above(motor(), motor()), "one MudMotor"),
     (lambda: OscillationTool(2.0, outer_diameter=0.127, spring=1e6, frequency=16.0), "either a force"),
     (lambda: above(OscillationTool(2.0, outer_diameter=0.127, spring=1e6, frequency=16.0, force=1e4)),
      "component below"),
@@ -461,7 +461,7 @@ def test_the_wall_holds_what_turns_with_the_bit_of_a_steady_start():
     history = cf.drilling.simulate(scene, 3.0, model="axial and torsional")
     assert np.ptp(history.bit_speed) < 1e-6 and np.ptp(history.surface_torque) < 1e-3
     assert history.bit_speed[0] == pytest.approx(Steady(scene, "torsion").speed_of_bit(6.0, None), rel=1e-3)
-    rates = Steady(scene, "axial").walls(None).rates(6.0, 0.0, 12.0)
+    rates = Steady(scene, "axial").walls(None).rates([6.0, 12.0], 0.0)
     assert rates[-1][0][2] == pytest.approx(rates[0][0][2] / 2, rel=1e-2)
 
 
@@ -470,3 +470,130 @@ def test_blades_below_a_motor_need_steps_for_the_motors_speed_too():
     fast = 6.0 + motor().speed(0.0)
     with pytest.raises(cf.SceneError, match=f"a step of at most {np.pi / 6 / fast:.3g} s"):
         cf.drilling.simulate(scene, 1.0, dt=np.pi / 6 / fast * 1.05)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Light(MudMotor):
+    """A motor whose housing is a small inertia, all but rigid."""
+
+    @property
+    def torsion(self):
+        return 3e10, 60.0 / self.length
+
+
+def two_motors(upper=None, lower=None):
+    """Two motors below a matched drive; the lower one leaks more."""
+    tools = motor(Light, **LOWER, **(lower or {})), motor(Light, rotor_inertia=8.0, **(upper or {}))
+    return above(*tools, drive=TopDrive(GIVEN["Om"], control=Matched(torque=3000.0)), law=Rising(500.0, 400.0))
+
+
+LOWER = {"leakage": 2.5e-8, "lost_torque": 200.0, "rotor_inertia": 12.0}
+
+
+def three_bodies(scene):
+    """(3, 3), (3, 2), (3,): d om/dt = A om + B flows + f of upper housing; upper rotor with lower housing; lower rotor
+    with the bit, by the torques of motors that turn forwards."""
+    up, low = scene.motors
+    J = np.array([60.0, 60.0 + up.rotor_inertia, low.rotor_inertia])
+    A, B, f = np.zeros((3, 3)), np.zeros((3, 2)), np.zeros(3)
+    A[0, 0], f[0] = -GIVEN["Z"], 3000.0 + GIVEN["Z"] * GIVEN["Om"]
+    A[2, 2], f[2] = -scene.bit.law.slope, -scene.bit.law.first
+    for k, tool in enumerate((up, low)):
+        for body, sign in ((k, -1), (k + 1, 1)):
+            A[body, k] += sign * tool.slope
+            A[body, k + 1] -= sign * tool.slope
+            B[body, k] += sign * tool.per_radian / tool.leakage
+            f[body] -= sign * tool.lost_torque
+    return A / J[:, None], B / J[:, None], f / J
+
+
+@pytest.mark.parametrize("model", ["torsion", "axial and torsional"])
+def test_two_motors_as_three_bodies(model, tmp_path):
+    """From their steady state both flows change over time; own integration of three bodies; resumed to the byte."""
+    ramps = [cf.signals.Table((0.0, 3.4, 3.5), (GIVEN["Q"], GIVEN["Q"], q)) for q in (0.03, 0.036)]
+    scene = two_motors({"flow": ramps[0]}, {"flow": ramps[1]})
+    A, B, f = three_bodies(scene)
+    start = np.linalg.solve(A, -f - B @ ([GIVEN["Q"]] * 2))
+    true = solve_ivp(
+        lambda t, om: A @ om + B @ [x.flow_at(t) for x in scene.motors] + f, (3.4, 3.7), start, method="Radau",
+        rtol=1e-9, atol=1e-9, dense_output=True).sol  # fmt: skip
+    found = cf.drilling.simulate(
+        scene, 3.7, model=model, dt=5e-4, elements=12, save_every=0.005, folder=tmp_path / "run", progress=False
+    )
+    assert (
+        found.model == model and (np.diff(true(3.7)) > 0).all() and abs(np.ptp([true(3.4), true(3.7)], 0)).min() > 0.1
+    )
+    times = found.mean_times
+    late = times > 3.4
+    got = np.column_stack([found.motor_speeds, found.bit_speed])[late]
+    expected = np.vstack([np.diff(true(times[late]), axis=0), true(times[late])[2:]]).T
+    assert got == pytest.approx(expected, abs=2e-3 * np.abs(expected).max())
+    assert found.motor_speed == pytest.approx(found.motor_speeds.sum(axis=1)) and not found.stalled[late].any()
+    last = zip(scene.motors, got[-1, :2], strict=True)
+    pressures = [x.pressure_at(speed, x.flow_at(times[-1])) for x, speed in last]
+    assert found.pressures[-1] == pytest.approx(pressures) and found.pressure[-1] == pytest.approx(sum(pressures))
+    assert abs(found.balance[-1]) < 1e-6 * found.work_of_tools[-1]
+    cf.drilling.simulate(
+        scene, 3.45, model=model, dt=5e-4, elements=12, save_every=0.005, folder=tmp_path / "part", progress=False
+    )
+    np.testing.assert_array_equal(cf.resume(tmp_path / "part", duration=3.7).rows, found.rows)
+    assert str(found).count("Motor ") == 2
+
+
+def test_small_motions_of_two_motors():
+    """Rates and response of the three bodies below a matched drive."""
+    scene = two_motors()
+    A, _, _ = three_bodies(scene)
+    steady = Steady(scene)
+    f = steady.equation(steady.parameters(GIVEN["Om"], None))
+    s = known = np.linalg.eigvals(A).astype(complex) * 1.0
+    for _ in range(20):
+        value, slope = f(s)
+        s = s - value / slope
+    assert s == pytest.approx(known, rel=2e-3)  # housings are all but rigid, and the pipe has no inertia there
+    frequency = np.array([0.1, 0.5, 2.0])
+    response = cf.drilling.frequency_response(scene, frequency)
+    per = [np.linalg.solve(2j * np.pi * x * np.eye(3) - A, [0, 0, -1 / scene.bit_inertia])[2] for x in frequency]
+    assert response.transfer("torque on bit", "bit speed") == pytest.approx(np.array(per), rel=2e-3)
+    rows = cf.drilling.stability(scene, [GIVEN["Om"]], up_to=1.0)
+    assert not rows.unstable(0)
+
+
+@pytest.mark.parametrize("model", ["torsion", "axial and torsional"])
+def test_steady_start_of_two_motors_with_curves(model):
+    """In a hole with friction nothing changes, and each gives what the parts below it take; so in linear theory."""
+    path = cf.well.WellPath.from_survey([0, 600], [60, 60], [0, 0], degrees=True)
+    hole = cf.well.Borehole(path, cf.well.HoleSection(600.0, "8 1/2 in", 0.3))
+    curved = motor(leakage=None, curves=CHART)
+    scene = above(Bit(0.2), motor(**LOWER), Collar(40.0, "NC46-65"), curved, Collar(30.0, "NC46-65"),
+                  length=527.7, hole=hole, mud=cf.well.Mud(0.0), start="steady",
+                  drag=ViscousDrag(torsion=0.1))  # fmt: skip
+    found = cf.drilling.simulate(scene, 0.3, model=model, progress=False)
+    assert np.ptp(found.bit_speed) < 1e-8 and np.ptp(found.surface_torque) < 1e-5 and (found.motor_speeds > 1).all()
+    linear = Steady(scene)._speeds(GIVEN["Om"], None)
+    assert np.diff(linear) == pytest.approx(found.motor_speeds[0], rel=1e-4)
+    taken = [tool.torque(om) for tool, om in zip(scene.motors, found.motor_speeds[0], strict=True)]
+    between = taken[0] - taken[1]
+    middle = [x for x, n in zip(scene.segments, scene.motors_above, strict=True) if n == 1]
+    wall = 0.3 * sum(x.weight * np.sin(np.pi / 3) * x.length * x.radius for x in middle)
+    drag = 0.1 * scene.inertias[1] * linear[1]
+    assert between == pytest.approx(wall + drag, rel=2e-2) and wall > 300  # the wall acts on nodes
+
+
+def test_limits_of_two_motors():
+    """A stiff second motor without flow is a collar; one that gives less than is taken stalls, which is told."""
+    size = {"outer_diameter": "6 3/4 in", "inner_diameter": 0.1, "length": 5.0}
+    stiff = motor(**{**size, "leakage": 1e-14, "flow": 0.0, "rotor_inertia": 1e-6})
+    rows = []
+    for upper in (stiff, Collar(**size)):
+        scene = above(Bit(0.2), motor(), upper, law=Stribeck(5e3, 4e3, 3.0), drag=ViscousDrag(torsion=0.3))
+        rows.append(cf.drilling.simulate(scene, 4.0, model="axial and torsional", dt=1e-3, elements=60))
+    for name in ("bit_speed", "surface_torque"):
+        first, second = (getattr(x, name) for x in rows)
+        assert first == pytest.approx(second, abs=1e-4 * np.abs(second).max()), name
+    weak = above(Bit(0.2), motor(), Collar(9.0, "NC46-65"), motor(flow=0.004), start="steady")
+    with pytest.raises(cf.SceneError, match="mud motor: it stalls: with 0.004"):
+        cf.drilling.simulate(weak, 1.0)
+    found = cf.drilling.simulate(replace(weak, start="rest"), 3.0, dt=1e-3, progress=False)
+    assert found.stalls[-1].tolist() == [True, False] and found.stalled[-1]
+    assert "THE MOTOR 1 FROM THE TOP STALLS" in str(found)

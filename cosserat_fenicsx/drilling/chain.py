@@ -169,8 +169,9 @@ def _chain_of_string(drilling, dt, elements, axial):
             at_ends[1:] += ends
         columns.append((diagonal, share * mass, rate * diagonal + damped, rate * share * mass - damper, spring))
     hanging, hanging_top, wall = _against_the_wall(drilling, depths)
-    for end, d, _ in joints:  # the tension beside the joint, not that of its spring
-        if axial and d == 0:
+    for end, d, _ in joints:
+        wall.share[wall.element == end] = 0.0  # what lies along a joint is above it
+        if axial and d == 0:  # the tension beside the joint, not that of its spring
             wall.element[wall.element == end] -= 1
     return Chain(depths, *_stacked(columns), hanging, hanging_top, wall, tuple(joints))
 

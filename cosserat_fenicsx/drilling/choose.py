@@ -66,13 +66,13 @@ def _left_out(scene, name):
 
 
 def _stalls(scene):
-    """A sentence where a bit at rest holds more than a motor gives."""
+    """Sentences where a bit at rest holds more than a motor gives."""
     law = scene.motor and scene.bit.law.resistance(scene.bit.most)
-    if not law or law.still < (stall := max(scene.motor.stall_torque(), 0.0)):
-        return []
     return [
-        f"{scene.motor.name} gives at most {stall:.5g} N m at the start, and the bit at rest holds {law.still:.5g} N m"
+        f"{motor.name} gives at most {stall:.5g} N m at the start, and the bit at rest holds {law.still:.5g} N m"
         ": where it sticks the motor stalls"
+        for motor in scene.motors
+        if law and law.still >= (stall := max(motor.stall_torque(), 0.0))
     ]
 
 
@@ -171,7 +171,7 @@ def model_of(scene, name, dt=None, elements=None):
     """
     if scene.discs and elements is not None:
         refuse("simulate", "elements", elements, "None for Discs, which are not divided")
-    if scene.discs or name == BOTH or scene.damped:
+    if scene.by_elements or name == BOTH:
         return AxialTorsional(scene, dt, elements, axial=name == BOTH)
     if dt is not None and elements is not None:
         refuse("simulate", "elements", elements, "None beside dt: waves of torsion have cells of one step")

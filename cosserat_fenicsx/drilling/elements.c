@@ -149,9 +149,8 @@ static void loads(model *m, double h, const double *signal)
         const double creep = m->pair_lost[p] / CREEP * (m->w[j + n] - m->w[j]);
         m->b[j] -= signal[n + p], m->b[j + n] += signal[n + p];
         m->rubbed[p] = fmax(fmin(creep, m->pair_lost[p]), -m->pair_lost[p]);
-        m->rubs[p] = 0;
+        m->rubs[p] = m->bends[p] = m->softens[p] = 0;
     }
-    m->bends = m->softens = 0;
     for (int d = 0; d < n; d++) m->b[last * n + d] -= m->bit.force[d + 2 - n];
     if (n == 2) m->b[2 * last] += m->bit.hanging; /* the tension at rest contains a part of the weight on bit */
 }
@@ -262,17 +261,17 @@ static int bend(model *m, int p)
     const int n = m->dofs, j = m->pair[p] * n + m->pair_dof[p];
     const double rate = m->w[j + n] - m->w[j], c = m->pair_slope[p];
     double slope;
-    const double more = torque_of_motor(&m->drives, rate, &slope) + c * rate, off = more - m->bends - m->softens * rate;
-    if (fabs(off) <= 1e-12 * c * (fabs(rate) + 1)) return 0;
-    m->softens = m->ease * (slope + c);
-    const double bends = more - m->softens * rate;
-    m->b[j] -= bends - m->bends, m->b[j + n] += bends - m->bends;
-    m->bends = bends;
+    const double more = torque_of_motor(m->drives + p, rate, &slope) + c * rate;
+    if (fabs(more - m->bends[p] - m->softens[p] * rate) <= 1e-12 * c * (fabs(rate) + 1)) return 0;
+    m->softens[p] = m->ease * (slope + c);
+    const double bends = more - m->softens[p] * rate;
+    m->b[j] -= bends - m->bends[p], m->b[j + n] += bends - m->bends[p];
+    m->bends[p] = bends;
     return 1;
 }
 
 /* Friction between both sides of joints, as that of a motor's rotor in its housing: where it holds them they creep, by
-   a damper; elsewhere it is a given force. And the curve of a motor. Returns whether one begins to stand or to slip, or
+   a damper; elsewhere it is a given force. And the curves of motors. Returns whether one begins to stand or to slip, or
    another tangent of the curve is taken. */
 static int rub_joints(model *m)
 {
@@ -280,10 +279,10 @@ static int rub_joints(model *m)
     int changed = 0;
     for (int p = 0; p < m->pairs; p++) {
         const double lost = m->pair_lost[p];
-        const int bends = p == m->motor && m->drives.count;
+        const int bends = m->drives[p].count > 0;
         if (bends) changed |= bend(m, p);
         if (lost == 0) {
-            if (bends) damp_pair(m, p, -m->softens);
+            if (bends) damp_pair(m, p, -m->softens[p]);
             continue;
         }
         const int j = m->pair[p] * n + m->pair_dof[p];
@@ -295,7 +294,7 @@ static int rub_joints(model *m)
         changed |= more != 0 || stands != m->stands[p];
         m->b[j] += more, m->b[j + n] -= more;
         m->rubs[p] = force;
-        if (bends || stands != m->stands[p]) damp_pair(m, p, (stands ? lost / CREEP : 0) - (bends ? m->softens : 0));
+        if (bends || stands != m->stands[p]) damp_pair(m, p, (stands ? lost / CREEP : 0) - (bends ? m->softens[p] : 0));
         m->stands[p] = stands;
     }
     return changed;

@@ -15,7 +15,7 @@ from scipy.optimize import brentq
 
 from cosserat_fenicsx.checks import number, positive, refuse
 from cosserat_fenicsx.drilling.chain import chain_of, fewest_in_period, unresolved, usual_step
-from cosserat_fenicsx.drilling.joints import largest_speed
+from cosserat_fenicsx.drilling.joints import speeds_of_parts
 from cosserat_fenicsx.drilling.laws import InC, check_bit
 from cosserat_fenicsx.drilling.linear_control import step_for
 from cosserat_fenicsx.drilling.protocol import (
@@ -180,9 +180,11 @@ class AxialTorsional(StringModel):
         if len(joints) > self._lib.MOST_PAIRS:
             refuse("DrillString", "components", len(joints), f"at most {self._lib.MOST_PAIRS} tools that part it")
         m.pairs = len(joints)
-        m.motor = next((p for p, (_, _, joint) in enumerate(joints) if joint.turns), -1)
-        if m.motor >= 0:
-            self._of_motor = self._put_curve(m.drives, self.scene.motor)
+        motors = [(p, end + 1, joint.tool) for p, (end, _, joint) in enumerate(joints) if joint.turns]
+        m.shown = len(motors) if len(motors) > 1 else 0
+        self._of_motors = [self._put_curve(m.drives[p], motor) for p, _, motor in motors]
+        for _, node, motor in motors[:-1]:  # the lowest one's rotor is a part of the bit's inertia
+            self._kept["mass"][node, -1] += motor.rotor_inertia
         for name, values in (("pair", [x[0] for x in joints]), ("pair_dof", [x[1] for x in joints])):
             self._array(m, name, np.array(values, dtype=np.int32))
         for name in ("damping", "lost"):
@@ -251,7 +253,8 @@ class AxialTorsional(StringModel):
     def _set_steady(self, motion):
         """A steady start, see `steady_start`."""
         m, kept, unknowns, chain = self._m, self._kept, slice(2 - self._dofs, 2), self._chain
-        turned = next((end + 1 for end, _, joint in chain.joints if joint.turns), None)
+        ends = [end + 1 for end, _, joint in chain.joints if joint.turns]
+        part = np.searchsorted(ends, np.arange(m.nodes), side="right")
         turning = float(steady_velocities(self.scene)[1])
 
         def limits(x):
@@ -262,23 +265,26 @@ class AxialTorsional(StringModel):
 
         def found(down):
             of_bit = steady_speed_of_bit(self.scene, down if self._axial else None)
-            if turned is not None:  # the wall holds what turns with the bit, too
-                of_bit = largest_speed(
-                    self.scene.motor, lambda om: -at(down, om)[3][turned, -1], of_bit, turning, _SPEEDS
-                )
-            bears, velocities, x, below = at(down, of_bit)
+
+            def taken(motor, speeds):  # by the wall, too; with the part above at the same speed its damper is still
+                speeds = np.where(np.arange(len(speeds)) > motor, speeds, speeds[motor + 1])
+                return at(down, speeds, False)[3][ends[motor], -1]
+
+            bears, velocities, x, below = at(
+                down, speeds_of_parts(self.scene.motors, taken, turning, of_bit, _SPEEDS), True
+            )
             return bears, velocities, x, below[0]
 
-        def at(down, of_bit):
+        def at(down, speeds, driven):
             bit = self.scene.bit
-            motion[:] = down, of_bit
-            velocities = np.full((m.nodes, 2), [down, turning])
-            if turned is not None:
-                velocities[turned:, 1] = motion[1]
+            motion[:] = down, speeds[-1]
+            velocities = np.column_stack([np.full(m.nodes, down), speeds[part]])
             bears = np.zeros(2) if bit is None else bit.law.steady_forces(bit.resting or 0.0, motion)
             extra = (bears - [m.bit.hanging, 0.0])[unknowns]
             friction = self._wall, m.of_rotation
-            pairs = [(*place, joint.steady(of_bit - turning)) for *place, joint in chain.joints]
+            rates = iter(np.diff(speeds))
+            pairs = [(*place, joint.steady(next(rates) if joint.turns else 0.0)) for *place, joint in chain.joints
+                     if driven or not joint.turns]  # fmt: skip
             return bears, velocities, *steady_state(velocities[:, unknowns], chain, limits, friction, extra, pairs)
 
         if self._axial and follows_the_bit(
@@ -321,10 +327,14 @@ class AxialTorsional(StringModel):
         for p, force in varying:  # of forces the means, as they oscillate
             for column in (1 + self._dofs + p, 1 + self._dofs + p + len(self._signals)):
                 parts[:, column] = _means(force, begin, parts)
-        flow = next((force.flow for p, force in varying if p == self._m.motor), None)
-        curves, _ = self._of_intervals = self._put_curves(_means(flow, begin, parts) if flow else ())
+        changing = [(p, joint) for p, (*_, joint) in enumerate(self._chain.joints) if joint.turns]
+        self._of_intervals = [
+            (p, *self._put_curves(joint.tool, () if joint.force.constant else _means(joint.force.flow, begin, parts)))
+            for p, joint in changing
+        ]
         for k, part in enumerate([parts] if self.end is None else parts[:, None]):
-            self._m.over = curves + k if curves else curves
+            for p, curves, _ in self._of_intervals:
+                self._m.over[p] = curves + k if curves else curves
             if self.end is not None:
                 self._take(self.end.begin(self, part[0, 0]))
             cast, out = self._ffi.cast, rows[self.steps - start :]

@@ -9,7 +9,7 @@ from cosserat_fenicsx.checks import File, number, positive, refuse
 from cosserat_fenicsx.drilling.choose import fastest
 from cosserat_fenicsx.drilling.joints import fastest_rotor
 from cosserat_fenicsx.drilling.linear_control import ZTorque
-from cosserat_fenicsx.drilling.protocol import LEDGER, PROFILE, SERIES
+from cosserat_fenicsx.drilling.protocol import LEDGER, PROFILE, SERIES, columns
 from cosserat_fenicsx.drilling.scene import Drilling
 from cosserat_fenicsx.drilling.stick_slip import SPEED, TORQUE, StickSlip, alias, stick_slip_of
 from cosserat_fenicsx.errors import SceneError, nearest
@@ -95,7 +95,9 @@ class DrillingHistory(ChartedBetween):
     - ``drive_speed``, ``bit_speed``: rad/s; ``drive_angle``, ``bit_angle``: rad;
     - ``surface_torque``, ``torque_on_bit``: N m; ``hook_load``, ``weight_on_bit``: N;
     - ``motor_speed``, ``pressure``, ``stalled``: speed of a `MudMotor`'s rotor against its housing, rad/s, the pressure
-      over it, Pa, and whether that speed is not above 0; 0, NaN and False without one;
+      over it, Pa, and whether that speed is not above 0; 0, NaN and False without one. Of several motors the sums, and
+      whether one of them stalls; ``motor_speeds``, ``pressures``, ``stalls`` (n, motors) are those of each, from the
+      top down;
     - ``bit_velocity``: m/s; ``bit_advance``: m;
     - ``kinetic``, ``strain``: energies, J; ``work_of_drive``, ``work_of_hook``, ``work_of_weight``, ``work_of_tools``:
       done on the string since the start, J; ``lost_at_bit``, ``lost_at_wall``, ``lost_in_mud``: J.
@@ -124,12 +126,12 @@ class DrillingHistory(ChartedBetween):
         self.model, self._why, self.dt, self.depths = model, tuple(why), float(dt), np.asarray(depths, dtype=float)
         self.counts: dict[str, int] = dict(counts or {})
         self.folder, self.errors = folder, None
-        self._pieces = [np.empty((0, len(COLUMNS))) if rows is None else rows]
+        self._pieces = [np.empty((0, columns(scene))) if rows is None else rows]
         shape = (0, 1 + len(PROFILE) * len(self.depths))
         self._profiles = [np.empty(shape) if profiles is None else profiles]
 
     def append(self, rows):
-        """Add (n, len(COLUMNS)) rows."""
+        """Add (n, `columns`) rows."""
         self._pieces.append(rows)
 
     def append_profile(self, time, profile):
@@ -143,7 +145,7 @@ class DrillingHistory(ChartedBetween):
 
     @property
     def rows(self):
-        """(n, len(COLUMNS)) all columns."""
+        """(n, `columns`) all columns."""
         if len(self._pieces) > 1:  # joined once
             self._pieces = [np.concatenate(self._pieces)]
         return self._pieces[0]
@@ -197,31 +199,43 @@ class DrillingHistory(ChartedBetween):
     @property
     def mean_times(self) -> np.ndarray:
         """(n,) s: the middles of the steps over which forces, torques and some speeds are means, see the class."""
-        over_two = self.model == "torsion" and not (self.scene.discs or self.scene.damped)
+        over_two = self.model == "torsion" and not self.scene.by_elements
         return self.times - (self.dt if over_two else self.dt / 2)
 
     @property
-    def pressure(self) -> np.ndarray:
-        """(n,) over the motor, Pa, at `mean_times`."""
-        motor = self.scene.motor
-        if motor is None:
-            return np.full(len(self), np.nan)
-        return motor.pressure_at(self.motor_speed, self._flow)
+    def motor_speeds(self) -> np.ndarray:
+        """(n, motors) of the rotors against their housings, rad/s, from the top down."""
+        each = self.rows[:, len(COLUMNS) :]
+        return each if each.shape[1] else self.rows[:, [COLUMNS.index("motor_speed")] * len(self.scene.motors)]
 
     @property
-    def _flow(self):
-        """(n,) through the motor, m^3/s."""
-        motor = self.scene.motor
-        asked = motor.flow_at if callable(motor.flow) else lambda t: motor.flow
-        return np.array([asked(max(t, 0.0)) for t in self.mean_times])
+    def pressures(self) -> np.ndarray:
+        """(n, motors) over each motor, Pa, at `mean_times`."""
+        return self._of_motors(lambda motor, speed, flow: motor.pressure_at(speed, flow))
+
+    @property
+    def stalls(self) -> np.ndarray:
+        """(n, motors) bool: a rotor stands or turns backwards, while its flow would turn it without load."""
+        return self._of_motors(lambda motor, speed, flow: (speed <= 0) & (motor.driven(flow) > motor.lost_torque)) > 0
+
+    def _of_motors(self, function):
+        """(n, motors) of a function of a motor, its speeds and its flows (n,), rad/s, m^3/s."""
+        found = np.empty((len(self), len(self.scene.motors)))
+        for k, motor in enumerate(self.scene.motors):
+            asked = motor.flow_at if callable(motor.flow) else lambda t, motor=motor: motor.flow
+            flow = np.array([asked(max(t, 0.0)) for t in self.mean_times])
+            found[:, k] = function(motor, self.motor_speeds[:, k], flow)
+        return found
+
+    @property
+    def pressure(self) -> np.ndarray:
+        """(n,) over all motors, Pa, at `mean_times`."""
+        return self.pressures.sum(axis=1) if self.scene.motors else np.full(len(self), np.nan)
 
     @property
     def stalled(self) -> np.ndarray:
-        """(n,) bool: the rotor of the motor stands or turns backwards, while its flow would turn it without load."""
-        motor = self.scene.motor
-        if motor is None:
-            return np.zeros(len(self), dtype=bool)
-        return (self.motor_speed <= 0) & (motor.driven(self._flow) > motor.lost_torque)
+        """(n,) bool: whether a motor stalls, see `stalls`."""
+        return self.stalls.any(axis=1)
 
     @property
     def balance(self) -> np.ndarray:
@@ -301,19 +315,22 @@ class DrillingHistory(ChartedBetween):
         yield from map(units.sentence, (*self.why[:1], *(x for x in self.why[1:] if x.startswith(_LOUD))))
 
     def _on_motor(self, units):
-        """Sentences on the motor, and on when it stalls."""
-        motor = self.scene.motor
-        if motor is None or len(self) < 3:
+        """Sentences on the motors, and on when they stall."""
+        if not self.scene.motors or len(self) < 3:
             return
         late = self.times >= self.times[-1] / 2
         shown = [units.on_screen(self.quantities[name]) for name in ("motor_speed", "pressure")]
-        mean = [f"{np.mean(getattr(self, name)[late]) / size:.4g} {unit}"
-                for name, (unit, size) in zip(("motor_speed", "pressure"), shown, strict=True)]  # fmt: skip
-        yield f"Motor in the second half: {mean[0]} faster than the string, {mean[1]} over it, in the mean."
-        if self.stalled.any():
-            first = self.mean_times[self.stalled.argmax()]
-            yield (f"THE MOTOR STALLS from t = {max(first, 0.0):.4g} s on, in {100 * self.stalled.mean():.3g} % of the "
-                   "time: the bit holds its rotor, or turns it backwards; no motor bears that for long.")  # fmt: skip
+        several = len(self.scene.motors) > 1
+        for k, (values, stalled) in enumerate(zip(
+            zip(self.motor_speeds.T, self.pressures.T, strict=True), self.stalls.T, strict=True)):  # fmt: skip
+            mean = [f"{np.mean(x[late]) / size:.4g} {unit}" for x, (unit, size) in zip(values, shown, strict=True)]
+            which, above = (f" {k + 1} from the top", "what is above it") if several else ("", "the string")
+            yield f"Motor{which} in the second half: {mean[0]} faster than {above}, {mean[1]} over it, in the mean."
+            if stalled.any():
+                first = self.mean_times[stalled.argmax()]
+                yield (f"THE MOTOR{which.upper()} STALLS from t = {max(first, 0.0):.4g} s on, in "
+                       f"{100 * stalled.mean():.3g} % of the time: the bit holds its rotor, or turns it backwards; no "
+                       "motor bears that for long.")  # fmt: skip
 
     def _more(self, units):
         if len(self) > 5 and not np.isnan(self.balance).all():

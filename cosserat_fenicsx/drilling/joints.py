@@ -6,6 +6,7 @@ housing, and between them a dashpot of its slope, and the friction of its rotor.
 An `OscillationTool` parts axial motion, with its spring and its force.
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -48,11 +49,7 @@ class Joint:
 
 def joints_of(laid, bottoms) -> tuple[Joint, ...]:
     """The `Joint`s of components in their places, from the top down; bottoms: measured depths of the lower ends of the
-    segments, in which fluids may cut components.
-
-    Raises:
-        SceneError: more than one motor.
-    """
+    segments, in which fluids may cut components."""
     found = []
     for place in reversed(laid):
         tool, k = place.component, bottoms.index(place.bottom)
@@ -62,9 +59,6 @@ def joints_of(laid, bottoms) -> tuple[Joint, ...]:
             if place is laid[0]:
                 refuse("DrillString", "components", tool.name, f"a component below {tool.name}, which it shakes")
             found.append(Joint(tool, k, False, tool.spring, 0.0, ScalarSignal(tool, "force", tool, "N")))
-    motors = [x.tool.name for x in found if x.turns]
-    if len(motors) > 1:
-        refuse("DrillString", "components", motors, "one MudMotor: two in a row are not computed")
     return tuple(found)
 
 
@@ -89,53 +83,83 @@ class _Driven(ScalarSignal):
 
 
 def fastest_rotor(scene) -> float:
-    """The largest speed that its flow gives the rotor of a motor against its housing, rad/s; 0 without a motor."""
-    joint = next((x for x in scene.joints if x.turns), None)
-    if joint is None:
-        return 0.0
+    """The largest speed that their flow gives the rotors of all motors against their housings, rad/s; 0 without any."""
+    return math.fsum(_fastest(joint) for joint in scene.joints if joint.turns)
+
+
+def _fastest(joint):
     if not joint.tool.curves:
         return max(0.0, (joint.force.largest - joint.lost) / joint.damping)
     flow = ScalarSignal(joint.tool, "flow", joint.tool.flow, "m^3/s").largest  # perhaps of a time after the motion
     return joint.tool.speed(0.0, min(flow, joint.tool.curves[-1].flow))
 
 
-def speed_of_bit(scene, turning, down=None, rubbed=None):
-    """The speed of the bit in steady rotation of a string (rad/s): its own, or below a motor the largest one at which
-    the torque on bit is the motor's.
+def steady_speeds(scene, turning, down=None, rubbed=None) -> np.ndarray:
+    """(motors + 1,) rad/s: the speeds of the drive, and of what is below each motor, in steady rotation of a string,
+    down to the bit's, see `speeds_of_parts`.
 
     Args:
-        scene: a `Drilling`. turning: of the string, rad/s.
+        scene: a `Drilling`. turning: of the drive, rad/s.
         down: velocity of a bit that drills, m/s; None for that by its weight.
-        rubbed: function of the speed that gives the torque of the wall on what turns with the bit, N m, or None.
+        rubbed: function of how many motors are above, and of a speed, that gives the torque of the wall on what turns
+            with it, N m, or None.
 
     Raises:
-        SceneError: the motor stalls.
+        SceneError: a motor stalls.
     """
-    motor, bit = scene.motor, scene.bit
-    if motor is None:
-        return turning
-    drag = scene.drag_rates[1] * scene.turned_inertia
+    bit, drag = scene.bit, scene.drag_rates[1] * scene.inertias if scene.motors else None
 
-    def excess(om):
+    def taken(motor, speeds):
+        om = speeds[-1]
         velocity = bit.law.rate(bit.resting, om) if down is None and bit.law.drills else down or 0.0
         torque = float(bit.law.steady_forces(bit.resting or 0.0, np.array([velocity, om]))[1])
-        torque += rubbed(om) if rubbed else 0.0
-        return motor.torque(om - turning) - torque - drag * om
+        for part in range(motor + 1, len(speeds)):
+            torque += drag[part] * speeds[part] + (rubbed(part, speeds[part]) if rubbed else 0.0)
+        return torque
 
-    return largest_speed(motor, excess, turning + motor.speed(0.0), turning)
+    return speeds_of_parts(scene.motors, taken, turning)
 
 
-def largest_speed(motor, excess, fastest, slowest, tried=_TRIED):
-    """The largest speed of a bit below a motor (rad/s) at which the torque in excess of what it takes is 0.
+def speeds_of_parts(motors, taken, turning, fastest=None, tried=_TRIED) -> np.ndarray:
+    """(motors + 1,) rad/s: the speeds of the drive, and of what is below each motor, in steady rotation: the largest
+    ones at which each gives the torque that it is asked for. From a speed of the bit on, what a motor is asked for
+    follows from the speeds below, and with its speed that of the part above.
+
+    Args:
+        motors: from the top down. turning: speed of the drive, rad/s.
+        taken: function of the number of a motor and of speeds (motors + 1,) that gives the torque asked from it, N m;
+            it depends on those below it alone.
+        fastest: an upper bound of the speed of the bit, rad/s; None for that without load.
+        tried: speeds between those of bit and drive at which torques are compared.
 
     Raises:
-        SceneError: the motor stalls.
+        SceneError: a motor stalls.
     """
-    speeds = np.linspace(fastest, slowest, tried)[:-1]
-    values = np.array([excess(om) for om in speeds])
-    k, stall = int(np.argmax(values >= 0)), motor.stall_torque()
-    if stall <= 0 or values[k] < 0:
-        raise SceneError(f"{motor.name}: it stalls: with {motor.flow_at(0.0):.4g} m^3/s it gives less than "
-                         f"{max(stall, 0.0):.5g} N m, and the bit takes more at every speed: expected less weight on "
-                         "bit, more flow or another motor; start='rest' computes how it stalls")  # fmt: skip
-    return float(speeds[0] if k == 0 else brentq(excess, speeds[k], speeds[k - 1], xtol=1e-14, rtol=1e-14))
+    if not motors:
+        return np.array([turning])
+
+    def speeds(of_bit):
+        found = np.full(len(motors) + 1, of_bit)
+        for k in range(len(motors) - 1, 0, -1):
+            found[: k + 1] = found[k + 1] - motors[k].speed(taken(k, found))
+        found[0] = turning
+        return found
+
+    def excess(of_bit):
+        found = speeds(of_bit)
+        return motors[0].torque(found[1] - turning) - taken(0, found)
+
+    if fastest is None:
+        fastest = turning + math.fsum(x.speed(0.0) for x in motors)
+    trials = np.linspace(fastest, turning, tried)[:-1]
+    values = np.array([excess(om) for om in trials])
+    k = int(np.argmax(values >= 0))
+    weakest = min(motors, key=lambda x: x.stall_torque())
+    if weakest.stall_torque() > 0 and values[k] >= 0:
+        found = speeds(trials[0] if k == 0 else brentq(excess, trials[k], trials[k - 1], xtol=1e-14, rtol=1e-14))
+        if (np.diff(found) > 0).all():
+            return found
+    raise SceneError(f"{weakest.name}: it stalls: with {weakest.flow_at(0.0):.4g} m^3/s it gives less than "
+                     f"{max(weakest.stall_torque(), 0.0):.5g} N m, and more is taken from it at every speed of the "
+                     "bit: expected less weight on bit, more flow or another motor; start='rest' computes how it "
+                     "stalls")  # fmt: skip

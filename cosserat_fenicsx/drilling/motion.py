@@ -10,7 +10,7 @@ from cosserat_fenicsx.checks import File, instance, number, refuse
 from cosserat_fenicsx.drilling.choose import chosen, fastest, model_of, with_step
 from cosserat_fenicsx.drilling.history import COLUMNS, DrillingHistory
 from cosserat_fenicsx.drilling.joints import fastest_rotor
-from cosserat_fenicsx.drilling.protocol import PROFILE
+from cosserat_fenicsx.drilling.protocol import PROFILE, columns
 from cosserat_fenicsx.drilling.scene import Drilling
 from cosserat_fenicsx.drilling.stick_slip import step_errors
 from cosserat_fenicsx.errors import NotConverged, SceneError
@@ -185,7 +185,7 @@ def simulate(
         head = {"duration": float(duration), "asked": {"model": name, "dt": dt, "elements": elements}, "apart": apart}
         head |= {"model": history.model, "why": history.why, "dt": history.dt, "depths": history.depths.tolist()}
         store = Store(folder, KIND).make(head, scene, float(duration))
-        _tables(store)
+        _tables(store, scene)
         history.folder = store.place
     TimeLoop(running, history, store, **apart, turn=_turn_to_watch(scene)).until(duration, progress)
     if check:
@@ -203,7 +203,7 @@ def go_on(store, scene, duration, progress):
     check_arguments(scene, duration, asked["dt"], asked["elements"])
     store.hold()
     try:
-        running, tables = _running(store, scene), _tables(store)
+        running, tables = _running(store, scene), _tables(store, scene)
         if duration > last:
             check_step(scene, running.dt, duration, apart["save_every"] * running.dt)
             store.extend(scene, duration, duration=duration)
@@ -238,7 +238,8 @@ def _alike(numbers, others):
 
 def read(store, scene):
     """The motion of a drill-string that is stored so far."""
-    scene, tables = _scene(store, scene, store.head["duration"]), _tables(store)
+    scene = _scene(store, scene, store.head["duration"])
+    tables = _tables(store, scene)
     store.check_rows(lambda rows: rows[:, 0])
     return _history(store, scene, [np.array(table.rows) for table in tables])
 
@@ -249,11 +250,11 @@ def _scene(store, scene, until):
     return store.scene(scene, until)
 
 
-def _tables(store):
+def _tables(store, scene):
     def table(name, width):
         return store.table(name, lambda dtype, shape: dtype.str == "<f8" and shape == (width,))
 
-    widths = len(COLUMNS), 1 + len(PROFILE) * len(store.head["depths"])
+    widths = columns(scene), 1 + len(PROFILE) * len(store.head["depths"])
     return list(map(table, KIND.tables, widths))
 
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from cosserat_fenicsx.algebra.building import Pointers
 from cosserat_fenicsx.checks import refuse
-from cosserat_fenicsx.drilling.joints import speed_of_bit
+from cosserat_fenicsx.drilling.joints import steady_speeds
 from cosserat_fenicsx.drilling.laws import SOURCES
 from cosserat_fenicsx.drilling.linear_control import arrays_of, check_answer, check_late, steady_control
 from cosserat_fenicsx.drilling.signals import means
@@ -26,7 +26,8 @@ from cosserat_fenicsx.errors import NotConverged
 #: Recorded at the end of every step. drive_speed, bit_speed: rad/s; drive_angle, bit_angle: rad; surface_torque: M at
 #: the top, torque_on_bit: against the rotation of the bit, N m; hook_load, weight_on_bit: N; bit_velocity: m/s,
 #: bit_advance: m, downwards; impulse_on_bit: sum of all impacts on rigid rock since the start, N s, not contained in
-#: weight_on_bit; motor_speed: of a mud motor's rotor against its housing, rad/s, 0 without one.
+#: weight_on_bit; motor_speed: of a mud motor's rotor against its housing, rad/s, 0 without one. Of several motors it is
+#: the sum, and columns after the LEDGER have those of each, from the top down.
 SERIES = (
     "drive_speed", "drive_angle", "surface_torque", "bit_speed", "bit_angle", "torque_on_bit", "hook_load",
     "bit_velocity", "bit_advance", "weight_on_bit", "impulse_on_bit", "motor_speed",
@@ -42,6 +43,11 @@ LEDGER = (
 #: Along the string, at `StringModel.depths`. angle: rad; speed: rad/s; torque: N m; displacement: m; velocity: m/s;
 #: tension: N; sticking: 1 where the wall holds the string, 0 where it slips or is free.
 PROFILE = ("angle", "speed", "torque", "displacement", "velocity", "tension", "sticking")
+
+
+def columns(scene) -> int:
+    """How many columns rows have, the time in the first one."""
+    return 1 + len(SERIES) + len(LEDGER) + (len(scene.motors) if len(scene.motors) > 1 else 0)
 
 
 class StringModel(Pointers):
@@ -84,10 +90,9 @@ class StringModel(Pointers):
         curve.count = len(shape)
         return arrays
 
-    def _put_curves(self, flows):
+    def _put_curves(self, motor, flows):
         """(curves for C at the flows (m^3/s) of steps, their arrays) of a motor whose flow changes; None for others."""
-        motor = self.scene.motor
-        if motor is None or not motor.curves or not callable(motor.flow):
+        if not motor.curves or not callable(motor.flow):
             return self._ffi.NULL, None
         each = self._ffi.new("curve[]", len(flows))
         return each, [self._put_curve(one, motor, float(flow)) for one, flow in zip(each, flows, strict=True)]
@@ -158,13 +163,13 @@ class StringModel(Pointers):
         """Do up to `steps` steps.
 
         Returns:
-            (n, 1 + len(SERIES) + len(LEDGER)): the time and the values of SERIES and LEDGER at the end of each.
+            (n, `columns`): the time and the values of SERIES and LEDGER at the end of each.
 
         Raises:
             NotConverged: a step fails however short it is; `rows` of the exception holds the steps before.
         """
         start, last, samplers = self.steps, self.steps + steps, self._samplers.values()
-        rows, failed = np.empty((steps, 1 + len(SERIES) + len(LEDGER))), False
+        rows, failed = np.empty((steps, columns(self.scene))), False
         while self.steps < last and not failed:
             for sampler in samplers:
                 sampler.at(self.steps, self._seen)
@@ -268,16 +273,16 @@ def steady_velocities(scene) -> np.ndarray:
 
 
 def steady_speed_of_bit(scene, down: float | None = None) -> float:
-    """rad/s, of steady motion: that of the drive, and of a motor.
+    """rad/s, of steady motion: that of the drive, and of motors.
 
     Args:
         down: velocity (m/s) of a bit that drills; None for that by its weight, or by the hook.
 
     Raises:
-        SceneError: the motor stalls.
+        SceneError: a motor stalls.
     """
     down = _of_hook(scene) if down is None and not follows_the_bit(scene) else down
-    return speed_of_bit(scene, scene.drive.signal()(0.0), down)
+    return float(steady_speeds(scene, scene.drive.signal()(0.0), down)[-1])
 
 
 def _of_hook(scene):

@@ -5,6 +5,8 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Annotated, Literal
 
+import numpy as np
+
 from cosserat_fenicsx.checks import refuse, store
 from cosserat_fenicsx.drilling import bit_curves  # noqa: F401 its laws join their family
 from cosserat_fenicsx.drilling.bit_laws import BitOnRock, Stribeck
@@ -239,20 +241,35 @@ class Drilling(InWords, Part):
         return () if self.discs else joints_of(self.laid, [place.bottom for place in self.places])
 
     @cached_property
+    def motors(self) -> tuple:
+        """The `MudMotor`s of the string, from the top down."""
+        return tuple(x.tool for x in self.joints if x.turns)
+
+    @property
     def motor(self):
-        """The `MudMotor` of the string, or None."""
-        return next((x.tool for x in self.joints if x.turns), None)
+        """The lowest `MudMotor` of the string, which turns the bit, or None."""
+        return self.motors[-1] if self.motors else None
+
+    @cached_property
+    def motors_above(self) -> np.ndarray:
+        """(segments,) how many motors are above each of them."""
+        return np.searchsorted([x.segment for x in self.joints if x.turns], np.arange(len(self.segments)))
 
     @cached_property
     def turned(self) -> tuple[Segment, ...]:
-        """The parts below a motor, which turn with the bit; none without one."""
-        parted = [x.segment for x in self.joints if x.turns]
-        return self.segments[parted[0] + 1 :] if parted else ()
+        """The parts below the lowest motor, which turn with the bit; none without one."""
+        below = self.motors_above == len(self.motors)
+        return tuple(x for x, turns in zip(self.segments, below, strict=True) if turns) if self.motors else ()
 
     @cached_property
+    def inertias(self) -> np.ndarray:
+        """(motors + 1,) of what turns with the drive, and of the parts below each motor, kg m^2."""
+        return np.bincount(self.motors_above, [x.rhoJ * x.length for x in self.segments], len(self.motors) + 1)
+
+    @property
     def turned_inertia(self) -> float:
-        """Of the parts below a motor, kg m^2."""
-        return math.fsum(x.rhoJ * x.length for x in self.turned)
+        """Of the parts below the lowest motor, kg m^2; 0 without one."""
+        return float(self.inertias[-1]) if self.motors else 0.0
 
     @property
     def drag_rates(self) -> tuple[float, float]:
@@ -261,13 +278,18 @@ class Drilling(InWords, Part):
 
     @property
     def bit_inertia(self) -> float:
-        """At the lower end, beside that of the string's sections: of the bit, and of a motor's rotor, kg m^2."""
+        """At the lower end, beside that of the string's sections: of bit and rotor of the lowest motor, kg m^2."""
         return (self.bit.inertia if self.bit else 0.0) + (self.motor.rotor_inertia if self.motor else 0.0)
 
     @property
     def damped(self) -> bool:
-        """Whether a component has a damping time: its motion is then computed by elements, in torsion too."""
+        """Whether a component has a damping time."""
         return not self.discs and any(part.damping_time for part in self.segments)
+
+    @property
+    def by_elements(self) -> bool:
+        """Whether motion is computed by elements in torsion, too: that of discs, damped strings and several motors."""
+        return self.discs is not None or self.damped or len(self.motors) > 1
 
     def with_case(self, speed: float | None = None, weight: float | None = None) -> "Drilling":
         """The same scene at another speed of the drive (rad/s) or another static weight on bit (N).

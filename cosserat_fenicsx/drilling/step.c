@@ -207,7 +207,7 @@ static void commit(model *m, double h, const double *signal)
     for (int p = 0; p < m->pairs; p++) {
         const int j = m->pair[p] * n + m->pair_dof[p];
         const double rate = m->w[j + n] - m->w[j], lost = h * m->pair_slope[p] * rate * rate;
-        m->applied[p] = signal[n + p] - m->rubbed[p] + (p == m->motor ? m->bends + m->softens * rate : 0);
+        m->applied[p] = signal[n + p] - m->rubbed[p] + m->bends[p] + m->softens[p] * rate;
         sums->tools += h * m->applied[p] * rate - lost;
         sums->mud -= lost;
     }
@@ -305,13 +305,19 @@ static void write_record(const model *m, double *row)
         const double error = m->top[0].error;
         strain += m->top[0].integral * error * error / 2 - m->hanging_top * error;
     }
-    const double *parted =
-        m->motor < 0 || m->stands[m->motor] ? NULL : m->w + (size_t)m->pair[m->motor] * n + turn;
+    double motors = 0;
+    for (int p = 0, k = 0; p < m->pairs; p++) {
+        const double *parted = m->w + (size_t)m->pair[p] * n + turn;
+        if (m->pair_dof[p] != turn) continue;
+        const double speed = m->stands[p] ? 0 : parted[n] - parted[0];
+        motors += speed;
+        if (m->shown) row[ROW - 1 + k++] = speed;
+    }
     const double drive = m->top[turn].force, hook = n == 2 ? m->hanging_top - m->top[0].force : NAN;
     const double weight_on_bit = n == 2 ? m->bit.recorded[0] : m->bit.over_time ? m->bit.weight : NAN;
     const double series[] = {w[turn], x[turn], drive, w[last * n + turn], x[last * n + turn], m->bit.recorded[1], hook,
                              n == 2 ? w[2 * last] : NAN, n == 2 ? x[2 * last] : NAN, weight_on_bit,
-                             n == 2 ? m->bit.impulse : NAN, parted ? parted[n] - parted[0] : 0, kinetic, strain,
+                             n == 2 ? m->bit.impulse : NAN, motors, kinetic, strain,
                              m->sums.drive, m->sums.hook, weight, m->sums.tools, m->sums.bit, m->sums.wall,
                              m->sums.mud};
     memcpy(row, series, sizeof series);
@@ -325,7 +331,8 @@ int advance_elements(model *m, int intervals, const double *interval, const doub
     for (int i = 0; i < intervals; i++, interval += 2 + 2 * all) {
         const double h = interval[0];
         if (weights) m->bit.weight = *weights;
-        if (m->over) m->drives = m->over[i];
+        for (int p = 0; p < m->pairs; p++)
+            if (m->over[p]) m->drives[p] = m->over[p][i];
         double from[2 + MOST_PAIRS], to[2 + MOST_PAIRS];
         memcpy(from, interval + 1, all * sizeof *from);
         memcpy(to, interval + 1 + all, all * sizeof *to);
@@ -364,7 +371,7 @@ int advance_elements(model *m, int intervals, const double *interval, const doub
             if (m->control.used) wait_on(&m->control);
             if (weights) weights++;
             write_record(m, rows + 1); /* after the time */
-            rows += ROW;
+            rows += ROW + m->shown;
         }
     }
     return intervals;

@@ -26,7 +26,8 @@ typedef struct {
     double scale, reach, load;      /* load: the weight on bit, N, for laws that are called */
 } friction;
 
-/* Numbers in a row of a motion: the time, SERIES and LEDGER of protocol.py. Most pairs of forces in a string. */
+/* Numbers in a row of a motion: the time, SERIES and LEDGER of protocol.py; those of motors may follow. Most pairs of
+   forces in a string. */
 enum { ROW = 22, MOST_PAIRS = 6 };
 
 #if 0
@@ -136,17 +137,18 @@ typedef struct {
     curve curve;                    /* of that law, if it is a function in Python */
     int of_rotation, fixed;         /* which of these; whether the normal force is always that of the rest */
     double *limit;                  /* (nodes, 3) largest force at rest, in motion, and radius of contact */
-    int pairs, motor;               /* pairs of forces between nodes; which one is a motor's, or -1 */
+    int pairs, shown;               /* pairs of forces between nodes; motors that rows have a column for */
     const int *pair, *pair_dof;     /* (pairs,) elements, and their unknowns */
     const double *pair_slope;       /* (pairs,) dampers, which count as tools; signals follow those of the top */
     const double *pair_lost;        /* (pairs,) largest friction between both sides */
-    curve drives;                   /* torque of a motor over its speed, less that at rest; empty: a line */
-    const curve *over;              /* the same in each of the intervals asked for, where its flow changes */
-    double bends, softens;          /* what it adds to that of its damper, by value at rest and slope */
-    double applied[6];              /* forces of the last step, friction included */
-    double rubbed[6], rubs[6];      /* friction between both sides; that which is a given force */
-    int stands[6];                  /* whether it holds them: then the matrix has a damper, */
-    double parted[6][3];            /* entries of the matrix without these */
+    /* of each pair: torque of a motor over its speed, less that at rest, empty: a line; */
+    curve drives[MOST_PAIRS];
+    const curve *over[MOST_PAIRS];  /* the same in each of the intervals asked for, where its flow changes, or NULL; */
+    double bends[MOST_PAIRS], softens[MOST_PAIRS]; /* what it adds to that of its damper, by value at rest and slope; */
+    double applied[MOST_PAIRS];     /* force of the last step, friction included; */
+    double rubbed[MOST_PAIRS], rubs[MOST_PAIRS]; /* friction between both sides; that which is a given force; */
+    int stands[MOST_PAIRS];         /* whether it holds them: then the matrix has a damper; */
+    double parted[MOST_PAIRS][3];   /* entries of the matrix without these */
     upper top[2];
     lower bit;
     books sums;

@@ -386,7 +386,7 @@ class TorsionWaves(StringModel):
             driven = means(self._driven, self.steps, steps, dt)
             self.c.driven = buffer("double[]", driven)
             flows = () if self._driven.constant else means(self._driven.flow, self.steps, steps, dt)
-            self.c.motors, _ = self._of_steps = self._put_curves(flows)  # which C does not own
+            self.c.motors, _ = self._of_steps = self._put_curves(self.scene.motor, flows)  # which C does not own
         rows = buffer("double[]", rows, require_writable=True)
         self.steps += self._lib.advance_waves(
             self.c, steps, buffer("double[]", speeds), self._weights(self.steps, steps), rows
@@ -421,4 +421,7 @@ def _check(scene):
     if scene.bit is not None and scene.bit.law.drills:
         refuse("TorsionWaves", "scene.bit.law", scene.bit.law, "a Stribeck law, or another one of the torque over the "
                "speed: torsion alone has no depth of cut")  # fmt: skip
+    if len(scene.motors) > 1:
+        refuse("TorsionWaves", "scene.string", [x.name for x in scene.motors], "one MudMotor: AxialTorsional(scene, "
+               "axial=False) has several")  # fmt: skip
     check_bit(scene)

@@ -35,7 +35,7 @@ from scipy.optimize import brentq
 
 from cosserat_fenicsx.checks import number, refuse
 from cosserat_fenicsx.drilling.bit_laws import Cutting
-from cosserat_fenicsx.drilling.joints import speed_of_bit
+from cosserat_fenicsx.drilling.joints import steady_speeds
 from cosserat_fenicsx.drilling.laws import refuse_several_speeds
 from cosserat_fenicsx.drilling.linear.impedances import Guide, axial, torsional
 from cosserat_fenicsx.drilling.linear.roots import Box
@@ -77,29 +77,29 @@ class WallDashpots:
                 start = k
         return found
 
-    def rates(self, speed, sliding, of_bit=None):
-        """[[(length, torsional, axial rate)]] of the pieces in each segment (m, 1/s), at a speed of rotation (rad/s)
-        and along the hole (m/s); of_bit: speed of what turns with the bit below a motor.
+    def rates(self, speeds, sliding):
+        """[[(length, torsional, axial rate)]] of the pieces in each segment (m, 1/s), at speeds of rotation of what is
+        above and below each motor (rad/s), and along the hole (m/s).
 
         Raises:
             SceneError: the string is at rest, or it slides and rotates at once.
         """
-        law, found = self._law, []
-        above = len(self.scene.segments) - len(self.scene.turned)
-        for k, (segment, pieces) in enumerate(zip(self.scene.segments, self.pieces, strict=True)):
-            row, turning = [], speed if k < above else of_bit
+        law, found, turns = self._law, [], np.asarray(speeds)[self.scene.motors_above].tolist()
+        for segment, pieces, turning in zip(self.scene.segments, self.pieces, turns, strict=True):
+            row = []
             for length, load, radius in pieces:
                 around, along = self._dashpots(law, turning, abs(sliding), radius) if load else (0.0, 0.0)
                 row.append((length, load * around / segment.rhoJ, load * along / segment.rhoA))
             found.append(row)
         return found
 
-    def torque_below(self, speed: float) -> float:
-        """On what turns with the bit below a motor, at a speed of rotation above 0 (rad/s), N m."""
-        found, above = 0.0, len(self.scene.segments) - len(self.scene.turned)
-        for length, load, radius in itertools.chain.from_iterable(self.pieces[above:]):
-            found += length * load * radius * float(self._law(speed if self._of_rotation else radius * speed))
-        return found
+    def torque_on(self, part: int, speed: float) -> float:
+        """On what is below as many motors as `part`, at its speed of rotation, not 0 (rad/s), N m."""
+        found, size = 0.0, abs(speed)
+        here = itertools.compress(self.pieces, self.scene.motors_above == part)
+        for length, load, radius in itertools.chain.from_iterable(here):
+            found += length * load * radius * float(self._law(size if self._of_rotation else radius * size))
+        return math.copysign(found, speed)
 
     def _dashpots(self, law, speed, sliding, radius):
         """(r^2 N s/m, N s/m) of a normal force of 1 N."""
@@ -345,13 +345,14 @@ class Steady:
             SceneError: friction holds the string; it slides and rotates at once.
         """
         walls = self.walls(weight)
-        curved = self.scene.motor is not None and self.scene.motor.curves
+        motors = self.scene.motors
+        curved = any(x.curves for x in motors)
         if walls is None and not curved:
             speed = weight = None
         if (speed, weight) not in self._guides:
-            of_bit = self.speed_of_bit(speed, weight) if curved or walls and self.scene.turned else None
-            damping = self.scene.motor.slope_at(of_bit - speed) if curved else None
-            rates, scene = walls and walls.rates(speed, self.sliding, of_bit), self.scene
+            speeds = self._speeds(speed, weight) if curved or walls and motors else np.array([speed])
+            damping = [x.slope_at(om) for x, om in zip(motors, np.diff(speeds), strict=True)] if curved else None
+            rates, scene = walls and walls.rates(speeds, self.sliding), self.scene
             turns, moves = self.cuts or self.kind == "torsion", self.cuts or self.kind == "axial"
             found = turns and torsional(scene, rates, damping), moves and axial(scene, rates)
             self._guides = {(speed, weight): tuple(x for x in found if x)}  # of the last case alone
@@ -393,14 +394,18 @@ class Steady:
         return np.array([kappa, speed, rest])
 
     def speed_of_bit(self, speed, weight):
-        """rad/s: a motor turns it faster than the string.
+        """rad/s: motors turn it faster than the string.
 
         Raises:
-            SceneError: the motor stalls.
+            SceneError: a motor stalls.
         """
+        return float(self._speeds(speed, weight)[-1])
+
+    def _speeds(self, speed, weight):
+        """(motors + 1,) of what is above and below each motor, rad/s."""
         scene = self.scene if weight is None else self.scene.with_case(weight=weight)
         down, walls = self._penetration(speed, None) if self.cuts and weight is None else None, self.walls(weight)
-        return speed_of_bit(scene, speed, down, walls and walls.torque_below)
+        return steady_speeds(scene, speed, down, walls and walls.torque_on)
 
     def _penetration(self, speed, weight):
         """V from the weight on bit less the load of wear flats; or from the speed of the hook."""

@@ -25,7 +25,7 @@ from scipy.optimize import brentq
 
 from cosserat_fenicsx.checks import instance, number, positive, refuse
 from cosserat_fenicsx.drilling.bit_laws import BitOnRock, Stribeck
-from cosserat_fenicsx.drilling.linear.impedances import Guide, axial, torsional
+from cosserat_fenicsx.drilling.linear.impedances import Guide, Parted, axial, torsional
 from cosserat_fenicsx.drilling.scene import Discs, Drilling
 from cosserat_fenicsx.drilling.top_drive import PI, RULES, Hook, TopDrive
 from cosserat_fenicsx.well.components import DrillString
@@ -62,7 +62,8 @@ def natural_frequencies(scene: Drilling, count: int, bit: str = "free", kind: st
     if kind == "torsion" and scene.motor is not None:
         if bit == "fixed":
             refuse("natural_frequencies", "bit", bit, f"'free': {scene.motor.name} lets the string turn above its bit")
-        guide = replace(guide, parts=guide.parts[: len(guide.parts) - len(scene.turned) - 1], inertia=0.0)
+        motor = next(k for k, part in enumerate(guide.parts) if isinstance(part, Parted))
+        guide = replace(guide, parts=guide.parts[:motor], inertia=0.0)
     return _circular(guide, count, bit == "fixed", top) / (2 * math.pi)
 
 

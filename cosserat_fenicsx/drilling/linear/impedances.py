@@ -179,7 +179,7 @@ class Disc(_Section):
 @dataclass(frozen=True)
 class Parted(_Section):
     """A place where a tool parts the string: a dashpot c (`damping`) or a spring k between both sides, the other one 0:
-    w below = w above - P/c, or - s P/k.
+    w below = w above - P/c, or - s P/k; and the inertia of a rotor below it, kg m^2.
 
     Its impedance, for scaling, is c, or 1 N s/m times the rate k/(1 N s/m).
     """
@@ -187,6 +187,7 @@ class Parted(_Section):
     damping: float
     spring: float
     name: str
+    rotor: float = 0.0
 
     length = travel = inertia = drag = 0.0
 
@@ -196,14 +197,13 @@ class Parted(_Section):
         return self.damping or np.sqrt(self.spring)
 
     def along(self, s, state, points, places):
-        return np.zeros(1), state.w, 0.0
+        return np.zeros(1), state.w, self.rotor * abs(self.through(s, state).w[0]) ** 2
 
     def through(self, s, state):
         """The state below."""
         give, slope = (1 / self.damping, 0.0) if self.damping else (s / self.spring, 1 / self.spring)
-        return State(
-            state.w - give * state.P, state.P, state.dw - give * state.dP - slope * state.P, state.dP, state.size
-        )
+        w, dw = state.w - give * state.P, state.dw - give * state.dP - slope * state.P
+        return State(w, state.P - self.rotor * s * w, dw, state.dP - self.rotor * (w + s * dw), state.size)
 
 
 @dataclass(frozen=True)
@@ -358,7 +358,7 @@ def _fed(drive, first, top):
 
 def torsional(scene, walls=None, damping=None) -> Guide:
     """Torsional waveguide of a `Drilling` scene; `walls`: rates of friction at the wall, see `WallDashpots`;
-    `damping`: of a motor at its speed, N m s/rad, None where it does not depend on it."""
+    `damping`: of each motor at its speed, N m s/rad, from the top down, None where they do not depend on it."""
     drive, string, bit = scene.drive, scene.discs, scene.bit_inertia
     if string:
         lower = zip((*string.stiffnesses, None), (*string.dampings, 0.0), strict=True)
@@ -396,6 +396,11 @@ def _uniform(scene, kind, walls, damping=None):
             length = sum(piece[0] for piece in pieces)
             section = getattr(x, stiffness), getattr(x, inertia), rate + wall
             found.append(Uniform(length, *section, x.name, x.damping_time))
-        parted = [x for x in scene.joints if x.segment == k and x.turns == (kind == "torsion")]
-        found += [Parted(damping or x.damping, x.spring, x.tool.name) for x in parted]
+        for joint in scene.joints:
+            if joint.segment == k and joint.turns == (kind == "torsion"):
+                found.append(Parted(joint.damping, joint.spring, joint.tool.name))
+    motors = [i for i, part in enumerate(found) if isinstance(part, Parted) and part.damping]
+    for k, i in enumerate(motors):  # the lowest one's rotor is a part of the bit's inertia
+        rotor = scene.motors[k].rotor_inertia if i != motors[-1] else 0.0
+        found[i] = replace(found[i], damping=damping[k] if damping else found[i].damping, rotor=rotor)
     return tuple(found)

@@ -69,7 +69,7 @@ def critical_slopes(scene: Drilling, up_to: float = 10.0, speed: float | None = 
 
 def _torsion(scene, speed):
     """The torsional `Guide` of a scene at a speed (rad/s), None for that of its drive."""
-    if scene.hole is None and not (scene.motor and scene.motor.curves):
+    if scene.hole is None and not any(motor.curves for motor in scene.motors):
         return torsional(scene)
     speed = speed_of("critical_slopes", scene, speed)
     return Steady(scene).guides(speed, scene.bit and scene.bit.weight)[0]

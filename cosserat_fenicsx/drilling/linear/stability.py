@@ -406,8 +406,8 @@ def stability(
 
     Friction at the wall acts by its slope at the slip of the case. Of a string that rotates it brakes axial motion, and
     drives torsion where it falls with the slip; the wall force is that of the soft string, in pieces. Components damp
-    by their `damping_time`, Kelvin and Voigt. A mud motor is a dashpot between string and bit, which turns by its speed
-    under the torque on bit faster; speeds are those of the string.
+    by their `damping_time`, Kelvin and Voigt. Mud motors are dashpots, and what is below turns by their
+    speeds under the torque on bit faster; speeds are those of the string above.
 
     Args:
         scene: a `Drilling`; the speed of its drive and its weight on bit are replaced by those of the cases.
