@@ -71,11 +71,8 @@ def quiet_compiler():
 
 @contextlib.contextmanager
 def compiling():
-    """Context manager in which C is compiled or loaded from the cache of compiled forms.
-
-    Raises:
-        InstallationError: the cache cannot be written or read, or there is no C compiler that works.
-    """
+    """Context manager in which C is compiled or loaded from the cache of compiled forms. Raises InstallationError: the
+    cache cannot be written or read, or there is no C compiler that works."""
     try:
         with quiet_compiler():
             yield

@@ -225,15 +225,9 @@ def is_smooth(values, step, of_all=lambda sizes: sizes):
 
 
 def derivative(values, step):
-    """The derivative of a function and an estimate of its error.
-
-    Args:
-        values: those at `PLACES` times the step, arrays of one shape; step: a number.
-
-    Returns:
-        (derivative, error), arrays: the error is the difference from a formula of sixth order, an upper bound where the
-        step is small.
-    """
+    """The derivative of a function and an estimate of its error. values: those at `PLACES` times the step, arrays of
+    one shape; step: a number. Returns (derivative, error), arrays: the error is the difference from a formula of sixth
+    order, an upper bound where the step is small."""
     odd = [np.subtract(values[4 + k], values[3 - k]) for k in range(4)]
     eight, six = (sum(w * part for w, part in zip(weights, odd, strict=True)) / step for weights in (_EIGHT, _SIX))
     return eight, np.abs(eight - six)

@@ -150,11 +150,8 @@ class _Clocked:
 
 
 class StageProgress(_Clocked):
-    """Context manager that shows what a computation is at, and the elapsed time; how long it takes is not known.
-
-    Args:
-        what: name of the computation. wanted, comm: see `Progress`.
-    """
+    """Context manager that shows what a computation is at, and the elapsed time; how long it takes is not known. what:
+    name of the computation. wanted, comm: see `Progress`."""
 
     def __init__(self, what, wanted, comm):
         super().__init__(wanted, comm)
@@ -170,11 +167,8 @@ class StageProgress(_Clocked):
 
 
 class MeshProgress(StageProgress):
-    """`StageProgress` of an eigenproblem on one mesh after the other, whose number is not known.
-
-    Args:
-        what: name of the computation; tol: its relative accuracy. wanted, comm: see `Progress`.
-    """
+    """`StageProgress` of an eigenproblem on one mesh after the other, whose number is not known. what: name of the
+    computation; tol: its relative accuracy. wanted, comm: see `Progress`."""
 
     def __init__(self, what, tol, wanted, comm):
         super().__init__(what, wanted, comm)

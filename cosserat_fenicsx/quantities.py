@@ -344,11 +344,8 @@ def _like(unit, known):
 
 
 def in_si(where, value, dimension):
-    """A number in SI from text with a unit of a dimension, such as "5 in"; anything else as it is.
-
-    Raises:
-        SceneError: no number, no unit, or one of another dimension.
-    """
+    """A number in SI from text with a unit of a dimension, such as "5 in"; anything else as it is. Raises SceneError:
+    no number, no unit, or one of another dimension."""
     if not isinstance(value, str):
         return value
     si, known, *_ = DIMENSIONS[dimension]

@@ -70,11 +70,8 @@ def are_apart():
 
 
 def communicator(comm=None):
-    """The MPI communicator of a computation: `comm`, by default all ranks; within `apart`, this one.
-
-    Raises:
-        SceneError: within `apart`, a communicator of several ranks, which would wait for the others forever.
-    """
+    """The MPI communicator of a computation: `comm`, by default all ranks; within `apart`, this one. Raises SceneError:
+    within `apart`, a communicator of several ranks, which would wait for the others forever."""
     from mpi4py import MPI
 
     if _apart and comm is not None and comm.size > 1:

@@ -432,15 +432,10 @@ def _sine(t, u):
 
 
 def closest_segments(points, rods, s, radii, apart, reach):
-    """Gaps between polygons through points of rods, by the distances of their sides: independent of `Strands`.
-
-    Args:
-        points: (n, 3); rods, s, radii: (n,) of each point; apart: an `Apart`; reach: largest gap of interest.
-
-    Returns:
-        (gap, allowed, first, second), (k,) each: gaps of sides, how far the polygons may lie inside of the curves, and
-        the arc lengths of the nearest points with their rods, (k, 2) each; only gaps below `reach`.
-    """
+    """Gaps between polygons through points of rods, by the distances of their sides: independent of `Strands`. points:
+    (n, 3); rods, s, radii: (n,) of each point; apart: an `Apart`; reach: largest gap of interest. Returns (gap,
+    allowed, first, second), (k,) each: gaps of sides, how far the polygons may lie inside of the curves, and the arc
+    lengths of the nearest points with their rods, (k, 2) each; only gaps below `reach`."""
     from scipy.spatial import cKDTree
 
     side = np.flatnonzero(np.diff(rods) == 0)

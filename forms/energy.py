@@ -13,7 +13,7 @@ from collections import namedtuple
 import ufl
 from cosserat_fenicsx.forms import law
 from cosserat_fenicsx.forms.inertia import lateral
-from cosserat_fenicsx.forms.rotation import conjugate_product, directors
+from cosserat_fenicsx.forms.rotation import conjugate_product, directors, turned
 
 #: r', q and q' of a configuration.
 Configuration = namedtuple("Configuration", "r_s q q_s")
@@ -26,25 +26,6 @@ def strains(line, section):
     e = section.R_R.T * (directors(line.q).T * line.r_s) - section.v_0
     k = section.R_R.T * (2 * conjugate_product(line.q, line.q_s))
     return e, k if section.k_0 is None else k - section.k_0
-
-
-def turned(q, dq):
-    """The derivative of the directors at q in the direction dq, linear in each."""
-
-    def of(i, j):
-        return q[i] * dq[j] + q[j] * dq[i]
-
-    a, b, c, d = range(4)
-    diagonal = [[of(a, a), of(b, b), -of(c, c), -of(d, d)], [of(a, a), -of(b, b), of(c, c), -of(d, d)],
-                [of(a, a), -of(b, b), -of(c, c), of(d, d)]]  # fmt: skip
-    first, second, third = (sum(terms) for terms in diagonal)
-    return ufl.as_matrix(
-        [
-            [first, 2 * (of(b, c) - of(a, d)), 2 * (of(b, d) + of(a, c))],
-            [2 * (of(b, c) + of(a, d)), second, 2 * (of(c, d) - of(a, b))],
-            [2 * (of(b, d) - of(a, c)), 2 * (of(c, d) + of(a, b)), third],
-        ]
-    )
 
 
 def euler_tensor(I_R):

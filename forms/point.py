@@ -74,10 +74,7 @@ def _by_small_rotation(theta, phi):
 
 def variation(work, point, test, direction):
     """The change of a virtual work `work(point, test)` in a direction of small displacement and inertial rotation.
-
-    Args:
-        direction: a `VirtualMotion`: phi_r, phi_r_s, phi and phi_s, with dR = phi x R and d(curvature) = R^T phi_s.
-    """
+    direction: a `VirtualMotion`: phi_r, phi_r_s, phi and phi_s, with dR = phi x R and d(curvature) = R^T phi_s."""
     moved = point.variable()
     value = work(moved, test)
     change = 0

@@ -28,6 +28,25 @@ def directors(q):
     )
 
 
+def turned(q, dq):
+    """The derivative of the directors at q in the direction dq, linear in each."""
+
+    def of(i, j):
+        return q[i] * dq[j] + q[j] * dq[i]
+
+    a, b, c, d = range(4)
+    diagonal = [[of(a, a), of(b, b), -of(c, c), -of(d, d)], [of(a, a), -of(b, b), of(c, c), -of(d, d)],
+                [of(a, a), -of(b, b), -of(c, c), of(d, d)]]  # fmt: skip
+    first, second, third = (sum(terms) for terms in diagonal)
+    return ufl.as_matrix(
+        [
+            [first, 2 * (of(b, c) - of(a, d)), 2 * (of(b, d) + of(a, c))],
+            [2 * (of(b, c) + of(a, d)), second, 2 * (of(c, d) - of(a, b))],
+            [2 * (of(b, d) - of(a, c)), 2 * (of(c, d) + of(a, b)), third],
+        ]
+    )
+
+
 def rotation_matrix(q):
     """R(q): the directors of q/|q|, a rotation for every q but zero."""
     return directors(q) / ufl.dot(q, q)

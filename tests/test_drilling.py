@@ -18,7 +18,7 @@ from cosserat_fenicsx.quantities import DIMENSIONS
 from cosserat_fenicsx.drilling.bit_laws import BitLaw
 from cosserat_fenicsx.drilling.charts import advance_unit
 from cosserat_fenicsx.drilling.choose import BOTH, TORSION, chosen
-from cosserat_fenicsx.drilling.film import Stage
+from cosserat_fenicsx.drilling.charts import Stage
 from cosserat_fenicsx.drilling.history import DrillingHistory
 from cosserat_fenicsx.drilling.protocol import LEDGER, PROFILE, SERIES
 from cosserat_fenicsx.drilling.scenefile import DrillingScene, SimulateDrilling, StabilityMap

@@ -16,7 +16,7 @@ from cosserat_fenicsx.actions.fluids import AddedMass, LinearDrag
 from cosserat_fenicsx.actions.walls import HoleWall
 from cosserat_fenicsx.numerics import directors
 from cosserat_fenicsx.parts import from_data, to_data
-from cosserat_fenicsx.pictures.motion_charts import draw_campbell, spectra
+from cosserat_fenicsx.pictures.motion_charts import campbell_figure, spectra
 from cosserat_fenicsx.results.whirl import Orbit, whirl_of
 
 pytestmark = pytest.mark.serial
@@ -148,7 +148,7 @@ def test_a_campbell_diagram_has_what_whirls(collar):
     np.testing.assert_allclose(rates[forward][np.argmax(amplitude[:, forward], axis=1)], speed, atol=resolution / 2)
     np.testing.assert_allclose(rates[backward][np.argmax(amplitude[:, backward], axis=1)], -30, atol=resolution / 4)
     np.testing.assert_allclose(amplitude[:, backward].max(axis=1), 0.004, rtol=0.05)
-    above, below, bar = draw_campbell(orbit).axes
+    above, below, bar = campbell_figure(orbit).axes
     assert below.get_xlabel() == "speed of rotation (rpm)" and "(rpm)" in below.get_ylabel()
     assert "(mm)" in above.get_ylabel() and "(dB of" in bar.get_ylabel()
 
@@ -172,7 +172,7 @@ def test_what_is_refused_in_words(collar):
         (lambda: history[0].whirl(middle), "whirl: expected a motion with at least two times"),
         (lambda: history[0].plot_orbit(middle), "expected a history with at least two times"),
         (lambda: history.plot_campbell(middle), "expected a motion with at least 200 times"),
-        (lambda: draw_campbell(circles(np.linspace(0, 1, 500), (0.01, 1.0))), "expected a run-up"),
+        (lambda: campbell_figure(circles(np.linspace(0, 1, 500), (0.01, 1.0))), "expected a run-up"),
         (lambda: cf.simulate(about(turning), 1.0, dt=0.1),
          r"loads\[0\] \(Centrifugal\) stands for the inertia of a motion"),
         (lambda: cf.solve(about(Centrifugal((1.0, 0, 3.0)), AddedMass(heavy, 1.0)), [1.0]),

@@ -20,10 +20,7 @@ _SIDE, _MOST, _NOTHING = 0.25, 4000, 1e-7
 
 class Surface:
     """The elastic surfaces of rods, dimensionless: the force F = c p^n of a contact at the depth p, see `RodContact`.
-
-    Args:
-        stiffness, damping: of `RodContact`; radii: of the elements of `Strands`; shares: (nodes,) of the rods' length.
-    """
+    stiffness, damping: of `RodContact`; radii: of the elements of `Strands`; shares: (nodes,) of the rods' length."""
 
     # Change of a depth, relative to it, below which the mean force of a step is that in its middle.
     _SAME = 1e-5

@@ -42,11 +42,8 @@ def module(*sources):
     lines with # are for C alone.
 
     C finds the number of arguments of FFCx's kernels as KERNEL_ARGUMENTS. Processes that come at the same time wait for
-    the one that compiles; a file that is damaged or belongs to another system is made again.
-
-    Raises:
-        InstallationError: there is no C compiler that works, or the cache cannot be used.
-    """
+    the one that compiles; a file that is damaged or belongs to another system is made again. Raises InstallationError:
+    there is no C compiler that works, or the cache cannot be used."""
     with compiling():
         name, *task = _task(sources or SOURCES)
         made = code_cache.load(name)

@@ -1,19 +1,20 @@
-"""Charts and maps of a drill-string in motion, and charts of its stability, by matplotlib."""
+"""Charts, maps and films of a drill-string in motion, and charts of its stability, by matplotlib."""
 
 import math
 from dataclasses import replace
 
 import numpy as np
 
-from cosserat_fenicsx.checks import finite_array, refuse
+from cosserat_fenicsx.checks import finite_array, positive, refuse
 from cosserat_fenicsx.drilling.protocol import LEDGER
 from cosserat_fenicsx.drilling.stick_slip import AT_REST, SPEED, TORQUE, WEIGHT, alias, turns
 from cosserat_fenicsx.drilling.top_drive import PI, Hook
 from cosserat_fenicsx.errors import SceneError, nearest
+from cosserat_fenicsx.pictures.animation import MOST_FRAMES, check_name, frame_rate, record
 from cosserat_fenicsx.pictures.charts import (
     COLOURS,
     STYLES,
-    chart,
+    arrange,
     chosen_unit,
     empty_figure,
     ledger,
@@ -21,9 +22,11 @@ from cosserat_fenicsx.pictures.charts import (
     room_for,
     scale,
     stacked,
+    styled,
     unit_of,
 )
 from cosserat_fenicsx.quantities import Quantity
+from cosserat_fenicsx.ranks import on_first, world
 
 _FORCE = Quantity("force", unit="N", shown="kN")
 _DEPTH = Quantity("measured depth", unit="m", shown="m", dimension="length")
@@ -42,11 +45,8 @@ _BANDS, _SOME = 400, 2000
 
 
 def times_between(where, times, between):
-    """The slice of ascending times (s) between two of them; all for None.
-
-    Raises:
-        SceneError: fewer than two times in it, or `between` is not two ascending times.
-    """
+    """The slice of ascending times (s) between two of them; all for None. Raises SceneError: fewer than two times in
+    it, or `between` is not two ascending times."""
     if len(times) < 2:
         raise SceneError(f"{where}: expected a motion with at least two times, this one has {len(times)}")
     if between is None:
@@ -241,8 +241,7 @@ def _shade(panel, t, where, label, colour, alpha=1.0):
                        zorder=0, label=label, alpha=alpha)  # fmt: skip
 
 
-@chart()
-def draw_phase(history, since=None):
+def phase_figure(history, since=None):
     """See `DrillingHistory.plot_phase`."""
     times_between("plot_phase", history.times, None)
     last = float(history.times[-1])
@@ -263,8 +262,7 @@ def draw_phase(history, since=None):
     return figure
 
 
-@chart()
-def draw_energy(history):
+def energy_figure(history):
     """See `DrillingHistory.plot_energy`."""
     times_between("plot_energy", history.times, None)
     curves = {}
@@ -282,8 +280,7 @@ _DEPTHS, _STICKS = 500, "0.8"
 _BIT = 0.03
 
 
-@chart()
-def draw_map(history, what=None, between=None):
+def map_figure(history, what=None, between=None):
     """See `DrillingHistory.plot_map`."""
     if what is None:
         what = "velocity" if moves_along(history) else "speed"
@@ -333,8 +330,7 @@ def draw_map(history, what=None, between=None):
 _MAPS, _LINES = 6, 8
 
 
-@chart()
-def draw_stability(answer, mode=None):
+def stability_figure(answer, mode=None):
     """See `Stability.plot`."""
     grid = len(answer.weights) > 1 and len(answer.speeds) > 1
     return (_maps if grid else _lines)(answer, _modes(answer, mode))
@@ -501,3 +497,112 @@ def hfto_figure(answer):
     figure.suptitle(f"Torsional oscillations that the bit keeps up, {answer.speed / size:.4g} {rpm}, "
                     f"its speed +- {largest / size:.4g} {rpm} at most")  # fmt: skip
     return figure
+
+
+# Longest film, s, where no speed is asked for; pixels across the string and along it; dots per inch; bands along a
+# string that moves along the axis.
+_LONGEST, _ACROSS, _ALONG, _DPI, _IN_BANDS = 10.0, 60, 400, 100, 20
+
+
+def film(history, file, speed=None, fps=25, progress=None):
+    """See `DrillingHistory.animate`."""
+    file = check_name(file)
+    times_between("animate", history.profile_times, None)
+    fps = frame_rate(file, fps)
+    first, last = history.profile_times[[0, -1]]
+    speed = max(1.0, (last - first) / _LONGEST) if speed is None else positive("animate", "speed", speed, "-")
+    count = int(np.ceil((last - first) * fps / speed)) + 1
+    if count > MOST_FRAMES:
+        raise SceneError(
+            f"animate.speed = {speed:g}: expected one that needs at most {MOST_FRAMES} frames, not {count}"
+        )
+    times = np.linspace(first, last, count)
+    on_first(world(), lambda: record(lambda: Stage(history, speed), file, times, fps, progress))
+
+
+class Stage:
+    """The picture at a time; the constant parts are drawn once. The string is seen from the side: its nearer half has a
+    bright stripe along it; where it moves along the axis, its bands move with it."""
+
+    def __init__(self, history, speed):
+        self._history, self._speed = history, speed
+        self._along = moves_along(history)
+        with styled():
+            self._figure = self._constant_parts(history)
+
+    def _constant_parts(self, history):
+        figure = empty_figure(9.6, 6.0)
+        figure.set_dpi(_DPI)
+        string, along, over = figure.subplots(1, 3, width_ratios=(0.35, 1.0, 2.0))
+        top, bottom = history.depths[[0, -1]]
+        self._places = np.linspace(top, bottom, _ALONG)
+        self._across = np.arcsin(np.linspace(-1, 1, _ACROSS) * 0.999)  # round a string that is seen from the side
+        if self._along:  # the largest displacement is drawn about as long as two bands
+            self._band = (bottom - top) / _IN_BANDS
+            largest = max(float(np.nanmax(np.abs(history.displacement))), 1e-9)
+            self._enlarge = float(f"{max(1.0, 2 * self._band / largest):.1g}")
+        blank, box = np.zeros((_ALONG, _ACROSS)), (0, 1, bottom, top)
+        self._stripes = string.imshow(blank, extent=box, aspect="auto", cmap="gray", vmin=-0.4, vmax=1.2)
+        string.set(xticks=[], ylabel="measured depth (m)", title="string")
+        quantity = MAPPED["velocity" if self._along else "speed"][0]
+        heading, self._size = scale(quantity)
+        values = self._shown() / self._size
+        (self._line,) = along.plot(values[0], history.depths, color="tab:purple")
+        (self._held,) = along.plot([], [], ".", color="0.6", markersize=4, label="held by friction")
+        low, high = float(min(np.nanmin(values), 0.0)), float(np.nanmax(values))
+        room = 0.05 * max(high - low, 1.0 if not self._along else 1e-3)
+        along.set(xlim=(low - room, high + room), ylim=(bottom, top), xlabel=heading, yticklabels=[])
+        if history.sticking.any():
+            legend(along)
+        for at_ends, label, colour in self._over_time():
+            over.plot(history.times, at_ends / self._size, color=colour, label=label, linewidth=1.0)
+        over.set(xlabel="time (s)", ylabel=heading, xlim=(0, history.times[-1]))
+        legend(over)
+        self._now = over.axvline(0.0, color="black", linewidth=0.8)
+        string.grid(visible=False)
+        figure.suptitle(self._title(float(history.profile_times[0])))
+        arrange(figure)
+        figure.set_layout_engine("none")  # found once: it would take half of the time of each frame
+        return figure
+
+    def _shown(self):
+        """(k, m) what is drawn along the string, and moves it."""
+        return self._history.velocity if self._along else self._history.speed
+
+    def _over_time(self):
+        """[(values over time at an end, label, colour)]."""
+        history, lower = self._history, lower_end(self._history)
+        if self._along:
+            block = velocity_of_block(history, history.times)
+            return (block, "block", DRIVE), (history.bit_velocity, lower, BIT)
+        return (history.drive_speed, "drive", DRIVE), (history.bit_speed, lower, BIT)
+
+    def at(self, t):
+        """(height, width, 3) the picture at t (s)."""
+        history = self._history
+        k = int(np.clip(np.searchsorted(history.profile_times, t) - 1, 0, len(history.profile_times) - 2))
+        begin, end = history.profile_times[k : k + 2]
+        share = (t - begin) / (end - begin)
+        by = history.displacement * self._enlarge if self._along else history.angle
+        moved, values = ((1 - share) * x[k] + share * x[k + 1] for x in (by, self._shown() / self._size))
+        moved = np.interp(self._places, history.depths, moved)[:, None]
+        if self._along:
+            bright = np.cos(2 * math.pi / self._band * (self._places[:, None] - moved)) + 0 * self._across
+        else:
+            bright = np.cos(moved + self._across)
+        self._stripes.set_data(np.cos(self._across) * np.where(bright > 0.0, 1.0, 0.25))
+        self._line.set_xdata(values)
+        held = history.sticking[k + round(share)]
+        self._held.set_data(values[held], history.depths[held])
+        self._now.set_xdata([t, t])
+        self._figure.suptitle(self._title(t))
+        self._figure.canvas.draw()
+        return np.asarray(self._figure.canvas.buffer_rgba())[..., :3].copy()
+
+    def _title(self, t):
+        pace = "real time" if self._speed == 1 else f"{self._speed:.3g} times faster than real"
+        moved = f"; displacements drawn {self._enlarge:g} times their size" if self._along else ""
+        return f"{title_of(self._history)}\nt = {t:.2f} s ({pace}){moved}"
+
+    def close(self):
+        """Nothing to free."""

@@ -16,11 +16,8 @@ MODELS = ("auto", TORSION, BOTH)
 
 
 def chosen(scene, model="auto"):
-    """(name, [sentence]): the model and the reasons for it.
-
-    Raises:
-        SceneError: an unknown model, or one that does not fit the scene.
-    """
+    """(name, [sentence]): the model and the reasons for it. Raises SceneError: an unknown model, or one that does not
+    fit the scene."""
     if not isinstance(model, str) or model not in MODELS:
         raise SceneError(f"simulate.model = {model!r}: {nearest(model, MODELS)}")
     if scene.discs:
@@ -145,11 +142,8 @@ def fastest(scene, until):
 
 
 def with_step(scene, name, model, factor: float):
-    """A new `StringModel` at rest with the step of another one, and the length of its elements, times a factor.
-
-    Raises:
-        SceneError: a step that the laws of friction do not allow, or a mesh that is as coarse as it can be.
-    """
+    """A new `StringModel` at rest with the step of another one, and the length of its elements, times a factor. Raises
+    SceneError: a step that the laws of friction do not allow, or a mesh that is as coarse as it can be."""
     if isinstance(model, TorsionWaves) or scene.discs:
         return model_of(scene, name, factor * model.dt)
     asked = max(2, round((len(model.depths) - 1) / factor))
@@ -160,15 +154,9 @@ def with_step(scene, name, model, factor: float):
 
 
 def model_of(scene, name, dt=None, elements=None):
-    """A new `StringModel` at rest.
-
-    Args:
-        name: "torsion" or "axial and torsional". dt: step, s. elements: how many along the string. Both None for those
-            of the model; waves of torsion have cells of one step, so that one of the two decides.
-
-    Raises:
-        SceneError: a scene that the model has no equations for; steps that its laws do not allow.
-    """
+    """A new `StringModel` at rest. name: "torsion" or "axial and torsional". dt: step, s. elements: how many along the
+    string. Both None for those of the model; waves of torsion have cells of one step, so that one of the two decides.
+    Raises SceneError: a scene that the model has no equations for; steps that its laws do not allow."""
     if scene.discs and elements is not None:
         refuse("simulate", "elements", elements, "None for Discs, which are not divided")
     if scene.by_elements or name == BOTH:

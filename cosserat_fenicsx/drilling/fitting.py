@@ -232,11 +232,8 @@ class _Problem:
         return scene_with(self._scene, self._names, self.numbers(shares)[0])
 
     def motion(self, shares, until):
-        """The `DrillingHistory` up to a time of the readings (s).
-
-        Raises:
-            SceneError, NotConverged: there is none with these numbers.
-        """
+        """The `DrillingHistory` up to a time of the readings (s). Raises SceneError, NotConverged: there is none with
+        these numbers."""
         values, clock = self.numbers(shares)
         key, duration = tuple(values), max(until + clock, 10 * self._how["dt"]) + 3 * self._how["dt"]
         found = self._known.get(key)

@@ -385,9 +385,7 @@ class DrillingHistory(ChartedBetween):
         Raises:
             SceneError: see `plot`; a quantity that the model does not have.
         """
-        from cosserat_fenicsx.drilling.charts import draw_map
-
-        return draw_map(self, file, what, between, units=units, width=width)
+        return self._drawn("drilling.charts.map_figure", file, units, width, what, between)
 
     def plot_phase(
         self,
@@ -403,15 +401,11 @@ class DrillingHistory(ChartedBetween):
             since: s; None for the second half.
             file, units, width: see `plot`.
         """
-        from cosserat_fenicsx.drilling.charts import draw_phase
-
-        return draw_phase(self, file, since, units=units, width=width)
+        return self._drawn("drilling.charts.phase_figure", file, units, width, since)
 
     def plot_energy(self, file: File | None = None, *, units: Any = "SI", width: int | None = None):
         """Draw the ledger of energy and its residual over time; for the arguments see `plot`."""
-        from cosserat_fenicsx.drilling.charts import draw_energy
-
-        return draw_energy(self, file, units=units, width=width)
+        return self._drawn("drilling.charts.energy_figure", file, units, width)
 
     def animate(self, file: File, *, speed: float | None = None, fps: float = 25, progress: bool | None = None) -> None:
         """Write a film of the string: twist and speed of rotation along it, or displacement and velocity along the axis
@@ -425,7 +419,7 @@ class DrillingHistory(ChartedBetween):
         Raises:
             SceneError: matplotlib, Pillow or ffmpeg is missing, another ending, or fewer than two profiles.
         """
-        from cosserat_fenicsx.drilling.film import film
+        from cosserat_fenicsx.drilling.charts import film
 
         film(self, file, speed, fps, progress)
 

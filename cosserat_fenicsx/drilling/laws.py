@@ -36,14 +36,10 @@ _FEWEST, _MOST = 8, 64
 
 @dataclass(frozen=True)
 class Resistance:
-    """R(s) = slipping + (still - slipping) exp(-s/decay), anything up to `still` at rest; or a function.
-
-    Attributes:
-        still: largest resistance at rest, N m or a coefficient of friction. slipping: resistance to fast slip; of a
-            function just above rest. decay: speed; 0 where the resistance drops at once, and for a function.
-        function: R(s) for a number s above 0, m/s or rad/s. fall: its steepest fall where it is continuous. drops:
-            whether it drops at some speed.
-    """
+    """R(s) = slipping + (still - slipping) exp(-s/decay), anything up to `still` at rest; or a function. still: largest
+    resistance at rest, N m or a coefficient of friction. slipping: resistance to fast slip; of a function just above
+    rest. decay: speed; 0 where the resistance drops at once, and for a function; function: R(s) for a number s above 0,
+    m/s or rad/s. fall: its steepest fall where it is continuous. drops: whether it drops at some speed."""
 
     still: float
     slipping: float
@@ -98,11 +94,8 @@ def slope_of(function, s):
 
 
 def by_method(owner, name, *more) -> Resistance:
-    """The `Resistance` of a method of a user's object, see `checked`; cached for equal objects.
-
-    Raises:
-        SceneError: its value is 0 at rest and not beyond; see `checked`.
-    """
+    """The `Resistance` of a method of a user's object, see `checked`; cached for equal objects. Raises SceneError: its
+    value is 0 at rest and not beyond; see `checked`."""
     return (_sampled if hashable(owner) else _sampled.__wrapped__)(owner, name, *more)
 
 
@@ -129,11 +122,8 @@ def _sampled(owner, name, *more):
 
 
 def checked(owner, name, *more):
-    """A method of a user's object as a checked function of a speed s from 0 on, with more arguments.
-
-    Raises:
-        SceneError: by the function, where the method fails, or its value is no number from 0 on.
-    """
+    """A method of a user's object as a checked function of a speed s from 0 on, with more arguments. Raises SceneError:
+    by the function, where the method fails, or its value is no number from 0 on."""
     method, where = getattr(owner, name), f"{type(owner).__name__}.{name}"
 
     def function(s):
@@ -185,13 +175,9 @@ def _cubics(values):
 
 @dataclass(frozen=True)
 class Surface:
-    """R over slip and load: cubics over the slip at some loads, and cubics between the loads.
-
-    Attributes:
-        loads: (m,) ascending, N, or (1,) where R does not depend on them. values, rise: splines over ln s, or over s
-            where not `logarithmic`, of R (m,) and of its slope by the load at these loads; constant beyond.
-        still: (2, m) the same at rest.
-    """
+    """R over slip and load: cubics over the slip at some loads, and cubics between the loads. loads: (m,) ascending, N,
+    or (1,) where R does not depend on them. values, rise: splines over ln s, or over s where not `logarithmic`, of R
+    (m,) and of its slope by the load at these loads; constant beyond; still: (2, m) the same at rest."""
 
     loads: np.ndarray
     values: CubicHermiteSpline
@@ -246,16 +232,10 @@ def tabulated(resistance: Resistance) -> CubicHermiteSpline | None:
 
 
 class InC:
-    """A `Resistance` for C, with the memory that C refers to.
-
-    Args:
-        ffi: of the module in C. resistance: the `Resistance`. function: of slip (a number) and load (N), which C calls
-            for every value, or beyond the loads of the surface; None to sample the resistance's own function, if it has
-            one. surface: a `Surface`, or None.
-
-    Attributes:
-        failure: the exception that ended the last call of the function, if any.
-    """
+    """A `Resistance` for C, with the memory that C refers to. ffi: of the module in C. resistance: the `Resistance`.
+    function: of slip (a number) and load (N), which C calls for every value, or beyond the loads of the surface; None
+    to sample the resistance's own function, if it has one. surface: a `Surface`, or None. failure: the exception that
+    ended the last call of the function, if any."""
 
     def __init__(self, ffi, resistance: Resistance, function=None, surface=None):
         self.failure, self.function, self._ffi, self._resistance = None, function, ffi, resistance
@@ -346,10 +326,7 @@ def refuse_several_speeds(slope: float, impedance: float, inertia: float, where:
 
 def check_bit(scene) -> None:
     """Refuse a bit of a `Drilling` whose law falls too steeply at slow rotation; a torque that drops at once passes.
-
-    Raises:
-        SceneError: see `refuse_several_speeds`.
-    """
+    Raises SceneError: see `refuse_several_speeds`."""
     law = None if scene.bit is None else scene.bit.law.resistance(scene.bit.most)
     if law is not None and scene.discs is None:  # the last one of Discs has inertia
         impedance = scene.segments[-1].torsional_impedance

@@ -143,11 +143,8 @@ def step_for(gains: Gains, dt: float) -> float:
 
 def steady_control(control: DriveControl, space: StateSpace, torque: float):
     """(level, x, y) of steady rotation at the speed asked for: the torque at which M counts as 0, the state, and the
-    output that holds a torque (N m).
-
-    Raises:
-        SceneError: the control has another speed, or another torque, in steady motion.
-    """
+    output that holds a torque (N m). Raises SceneError: the control has another speed, or another torque, in steady
+    motion."""
     A, B, C, D = arrays_of(space)
     level = torque if space.level is None else space.level
     u, y = np.array([0.0, torque - level]), 0.0 if space.of_speed else torque
@@ -164,13 +161,8 @@ def steady_control(control: DriveControl, space: StateSpace, torque: float):
 def check_late(control: DriveControl, space: StateSpace | None, impedance: float | None, discs: bool = False) -> None:
     """Refuse a control that acts late and answers to fast torques so much that motions of all frequencies grow, the
     faster the shorter they are: a speed times the impedance (N m s/rad) of the string, a torque over that of a body.
-
-    Args:
-        impedance: None where the drive turns a body, an element or a disc. discs: whether it is a disc.
-
-    Raises:
-        SceneError: so it is.
-    """
+    impedance: None where the drive turns a body, an element or a disc. discs: whether it is a disc. Raises SceneError:
+    so it is."""
     if space is None or not control.late:
         return
     _, B, C, D = arrays_of(space)
@@ -187,11 +179,8 @@ def check_late(control: DriveControl, space: StateSpace | None, impedance: float
 
 
 def check_answer(control: DriveControl, answer: float, dt: float) -> None:
-    """Refuse a step dt (s) in which a control answers to the mean torque by a factor `answer` of 1 or more.
-
-    Raises:
-        SceneError: so it is.
-    """
+    """Refuse a step dt (s) in which a control answers to the mean torque by a factor `answer` of 1 or more. Raises
+    SceneError: so it is."""
     if not math.isfinite(answer) or answer >= 1:
         refuse("simulate", "dt", dt, f"a shorter step (s): in this one the torque of {type(control).__name__} follows "
                f"the torque of the string by a factor of {answer:.3g}, which has to be below 1")  # fmt: skip

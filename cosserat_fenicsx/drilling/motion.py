@@ -42,11 +42,8 @@ class TimeLoop:
         self._save_every, self._profile_every, self._turn = save_every, profile_every, turn
 
     def until(self, duration, progress=None):
-        """Advance to a time (s), and return the history.
-
-        Raises:
-            NotConverged, Interrupted, NotStored: with the history so far as `.path`.
-        """
+        """Advance to a time (s), and return the history. Raises NotConverged, Interrupted, NotStored: with the history
+        so far as `.path`."""
         model, history = self.model, self.history
         end = duration - _NOTHING * model.dt
         try:
@@ -266,14 +263,8 @@ def _history(store, scene, rows):
 
 
 def check_arguments(scene, duration, dt=None, elements=None, save_every=None, profile_every=None):
-    """Refuse numbers out of their range, and jumps in speed.
-
-    Returns:
-        duration, dt, save_every, profile_every, s, of which any may be given as text with a unit.
-
-    Raises:
-        SceneError: naming the argument.
-    """
+    """Refuse numbers out of their range, and jumps in speed. Returns duration, dt, save_every, profile_every, s, of
+    which any may be given as text with a unit. Raises SceneError: naming the argument."""
     where = "simulate"
     duration = _seconds(where, "duration", duration)
     times = {"dt": dt, "save_every": save_every, "profile_every": profile_every}
@@ -297,11 +288,8 @@ def check_arguments(scene, duration, dt=None, elements=None, save_every=None, pr
 
 
 def check_step(scene, dt, duration, save_every=None):
-    """Refuse a step that is too long for the rotation in it, and too many steps or rows.
-
-    Raises:
-        SceneError: naming the step and its limit.
-    """
+    """Refuse a step that is too long for the rotation in it, and too many steps or rows. Raises SceneError: naming the
+    step and its limit."""
     where, speed = "simulate", fastest(scene, duration)
     if duration / dt > MOST_STEPS:
         refuse(where, "duration", duration, f"at most {MOST_STEPS:g} steps of {dt:g} s, {MOST_STEPS * dt:g} s")

@@ -329,11 +329,8 @@ class TopEnd:
         return speed, (force - self.given) / self.Ki if self.Ki else 0.0
 
     def step(self, state, start, end, impedance, wave):
-        """The mean speed in a step from start to end (s), and the new state, by the implicit midpoint rule.
-
-        Args:
-            state: see `rest`. impedance: of the string, with its drag. wave: M - Z om that arrives.
-        """
+        """The mean speed in a step from start to end (s), and the new state, by the implicit midpoint rule. state: see
+        `rest`. impedance: of the string, with its drag. wave: M - Z om that arrives."""
         h, (om, phi, *x) = end - start, state
         if self.mean is None:
             return (phi - wave) / impedance, state
@@ -366,12 +363,8 @@ class TopEnd:
 
 
 class DelayLines:
-    """The torsional or the axial waves in parts from the top down.
-
-    Args:
-        impedance, time: (n,) impedances and travel times (s) of the parts. drag: (n + 1,) force over speed at the
-            nodes. top: a `TopEnd`.
-    """
+    """The torsional or the axial waves in parts from the top down. impedance, time: (n,) impedances and travel times
+    (s) of the parts. drag: (n + 1,) force over speed at the nodes. top: a `TopEnd`."""
 
     def __init__(self, impedance, time, drag, top):
         self._Z, self._time, self._drag = (np.array(x, dtype=float) for x in (impedance, time, drag))

@@ -34,13 +34,9 @@ from cosserat_fenicsx.well.operations import doubt_on_bit
 
 @dataclass(frozen=True)
 class Segment:
-    """A uniform part of a string.
-
-    Attributes:
-        length: m. GJ, rhoJ: torsional stiffness, N m^2, and polar inertia per length, kg m, with tool joints, see
-            `StringPart.torsion`. EA: N. rhoA: kg/m, with tool joints. radius: of contact, m. weight: in mud, N/m.
-        name: of the component. damping_time: of Kelvin and Voigt, s.
-    """
+    """A uniform part of a string. length: m. GJ, rhoJ: torsional stiffness, N m^2, and polar inertia per length, kg m,
+    with tool joints, see `StringPart.torsion`. EA: N. rhoA: kg/m, with tool joints. radius: of contact, m. weight: in
+    mud, N/m; name: of the component. damping_time: of Kelvin and Voigt, s."""
 
     length: float
     GJ: float
@@ -74,11 +70,8 @@ class Segment:
 
 
 def segment_of(place, weight):
-    """The `Segment` of a component in its place (`Laid`) with a weight in mud (N/m).
-
-    Raises:
-        SceneError: a component without stiffness, mass or inertia.
-    """
+    """The `Segment` of a component in its place (`Laid`) with a weight in mud (N/m). Raises SceneError: a component
+    without stiffness, mass or inertia."""
     part = place.component
     stiffness = part.stiffness
     if stiffness is None:

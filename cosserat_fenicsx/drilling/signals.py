@@ -51,12 +51,8 @@ def doubt_decay(owner: object, speed: float | None, most: float = 15.0, unit: st
 
 
 class ScalarSignal:
-    """A number at every time (s), from a number or from a function of time.
-
-    Attributes:
-        jumps: times where it is not smooth, s; time steps end there.
-        constant: whether it is a number.
-    """
+    """A number at every time (s), from a number or from a function of time. jumps: times where it is not smooth, s;
+    time steps end there; constant: whether it is a number."""
 
     def __init__(self, owner, field, value, unit):
         self._where, self.unit = f"{type(owner).__name__}.{field}", unit
@@ -112,11 +108,8 @@ def means(signal, first: int, steps: int, dt: float) -> np.ndarray:
 
 
 def intervals(signals, steps, dt):
-    """Rows (length, signals at the begin, signals at the end, 1 where a step ends) of steps, cut at jumps.
-
-    Args:
-        signals: a list of `ScalarSignal`. steps: (first, last + 1). dt: s.
-    """
+    """Rows (length, signals at the begin, signals at the end, 1 where a step ends) of steps, cut at jumps. signals: a
+    list of `ScalarSignal`. steps: (first, last + 1). dt: s."""
     first, last = steps
     grid = np.arange(first, last + 1) * dt
     jumps = {t for signal in signals for t in signal.jumps if grid[0] <= t < grid[-1]}

@@ -172,13 +172,9 @@ _SLOW = 0.1
 
 
 class Cycle(NamedTuple):
-    """Numbers of a motion, or their errors.
-
-    Attributes:
-        period: mean time between two starts of the bit, s; NaN where it starts fewer than twice.
-        peak: largest speed of the bit, in the sense of the drive, rad/s. least_torque, largest_torque: at the surface,
-            N m.
-    """
+    """Numbers of a motion, or their errors. period: mean time between two starts of the bit, s; NaN where it starts
+    fewer than twice; peak: largest speed of the bit, in the sense of the drive, rad/s. least_torque, largest_torque: at
+    the surface, N m."""
 
     period: float
     peak: float

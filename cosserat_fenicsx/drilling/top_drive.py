@@ -217,11 +217,7 @@ class Sampler:
 
     def at(self, step: int, now) -> None:
         """Take a sample, and let a command act, as far as it is time; `now`: function that gives the `Sample` but for
-        the speed asked for.
-
-        Raises:
-            SceneError: the control fails, or returns no numbers.
-        """
+        the speed asked for. Raises SceneError: the control fails, or returns no numbers."""
         if step % self.every == 0:
             self._waiting.append(self._take(now()._replace(asked=self._signal(step * self._dt))))
         if step % self.every == self._after and len(self._waiting) > self._whole:
@@ -231,11 +227,7 @@ class Sampler:
 
     def reach(self, t: float, now) -> None:
         """Take what samples, and let what commands act, are due at a time (s) at which a step ends, in motions whose
-        steps are not those of `dt`; `now` as of `at`.
-
-        Raises:
-            SceneError: as of `at`; or one was due within the step.
-        """
+        steps are not those of `dt`; `now` as of `at`. Raises SceneError: as of `at`; or one was due within the step."""
         while (late := t - self._next * self._dt) >= -1e-3 * self._dt:
             if late > 1e-3 * self._dt:
                 where = f", at t = {self._next * self._dt:g} s"
@@ -282,11 +274,8 @@ class Sampler:
 
 
 def divided(control, dt: float, given: bool) -> float | None:
-    """The sample (s) that steps of a motion divide, or the delay of a control of continuous time, if any.
-
-    Raises:
-        SceneError: a step dt (s) that is `given` is longer than half of it, or the control has no such sample.
-    """
+    """The sample (s) that steps of a motion divide, or the delay of a control of continuous time, if any. Raises
+    SceneError: a step dt (s) that is `given` is longer than half of it, or the control has no such sample."""
     name = "sample" if control.sampled else "delay"
     if control.sampled:
         period = positive_number(control, "sample", control.sample, "s")

@@ -204,11 +204,8 @@ def loads_between(scene, pieces, cuts, normal_force=None):
 
 
 def wall_of(scene, depths, normal_force=None):
-    """The `Wall` of a `Drilling` at nodes (measured depths, m), each with half of the cells beside it.
-
-    Args:
-        normal_force: function of measured depths that gives N/m, in place of the soft string.
-    """
+    """The `Wall` of a `Drilling` at nodes (measured depths, m), each with half of the cells beside it. normal_force:
+    function of measured depths that gives N/m, in place of the soft string."""
     size = len(depths)
     if scene.hole is None:
         return Wall(np.zeros(size), np.ones(size))
@@ -231,12 +228,9 @@ _MOST, _ENOUGH = 60, 1e-13  # Newton steps; relative change of x that ends them
 
 
 class PipeFriction:
-    """Friction at the inner nodes of a pipe that is the upper part of the string of a `Drilling` with a hole.
-
-    Args:
-        scene: the `Drilling`. depths: (n + 2,) measured depths of the nodes, m; the wall beside an end acts at the
-            node next to it.
-    """
+    """Friction at the inner nodes of a pipe that is the upper part of the string of a `Drilling` with a hole. scene:
+    the `Drilling`. depths: (n + 2,) measured depths of the nodes, m; the wall beside an end acts at the node next to
+    it."""
 
     def __init__(self, scene, depths):
         pieces, middles = scene_pieces(scene), (depths[1:] + depths[:-1]) / 2

@@ -1,7 +1,11 @@
 """Moving models for time schemes with accelerations: eq. (1) holds at the end of a step.
 
+Their angular velocities Om and the rates of these have components in the reference frame, as in forms/inertia.py. The
+rotation of a section over a step is the rotation vector theta with q_1 = q_0 exp(theta), so that a rotation at constant
+Om is exact for any length of the step.
+
 And moving spatial models that carry the rates of the directors of the nodes from step to step, by the trapezoidal rule:
-with mass centres off the axis (forms/eccentric.py), and with the energy-conserving scheme (forms/energy.py).
+with mass centres off the axis, and with the energy-conserving scheme (forms/energy.py).
 """
 
 import numpy as np
@@ -9,7 +13,7 @@ import ufl
 from dolfinx import fem
 
 from cosserat_fenicsx import compat, numerics
-from cosserat_fenicsx.forms import collocation, eccentric, energy, inertia, spatial
+from cosserat_fenicsx.forms import energy, equilibrium, inertia, law, rotation, spatial
 from cosserat_fenicsx.forms.rotation import directors, rotation_matrix
 from cosserat_fenicsx.forms.spatial import parts_of
 from cosserat_fenicsx.models.compiled import along
@@ -24,6 +28,31 @@ from cosserat_fenicsx.models.moving import (
 from cosserat_fenicsx.models.rod_data import as_matrix, gauss_function
 from cosserat_fenicsx.numerics import conjugate_product
 
+# Where tan(|theta|/2)^2 is below this, the series is exact to rounding.
+_SMALL = 1e-4
+
+
+def rotation_over_step(q0, q1):
+    """theta in reference components with q1 = q0 exp(theta), |theta| < pi, for q0 and q1 of any length."""
+    t = rotation.conjugate_product(q0, q1) / ufl.dot(q0, q1)  # tan(|theta|/2) along theta
+    y = ufl.dot(t, t)
+    large = ufl.sqrt(ufl.max_value(y, _SMALL))
+    series = 1 - y / 3 + y**2 / 5 - y**3 / 7
+    return 2 * ufl.conditional(ufl.lt(y, _SMALL), series, ufl.atan(large) / large) * t
+
+
+def strains_of(motion, section):
+    """The six material strains v - v_0 and u - u_0."""
+    e, k = equilibrium.strains(motion, section)
+    return ufl.as_vector([*e, *k])
+
+
+def stress_work(motion, section, viscosity, rates, test):
+    """Virtual work of n and m in eq. (1), with the viscous terms of the law for given rates of the six strains."""
+    T, both = equilibrium.frame(motion, section), equilibrium.strains(motion, section)
+    rates = [ufl.as_vector([rates[k + i] for i in range(3)]) for k in (0, 3)]
+    return equilibrium.balance(*(T * a for a in law.damped(section.law, viscosity, both, rates)), motion, test)
+
 
 class SpatialCollocation(SpatialStep):
     """A `SpatialStep` with six rates per node, dr/dt and Om."""
@@ -31,7 +60,7 @@ class SpatialCollocation(SpatialStep):
     def increment(self, w, w0):
         """The increment of r over the step, and its rotation vector."""
         (r0, q0), (r1, q1) = parts_of(w0), parts_of(w)
-        return ufl.as_vector([*(r1 - r0), *collocation.rotation_vector(q0, q1)])
+        return ufl.as_vector([*(r1 - r0), *rotation_over_step(q0, q1)])
 
     def rate_of_momentum(self, v, a):
         """Virtual work of inertia per unit length, from velocities and accelerations at the end of the step."""
@@ -47,9 +76,8 @@ class SpatialCollocation(SpatialStep):
         return self._momentum(r_t, R * (self.body.I_R * Om), R, None if b is None else R * ufl.cross(Om, b))
 
     def _momentum(self, r_t, kappa, R, z_t):
-        if z_t is None:
-            return inertia.momentum(r_t, kappa, self.body, self.test)
-        return eccentric.momentum(r_t, R * self.body.offset, z_t, kappa, self.body, self.test)
+        z = None if z_t is None else R * self.body.offset
+        return inertia.momentum(r_t, kappa, self.body, self.test, z, z_t)
 
     def _rotation(self):
         return rotation_matrix(parts_of(self.nodal)[1])
@@ -81,14 +109,14 @@ def compile_collocated(step):
     """The `MotionForms` at the end of a step, the changes of the six strains over it, and their rates at its end."""
     model, dx = step.model, step.dx
     increment = step.increment(step.nodal, step.nodal0)
-    strains = [collocation.strains(motion, step.section) for motion in (step.before, step.after)]
+    strains = [strains_of(motion, step.section) for motion in (step.before, step.after)]
     v = model.by_velocity * increment + model.known_velocity
     a = model.by_acceleration * increment + model.known_acceleration
     rates = model.by_velocity * (strains[1] - strains[0]) + model.known_strain_rate
     residual = (step.rate_of_momentum(v, a) + model.drag[0] * step.momentum_by(v)) * dx.nodes
 
     def of_stress(test):
-        return collocation.stress(step.after, step.section, step.viscosity, rates, test)
+        return stress_work(step.after, step.section, step.viscosity, rates, test)
 
     residual += of_stress(step.test) * dx.gauss
     residual += step.constraint()
@@ -297,7 +325,7 @@ class EccentricStep(SpatialStep):
         return self.momentum(self.nodal, 2 * self.passed - self.rates, 2 * self._arm_passed() - self.turned)
 
     def of_moving_axis(self):
-        return eccentric.of_moving_axis(parts_of(self.passed)[0], self._arm_passed(), self.body, self.test)
+        return inertia.of_moving_axis(parts_of(self.passed)[0], self._arm_passed(), self.body, self.test)
 
     def _arm_passed(self):
         """The rate (z_1 - z_0)/h of the step."""
@@ -321,13 +349,9 @@ class EccentricSpatial(Turning, MovingSpatial):
 
 
 class ConservingStep(SpatialStep):
-    """See `StepForms`: energies and momenta of the directors' rates; test functions are changes of (r, q).
-
-    Attributes:
-        spin: rates of the directors at the beginning of the step; moved, turned: mean rates of r and of the directors
-            over it.
-        lines: `energy.Configuration`s of its two ends.
-    """
+    """See `StepForms`: energies and momenta of the directors' rates; test functions are changes of (r, q). spin: rates
+    of the directors at the beginning of the step; moved, turned: mean rates of r and of the directors over it; lines:
+    `energy.Configuration`s of its two ends."""
 
     def __init__(self, model):
         super().__init__(model)
@@ -348,9 +372,8 @@ class ConservingStep(SpatialStep):
     def momentum_before(self):
         (_, q), (r_t, _), body = parts_of(self.nodal), parts_of(self.rates), self.body
         kappa = energy.angular_momentum(q, self.spin, body)
-        if body.offset is None:
-            return inertia.momentum(r_t, kappa, body, self.test)
-        return eccentric.momentum(r_t, eccentric.arm(q, body), self.spin * body.offset, kappa, body, self.test)
+        z_t = None if body.offset is None else self.spin * body.offset
+        return inertia.momentum(r_t, kappa, body, self.test, inertia.arm(q, body), z_t)
 
     def kinetic_before(self):
         return energy.kinetic_energy(parts_of(self.rates)[0], self.spin, self.body)

@@ -11,7 +11,7 @@ from mpi4py import MPI
 
 from cosserat_fenicsx import compat
 from cosserat_fenicsx.errors import SceneError
-from cosserat_fenicsx.forms import eccentric, inertia
+from cosserat_fenicsx.forms import inertia
 from cosserat_fenicsx.forms import planar as eq
 from cosserat_fenicsx.forms.equilibrium import VirtualMotion
 from cosserat_fenicsx.forms.point import AXES, NONE
@@ -229,17 +229,13 @@ class SpatialStep(StepForms):
         """See `StepForms`; z_t: rate of the mass centre about the axis, by default from the rates of q."""
         (_, q), (r_t, q_t), body = parts_of(w), parts_of(w_t), self.body
         kappa = inertia.angular_momentum(q, q_t, body)
-        if body.offset is None:
-            return inertia.momentum(r_t, kappa, body, self.test)
-        z_t = eccentric.arm_rate(q, q_t, body) if z_t is None else z_t
-        return eccentric.momentum(r_t, eccentric.arm(q, body), z_t, kappa, body, self.test)
+        z_t = inertia.arm_rate(q, q_t, body) if z_t is None else z_t
+        return inertia.momentum(r_t, kappa, body, self.test, inertia.arm(q, body), z_t)
 
     def kinetic(self, w, w_t, z_t=None):
         (_, q), (r_t, q_t), body = parts_of(w), parts_of(w_t), self.body
-        Om = inertia.angular_velocity(q, q_t)
-        if body.offset is None:
-            return inertia.kinetic_energy(r_t, Om, body)
-        return eccentric.kinetic_energy(r_t, eccentric.arm_rate(q, q_t, body) if z_t is None else z_t, Om, body)
+        z_t = inertia.arm_rate(q, q_t, body) if z_t is None else z_t
+        return inertia.kinetic_energy(r_t, inertia.angular_velocity(q, q_t), body, z_t)
 
 
 class Moving(Damped):

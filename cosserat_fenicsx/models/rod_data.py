@@ -112,12 +112,9 @@ def rod_data(scene, layout, scales, rule, reference, *, coupled):
     """Law and reference at the Gauss points.
 
     The reference strain is that of the interpolated curve, so that the discrete rod is free of stress at rest; it
-    differs from (0, 0, 1) by the interpolation error, which does not reduce the order of convergence.
-
-    Args:
-        rule: the `ElementRule`; reference: (nodes, 3) positions at rest over the unit of length.
-        coupled: whether the law couples strains.
-    """
+    differs from (0, 0, 1) by the interpolation error, which does not reduce the order of convergence. rule: the
+    `ElementRule`; reference: (nodes, 3) positions at rest over the unit of length; coupled: whether the law couples
+    strains."""
     xs, counts = layout.inside(rule.gauss), np.array(layout.counts)
 
     def law_of_rod(i):

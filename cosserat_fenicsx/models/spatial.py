@@ -313,15 +313,10 @@ def _to_plane(t):
 
 
 def in_space(axes, offset, r, theta, n, m, r_s):
-    """Results of a planar model as vectors and quaternions in space.
-
-    Args:
-        axes: (3, 3) rows e_1, e_2, e_3; offset: (N, 3) the constant part of the positions.
-        r, theta: at the nodes, (k, N, 2) and (k, N); n, m, r_s: at the Gauss points, (.., 2), (..), (.., 2).
-
-    Returns:
-        (r, q) (k, N, 7) and (n, m, r') (.., 9), inertial; q is continuous where theta is, beyond full turns too.
-    """
+    """Results of a planar model as vectors and quaternions in space. axes: (3, 3) rows e_1, e_2, e_3; offset: (N, 3)
+    the constant part of the positions; r, theta: at the nodes, (k, N, 2) and (k, N); n, m, r_s: at the Gauss points,
+    (.., 2), (..), (.., 2). Returns (r, q) (k, N, 7) and (n, m, r') (.., 9), inertial; q is continuous where theta is,
+    beyond full turns too."""
     rq, fields = np.empty((*theta.shape, 7)), np.empty((*m.shape, 9))
     half = theta / 2
     rq[..., :3] = r @ axes[:2] + offset

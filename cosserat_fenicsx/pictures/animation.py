@@ -121,13 +121,9 @@ def _pace_in_words(speed):
 
 
 def record(make_stage, file, times, fps, progress):
-    """Draw and write all frames, on one rank.
-
-    Args:
-        make_stage: function that returns the stage: `at(t)` is the picture (height, width, 3) at t, and `close()` frees
-            it.
-        file: .gif or .mp4, a Path; times: t of each frame; fps: frames per second; progress: as of `film`.
-    """
+    """Draw and write all frames, on one rank. make_stage: function that returns the stage: `at(t)` is the picture
+    (height, width, 3) at t, and `close()` frees it; file: .gif or .mp4, a Path; times: t of each frame; fps: frames per
+    second; progress: as of `film`."""
     stage, stopped = make_stage(), None
     try:
         samples = [stage.at(t) for t in times[:: max(1, len(times) // 6)]]

@@ -9,7 +9,6 @@ import math
 import textwrap
 from contextlib import contextmanager
 from contextvars import ContextVar
-from functools import wraps
 from pathlib import Path
 
 import numpy as np
@@ -67,21 +66,6 @@ def draw_chart(make, file=None, comm=Alone, *, width=None, units="SI"):
         return drawn()
     on_first(comm, lambda: _write(drawn(), Path(file)))
     return None
-
-
-def chart(check=lambda result: None):
-    """Decorator: a function (result, ...) that makes a Figure becomes a function (result, file, ..., **look), see
-    `draw_chart`; `check(result)` refuses what has no chart."""
-
-    def decorate(make):
-        @wraps(make)
-        def draw(result, file=None, *given, **look):
-            check(result)
-            return draw_chart(lambda: make(result, *given), file, result._ranks, **look)
-
-        return draw
-
-    return decorate
 
 
 @contextmanager
@@ -163,11 +147,7 @@ def stacked(width, heights):
 
 def beside(widths, height):
     """A Figure and panels beside each other, inches, that share the vertical axis; in several rows where the picture is
-    narrower.
-
-    Returns:
-        the Figure; the panels, in the order of the widths; for each row the panels in it.
-    """
+    narrower. Returns the Figure; the panels, in the order of the widths; for each row the panels in it."""
     room, rows = room_for(sum(widths)), [[]]
     for k, width in enumerate(widths):
         if rows[-1] and sum(widths[i] for i in rows[-1]) + width > _SQUEEZED * room:

@@ -7,7 +7,6 @@ from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.pictures.charts import (
     COLOURS,
     GREY,
-    chart,
     empty_figure,
     ledger,
     legend,
@@ -36,19 +35,15 @@ _CONSTANT = 0.05
 _LEAST, _SHORTEST, _LONGEST, _OVERLAP, _FLOOR, _FINER = 200, 1 / 40, 1 / 4, 8, 1e-3, 4
 
 
-def _with_times(what):
-    """A check that a motion or an orbit has at least two times; `what`: the chart, in words."""
-
-    def check(result):
-        if len(result) < 2:
-            raise SceneError(f"chart of {what}: expected a history with at least two times")
-
-    return check
+def _refuse_short(result, what):
+    """Refuse a motion or an orbit with fewer than two times; `what`: the chart, in words."""
+    if len(result) < 2:
+        raise SceneError(f"chart of {what}: expected a history with at least two times")
 
 
-@chart(_with_times("energies"))
-def draw_energy(history):
+def energy_figure(history):
     """See `History.plot_energy`."""
+    _refuse_short(history, "energies")
     title = f"{history.scene.title or 'Motion'}: energy, scheme {history.scheme}"
     return ledger(history.times, *energies_of(history), history.balance, title)
 
@@ -58,9 +53,9 @@ def energies_of(history):
     return [[(label, getattr(history, name), *style) for name, label, *style in curves] for curves in (_STORED, _DONE)]
 
 
-@chart(_with_times("orbit"))
-def draw_orbit(orbit):
+def orbit_figure(orbit):
     """See `Orbit.plot`."""
+    _refuse_short(orbit, "orbit")
     from matplotlib.collections import LineCollection
 
     figure = empty_figure(7.5, 0.83 * room_for(7.5))
@@ -86,9 +81,9 @@ def draw_orbit(orbit):
     return figure
 
 
-@chart(_with_times("whirl"))
-def draw_whirl(orbit):
+def whirl_figure(orbit):
     """See `Whirl.plot`."""
+    _refuse_short(orbit, "whirl")
     t = orbit.times
     figure, (above, middle, below) = stacked(10, (2.4, 2.4, 2.4))
     heading, size = scale(_DISTANCE)
@@ -127,11 +122,11 @@ def _check_run_up(orbit):
         )
 
 
-@chart(_check_run_up)
-def draw_campbell(orbit):
+def campbell_figure(orbit):
     """Above, the amplitude of whirl over the speed of rotation; below, the spectrum over that speed: rates of the
     section's axis, forward (positive) and backward, with lines for the speed of rotation itself, forward and backward,
     and for rolling without slip."""
+    _check_run_up(orbit)
     at, amplitude, speed, rates = spectra(orbit)
     order = np.argsort(speed)
     touches = np.nan_to_num(orbit.normal).any()
@@ -186,7 +181,7 @@ def spectra(orbit):
 _UNSTABLE, _ROOM = {"marker": "x", "color": "tab:red", "ls": "", "label": "grows"}, 1.08
 
 
-def of_modes(found, seen, orders):
+def modes_figure(found, seen, orders):
     """See `ModesAlong.plot`."""
     figure, (above, below) = stacked(7.5, (3.2, 1.8))
     known, over = found.quantities, found.value(found._over)

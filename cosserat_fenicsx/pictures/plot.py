@@ -320,12 +320,8 @@ _PIECES, _FEWEST, _GAP = 600, 8, 0.18
 
 
 def tangled(shapes, right, above):
-    """Whether shapes cross each other so often in the picture that they cannot be distinguished.
-
-    Args:
-        shapes: of each shape the list of the centrelines of its rods, (n, 3), m.
-        right, above: unit vectors (3,) of the picture.
-    """
+    """Whether shapes cross each other so often in the picture that they cannot be distinguished. shapes: of each shape
+    the list of the centrelines of its rods, (n, 3), m; right, above: unit vectors (3,) of the picture."""
     flat = [_segments(lines, np.column_stack([right, above])) for lines in shapes]
     pairs = list(itertools.combinations(flat, 2))
     return bool(pairs) and sum(itertools.starmap(_crossings, pairs)) >= _TANGLED * len(pairs)

@@ -92,11 +92,7 @@ class Symbols:
 
     def support(self, mark, pose, text=""):
         """A plate for a clamp, a cone for a pin, a cone with the axis for a hinge, a cone on balls for a roller; with
-        an arrow for a prescribed displacement.
-
-        Args:
-            text: the label of that arrow; without one it is not drawn.
-        """
+        an arrow for a prescribed displacement. text: the label of that arrow; without one it is not drawn."""
         a = self._size
         if mark.kind in ("clamp", "moved"):
             across = max(1.2 * a, 2.6 * pose.radius)

@@ -231,11 +231,8 @@ def least_gap(path):
 
 def check_passes(path, share=1e-2, whole=None):
     """Refuse a path or motion where a rod passes into an obstacle between two nodes far deeper than at these nodes, and
-    by more than a share of the largest displacement of that state or of the obstacle's size.
-
-    Raises:
-        Passes: naming rod, place and depth; with the path `whole`, or with this one.
-    """
+    by more than a share of the largest displacement of that state or of the obstacle's size. Raises Passes: naming rod,
+    place and depth; with the path `whole`, or with this one."""
     if path.scene.stages:
         for part in path.parts.values():
             check_passes(part, share, whole=path)
@@ -416,11 +413,8 @@ def _pairs_at_nodes(history, k, strands):
 
 
 def check_apart(path, whole=None):
-    """Refuse a path in which rods overlap, by the distances of the sides of fine polygons along them.
-
-    Raises:
-        NotConverged: naming rods, places and depth; with the path `whole`, or with this one.
-    """
+    """Refuse a path in which rods overlap, by the distances of the sides of fine polygons along them. Raises
+    NotConverged: naming rods, places and depth; with the path `whole`, or with this one."""
     scene, action = path.scene, path.scene.rod_contact
     apart = action.apart(scene)
     for k in range(len(path)):

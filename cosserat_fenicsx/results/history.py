@@ -228,9 +228,7 @@ class History(RodResult):
             units: "SI", "field", or a dict of units by dimensions, such as {"force": "klbf"}.
             width: of the picture, pixels, which its fonts and legends are arranged for; None for 150 to the inch.
         """
-        from cosserat_fenicsx.pictures import motion_charts
-
-        return motion_charts.draw_energy(self, file, units=units, width=width)
+        return self._drawn("pictures.motion_charts.energy_figure", file, units, width)
 
     def animate(self, file, *, fps=25, speed=None, magnify=1.0, enlarge=1.0, size=(960, 720), color=None,
                 progress=None):  # fmt: skip
@@ -349,9 +347,7 @@ class History(RodResult):
 
         Args: see `plot_orbit`.
         """
-        from cosserat_fenicsx.pictures.motion_charts import draw_whirl
-
-        return draw_whirl(self.orbit(station, wall), file, units=units, width=width)
+        return self.orbit(station, wall)._drawn("pictures.motion_charts.whirl_figure", file, units, width)
 
     def plot_campbell(
         self,
@@ -370,9 +366,7 @@ class History(RodResult):
         Raises:
             SceneError: the speed of rotation hardly changes, or too few times are saved.
         """
-        from cosserat_fenicsx.pictures.motion_charts import draw_campbell
-
-        return draw_campbell(self.orbit(station, wall), file, units=units, width=width)
+        return self.orbit(station, wall)._drawn("pictures.motion_charts.campbell_figure", file, units, width)
 
     def _at_clamp(self, point, joined):
         return self._stacked("clamp_forces")[:, point]

@@ -480,9 +480,6 @@ class ModesAlong(Result):
         Raises:
             SceneError: another frame, or a file's ending that matplotlib does not know.
         """
-        from cosserat_fenicsx.pictures.charts import draw_chart
-        from cosserat_fenicsx.pictures.motion_charts import of_modes
-
         if seen not in ("rotating", "inertial"):
             raise SceneError(f'seen = {seen!r}: expected "rotating" or "inertial"')
-        return draw_chart(lambda: of_modes(self, seen, orders), file, self._ranks, width=width, units=units)
+        return self._drawn("pictures.motion_charts.modes_figure", file, units, width, seen, orders)

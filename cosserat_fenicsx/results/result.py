@@ -253,6 +253,14 @@ class Result:
         number = 0.0 if abs(value) <= quantity.noise else value / size
         return f"{number:{form}} {unit}" if unit != "1" else f"{number:{form}}"
 
+    def _drawn(self, chart, file, units, width, *given):
+        """Draw the Figure `chart(self, *given)`, a function with its module below the package, see `draw_chart`."""
+        from cosserat_fenicsx.pictures.charts import draw_chart
+
+        module, _, name = chart.rpartition(".")
+        make = getattr(import_module(f"cosserat_fenicsx.{module}"), name)
+        return draw_chart(lambda: make(self, *given), file, self._ranks, units=units, width=width)
+
     # -- of subclasses -----------------------------------------------------------------------------------------------
 
     @property
@@ -298,14 +306,7 @@ class Charted(Result):
             SceneError: matplotlib is missing, the ending is unknown, or there is nothing to draw.
             OSError: the file cannot be written.
         """
-        return self._drawn(file, units, width)
-
-    def _drawn(self, file, units, width, *given):
-        from cosserat_fenicsx.pictures.charts import draw_chart
-
-        module, _, name = self._chart.rpartition(".")
-        make = getattr(import_module(f"cosserat_fenicsx.{module}"), name)
-        return draw_chart(lambda: make(self, *given), file, self._ranks, units=units, width=width)
+        return self._drawn(self._chart, file, units, width)
 
 
 class ChartedBetween(Charted):
@@ -327,7 +328,7 @@ class ChartedBetween(Charted):
                 times.
             OSError: the file cannot be written.
         """
-        return self._drawn(file, units, width, between)
+        return self._drawn(self._chart, file, units, width, between)
 
 
 # Most rods whose numbers of elements are listed one by one.

@@ -136,12 +136,9 @@ def as_text(table, width=140, most=None):
 
 
 def page(answer, table_of=None):
-    """Sentences and a table that fit a screen.
-
-    Args:
-        answer: sentences; those that do not fit are left out, from the end. table_of: a function of the number of rows
-            that returns a rich table, or None where there is nothing to show; None without a table.
-    """
+    """Sentences and a table that fit a screen. answer: sentences; those that do not fit are left out, from the end.
+    table_of: a function of the number of rows that returns a rich table, or None where there is nothing to show; None
+    without a table."""
     lines = [line for told in answer for line in textwrap.wrap(told, WIDTH, break_on_hyphens=False)]
     room = LINES - (0 if table_of is None else _FRAME + _FEWEST)
     if len(lines) > room:

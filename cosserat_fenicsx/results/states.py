@@ -109,12 +109,8 @@ class States(OnNodes):
     def __getitem__(self, k: int | slice) -> Self:
         """State k, or the states of a slice: a result of the same kind with these states alone, in SI units as ever.
 
-        `at_points` takes a list of indices. Neither has events.
-
-        Raises:
-            IndexError: there is no state k.
-            SceneError: k is no whole number.
-        """
+        `at_points` takes a list of indices. Neither has events. Raises IndexError: there is no state k; SceneError: k
+        is no whole number."""
         if isinstance(k, slice):
             return self.at_points(list(range(len(self))[k]))
         return self.at_points([self._index(k, f"[{k!r}]")])

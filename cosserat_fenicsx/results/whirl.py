@@ -136,9 +136,7 @@ class Orbit(Result):
         Args:
             file, units, width: see `History.plot_energy`.
         """
-        from cosserat_fenicsx.pictures.motion_charts import draw_orbit
-
-        return draw_orbit(self, file, units=units, width=width)
+        return self._drawn("pictures.motion_charts.orbit_figure", file, units, width)
 
     @property
     def radius(self) -> np.ndarray:
@@ -376,11 +374,9 @@ class Whirl(Result):
         Raises:
             SceneError: the Whirl was made without its orbit.
         """
-        from cosserat_fenicsx.pictures.motion_charts import draw_whirl
-
         if self.orbit is None:
             raise SceneError("plot: expected a Whirl with its orbit, as History.whirl returns it")
-        return draw_whirl(self.orbit, file, units=units, width=width)
+        return self.orbit._drawn("pictures.motion_charts.whirl_figure", file, units, width)
 
 
 def whirl(history, station, wall=None, since=None):

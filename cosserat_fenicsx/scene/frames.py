@@ -353,11 +353,8 @@ def _known(name, known):
 
 @dataclass(frozen=True)
 class MeshGroup(Part):
-    """The section and the material of the lines of a group of a mesh.
-
-    Args:
-        name: of the group, or its number. section: of its rods. material: None for that of the mesh.
-    """
+    """The section and the material of the lines of a group of a mesh. name: of the group, or its number. section: of
+    its rods. material: None for that of the mesh."""
 
     name: str | int
     section: Section

@@ -103,11 +103,8 @@ def parameter_of(scene, given):
 
     Names are made of fields and numbers from 0: "rods.column.section.diameter" or "rods[0].section.diameter",
     "rods.column.material.E", "materials[0].E" (of the rods' different materials, in order) or "materials.steel.E" (of a
-    scene file), "loads[1].force[2]", "supports[0].displacement[0]".
-
-    Raises:
-        SceneError: there is no such number (names the nearest), or it is 0 and its scale is unknown.
-    """
+    scene file), "loads[1].force[2]", "supports[0].displacement[0]". Raises SceneError: there is no such number (names
+    the nearest), or it is 0 and its scale is unknown."""
     if isinstance(given, Parameter):
         return given
     if not isinstance(given, str):

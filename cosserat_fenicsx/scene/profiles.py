@@ -46,11 +46,8 @@ def piece_at(breaks, s, side, length):
 
 @dataclass(frozen=True)
 class InPieces(Kind):
-    """A value of another kind, or pieces (s_end, value) along a rod.
-
-    Attributes:
-        key: the key of the value in the table of a piece, beside "to"; "" where the value is itself the table.
-    """
+    """A value of another kind, or pieces (s_end, value) along a rod. key: the key of the value in the table of a piece,
+    beside "to"; "" where the value is itself the table."""
 
     inner: Kind = Kind()
     key: str = ""

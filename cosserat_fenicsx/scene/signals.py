@@ -276,12 +276,8 @@ class Signal:
         return self.function
 
     def __call__(self, t: float) -> tuple:
-        """The vector at t, s.
-
-        Raises:
-            SceneError: the function raised, or returned another number of values, values that are not finite, or
-                outside the limits of the field; the message gives the time.
-        """
+        """The vector at t, s. Raises SceneError: the function raised, or returned another number of values, values that
+        are not finite, or outside the limits of the field; the message gives the time."""
         when = f"at the time t = {t:g} s" + (f", of the {self.owner} at {self.place}" if self.place else "")
         given = call(self.function, t, f"{self.owner}.{self.field}: its function", f", {when}")
         given = (given,) if self.size == 1 and isinstance(given, numbers.Real) else given
@@ -402,11 +398,8 @@ class Along(FunctionAlong):
             refuse(self, "function", self.function, "a function of the arc length s (m)")
 
     def __call__(self, s):
-        """(n, 3) at arc lengths s (n,), m.
-
-        Raises:
-            SceneError: the function raised, or returned something else than three finite numbers.
-        """
+        """(n, 3) at arc lengths s (n,), m. Raises SceneError: the function raised, or returned something else than
+        three finite numbers."""
         values = [vector_at("Along", "function", self.function, x, "per length") for x in np.asarray(s, float).tolist()]
         return np.array(values).reshape(-1, 3)
 

@@ -260,12 +260,8 @@ def legs_of(scene):
 
 
 def after(leg):
-    """The loads and supports, lists of `Named`, that a stage after this one finds.
-
-    Raises:
-        SceneError: a part of the reaction of a released support, or of the tension of a released tendon of given
-            length, is left.
-    """
+    """The loads and supports, lists of `Named`, that a stage after this one finds. Raises SceneError: a part of the
+    reaction of a released support, or of the tension of a released tendon of given length, is left."""
     lengths = any(x.item.shortens and leg.releases(x.item) for x in leg.ramped)
     if (leg.released or lengths) and leg.last != 1:
         raise SceneError(

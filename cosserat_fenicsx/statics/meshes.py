@@ -379,11 +379,8 @@ def balanced(fine, coarse, above):
 
 def halved(path, target):
     """The layout with all elements halved; in a frame of many rods, those of rods that bend most are cut into more, so
-    that the error estimated from the two meshes may be expected to be below the target.
-
-    Args:
-        path: a `Path` on the mesh, whose errors are unknown.
-    """
+    that the error estimated from the two meshes may be expected to be below the target. path: a `Path` on the mesh,
+    whose errors are unknown."""
     layout, scene, p = path.layout, path.scene, path.degree
     if len(scene.rods) < _FIRST.many_rods:
         return layout.finer(scene, 2.0)

@@ -65,13 +65,9 @@ def softness(problem, K):
 
 def corrected(softness, M, C, values, vectors, rounding, trusted):
     """Eigenvalues without `softness`, to first order with left eigenvectors taken for right ones, unless that is within
-    their relative rounding errors (n,); and these with what is left, or with what rounding may hide of the change.
-
-    Args:
-        M, C: see the head of this file; C is None where `values` are squares of frequencies.
-        values: (n,) dimensionless; vectors: (size, n). trusted: whether the stiffness is symmetric, so that the left
-            eigenvectors are known.
-    """
+    their relative rounding errors (n,); and these with what is left, or with what rounding may hide of the change. M,
+    C: see the head of this file; C is None where `values` are squares of frequencies; values: (n,) dimensionless;
+    vectors: (size, n). trusted: whether the stiffness is symmetric, so that the left eigenvectors are known."""
     if softness is None:
         return values, rounding
     left = vectors.conj()

@@ -67,15 +67,9 @@ def rubbing(A, b, friction, start):
     """Forces (m, 3) of contacts, normal and across it, by which motions A f + b obey Signorini's and Coulomb's laws.
 
     By Newton's method for the nonsmooth equations of Alart & Curnier (Comput. Methods Appl. Mech. Engrg. 92 (1991)
-    353), with shares of steps until their residual falls, from given forces and from those without friction.
-
-    Args:
-        A: (3 m, 3 m), positive definite, not necessarily symmetric; b: (3 m,); friction: (m,) coefficients.
-        start: (m, 3) forces.
-
-    Returns:
-        (m, 3) forces, and the largest error of a force by its law over the largest force.
-    """
+    353), with shares of steps until their residual falls, from given forces and from those without friction. A: (3 m, 3
+    m), positive definite, not necessarily symmetric; b: (3 m,); friction: (m,) coefficients; start: (m, 3) forces.
+    Returns (m, 3) forces, and the largest error of a force by its law over the largest force."""
     m, normal = len(friction), np.arange(len(friction)) * 3
     across = normal[:, None] + (1, 2)
     stiff = 1 / np.diag(A)
@@ -134,14 +128,8 @@ class _Steps(LimitedNewton):
 
 
 class RodContacts:
-    """The contacts of a scene's rods at the state of a `Problem`.
-
-    Args:
-        problem: a `Problem`, loaded with a scene that has a `RodContact`.
-
-    Attributes:
-        force: (unknowns,) what the contacts add to the residual.
-    """
+    """The contacts of a scene's rods at the state of a `Problem`. problem: a `Problem`, loaded with a scene that has a
+    `RodContact`. force: (unknowns,) what the contacts add to the residual."""
 
     def __init__(self, problem):
         model = problem.model
@@ -202,15 +190,9 @@ class RodContacts:
     # -- equilibrium -------------------------------------------------------------------------------------------------
 
     def solve(self, numbers, load_factor, accepted):
-        """Newton's method to an equilibrium at a load factor, by steps in which no rod passes through another.
-
-        Args:
-            numbers: `Problem.numbers` to start from, where no strand is passed on the way to them from the last
-                accepted state, `accepted`, from which it starts otherwise.
-
-        Returns:
-            Solved.
-        """
+        """Newton's method to an equilibrium at a load factor, by steps in which no rod passes through another. numbers:
+        `Problem.numbers` to start from, where no strand is passed on the way to them from the last accepted state,
+        `accepted`, from which it starts otherwise. Returns Solved."""
         problem, newton = self._problem, self._newton
         problem.set_load_factor(load_factor)
         newton.iterations, spring, sizes, why = 0, 0.0, [], ""

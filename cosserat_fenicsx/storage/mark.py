@@ -63,12 +63,9 @@ def until(mark, time):
 
 
 def difference(given, expected, what, rounding=0.0):
-    """The first difference of two marks in words, of a function at the sample that differs most; None for none.
-
-    Args:
-        what: the stored thing that `expected` belongs to, such as "motion".
-        rounding: relative difference of numbers that counts as equal.
-    """
+    """The first difference of two marks in words, of a function at the sample that differs most; None for none. what:
+    the stored thing that `expected` belongs to, such as "motion"; rounding: relative difference of numbers that counts
+    as equal."""
     groups = {}
     for place in expected:
         groups.setdefault(place.partition(" at ")[0], []).append(place)

@@ -36,11 +36,8 @@ _SENDABLE = "arguments that pickle takes: numbers, texts, arrays, scenes, functi
 
 
 def computed(task, case):
-    """What a case gives, as a part of the row that is stored: its result or its failure in words, and seconds.
-
-    Raises:
-        InstallationError: it needs what is not installed.
-    """
+    """What a case gives, as a part of the row that is stored: its result or its failure in words, and seconds. Raises
+    InstallationError: it needs what is not installed."""
     return computed_at_once(task, [case])[0]
 
 

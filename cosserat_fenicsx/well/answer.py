@@ -488,11 +488,9 @@ class TorqueAndDrag(Differentiated, ChartedBetween):
         Raises:
             SceneError: see `plot`; no mud.
         """
-        from cosserat_fenicsx.well import charts
-
         if self.mud is None:
             raise SceneError("plot_pressures: mud = None: expected the answer of a string in Mud(density)")
-        return charts.drawn(self, charts.pressures_figure, file, between, units=units, width=width)
+        return self._drawn("well.charts.pressures_figure", file, units, width, between)
 
     def plot_from_side(
         self,
@@ -513,12 +511,10 @@ class TorqueAndDrag(Differentiated, ChartedBetween):
         Raises:
             SceneError: a soft string, which has no shape of its own; matplotlib is missing, or the ending is unknown.
         """
-        from cosserat_fenicsx.well import charts
-
         if self.model != "rod":
             raise SceneError(f"plot_from_side: a {self.words} lies on the axis: expected an answer of model = 'rod'")
         length = None if length is None else positive("plot_from_side", "length", length, "m")
-        return charts.drawn(self, charts.side_figure, file, length, units=units, width=width)
+        return self._drawn("well.charts.side_figure", file, units, width, length)
 
     def plot_3d(
         self,

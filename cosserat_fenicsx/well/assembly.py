@@ -44,14 +44,10 @@ _WALLS, _STIFFER, _STEPS = 5, 10.0, 40
 
 @dataclass(frozen=True)
 class Assembly:
-    """The lower end of a string.
-
-    Attributes:
-        ends: (n,) upper ends of its uniform parts, m from the bit up; EI (N m^2), GA (N), weight (N/m in mud),
-            clearance (of the body, m): of each.
-        rings: [(s, clearance)] of stabilisers, m. bends: [(s, angle)], rad, > 0 where it points the bit to the high
-            side. thrust: weight on bit, N. inclination: of the hole at the bit, rad.
-    """
+    """The lower end of a string. ends: (n,) upper ends of its uniform parts, m from the bit up; EI (N m^2), GA (N),
+    weight (N/m in mud), clearance (of the body, m): of each; rings: [(s, clearance)] of stabilisers, m. bends: [(s,
+    angle)], rad, > 0 where it points the bit to the high side. thrust: weight on bit, N. inclination: of the hole at
+    the bit, rad."""
 
     ends: np.ndarray
     EI: np.ndarray
@@ -69,11 +65,8 @@ class Assembly:
         return float(self.ends[-1])
 
     def at(self, curvature):
-        """The `Held` in a hole of a curvature, 1/m.
-
-        Raises:
-            NotConverged: no contacts were found that fit, or the string does not lie down on the wall within it.
-        """
+        """The `Held` in a hole of a curvature, 1/m. Raises NotConverged: no contacts were found that fit, or the string
+        does not lie down on the wall within it."""
         whole = _solved(self, curvature, self.length, 0)
         sides, side = whole.sides[:-1], int(whole.sides[-2])
         lies = whole.s[len(sides) - 1 - np.argmax(sides[::-1] != side)]
@@ -101,12 +94,9 @@ class Assembly:
 
 
 def assembly_of(hole, laid, mud, operation, depth, length):
-    """The `Assembly` of the lowest `length` (m) of a string with its bit at a measured depth (m).
-
-    Raises:
-        SceneError: a component without stiffness, or that bends differently about its two axes; a lower end that is
-            no bit; a bend to another side than the high or the low one.
-    """
+    """The `Assembly` of the lowest `length` (m) of a string with its bit at a measured depth (m). Raises SceneError: a
+    component without stiffness, or that bends differently about its two axes; a lower end that is no bit; a bend to
+    another side than the high or the low one."""
     if laid[0].component.touches != "bottom":
         raise SceneError(
             f"build_rate: the lowest component is {laid[0].component.name}: expected a Bit, at which the hole is made"
@@ -138,13 +128,9 @@ def assembly_of(hole, laid, mud, operation, depth, length):
 
 @dataclass(frozen=True, eq=False)
 class Held:
-    """An `Assembly` in its hole; arrays are over the nodes from the bit up.
-
-    Attributes:
-        s: from the bit up, m. offset: to the high side, m; angle: rad. sides: where it touches, 1 the high side, -1
-            the low one, 0 not. force: of the wall, N, to the high side. moment_at_end: N m, of the support of the upper
-            end, beyond that of the hole's curvature.
-    """
+    """An `Assembly` in its hole; arrays are over the nodes from the bit up. s: from the bit up, m. offset: to the high
+    side, m; angle: rad. sides: where it touches, 1 the high side, -1 the low one, 0 not. force: of the wall, N, to the
+    high side. moment_at_end: N m, of the support of the upper end, beyond that of the hole's curvature."""
 
     s: np.ndarray
     offset: np.ndarray

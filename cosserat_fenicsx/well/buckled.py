@@ -38,12 +38,8 @@ _Start = namedtuple("_Start", "EI clearance known load")
 
 
 def buckled_string(soft, pieces, sections, tol):
-    """The `Solved` with helices, from the soft string without them; None if it has none.
-
-    Raises:
-        LockUp: the string locks up.
-        NotConverged: the tolerance was not reached.
-    """
+    """The `Solved` with helices, from the soft string without them; None if it has none. Raises LockUp: the string
+    locks up; NotConverged: the tolerance was not reached."""
     for rtols in _SET.rtols:
         start, first = _begin(soft, pieces, sections, criteria.helix_load)
         if first is None:
@@ -64,11 +60,7 @@ def buckled_string(soft, pieces, sections, tol):
 
 def earliest_helix(soft, pieces, sections):
     """The `Solved`, roughly, of a string whose snakes are helices, and which begins to be one as early as a helix is
-    known to be possible: more than the friction of whatever shape it has.
-
-    Raises:
-        LockUp: such a string locks up.
-    """
+    known to be possible: more than the friction of whatever shape it has. Raises LockUp: such a string locks up."""
     start, first = _begin(soft, pieces, sections, criteria.earliest_helix_load)
     return soft if first is None else _March(soft, start, pieces.bottom[-1], _SET.rough).up(first)
 
@@ -100,11 +92,7 @@ def _begin(soft, pieces, sections, load):
 
 
 class LockUp(SceneError):
-    """The string locks up: no thrust moves it.
-
-    Attributes:
-        md: where, m.
-    """
+    """The string locks up: no thrust moves it. md: where, m."""
 
     def __init__(self, md):
         super().__init__(

@@ -10,7 +10,6 @@ from cosserat_fenicsx.pictures.charts import (
     SMALL,
     STYLES,
     beside,
-    draw_chart,
     empty_figure,
     legend,
     scale,
@@ -27,11 +26,8 @@ SIDES = {"low": "tab:blue", "high": "tab:red", "left": "tab:green", "right": "ta
 
 
 def depths_between(where, between, depth):
-    """(top, bottom), m, of the depths that a picture shows, at most from 0 to the depth of the bit.
-
-    Raises:
-        SceneError: they are not two depths of the string, the upper one first.
-    """
+    """(top, bottom), m, of the depths that a picture shows, at most from 0 to the depth of the bit. Raises SceneError:
+    they are not two depths of the string, the upper one first."""
     if between is None:
         return 0.0, float(depth)
     ends = finite_array(where, "between", between, "two measured depths (m), such as (3000, 3400)")
@@ -73,11 +69,6 @@ _HOOK = Quantity("hook load", unit="N", shown="kN")
 _SURFACE = Quantity("surface torque", unit="N m", shown="kN m")
 _BIT_DEPTH = Quantity("measured depth of the bit", unit="m", shown="m", dimension="length")
 DEPTH = Quantity("measured depth", unit="m", shown="m", dimension="length")
-
-
-def drawn(result, make, file, *given, **look):
-    """The chart `make(result, *given)`, see `draw_chart`."""
-    return draw_chart(lambda: make(result, *given), file, result._ranks, **look)
 
 
 def over_depth(widths, quantity):

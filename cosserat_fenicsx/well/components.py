@@ -67,14 +67,8 @@ def standard_sizes():
 
 def standard_size(kind, name):
     """Its full name as `size`, outer_diameter, inner_diameter, tool_joint (m, or None), mass (kg/m in air, or None).
-
-    Args:
-        kind: "DrillPipe", "HeavyWeight", "Collar" or "Casing"; name: such as "5 in 19.50 lb/ft"; the units may be left
-            out.
-
-    Raises:
-        SceneError: an unknown name, with the nearest known one.
-    """
+    kind: "DrillPipe", "HeavyWeight", "Collar" or "Casing"; name: such as "5 in 19.50 lb/ft"; the units may be left out.
+    Raises SceneError: an unknown name, with the nearest known one."""
     known = standard_sizes()[kind]
     plain = {_plain(size): size for size in known}
     if not isinstance(name, str) or _plain(name) not in plain:
@@ -477,13 +471,9 @@ def weight_in_mud(component, mud, md):
     carry a part of it.
 
     w = m g - rho_o g A_o + rho_i g A_i, the weight that goes with the effective tension: A. Sparks, J. Energy Resour.
-    Technol. 106 (1984) 46, doi:10.1115/1.3231023. The outer area A_o is the area of the steel, mass
-    over density, and of the bore A_i, so that tool joints count. Where the fluids change w jumps and the effective
-    tension does not.
-
-    Raises:
-        SceneError: no mud, and no weight in it.
-    """
+    Technol. 106 (1984) 46, doi:10.1115/1.3231023. The outer area A_o is the area of the steel, mass over density, and
+    of the bore A_i, so that tool joints count. Where the fluids change w jumps and the effective tension does not.
+    Raises SceneError: no mud, and no weight in it."""
     if component.weight is not None:
         return np.full(np.shape(md), component.weight)[()]
     if mud is None:

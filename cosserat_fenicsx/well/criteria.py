@@ -59,16 +59,9 @@ def lubinski(EI, weight):
 
 
 def he_kyllingstad(EI, clearance, along, across, curvature):
-    """N: the smallest F > 0 with F = 2 sqrt(EI N(F)/r), N^2 = (across - curvature F)^2 + along^2.
-
-    Args:
-        along, across: weight per length along the binormal and along the normal of the axis (which points to the
-            centre of its curvature), N/m.
-        curvature: of the axis, 1/m.
-
-    Returns:
-        infinity where no load fulfils it.
-    """
+    """N: the smallest F > 0 with F = 2 sqrt(EI N(F)/r), N^2 = (across - curvature F)^2 + along^2. along, across: weight
+    per length along the binormal and along the normal of the axis (which points to the centre of its curvature), N/m;
+    curvature: of the axis, 1/m. Returns infinity where no load fulfils it."""
     EI, clearance, along, across, curvature = np.broadcast_arrays(EI, clearance, along, across, curvature)
     # with F = f x: x^4 - (curvature f/q)^2 x^2 + 2 curvature f across/q^2 x - (across^2 + along^2)/q^2 = 0
     f = 2 * np.sqrt(EI * np.maximum(np.hypot(along, across), 1e-9) / clearance)
@@ -84,11 +77,8 @@ def he_kyllingstad(EI, clearance, along, across, curvature):
 
 
 def load_of(name, EI, clearance, weight, inclination, along, across, curvature):
-    """N: by the criterion of a name, see the functions above; NaN where EI or a clearance is missing.
-
-    Raises:
-        SceneError: an unknown name.
-    """
+    """N: by the criterion of a name, see the functions above; NaN where EI or a clearance is missing. Raises
+    SceneError: an unknown name."""
     loose = np.where(clearance > 1e-9, clearance, np.nan)
     straight = {"Dawson-Paslay": dawson_paslay, "Chen": chen, "Wu": wu}
     if name in straight:

@@ -117,16 +117,10 @@ def free_span(EI, d, q):
 
 
 def prying(rings, depth, along):
-    """Effects that a soft string neglects at its rings, as sums of absolute values.
-
-    Args:
-        rings: [`Ring`] from the bit up. depth: of the string's end, m. along: function of two measured depths (m) that
-            gives the largest load across (N/m), compression (N), curvature (1/m), clearance (m) and EI (N m^2) of the
-            string between them.
-
-    Returns:
-        (rings,) sum of the forces by which each pries, N; (rings,) load that it takes from the body, N.
-    """
+    """Effects that a soft string neglects at its rings, as sums of absolute values. rings: [`Ring`] from the bit up.
+    depth: of the string's end, m. along: function of two measured depths (m) that gives the largest load across (N/m),
+    compression (N), curvature (1/m), clearance (m) and EI (N m^2) of the string between them. Returns (rings,) sum of
+    the forces by which each pries, N; (rings,) load that it takes from the body, N."""
     if not rings:
         return np.zeros(0), np.zeros(0)
     places = [depth, *(ring.s for ring in rings), 0.0]
@@ -176,11 +170,8 @@ def checked_depth(owner, hole, string, operation, mud, depth, such="TripOut()"):
 
 
 def pieces_of(hole, string, operation, mud, depth):
-    """The `Pieces` of a string whose lower end is at a measured depth (m), and its components in their places.
-
-    Raises:
-        SceneError: a string that does not fit the hole: too long, too short, too wide, or a hole that ends above it.
-    """
+    """The `Pieces` of a string whose lower end is at a measured depth (m), and its components in their places. Raises
+    SceneError: a string that does not fit the hole: too long, too short, too wide, or a hole that ends above it."""
     if not 0 < depth <= hole.length * (1 + 1e-12):
         raise SceneError(
             f"torque_and_drag: depth = {depth:.10g} m: expected a measured depth in the hole, which ends at "

@@ -73,14 +73,8 @@ class ModelError(NamedTuple):
 
 
 def model_errors(path, pieces, soft, solved, sections, rings=()):
-    """`ModelError` of the hook load and of the surface torque.
-
-    Args:
-        soft, solved: the `Solved` without and with buckling. rings: [`Ring`] from the bit up.
-
-    Returns:
-        infinite parts for snakes with which the string may lock up.
-    """
+    """`ModelError` of the hook load and of the surface torque. soft, solved: the `Solved` without and with buckling.
+    rings: [`Ring`] from the bit up. Returns infinite parts for snakes with which the string may lock up."""
     chain = solved.chain
     groups = np.flatnonzero(np.diff(chain.origin, prepend=-1))  # the first part of each piece, from below
     load, turn, EI = np.abs(chain.drag), chain.turn, np.nan_to_num(sections.EI[pieces.component[chain.origin]])
@@ -333,11 +327,7 @@ def _instead(flexible, why):
 
 
 def check_settings(model=AUTO, tol=1e-4, torque_convention=CONVENTIONS[0]):
-    """`tol`, where `torque_and_drag` takes it and the others.
-
-    Raises:
-        SceneError: it does not.
-    """
+    """`tol`, where `torque_and_drag` takes it and the others. Raises SceneError: it does not."""
     if model not in MODELS:
         refuse("torque_and_drag", "model", model, " or ".join(f"'{name}'" for name in MODELS))
     if torque_convention not in CONVENTIONS:

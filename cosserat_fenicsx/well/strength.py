@@ -213,11 +213,8 @@ _CURVE_E, _CURVE_S = 67e3, 133.4e3  # psi, largest tensions of the allowed bendi
 
 
 def yield_of(owner, grade):
-    """Yield strength (Pa) of a grade by its name, or as a number or text with a unit.
-
-    Raises:
-        SceneError: an unknown name, with the nearest one; a number that is no yield strength.
-    """
+    """Yield strength (Pa) of a grade by its name, or as a number or text with a unit. Raises SceneError: an unknown
+    name, with the nearest one; a number that is no yield strength."""
     if isinstance(grade, str):
         plain = re.sub(r"[\s_-]|grade", "", grade, flags=re.IGNORECASE).upper()
         found = [name for name in GRADES if plain in (name, name[0])]
@@ -231,11 +228,8 @@ def yield_of(owner, grade):
 
 
 def wear_of(owner, wear):
-    """Share of the wall that is left, of a class by its name or as a number.
-
-    Raises:
-        SceneError: an unknown name, with the nearest one; a number that is no share.
-    """
+    """Share of the wall that is left, of a class by its name or as a number. Raises SceneError: an unknown name, with
+    the nearest one; a number that is no share."""
     expected = f"the share of the wall that is left, from 0.1 to 1, or {', '.join(map(repr, CLASSES))}"
     if isinstance(wear, str):
         plain = " ".join(wear.lower().replace("-", " ").replace("_", " ").split())

@@ -51,12 +51,9 @@ _SPELT = (
 
 
 def read_columns(who, file, names, degrees, length_unit, sheet=None):
-    """Three columns of a survey in a file: depths (m), inclinations, azimuths; and its `degrees`.
-
-    Args:
-        who: "WellPath.from_csv" or "WellPath.from_xlsx", which decides how the file is read, and has the arguments.
-        names: of the columns of measured depth, inclination and azimuth.
-    """
+    """Three columns of a survey in a file: depths (m), inclinations, azimuths; and its `degrees`. who:
+    "WellPath.from_csv" or "WellPath.from_xlsx", which decides how the file is read, and has the arguments; names: of
+    the columns of measured depth, inclination and azimuth."""
     workbook = who == "WellPath.from_xlsx"
     file = Path(
         instance(who, "file", file, str | os.PathLike, f"the name of {'an .xlsx' if workbook else 'a .csv'} file")

@@ -45,11 +45,8 @@ def measured(scene, over, *, cases, calls, runs):
 
 
 def main(cases=2048, calls=100, runs=5, out="out"):
-    """Print the table and write it to out/cases.md.
-
-    Returns:
-        (largest relative difference from `solve`, cases that went to it) of every row.
-    """
+    """Print the table and write it to out/cases.md. Returns (largest relative difference from `solve`, cases that went
+    to it) of every row."""
     rows, results = [], []
     for name, scene, over in (
         ("planar column, four numbers", column(0.0), OVER),

@@ -104,11 +104,7 @@ def load_factors_of(options):
 
 
 def main(runs=9, out="out", scenes=SCENES, counts=COUNTS):
-    """Print the table and write it to out/choice.md.
-
-    Returns:
-        {scene: what `compare` found}.
-    """
+    """Print the table and write it to out/choice.md. Returns {scene: what `compare` found}."""
     cells, found = [], {}
     for name in scenes:
         given = cf.read(Path(__file__).parents[1] / f"{name}.toml")

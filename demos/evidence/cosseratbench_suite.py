@@ -44,17 +44,8 @@ _STEPS, _SLOW_STEPS = 20, 4
 
 
 def solve(scenario, elements, frames):
-    """Solve a scenario of the suite.
-
-    Args:
-        scenario: with the attributes of the suite's `Scenario`. elements: of every rod. frames: how many.
-
-    Returns:
-        Frames.
-
-    Raises:
-        NotImplementedError: in words, what this adapter does not do.
-    """
+    """Solve a scenario of the suite. scenario: with the attributes of the suite's `Scenario`. elements: of every rod.
+    frames: how many. Returns Frames. Raises NotImplementedError: in words, what this adapter does not do."""
     if scenario.obstacles:
         raise NotImplementedError("obstacles")
     rods = [_rod(k, given, scenario) for k, given in enumerate(scenario.rods)]
@@ -236,14 +227,8 @@ def kept(folder, experiment):
 
 
 def main(out="out", suite=None):
-    """Run all experiments of the suite, and write the table.
-
-    Args:
-        out: folder. suite: a folder with the suite, or None to get it.
-
-    Returns:
-        The table, Markdown.
-    """
+    """Run all experiments of the suite, and write the table. out: folder. suite: a folder with the suite, or None to
+    get it. Returns The table, Markdown."""
     folder = Path(suite) if suite else obtained(out)
     sys.path.insert(0, str(folder / "src"))
     run, solver, rows = importlib.import_module("cosseratbench.experiment").run, adapter(), []

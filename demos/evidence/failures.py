@@ -67,11 +67,7 @@ def compute(file, data, columns, rows):
 
 
 def main(out="out", quick=False, fresh=False):
-    """Compute, write and draw.
-
-    Returns:
-        The dict that failures.json holds.
-    """
+    """Compute, write and draw. Returns The dict that failures.json holds."""
     if MPI.COMM_WORLD.size > 1:
         sys.exit("failures.py: expected one process, not several: the cells follow each other")
     stem = "failures_quick" if quick else "failures"

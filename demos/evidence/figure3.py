@@ -103,11 +103,7 @@ def compute(store, settings):
 
 
 def main(out="out", quick=False, fresh=False):
-    """Compute, write and draw.
-
-    Returns:
-        The dict that figure3.json holds.
-    """
+    """Compute, write and draw. Returns The dict that figure3.json holds."""
     if MPI.COMM_WORLD.size > 1:
         sys.exit("figure3.py: expected one process, not several: the curves follow each other")
     settings = curves.QUICK if quick else curves.FULL

@@ -50,11 +50,8 @@ def first_and_next(command, package):
 
 
 def main(runs=3, out="out", kinds=tuple(RUNS), package=ROOT):
-    """Print the table and write it to out/first_runs.md.
-
-    Returns:
-        {kind: (first, next, compiled files)}, times (processor, wall-clock) in s.
-    """
+    """Print the table and write it to out/first_runs.md. Returns {kind: (first, next, compiled files)}, times
+    (processor, wall-clock) in s."""
     rows, found = [], {}
     for kind in kinds:
         measured = [first_and_next(RUNS[kind], package) for _ in range(runs)]

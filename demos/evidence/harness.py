@@ -80,11 +80,7 @@ def orders(errors, counts):
 
 
 def table(heads, rows):
-    """Lines of a Markdown table.
-
-    Args:
-        heads: in one text, such as "degree | error"; rows: of cells, as texts or numbers.
-    """
+    """Lines of a Markdown table. heads: in one text, such as "degree | error"; rows: of cells, as texts or numbers."""
     yield f"| {heads} |"
     yield "|" + "---|" * (heads.count("|") + 1)
     for row in rows:
@@ -123,12 +119,9 @@ def drawn(make, file):
 
 
 def record():
-    """The conditions of a measurement, as a dict of strings and numbers for JSON.
-
-    Returns:
-        date (UTC, ISO 8601), cpu (model), cores (that this process may use), platform, and the releases by the names
-        dolfinx, petsc, numpy, python.
-    """
+    """The conditions of a measurement, as a dict of strings and numbers for JSON. Returns date (UTC, ISO 8601), cpu
+    (model), cores (that this process may use), platform, and the releases by the names dolfinx, petsc, numpy,
+    python."""
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
     return {
         "date": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),

@@ -146,11 +146,8 @@ def space_table(meshes, fine):
 
 
 def main(quick=False, out="out"):
-    """Print the tables, write them to out/orders.md.
-
-    Returns:
-        {(scene, scheme): {query: order in dt}} and {degree: order in h}, of the finest two that are used.
-    """
+    """Print the tables, write them to out/orders.md. Returns {(scene, scheme): {query: order in dt}} and {degree: order
+    in h}, of the finest two that are used."""
     in_dt, temporal = time_table(QUICK_STEPS if quick else STEPS)
     in_h, spatial = space_table(QUICK_MESHES if quick else MESHES, (12, 16) if quick else (24, 32))
     lines = [f"{compat.version()}.", "", *in_dt, "", *in_h]

@@ -121,11 +121,8 @@ def compare(degree, elements, runs):
 
 
 def main(runs=15, out="out"):
-    """Print the table and write it to out/overhead.md.
-
-    Returns:
-        Ratios to the bare loop, ratios to the one with the stability count, differences (m), one per mesh.
-    """
+    """Print the table and write it to out/overhead.md. Returns Ratios to the bare loop, ratios to the one with the
+    stability count, differences (m), one per mesh."""
     rows, results = [], []
     for degree, elements in MESHES:
         seconds, ratios, difference, newton = compare(degree, elements, runs)

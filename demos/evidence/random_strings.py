@@ -237,11 +237,8 @@ def tried(seed):
 
 
 def main(quick=False, count=200, first=0, out="out"):
-    """Try a number of strings from the seed `first` on, print what is off, and write random_strings.md.
-
-    Returns:
-        [(seed, what, ratio to its limit)], and [what was refused].
-    """
+    """Try a number of strings from the seed `first` on, print what is off, and write random_strings.md. Returns [(seed,
+    what, ratio to its limit)], and [what was refused]."""
     rows, refusals = [], []
     for seed in [62] if quick else range(first, first + count):
         found, refused = tried(seed)

@@ -42,11 +42,8 @@ def under_mpirun(ranks, elements):
 
 
 def main(sizes=SIZES, rounds=ROUNDS, out="out", ranks=RANKS):
-    """Print the table, write it to out/ranks.md.
-
-    Returns:
-        [(unknowns, {ranks: median time (s)}, largest difference of the tip's displacement, relative)].
-    """
+    """Print the table, write it to out/ranks.md. Returns [(unknowns, {ranks: median time (s)}, largest difference of
+    the tip's displacement, relative)]."""
     lines = [
         f"{in_words()}. Wall clock, medians of {rounds} run(s) in turn; at the start {os.getloadavg()[0]:.1f}"
         " other processes were running.",

@@ -115,11 +115,7 @@ def compare(draw, mesh, runs):
 
 
 def main(runs=9, out="out", scenes=SCENES):
-    """Print the table and write it to out/rungs.md.
-
-    Returns:
-        {(scene, mesh): rows of `compare`}.
-    """
+    """Print the table and write it to out/rungs.md. Returns {(scene, mesh): rows of `compare`}."""
     cells, found = [], {}
     for draw, meshes in scenes:
         for mesh in meshes:

@@ -147,11 +147,7 @@ def floor_table(runs):
 
 
 def main(sizes=SIZES, out="out", runs=300):
-    """Print the tables, write them to out/scaling.md.
-
-    Returns:
-        The rows (unknowns, step, count, memory) as an array.
-    """
+    """Print the tables, write them to out/scaling.md. Returns The rows (unknowns, step, count, memory) as an array."""
     rows = []
     for elements in sizes:
         rows.append(apart(__file__, elements))

@@ -118,11 +118,7 @@ def chart(rows):
 
 
 def main(install=True, out="out"):
-    """Measure, write table and chart; returns the rows.
-
-    Args:
-        install: whether peers that are not there are installed.
-    """
+    """Measure, write table and chart; returns the rows. install: whether peers that are not there are installed."""
     rows, silent = measure(install)
     print(write("soft_string", lines(rows, silent), out))
     drawn(lambda: chart(rows), Path(out) / "soft_string.png")

@@ -81,11 +81,8 @@ def compare(runs, duration):
 
 
 def main(runs=7, duration=5.0, out="out"):
-    """Print the tables and write them to out/steps.md.
-
-    Returns:
-        [(seconds, iterations, History)], one of each kind; and what `compare` found.
-    """
+    """Print the tables and write them to out/steps.md. Returns [(seconds, iterations, History)], one of each kind; and
+    what `compare` found."""
     rows, found = [], []
     for model, scheme in KINDS:
         seconds, iterations, history = measure(model, scheme, runs, duration)

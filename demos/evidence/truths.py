@@ -21,11 +21,8 @@ ROOT = Path(__file__).resolve().parents[2]
 
 
 def compared(only=""):
-    """[(file of tests, problem, error, error asked for)], of the tests with a text in their names.
-
-    Raises:
-        RuntimeError: a test fails.
-    """
+    """[(file of tests, problem, error, error asked for)], of the tests with a text in their names. Raises RuntimeError:
+    a test fails."""
     with tempfile.TemporaryDirectory() as folder:
         told = Path(folder) / "found.xml"
         words = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "--truths", "-o", "junit_family=xunit1",

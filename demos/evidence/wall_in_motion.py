@@ -71,11 +71,8 @@ def measure(height, runs, duration, length, elements):
 
 
 def main(runs=3, duration=0.3, length=LENGTH, elements=ELEMENTS, out="out"):
-    """Print the tables and write them to out/wall_in_motion.md.
-
-    Returns:
-        {kind: (processor seconds a simulated second, History)}.
-    """
+    """Print the tables and write them to out/wall_in_motion.md. Returns {kind: (processor seconds a simulated second,
+    History)}."""
     found = {kind: measure(height, runs, duration, length, elements) for kind, height in KINDS.items()}
     residual, tangent, substitution = parts(pipe(0.0, length), elements)
     rows, split = [], []

@@ -196,14 +196,8 @@ def _round(todo, like, started, found, wanted, limits, bar, name):
 
 
 def run(found, peers, budgets, *, quick, wanted, limits, after=None):
-    """All samples of the problems in `budgets` ({name: s of measuring until then}); returns the rows.
-
-    Args:
-        after: what is measured at last, a function of the started peers and the rows.
-
-    Raises:
-        SystemExit: Ctrl-C; the samples are kept.
-    """
+    """All samples of the problems in `budgets` ({name: s of measuring until then}); returns the rows. after: what is
+    measured at last, a function of the started peers and the rows. Raises SystemExit: Ctrl-C; the samples are kept."""
     started, rows = start(peers, not quick, found), []
     try:
         for name, budget in budgets.items():

@@ -116,15 +116,9 @@ def draw(rows):
 
 
 def main(out="out", quick=False, fresh=False, peers=motions.PEERS, wanted=None):
-    """Measure, write the JSON, the table and the chart.
-
-    Args:
-        out: folder; quick: few configurations, nothing is installed; fresh: discard earlier samples; peers: which;
-        wanted: samples of every configuration, at least.
-
-    Returns:
-        The `Record`.
-    """
+    """Measure, write the JSON, the table and the chart. out: folder; quick: few configurations, nothing is installed;
+    fresh: discard earlier samples; peers: which;; wanted: samples of every configuration, at least. Returns The
+    `Record`."""
     out = Path(out)
     stem = "work_precision_motion_quick" if quick else "work_precision_motion"
     found = Record(out / f"{stem}.json", fresh or quick, PANEL)

@@ -326,11 +326,7 @@ class Hfto(Charted):
 
 def oscillations(scene, up_to, frequencies, growth):
     """The `Hfto` of a scene at its speed and weight on bit, up to a frequency (Hz); (n,) frequencies (Hz) and growth
-    (1/s) of its modes.
-
-    Raises:
-        SceneError: the torque of the bit does not follow from its speed.
-    """
+    (1/s) of its modes. Raises SceneError: the torque of the bit does not follow from its speed."""
     law = scene.bit.law.resistance(scene.bit.weight) if scene.bit is not None else None
     if law is None:
         refuse("Stability", "hfto", scene.bit, "a bit whose torque follows from its speed, such as one with Stribeck")

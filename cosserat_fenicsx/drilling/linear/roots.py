@@ -152,11 +152,8 @@ def count(f, box, spacing):
 
 
 def each(f, starts, stride):
-    """Newton's method from many points at once, with steps of at most `stride`.
-
-    Returns:
-        (n,) complex, NaN where it has not settled.
-    """
+    """Newton's method from many points at once, with steps of at most `stride`. Returns (n,) complex, NaN where it has
+    not settled."""
     s = np.array(starts, dtype=complex)
     size, open_ = np.full(len(s), np.inf), np.arange(len(s))
     for _ in range(_SET.steps):
@@ -222,18 +219,10 @@ def counted(f, box, spacing):
 
 
 def all_roots(f, box, spacing, known=()):
-    """All roots in a box, as many as the argument principle says.
-
-    Args:
-        f: see above. box: a `Box`. spacing: typical distance of roots, rad/s. known: guesses, (n,).
-
-    Returns:
-        (roots, box): (n,) complex of Im s >= 0, repeated as often as they are multiple; by frequency, then by growth.
-        The box differs by a few thousandths of `spacing` where a root would lie on its contour.
-
-    Raises:
-        NotConverged: the roots found are fewer than those counted.
-    """
+    """All roots in a box, as many as the argument principle says. f: see above. box: a `Box`. spacing: typical distance
+    of roots, rad/s. known: guesses, (n,). Returns (roots, box): (n,) complex of Im s >= 0, repeated as often as they
+    are multiple; by frequency, then by growth. The box differs by a few thousandths of `spacing` where a root would lie
+    on its contour. Raises NotConverged: the roots found are fewer than those counted."""
     total, box = counted(f, box, spacing)
     found = np.array([], dtype=complex)
     if len(known):

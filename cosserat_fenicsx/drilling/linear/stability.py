@@ -365,11 +365,9 @@ class Stability(Result):
             SceneError: matplotlib is missing, there is no such mode, or the file's ending is unknown.
             OSError: the file cannot be written.
         """
-        from cosserat_fenicsx.drilling.charts import draw_stability
-
         if mode is not None:
             self._known(mode)
-        return draw_stability(self, file, mode, units=units, width=width)
+        return self._drawn("drilling.charts.stability_figure", file, units, width, mode)
 
     def __repr__(self):
         grow = self.unstable_modes
@@ -456,11 +454,8 @@ def stability(
 
 
 def steady_of(owner, scene, kind):
-    """The `Steady` of a scene for a kind of motion that a user gave.
-
-    Raises:
-        SceneError: an unknown kind, or axial motion alone of a bit that cuts; see `Steady`.
-    """
+    """The `Steady` of a scene for a kind of motion that a user gave. Raises SceneError: an unknown kind, or axial
+    motion alone of a bit that cuts; see `Steady`."""
     if kind not in ("torsion", "axial"):
         refuse(owner, "kind", kind, "'torsion' or 'axial'")
     if kind == "axial" and scene.bit is not None and scene.bit.law.drills and owner == "stability":
@@ -536,11 +531,8 @@ def _range(answer, units):
 
 def undisturbed(scene, least, peak):
     """A caution where the bit of a `Drilling` keeps the speed of a steady start, though its linear theory has modes
-    that grow; else "", also where that theory does not apply.
-
-    Args:
-        least, peak: smallest and largest speed of the bit, rad/s.
-    """
+    that grow; else "", also where that theory does not apply. least, peak: smallest and largest speed of the bit,
+    rad/s."""
     speed = max(abs(least), abs(peak))
     if scene is None or scene.start != "steady" or not speed or peak - least >= _STILL * speed:
         return ""

@@ -14,8 +14,7 @@ from functools import cached_property
 from cosserat_fenicsx.errors import NotConverged
 from cosserat_fenicsx.interrupts import obey
 from cosserat_fenicsx.numerics import lagrange
-from cosserat_fenicsx.statics.path.chord import Chord
-from cosserat_fenicsx.statics.path.events import UNEXPLAINED, Locator, Lost
+from cosserat_fenicsx.statics.path.events import UNEXPLAINED, Chord, Locator, Lost
 from cosserat_fenicsx.statics.path.load_control import Continuation, StepControl, Sweep
 from cosserat_fenicsx.statics.path.track import LIMITS, NEAR, Track, bends, between, step_control, through
 

@@ -24,8 +24,7 @@ from cosserat_fenicsx.results.staged import StagedPath
 from cosserat_fenicsx.scene.action import rubs
 from cosserat_fenicsx.statics.critical import derivatives_of
 from cosserat_fenicsx.statics.path.follower import Follower, plain
-from cosserat_fenicsx.statics.path.chord import Chord
-from cosserat_fenicsx.statics.path.events import Lost
+from cosserat_fenicsx.statics.path.events import Chord, Lost
 from cosserat_fenicsx.statics.path.track import NEAR, NOTHING, between
 from cosserat_fenicsx.statics.problem import Promoted, record_of
 

@@ -65,12 +65,8 @@ class InHole:
         self._mesh_before = None
 
     def estimate(self, values, before):
-        """Set the errors.
-
-        Args:
-            values: {factor: {name: value}} in walls of several stiffnesses on this mesh, see `RodErrors`; before: the
-                `InHole` on the mesh before, or None; ignored where its mesh is no coarser.
-        """
+        """Set the errors. values: {factor: {name: value}} in walls of several stiffnesses on this mesh, see
+        `RodErrors`; before: the `InHole` on the mesh before, or None; ignored where its mesh is no coarser."""
         if before:
             self.steps += before.steps
             if before.path.elements[0] < self.path.elements[0]:
@@ -429,14 +425,10 @@ UNSEEN = 9e-6
 
 
 class RodErrors:
-    """Estimated errors of an `InHole`.
-
-    Attributes:
-        values: {factor: {name: value}} in walls stiffer than the scene's by ascending factors; ratio: of the last two
-            changes; changes: {name: relative change from the mesh before}, infinite without one.
-        errors: {name: error} in N and N m; error: the largest relative error of hook load and torque, of the torque
-            only where the string turns; of_stiffness: its part from the wall's softness.
-    """
+    """Estimated errors of an `InHole`. values: {factor: {name: value}} in walls stiffer than the scene's by ascending
+    factors; ratio: of the last two changes; changes: {name: relative change from the mesh before}, infinite without
+    one; errors: {name: error} in N and N m; error: the largest relative error of hook load and torque, of the torque
+    only where the string turns; of_stiffness: its part from the wall's softness."""
 
     def __init__(self, values, scales, rounding, counted, before=None, capped=np.inf):
         """

@@ -361,11 +361,8 @@ def along_elements(mean, sizes, nodes):
     """(elements, nodes) values that have the mean of each element, and a slope from the means of its neighbours.
 
     The slope is the smaller one of those to the two neighbours, and none at a peak (B. van Leer, J. Comput. Phys. 32
-    (1979) 101, doi:10.1016/0021-9991(79)90145-1), so that no value is beyond the neighbours' means.
-
-    Args:
-        mean, sizes: (elements,) means, and lengths of the elements, m. nodes: in an element, from 0 to 1.
-    """
+    (1979) 101, doi:10.1016/0021-9991(79)90145-1), so that no value is beyond the neighbours' means. mean, sizes:
+    (elements,) means, and lengths of the elements, m. nodes: in an element, from 0 to 1."""
     steps = np.diff(mean) / ((sizes[1:] + sizes[:-1]) / 2)
     before, after = np.append(steps[:1], steps), np.append(steps, steps[-1:])
     slope = np.where(before * after > 0, np.sign(before) * np.minimum(abs(before), abs(after)), 0.0)

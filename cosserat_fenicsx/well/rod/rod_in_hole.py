@@ -120,22 +120,14 @@ def solve_in_hole(path, lengths, stiffness, weight, contact_radius, *, wall_stif
 
 
 class Work:
-    """What a search for an equilibrium may cost: `left`, elements times Newton steps, of which a second takes about
-    60 000. So where it ends does not depend on the machine.
-
-    Args:
-        seconds: about how long it may take.
-    """
+    """What a search for an equilibrium may cost: `left`, elements times Newton steps, of which a second takes about 60
+    000. So where it ends does not depend on the machine. seconds: about how long it may take."""
 
     def __init__(self, seconds):
         self._seconds, self.left = seconds, _STEPS * seconds
 
     def spend(self, elements):
-        """Count a Newton step on a mesh of `elements` elements.
-
-        Raises:
-            NotConverged: it is one too many.
-        """
+        """Count a Newton step on a mesh of `elements` elements. Raises NotConverged: it is one too many."""
         self.left -= elements
         if self.left < 0:
             raise NotConverged(self.words)
@@ -147,11 +139,7 @@ class Work:
 
 
 class NotAccurate(NotConverged):
-    """An equilibrium whose error is above `tol`.
-
-    Attributes:
-        answer: the `InHole`.
-    """
+    """An equilibrium whose error is above `tol`. answer: the `InHole`."""
 
     def __init__(self, answer, tol, ended=""):
         ended = ended and f"{ended}: "
@@ -305,13 +293,8 @@ def _settled(string, problem, stages, factor=1.0, careful=(), on_stage=None, hol
 
 def at_rest(string, elements, degree, comm=None):
     """The `Path` of one equilibrium of a `StringScene`, with its sections and wall as they are, on equal elements.
-
-    Args:
-        elements, degree, comm: as `simulate` takes them, so that it may start there.
-
-    Raises:
-        NotConverged: no equilibrium was found.
-    """
+    elements, degree, comm: as `simulate` takes them, so that it may start there. Raises NotConverged: no equilibrium
+    was found."""
     layout, found = Layout.of(string.scene, elements), []
     with solvers_of(string.scene, layout, degree=degree, comm=communicator(comm)) as (problem, _, stability):
         problem.set_load_factor(1.0)

@@ -27,12 +27,8 @@ from cosserat_fenicsx.well.criteria import snake_load
 
 @dataclass(frozen=True)
 class _BentLine(Curve):
-    """A line with kinks, whose frame jumps there.
-
-    Args:
-        line: the `Line` without them. places: ascending arc lengths of the kinks, m. turns: of each the rotation
-            vector (rad) in components of the frame above it.
-    """
+    """A line with kinks, whose frame jumps there. line: the `Line` without them. places: ascending arc lengths of the
+    kinks, m. turns: of each the rotation vector (rad) in components of the frame above it."""
 
     line: Line
     places: tuple[float, ...]
@@ -87,12 +83,9 @@ class _BentLine(Curve):
 
 
 def bent_line(line, path, bends, carried):
-    """The reference line of a string with `bends`, see `string_in`, that lies in the hole without twist.
-
-    Args:
-        line: the `Line` without bends. path: the `WellPath`. carried: function of tangents (n, 3) that gives the
-            rotations without twist from the line's frame to them, (n, 4).
-    """
+    """The reference line of a string with `bends`, see `string_in`, that lies in the hole without twist. line: the
+    `Line` without bends. path: the `WellPath`. carried: function of tangents (n, 3) that gives the rotations without
+    twist from the line's frame to them, (n, 4)."""
     turns = []
     for s, angle, side in bends:
         near = path.nearest(None, np.append(path.md[path.md < s], s))

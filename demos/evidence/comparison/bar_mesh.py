@@ -52,15 +52,9 @@ def moments(points, cells):
 
 
 def swept(points, cells, z):
-    """Second-order hexahedra from nine-node quadrilaterals.
-
-    Args:
-        points (n, 2), cells (m, 3, 3): of the section.
-        z: the ends of the elements along the bar.
-
-    Returns:
-        points (n * (2 len(z) - 1), 3), section by section; cells (m * (len(z) - 1), 3, 3, 3).
-    """
+    """Second-order hexahedra from nine-node quadrilaterals. points (n, 2), cells (m, 3, 3): of the section; z: the ends
+    of the elements along the bar. Returns points (n * (2 len(z) - 1), 3), section by section; cells (m * (len(z) - 1),
+    3, 3, 3)."""
     levels = np.sort(np.concatenate([z, (z[:-1] + z[1:]) / 2]))
     solid = np.concatenate([np.column_stack([points, np.full(len(points), level)]) for level in levels])
     layers = len(points) * (2 * np.arange(len(z) - 1)[:, None] + np.arange(3))

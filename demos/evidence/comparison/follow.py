@@ -36,11 +36,8 @@ class Stopped(Exception):
 
 
 def newton(problem, x, eta, before=None, most=20, tolerance=TOLERANCE):
-    """Newton's method at a fixed load factor from x.
-
-    Returns:
-        (state, iterations), the state None where the method did not converge.
-    """
+    """Newton's method at a fixed load factor from x. Returns (state, iterations), the state None where the method did
+    not converge."""
     before = x if before is None else before
     for k in range(1, most + 1):
         try:

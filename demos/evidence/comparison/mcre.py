@@ -43,11 +43,7 @@ def limit(problem):
 
     For the paper's column at 0.3111, 0.4644, 0.5837, 0.6065, 0.6085, 0.6107 with 1, 2, 4, 8, 16, 32 elements: a plateau
     at 0.61, but not the limit. With 64, 128, 256 elements it is at 0.6158, 0.6219, 0.6251, and for the truncated energy
-    itself, the limit under mesh refinement, at 0.62655.
-
-    Returns:
-        None where the load factor passes 10 without one.
-    """
+    itself, the limit under mesh refinement, at 0.62655. Returns None where the load factor passes 10 without one."""
     found = limit_point(problem)
     return found and LimitPoint(found.eta, *problem.tip(found.x), found.x)
 
@@ -58,15 +54,9 @@ def branch(problem, beyond):
 
 
 def energy(length, axial, shear, bending=1.0):
-    """Symmetric tensors T_2, T_3, T_4 of the element's energy T_2[q, q] + T_3[q, q, q] + T_4[q, q, q, q].
-
-    Args:
-        length: of the element.
-        axial, shear, bending: EA, GA, EI.
-
-    Returns:
-        Arrays of shape (6, 6), (6, 6, 6), (6, 6, 6, 6) for q = (u, w, phi) at both ends.
-    """
+    """Symmetric tensors T_2, T_3, T_4 of the element's energy T_2[q, q] + T_3[q, q, q] + T_4[q, q, q, q]. length: of
+    the element; axial, shear, bending: EA, GA, EI. Returns Arrays of shape (6, 6), (6, 6, 6), (6, 6, 6, 6) for q = (u,
+    w, phi) at both ends."""
     x, weights = np.polynomial.legendre.leggauss(10)
     s, ds = length * (x + 1) / 2, length * weights / 2
     linear = _at(_linear_solution(length, shear, bending), s)

@@ -49,9 +49,6 @@ def carried_stress_tangent(H, before, trial, test, lame):
 
 def eccentric_traction(x, area, inertia, eccentricity):
     """Dead axial traction of unit force and of the moment `eccentricity` about the centroid, linear over the end face.
-
-    Args:
-        x: coordinate across the face, from the centroid, in the direction of the eccentricity.
-        area, inertia: of the face.
-    """
+    x: coordinate across the face, from the centroid, in the direction of the eccentricity; area, inertia: of the
+    face."""
     return 1 / area + eccentricity * x / inertia

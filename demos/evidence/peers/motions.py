@@ -46,11 +46,8 @@ def problems():
 
 
 def error(name, model, ends):
-    """Largest error of the positions of the ends (n, 3), over the length of a rod.
-
-    Args:
-        name: of the problem; model: the mechanical model, one for all here.
-    """
+    """Largest error of the positions of the ends (n, 3), over the length of a rod. name: of the problem; model: the
+    mechanical model, one for all here."""
     return float(np.linalg.norm(np.asarray(ends) - TRUTHS[name], axis=1).max() / _LENGTH)
 
 

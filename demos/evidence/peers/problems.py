@@ -93,12 +93,8 @@ TITLES = {
 
 @cache
 def truth(name, model):
-    """Displacements of the tip at the load factors, (n, 3) m, independent of all solvers.
-
-    Args:
-        name: of the problem.
-        model: "Reissner", or "shear-rigid" (Euler-Bernoulli with extension: GA infinite).
-    """
+    """Displacements of the tip at the load factors, (n, 3) m, independent of all solvers. name: of the problem; model:
+    "Reissner", or "shear-rigid" (Euler-Bernoulli with extension: GA infinite)."""
     problem = problems()[name]
     GA = problem["GA"] if model == "Reissner" else math.inf
     if name.startswith("roll-up"):

@@ -21,14 +21,8 @@ COURANT = 0.99
 
 
 def run(scene, cells, duration):
-    """The motion of a stiff drive, pipe and collars, and a bit with inertia.
-
-    Args:
-        scene: a `Drilling` of two segments. cells: in all. duration: s.
-
-    Returns:
-        (times, bit speeds, surface torques), (n,) each: s, rad/s, N m.
-    """
+    """The motion of a stiff drive, pipe and collars, and a bit with inertia. scene: a `Drilling` of two segments.
+    cells: in all. duration: s. Returns (times, bit speeds, surface torques), (n,) each: s, rad/s, N m."""
     ffi, lib = module(Path(__file__).with_suffix(".c"))
     pipe, collars = scene.segments
     first = round(cells * pipe.length / (pipe.length + collars.length))

@@ -35,12 +35,8 @@ def rotation_of(theta):
 
 
 class Rod:
-    """The clamped rod on a mesh, in the state after its last step.
-
-    Args:
-        problem: see `trials.problems`.
-        elements, degree: of the mesh.
-    """
+    """The clamped rod on a mesh, in the state after its last step. problem: see `trials.problems`; elements, degree: of
+    the mesh."""
 
     def __init__(self, problem, elements, degree=1):
         L = self.length = problem["length"]
@@ -98,10 +94,7 @@ class Rod:
 
     def step(self, load, turn=(0.0, 0.0, 0.0), most=30):
         """Newton's method to a tip load (force, moment) in units of EI/L^2, L; the clamp rotates by a rotation vector.
-
-        Raises:
-            Stopped: Newton's method does not converge.
-        """
+        Raises Stopped: Newton's method does not converge."""
         x, free = self.U.x.array, self._free
         before = x.copy()
         x[self._clamp[3:]] = turn
