@@ -7,7 +7,8 @@ u is axial (along z), w transverse (along x), in units of L; forces in EI/L^2. A
 import numpy as np
 from scipy.linalg import eigvals_banded, solve_banded
 
-from comparison.column import CRITICAL
+from comparison.column import CRITICAL, Column, Curve
+from comparison.follow import Stopped, follow
 from cosserat_fenicsx.checks import refuse
 
 _BAND = 5  # the half bandwidth of node-by-node numbering
@@ -75,3 +76,29 @@ class Chain:
         if self.column.arm:
             band[_BAND, -1] += eta * CRITICAL * self._e * np.sin(x[-1])
         return band
+
+
+def of(law):
+    """(problem, solve) of columns whose elements have a law(length, EA, GA), in units of EI/L^2.
+
+    problem(elements, column=None): a `Chain` of equal elements, of the paper's column by default. solve(etas, elements,
+    column=None, adaptive=True): its `Curve` under load control through ascending load factors F/P_cr; `stopped` gives
+    the reason if it ends early. adaptive: False takes each load factor in one step and accepts any state that Newton's
+    method converges to. Raises SceneError: a number of elements that is not whole and positive, load factors that are
+    no numbers or descend.
+    """
+
+    def problem(elements, column=None):
+        column = column or Column()
+        axial, shear, _ = column.relative
+        return Chain(column, elements, lambda length: law(length, axial, shear))
+
+    def solve(etas, elements, *, column=None, adaptive=True):
+        chain, points, stopped = problem(elements, column), [], ""
+        try:
+            points.extend(follow(chain, etas, adaptive=adaptive))
+        except Stopped as why:
+            stopped = str(why)
+        return Curve.of(chain, points, stopped)
+
+    return problem, solve

@@ -5,46 +5,19 @@ Each element is a linear Timoshenko beam, exact in its nodes for bending and she
 order to Reissner's rod, except for terms of the order of the square of the strains, here 1e-8.
 """
 
+from functools import partial
+
 import numpy as np
 
-from comparison.chain import Chain
-from comparison.column import Column, Curve
-from comparison.follow import Stopped, follow
+from comparison import chain
 
 
-def solve(etas, elements, *, column=None, adaptive=True):
-    """The path of the co-rotational column under load control.
-
-    Args:
-        etas: load factors F/P_cr, ascending.
-        elements: number of equal elements.
-        column: `Column`; the paper's by default. `arm=True` puts the force on an arm that turns with the tip.
-        adaptive: False takes each load factor in one step and accepts any state that Newton's method converges to.
-
-    Returns:
-        A `Curve`; `stopped` gives the reason if it ends early.
-
-    Raises:
-        SceneError: a number of elements that is not whole and positive, load factors that are no numbers or descend.
-    """
-    return chain_path(problem(elements, column), etas, adaptive)
+def law(length, axial, shear):
+    """The law of elements, see `chain`."""
+    return partial(beam, length=length, axial=axial, shear=shear)
 
 
-def problem(elements, column=None):
-    """The column as a problem of `follow`."""
-    column = column or Column()
-    axial, shear, _ = column.relative
-    return Chain(column, elements, lambda length: lambda nodal: beam(nodal, length, axial, shear))
-
-
-def chain_path(problem, etas, adaptive=True):
-    """A `Curve` of a problem through `etas`, as far as load control goes."""
-    points, stopped = [], ""
-    try:
-        points.extend(follow(problem, etas, adaptive=adaptive))
-    except Stopped as why:
-        stopped = str(why)
-    return Curve.of(problem, points, stopped)
+problem, solve = chain.of(law)
 
 
 def beam(nodal, length, axial, shear, bending=1.0):

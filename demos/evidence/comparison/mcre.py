@@ -20,22 +20,17 @@ from itertools import permutations
 import numpy as np
 from numpy.polynomial import Polynomial as P
 
-from comparison.chain import Chain
-from comparison.column import Column, LimitPoint
-from comparison.corotational import chain_path
+from comparison import chain
+from comparison.column import LimitPoint
 from comparison.follow import limit_point, trace
 
 
-def solve(etas, elements, *, column=None, adaptive=True):
-    """The path of the reconstructed MCRE under load control; arguments and result as in `corotational.solve`."""
-    return chain_path(problem(elements, column), etas, adaptive)
+def law(length, axial, shear):
+    """The law of elements, see `chain`."""
+    return partial(derivatives, energy(length, axial, shear))
 
 
-def problem(elements, column=None):
-    """The column of equal elements as a problem of `follow`."""
-    column = column or Column()
-    axial, shear, _ = column.relative
-    return Chain(column, elements, lambda length: partial(derivatives, energy(length, axial, shear)))
+problem, solve = chain.of(law)
 
 
 def limit(problem):

@@ -78,22 +78,20 @@ def _curves(axes, curves):
 
 def _differences(axes, curves):
     """Difference of every model from the exact rod under the same load, in percent."""
-    below = np.linspace(0.02, 0.999, 400)
-    eq_8, beam = analytic.secant_delta(below, Column().eccentricity), curves["corotational"]
-    axes.semilogy(below, _percent(eq_8, exact(below)), color="tab:red", ls="--")
-    axes.semilogy(beam["eta"], _percent(beam["delta"], exact(beam["eta"])), "kx", ms=6)
-    solid, clamped = curves["solid"], curves["solid_clamped"]
-    axes.semilogy(
-        solid["eta"], _percent(solid["delta"], exact(solid["eta"], arm=True)), "s", mfc="none", mec="tab:orange", ms=6
-    )
-    finer = solid["finer"]
-    axes.semilogy(solid["eta"], np.full(len(solid["eta"]), np.nan), "s", mfc="none", mec="tab:orange", ms=6,
-                  label=f"3D elasticity, {solid['along']} elements along (the curve)")  # fmt: skip
-    axes.semilogy(finer["eta"], _percent(finer["delta"], exact(finer["eta"], arm=True)), "s", color="tab:orange", ms=6,
-                  label=f"3D elasticity, {finer['along']} elements along: less of the mesh's error")  # fmt: skip
-    axes.semilogy(clamped["eta"], _percent(clamped["delta"], exact(clamped["eta"], arm=True)), "D", color="tab:orange",
-                  ms=6,
-                  label="3D elasticity with the foot's face fixed altogether")  # fmt: skip
+    below, beam = np.linspace(0.02, 0.999, 400), curves["corotational"]
+    solid, finer, clamped = curves["solid"], curves["solid"]["finer"], curves["solid_clamped"]
+    open_square = {"mfc": "none", "mec": "tab:orange"}
+    for eta, delta, arm, mark, look in (
+        (below, analytic.secant_delta(below, Column().eccentricity), False, "--", {"color": "tab:red"}),
+        (beam["eta"], beam["delta"], False, "kx", {}),
+        (solid["eta"], solid["delta"], True, "s",
+         {**open_square, "label": f"3D elasticity, {solid['along']} elements along (the curve)"}),
+        (finer["eta"], finer["delta"], True, "s",
+         {"color": "tab:orange", "label": f"3D elasticity, {finer['along']} elements along: less of the mesh's error"}),
+        (clamped["eta"], clamped["delta"], True, "D",
+         {"color": "tab:orange", "label": "3D elasticity with the foot's face fixed altogether"}),
+    ):  # fmt: skip
+        axes.semilogy(eta, _percent(delta, exact(eta, arm=arm)), mark, ms=6, **look)
     for name, colour in _GREEN.items():
         _, eta, delta, turn = _branch(curves, name)
         axes.semilogy(eta[1 : turn + 1], _percent(delta[1 : turn + 1], exact(eta[1 : turn + 1])), color=colour, lw=2)

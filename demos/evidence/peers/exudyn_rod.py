@@ -8,6 +8,9 @@ Measured on the column, what makes it fastest: loads by symbolic functions, whic
 on few elements); Eigen's dense factors up to a hundred unknowns (a third to a half), its sparse ones with their pattern
 analysed once (a seventh) beyond. No faster or slower, or less accurate: modified Newton, tolerances on residuals or for
 each coordinate, numerical derivatives, fixed steps, loads on coordinates, memory kept between calls, one thread.
+
+The trials' problems may have a history of loads and a tip that is held ("guided"), their configurations a tolerance on
+the norm of the residual, and "dense": the solver with dense factors, since EigenDense sees no singular matrix.
 """
 
 import math
@@ -32,47 +35,54 @@ def prepare(problem, configuration):
     container = exu.SystemContainer()
     mbs = container.AddSystem()
     tip = _rod(mbs, problem, configuration)
-    factors = [0.0, *problem["load_factors"]]
-    last = len(factors) - 1
-    first, then = factors[1], factors[-1] - factors[-2]  # all later ones are as far apart
-
-    def loaded(mbs, time, vector):  # a unit of time is a load factor; the solver may stop in between
-        factor = first * time + (then - first) * exu.symbolic.max(time - 1, 0)
-        return [factor * vector[0], factor * vector[1], factor * vector[2]]
-
-    functions = []
-    for number in load(mbs, problem, tip, 0, 0):
-        functions.append(CreateSymbolicUserFunction(mbs, loaded, "loadVectorUserFunction", number))
-        mbs.SetLoadParameter(number, "loadVectorUserFunction", functions[-1])
+    stages = [(0.0, 0.0), *(problem.get("history") or [(factor, factor) for factor in problem["load_factors"]])]
+    kept, last = _load(mbs, problem, tip, stages), len(stages) - 1
+    if problem.get("guided"):
+        exudyn_motion.hold(mbs, tip, (0, 2, 4, 5, 6) if configuration["element"].endswith("EP") else (0, 2))
     sensor = mbs.AddSensor(item.SensorNode(nodeNumber=tip, storeInternal=True, outputVariableType=DISPLACEMENT))
     mbs.Assemble()
-    solver = "EigenSparse" if mbs.systemData.ODE2Size() > DENSE else "EigenDense"
-    settings = _settings(configuration, last, solver)
+    dense = configuration.get("dense", "EigenDense")
+    settings = _settings(configuration, last, "EigenSparse" if mbs.systemData.ODE2Size() > DENSE else dense)
 
     def solve():
-        if not mbs.SolveStatic(settings, showHints=False, showCausingItems=False):
-            raise Stopped("SolveStatic failed")
-        rows = mbs.GetSensorStoredData(sensor)
+        done = mbs.SolveStatic(settings, showHints=False, showCausingItems=False)
+        rows = np.reshape(mbs.GetSensorStoredData(sensor), (-1, 4))
         at = np.searchsorted(rows[:, 0], np.arange(1, last + 1) - 1e-6)
-        if at[-1] >= len(rows):
-            raise Stopped(f"stopped at step {rows[-1, 0]:g} of {last}")
+        if not done or at[-1] >= len(rows):
+            reached = np.interp(rows[-1, 0] if len(rows) else 0.0, range(last + 1), [force for force, _ in stages])
+            raise Stopped(f"SolveStatic failed beyond the load factor {reached:.6g}")
         return rows[at, 1:4].tolist()
 
-    solve.keep = container, functions
+    solve.keep = container, kept
     return solve
 
 
-def load(mbs, problem, tip, force, moment):
-    """A dead force and a dead moment on the tip's node, scaled in time by Exudyn's user functions `force`, `moment`;
-    returns the numbers of these loads."""
+def _load(mbs, problem, tip, stages):
+    """A dead force and a dead moment on the tip's node, with a unit of time for each of the `stages`, the factors of
+    both; returns what has to be kept."""
     point = mbs.AddMarker(item.MarkerNodePosition(nodeNumber=tip))
-    given = {"loadVector": problem["force"], "loadVectorUserFunction": force}
-    loads = [mbs.AddLoad(item.LoadForceVector(markerNumber=point, **given))]
+    loads = [mbs.AddLoad(item.LoadForceVector(markerNumber=point, loadVector=problem["force"]))]
     if any(problem["moment"]):
         section = mbs.AddMarker(item.MarkerNodeRigid(nodeNumber=tip))
-        given = {"loadVector": problem["moment"], "loadVectorUserFunction": moment}
-        loads.append(mbs.AddLoad(item.LoadTorqueVector(markerNumber=section, **given)))
-    return loads
+        loads.append(mbs.AddLoad(item.LoadTorqueVector(markerNumber=section, loadVector=problem["moment"])))
+    kept = [_scaled(mbs, load, factors) for load, factors in zip(loads, zip(*stages, strict=True), strict=False)]
+    for load, scaled in zip(loads, kept, strict=True):
+        mbs.SetLoadParameter(load, "loadVectorUserFunction", scaled)
+    return kept
+
+
+def _scaled(mbs, load, factors):
+    """Exudyn's user function of a load: `factors` at whole times, linear in between; the solver may stop there."""
+    first, *steps = np.diff(factors).tolist()
+    then = steps[-1] if steps else 0.0
+    if np.allclose(steps, then):
+
+        def loaded(mbs, time, vector):
+            factor = first * time + (then - first) * exu.symbolic.max(time - 1, 0)
+            return [factor * vector[0], factor * vector[1], factor * vector[2]]
+
+        return CreateSymbolicUserFunction(mbs, loaded, "loadVectorUserFunction", load)
+    return lambda mbs, time, vector: [float(np.interp(time, range(len(factors)), factors)) * x for x in vector]
 
 
 def _settings(configuration, steps, solver):
@@ -85,6 +95,9 @@ def _settings(configuration, steps, solver):
     static.newton.absoluteTolerance = configuration["tol"]
     static.computeLoadsJacobian = configuration["element"].startswith("spatial")  # dead moments need it there
     static.verboseMode = 0
+    if "residual" in configuration:  # its own default test
+        newton = static.newton
+        newton.residualMode, newton.relativeTolerance, newton.absoluteTolerance = 0, configuration["residual"], 1e-12
     settings.solution.file.write = False
     settings.solution.sensors.writePeriod = 1e-9
     settings.linearSolver.solverType = getattr(exu.LinearSolverType, solver)

@@ -5,6 +5,9 @@ Elements: "elastic" is elasticBeamColumn, of second order; "CBDI" is forceBeamCo
 displacements carry the force's moment inside the element: of high order. A step that fails is halved.
 The sample is the analysis over all load factors. The model is built again for each sample, which is not counted, since
 `reset` does not restore its spatial corotational transformation.
+
+The trials' problems may have a history of loads, a tip that is held ("guided") and a clamp that turns, and their
+configurations a tolerance on the norm of the residual.
 """
 
 import math
@@ -41,22 +44,47 @@ def _build(problem, configuration):
     ops.timeSeries("Linear", 1)
     ops.pattern("Plain", 1, 1)
     (fx, fy, fz), (mx, my, mz) = problem["force"], problem["moment"]
-    ops.load(n + 1, *((fx, fy, fz, mx, my, mz) if spatial else (fx, fy, mz)))
-    ops.constraints("Plain")
+    if "history" not in problem:
+        ops.load(n + 1, *((fx, fy, fz, mx, my, mz) if spatial else (fx, fy, mz)))
+    if problem.get("guided"):
+        ops.fix(n + 1, 1, 0, 1)
+    _set_analysis("Plain", "NormDispIncr", configuration["tol"], 12)
+    if "residual" in configuration:  # relative to the largest load
+        size = max(map(abs, [*problem["force"], *problem["moment"]])) * max(problem["load_factors"])
+        ops.test("NormUnbalance", configuration["residual"] * size, 12, 0)
+    if "turn" in problem:
+        _turn_the_clamp(problem["turn"], problem["load_factors"][-1])
+    return n + 1
+
+
+def _set_analysis(constraints, test, tol, most):
+    """Newton's method under load control, with a test and at most so many iterations."""
+    ops.constraints(constraints)
     ops.numberer("Plain")
     ops.system("BandGeneral")
-    ops.test("NormDispIncr", configuration["tol"], 12, 0)
+    ops.test(test, tol, most, 0)
     ops.algorithm("Newton")
     ops.integrator("LoadControl", 1.0)
     ops.analysis("Static")
-    return n + 1
+
+
+def _turn_the_clamp(vector, last):
+    """The clamp's rotation grows with the load, about a fixed axis, up to the full one at the last load factor."""
+    ops.wipeAnalysis()
+    ops.timeSeries("Linear", 4, "-factor", 1 / last)
+    ops.pattern("Plain", 4, 4)
+    for axis, angle in zip((4, 5, 6), vector, strict=True):
+        ops.remove("sp", 1, axis)
+        ops.sp(1, axis, angle)
+    _set_analysis("Transformation", "NormDispIncr", 1e-8, 30)
 
 
 def prepare(problem, configuration):
     def solve():
         tip = _build(problem, configuration)
         began = time.process_time()
-        tips = _analyse(problem, configuration.get("substeps", 1), tip)
+        analyse = _in_stages if "history" in problem else _analyse
+        tips = analyse(problem, configuration.get("substeps", 1), tip)
         return tips, time.process_time() - began
 
     return solve
@@ -76,15 +104,34 @@ def advance(reached, target, step, smallest):
     return reached, True
 
 
+def _moved(tip):
+    u = ops.nodeDisp(tip)
+    return u[0], u[1], u[2] if ops.getNDM()[0] == 3 else 0.0
+
+
 def _analyse(problem, substeps, tip):
     tips, reached = [], 0.0
     for factor in problem["load_factors"]:
         reached, done = advance(reached, factor, (factor - reached) / substeps, 1e-3 * factor)
         if not done:
             raise Stopped(f"no convergence beyond the load factor {reached:g}")
-        u = ops.nodeDisp(tip)
-        tips.append((u[0], u[1], u[2] if ops.getNDM()[0] == 3 else 0.0))
+        tips.append(_moved(tip))
     return tips
+
+
+def _in_stages(problem, substeps, tip):
+    """The displacement at the end of a history of force and moment."""
+    history, zero = problem["history"], [0.0] * 3
+    times = [float(k) for k in range(len(history) + 1)]
+    for tag, vector, column in ((2, [*problem["force"], *zero], 0), (3, [*zero, *problem["moment"]], 1)):
+        values = [0.0, *(stage[column] for stage in history)]
+        ops.timeSeries("Path", tag, "-time", *times, "-values", *values)
+        ops.pattern("Plain", tag, tag)
+        ops.load(tip, *(vector if ops.getNDM()[0] == 3 else (vector[0], vector[1], vector[5])))
+    reached, done = advance(0.0, len(history), 1.0 / substeps, 1e-3)
+    if not done:
+        raise Stopped(f"no convergence in stage {reached:.4g} of {len(history)}")
+    return [_moved(tip)]
 
 
 if __name__ == "__main__":

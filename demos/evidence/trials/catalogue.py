@@ -62,12 +62,12 @@ def _rolled(turns, steps, limit, **more):
 def _twisted(method):
     problem = problems.twisted()
     answer = method.solve(problem)
-    return judged(_tips(answer, _twist_truth(), problem), 1e-2, answer, _OF_LENGTH)
+    return judged(_tips(answer, _shot(problems.twisted), problem), 1e-2, answer, _OF_LENGTH)
 
 
 @cache
-def _twist_truth():
-    return problems.shot(problems.twisted())
+def _shot(make):
+    return problems.shot(make())
 
 
 def _limit_point(method):
@@ -92,16 +92,11 @@ def _locking(method):
     errors, notes = [_delta_error(straight, answer).max()], []
     arc = {**problems.thin_arc(), "coarse": True}
     try:
-        answer = method.solve(arc)
-        errors.append(float(np.linalg.norm(answer.tip[-1] - _arc_truth()[0]) / np.linalg.norm(_arc_truth())))
+        answer, truth = method.solve(arc), _shot(problems.thin_arc)
+        errors.append(float(np.linalg.norm(answer.tip[-1] - truth[0]) / np.linalg.norm(truth)))
     except NotForIt as missing:
         notes.append(f"the straight rod alone: {missing}")
     return judged(max(errors), 0.1, answer, _RELATIVE, "; ".join(notes))
-
-
-@cache
-def _arc_truth():
-    return problems.shot(problems.thin_arc())
 
 
 def _slender(method):

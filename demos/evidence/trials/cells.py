@@ -13,7 +13,6 @@ NOT = "does not apply"
 MISSING = "not installed"
 #: The unit in which `numerics` of a method gives how far the clamp's quaternion is from a rotation.
 NO_ROTATION = "norm of q at the clamp, less one"
-VERDICTS = (RIGHT, SAID, STOPPED, SILENT, NOT, MISSING)
 
 
 @dataclass(frozen=True)

@@ -220,8 +220,8 @@ def _elements(problem):
 CHAINS = (
     ChainMethod("corotational", "co-rotational\nbeam",
                 f"Figure 3's planar two-node co-rotational Timoshenko beam, {ELEMENTS} elements, load control, halving "
-                "steps", lambda h, EA, GA: partial(corotational.beam, length=h, axial=EA, shear=GA)),
+                "steps", corotational.law),
     ChainMethod("mcre", "MCRE (re-\nconstruction)",
                 f"Figure 3's reconstruction of the Modified Cosserat Rod Element: truncated rotations, {ELEMENTS} "
-                "elements", lambda h, EA, GA: partial(mcre.derivatives, mcre.energy(h, EA, GA))),
+                "elements", mcre.law),
 )  # fmt: skip

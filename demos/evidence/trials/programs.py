@@ -1,10 +1,6 @@
-"""The peers of `demos/evidence/peers`, each in a separate process; cells of peers that are not installed say so.
-
-The files `extended_*.py` add to their runners: histories of loads, guided tips, convergence tests on residuals.
-"""
+"""The peers of `demos/evidence/peers`, each in a separate process; cells of peers that are not installed say so."""
 
 import math
-from pathlib import Path
 
 import numpy as np
 from peers.environments import Missing
@@ -16,7 +12,6 @@ from trials.cells import Answer, Method, NotForIt, NotInstalled, Stopped, load_f
 from trials.chains import NEXT_TO_INFINITE
 
 LIMIT = 16.0  # time limit of an answer, s, unless a program has another
-_EXTENDED = {"Exudyn": "extended_exudyn.py", "OpenSeesPy": "extended_opensees.py"}
 
 
 class Program(Method):
@@ -44,9 +39,6 @@ class Program(Method):
                 self._peer = Peer(self.key, install=False)
             except Missing as why:
                 raise NotInstalled(str(why)) from None
-            if self.key in _EXTENDED:
-                python = self._peer.words[0]
-                self._peer.words = [python, str(Path(__file__).with_name(_EXTENDED[self.key]))]
         return self._peer
 
     def end(self):
@@ -119,8 +111,8 @@ def _as_it_takes(problem, free, turns_clamp):
 
 
 PROGRAMS = (
-    Program("Exudyn", {"element": "planar 3-node", "elements": 32, "tol": 1e-8, "substeps": 4},
-            {"element": "spatial 2-node EP", "elements": 32, "tol": 1e-8, "substeps": 4, "load_jacobian": True}, 8,
+    Program("Exudyn", {"element": "planar 3-node", "elements": 32, "tol": 1e-8, "substeps": 4, "dense": "EXUdense"},
+            {"element": "spatial 2-node EP", "elements": 32, "tol": 1e-8, "substeps": 4, "dense": "EXUdense"}, 8,
             ("free", "history", "guided", "residual", "arcs in space"),
             "Exudyn 1.13.6, geometrically exact rods: 3-node in a plane, 2-node with Euler parameters in space"),
     Program("OpenSeesPy", {"element": "planar CBDI", "elements": 48, "tol": 1e-6, "substeps": 4, "inner": 1e-16},
