@@ -83,8 +83,7 @@ class ElementRule:
 
     @cached_property
     def from_slopes(self):
-        """(p + 1, gauss) matrix from slopes at the Gauss points (p of them) to the values of their integral at the
-        nodes."""
+        """(p + 1, gauss) from slopes at the p Gauss points to the values of their integral at the nodes."""
         count = len(self.gauss)
         powers = np.column_stack([(2 * self.nodes - 1) ** (k + 1) - (-1) ** (k + 1) for k in range(count)])
         return powers / (2 * np.arange(1, count + 1)) @ np.linalg.inv(np.vander(2 * self.gauss - 1, increasing=True))
@@ -113,8 +112,7 @@ class ElementRule:
         return _interpolating(self.gauss, np.asarray(x))
 
     def locate_all(self, breaks, x, basis=None):
-        """Elements (n,) and basis functions (n, p + 1), or another `basis`, at x (n,) of a rod with element ends
-        `breaks`."""
+        """Elements (n,) and basis functions (n, p + 1) at x (n,) of a rod with element ends `breaks`."""
         cells = np.clip(np.searchsorted(breaks, x, side="left") - 1, 0, len(breaks) - 2)
         local = (x - breaks[cells]) / np.diff(breaks)[cells]
         return cells, (basis or self.basis)(np.clip(local, 0.0, 1.0))

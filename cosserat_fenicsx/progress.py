@@ -175,8 +175,7 @@ class MeshProgress(StageProgress):
         self._tol = tol
 
     def on(self, elements, reached):
-        """The computation begins on a mesh of at most `elements` elements per rod; reached: the estimated error so
-        far."""
+        """It begins on a mesh of at most `elements` elements per rod; reached: the estimated error so far."""
         error = f", estimated error {reached:.1e} of {self._tol:g}" if math.isfinite(reached) else ""
         self.at(f"{elements} elements per rod{error}")
 

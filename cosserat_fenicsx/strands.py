@@ -135,8 +135,7 @@ class Strands:
         return cls(cells, rods, sizes, np.concatenate(starts), radii[rods], rule, apart)
 
     def basis(self, element, place, order=0):
-        """(n, 3 (p + 1)) derivatives of an order of the basis by the place in the element, of `stencil`; (n, orders, 3
-        (p + 1)) where `order` is a tuple."""
+        """(n, 3 (p + 1)) derivatives of the basis by the place, of `stencil`; (n, orders, ..) for a tuple `order`."""
         orders, slopes, count = order if isinstance(order, tuple) else (order,), self._slopes, len(self._nodes)
         powers = (2 * place - 1)[:, None] ** self._powers
         found = np.stack([powers @ self._coefficients[k] for k in orders], axis=1)
@@ -149,8 +148,7 @@ class Strands:
         return found if isinstance(order, tuple) else found[:, 0]
 
     def at(self, x, element, place, order=0):
-        """(n, 3) position, or its derivative by arc length, for positions x (N, 3) of the nodes; (n, orders, 3) where
-        `order` is a tuple."""
+        """(n, 3) position, or its derivative by arc length, by x (N, 3); (n, orders, 3) for a tuple `order`."""
         orders = order if isinstance(order, tuple) else (order,)
         nodes = x[self.stencil[element]]
         first = nodes[:, :1]  # subtracted for the sake of rounding
@@ -291,8 +289,7 @@ class Strands:
         return second - first
 
     def between(self, first, second, share):
-        """Elements and places (m, 2) at a share (m,) of the arc lengths from the points of some `Touches` to those of
-        others of the same rods."""
+        """Elements, places (m, 2) at a share (m,) of the arc lengths from some `Touches` to others of the same rods."""
         ends = np.cumsum(self.sizes) - self.sizes
         begin, end = (ends[t.element] + self.sizes[t.element] * t.place for t in (first, second))
         at = begin + share[:, None] * (end - begin)
@@ -473,8 +470,7 @@ def in_words(rods, places, verb):
 
 
 def overlap(rods, found, allowed):
-    """Where polygons overlap most beyond depths that are allowed (m, one or one each), in words; "" where they do not.
-    found: of `closest_segments`, in m."""
+    """Where polygons overlap most beyond allowed depths (m), in words; "" without. found: of `closest_segments`, m."""
     gap, sag, *places = found
     deep = -(gap + sag) - allowed
     if not len(gap) or deep.max() <= 0:

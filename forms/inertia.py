@@ -91,8 +91,7 @@ def strain_energy(motion, section):
 
 
 def averaged_stress(before, after, middle, section, viscosity, h, test):
-    """The stress terms of eq. (1) over a step: elastic for the average strains of both ends, viscous for their
-    differences over h."""
+    """The stress terms of eq. (1) over a step: elastic for mean strains, viscous for differences over h."""
     T, ends = frame(middle, section), list(zip(strains(before, section), strains(after, section), strict=True))
     averages, rates = [(b + a) / 2 for b, a in ends], [(a - b) / h for b, a in ends]
     return balance(*(T * a for a in law.damped(section.law, viscosity, averages, rates)), middle, test)

@@ -361,8 +361,7 @@ def allowed(problem, variations):
 
 
 class LockStep(Pointers):
-    """The C structure `lock_step` (`c`; None where kernels cannot be compiled for lanes) for problems such as this one;
-    variations: its `NegativeModes`."""
+    """The C structure `lock_step` (`c`; None without kernels for lanes) for problems such as this one."""
 
     def __init__(self, problem, variations):
         super().__init__()

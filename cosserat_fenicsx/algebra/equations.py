@@ -256,8 +256,7 @@ class Equations(Called):
         return self.ties.forces(self.tie_load_factor) if self.ties else np.empty((0, 2, 6))
 
     def at_ties(self, x, load_factors):
-        """(multipliers (n, ties), `tie_forces` (n, ties, 2, 6)) at unknowns x (n, this rank's part) and load factors
-        (n,); the ties stay at the last one."""
+        """(multipliers (n, ties), `tie_forces` (n, ties, 2, 6)) at unknowns x (n, size) and load factors (n,)."""
         return self.ties.along(x, load_factors) if self.ties else (np.empty((len(x), 0)), np.empty((len(x), 0, 2, 6)))
 
     def multipliers(self):

@@ -280,8 +280,7 @@ class BorderedNewton(Newton):
         return problem.solve(force, motion) and math.isfinite(motion.norm())
 
     def slope_here(self, neutral=None):
-        """(owned unknowns,) dx/d load_factor at the problem's x and load factor, without the neutral motion;
-        NotConverged where the tangent is singular."""
+        """(owned unknowns,) dx/d load_factor here; NotConverged where the tangent is singular."""
         problem, self.neutral = self.problem, neutral
         if not self._solved_here(problem.load_derivative(problem.x), self._slope):
             raise NotConverged(

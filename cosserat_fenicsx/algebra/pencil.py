@@ -38,8 +38,7 @@ def on_every_rank(A):
 
 
 def constraint_rows(gradients, tied, size):
-    """(equations, size) gradients of constraint equations by all unknowns, from those by (tied nodes, block); tied:
-    numbers of the unknowns, -1 where clamped."""
+    """(equations, size) gradients by all unknowns from those by (tied nodes, block), of the unknowns `tied`."""
     held = np.zeros((len(gradients), size + 1))  # number -1 goes to the last column
     held[:, tied.ravel()] = gradients.reshape(len(gradients), tied.size)
     return held[:, :size]

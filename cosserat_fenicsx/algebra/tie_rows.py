@@ -116,8 +116,7 @@ class TieRows(Pointers):
         self.c.known = self.c.known_change = 0
 
     def find_maps(self, values, forces):
-        """Set the rows of forces (nodes, 6) on nodes with these unknowns (nodes, block), and their change, where they
-        turn with the nodes."""
+        """Set the rows of forces (nodes, 6) on nodes with unknowns (nodes, block), and their change by rotations."""
         self._test[:] = self.model.tie_maps(values)[1]
         self._turned[:] = self.model.turned_reactions(values, forces)
 

@@ -61,8 +61,7 @@ def times_between(where, times, between):
 
 
 def bands(times, *lines):
-    """(middles, [(least, largest)]) of lines in intervals with equal numbers of rows: oscillations of a long run would
-    fill a chart with one colour."""
+    """(middles, [(least, largest)]) of lines in intervals of equal numbers of rows, for oscillations of a long run."""
     edges = np.linspace(0, len(times), _BANDS + 1).astype(int)[:-1]
     ends = np.append(edges[1:], len(times)) - 1
     extremes = [(np.minimum.reduceat(line, edges), np.maximum.reduceat(line, edges)) for line in lines]
@@ -97,8 +96,7 @@ def is_axial(history):
 
 
 def moves_along(history):
-    """Whether the motion along the axis is of more interest than the rotation: nothing turns, or the block moves up and
-    down, as by heave."""
+    """Whether axial motion is of more interest than rotation: nothing turns, or the block moves up and down."""
     if not is_axial(history):
         return False
     block = velocity_of_block(history, _some(history.times))

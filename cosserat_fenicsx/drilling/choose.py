@@ -16,8 +16,7 @@ MODELS = ("auto", TORSION, BOTH)
 
 
 def chosen(scene, model="auto"):
-    """(name, [sentence]): the model and the reasons for it. Raises SceneError: an unknown model, or one that does not
-    fit the scene."""
+    """(name, [sentence]): the model and its reasons; a SceneError for one that is unknown or does not fit the scene."""
     if not isinstance(model, str) or model not in MODELS:
         raise SceneError(f"simulate.model = {model!r}: {nearest(model, MODELS)}")
     if scene.discs:

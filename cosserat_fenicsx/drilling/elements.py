@@ -366,8 +366,7 @@ class AxialTorsional(StringModel):
             bit.rock, (bit.floor, bit.sinking) = 1, given.rock
 
     def bit_state(self) -> np.ndarray:
-        """(2, 2) of the bit at the end of the last step: place (m downwards, rad) and velocity; NaN where axial motion
-        is left out."""
+        """(2, 2) place (m downwards, rad) and velocity of the bit at the end of the last step."""
         found = np.full((2, 2), np.nan)
         found[:, 2 - self._dofs :] = self._kept["x"][-1], self._kept["v"][-1]
         return found

@@ -194,8 +194,7 @@ class Surface:
 
 @functools.lru_cache(16)
 def surface_of(owner, name: str, most: float) -> Surface | None:
-    """A method (slip, load) of a user's object as a `Surface` for loads up to `most` (N), None where none is within
-    1e-8 of its range: it drops, or has a kink."""
+    """A method (slip, load) of a user as a `Surface` for loads up to `most` (N); None where that is not accurate."""
     loads, x = np.linspace(0.0, most, _FEWEST + 1), np.log(SLIPS)
     for load in loads[:: _FEWEST // 2]:
         if tabulated(by_method(owner, name, float(load))) is None:

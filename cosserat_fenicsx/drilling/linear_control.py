@@ -179,8 +179,7 @@ def check_late(control: DriveControl, space: StateSpace | None, impedance: float
 
 
 def check_answer(control: DriveControl, answer: float, dt: float) -> None:
-    """Refuse a step dt (s) in which a control answers to the mean torque by a factor `answer` of 1 or more. Raises
-    SceneError: so it is."""
+    """Refuse a step dt (s) in which a control answers to the mean torque by a factor of 1 or more."""
     if not math.isfinite(answer) or answer >= 1:
         refuse("simulate", "dt", dt, f"a shorter step (s): in this one the torque of {type(control).__name__} follows "
                f"the torque of the string by a factor of {answer:.3g}, which has to be below 1")  # fmt: skip

@@ -42,8 +42,7 @@ class TimeLoop:
         self._save_every, self._profile_every, self._turn = save_every, profile_every, turn
 
     def until(self, duration, progress=None):
-        """Advance to a time (s), and return the history. Raises NotConverged, Interrupted, NotStored: with the history
-        so far as `.path`."""
+        """Advance to a time (s), and return the history, which exceptions have as `.path`."""
         model, history = self.model, self.history
         end = duration - _NOTHING * model.dt
         try:
@@ -288,8 +287,7 @@ def check_arguments(scene, duration, dt=None, elements=None, save_every=None, pr
 
 
 def check_step(scene, dt, duration, save_every=None):
-    """Refuse a step that is too long for the rotation in it, and too many steps or rows. Raises SceneError: naming the
-    step and its limit."""
+    """Refuse a step that is too long for the rotation in it, and too many steps or rows."""
     where, speed = "simulate", fastest(scene, duration)
     if duration / dt > MOST_STEPS:
         refuse(where, "duration", duration, f"at most {MOST_STEPS:g} steps of {dt:g} s, {MOST_STEPS * dt:g} s")

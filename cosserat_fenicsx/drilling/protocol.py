@@ -220,11 +220,7 @@ class StringModel(Pointers):
 
 
 def check_steady(scene) -> None:
-    """Refuse a scene whose drive has no steady speed of its own.
-
-    Raises:
-        SceneError: a motor, a control without an integral part, or a drive at rest.
-    """
+    """Refuse a scene whose drive has no steady speed of its own: a motor, no integral part, or at rest."""
     drive = scene.drive
     gains = None if drive.speed is None or drive.control.sampled else drive.control.gains(1.0)
     sampled = drive.speed is not None and drive.control.sampled
@@ -261,11 +257,7 @@ def follows_the_bit(scene) -> bool:
 
 
 def steady_velocities(scene) -> np.ndarray:
-    """(2,) of steady motion: m/s downwards, rad/s.
-
-    Raises:
-        SceneError: a bit that drills by its weight, which its wear flats bear.
-    """
+    """(2,) m/s downwards, rad/s; a SceneError for a bit whose weight its wear flats bear."""
     turning = scene.drive.signal()(0.0)
     if follows_the_bit(scene):
         return np.array([scene.bit.law.rate(scene.bit.weight, steady_speed_of_bit(scene)), turning])

@@ -120,8 +120,7 @@ _AT_ENDS = ("drive_angle", "bit_angle", "bit_advance", "impulse_on_bit")
 
 
 def computed(history, name, times):
-    """A quantity of a history at times (s), by lines between its rows, where the means over steps hold for the middles
-    of the steps."""
+    """A quantity of a history at times (s), by lines between rows; means hold for the middles of the steps."""
     ends = name in _AT_ENDS or (name == "drive_speed" and history.scene.drive.inertia > 0)
     return np.interp(times, history.times if ends else history.mean_times, getattr(history, name))
 

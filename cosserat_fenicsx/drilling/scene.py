@@ -70,8 +70,7 @@ class Segment:
 
 
 def segment_of(place, weight):
-    """The `Segment` of a component in its place (`Laid`) with a weight in mud (N/m). Raises SceneError: a component
-    without stiffness, mass or inertia."""
+    """The `Segment` of a `Laid` component of a weight in mud (N/m); a SceneError without stiffness or mass."""
     part = place.component
     stiffness = part.stiffness
     if stiffness is None:

@@ -39,8 +39,7 @@ def doubt_block_speed(owner: object, field: str, speed: float) -> None:
 
 
 def doubt_decay(owner: object, speed: float | None, most: float = 15.0, unit: str = "rad/s") -> None:
-    """Warn of a speed of a law of friction, at which its static part decays, that looks like revolutions a minute; or,
-    of a slip in m/s, that no string has."""
+    """Warn of a speed of decay that looks like revolutions a minute, or like a slip (m/s) that no string has."""
     if speed is not None and speed > most:
         rate = f"'{speed:g} rpm', {speed * units.rpm:.3g} rad/s"
         rate += "" if unit == "rad/s" else ", with of_rotation=True"

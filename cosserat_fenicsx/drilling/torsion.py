@@ -67,8 +67,7 @@ Cells = namedtuple("Cells", "dt depths impedance time turn joined unfit")
 
 
 def cells_of(segments, dt, period=None):
-    """The `Cells` of `Segment`s from the top down, for a step of dt (s) or the next shorter one that fits better, a
-    whole part of a period (s) if there is one."""
+    """The `Cells` of `Segment`s for a step of dt (s), or the next shorter one that fits times and period (s) better."""
     parts, top = [], 0.0
     for segment in segments:
         bottom = top + segment.length

@@ -254,8 +254,7 @@ class PipeFriction:
         self._now = self._before = (rest, np.full(self._count, np.nan), rest + thrust)
 
     def holding(self, push, torque, axial, torsional):
-        """(2, n) friction along the hole, N, and around it, N m, in a step; see the module for the arguments: f, g r, A
-        and B r^2 of the inner nodes."""
+        """(2, n) friction along the hole, N, and around it, N m, in a step, by f, g r, A and B r^2."""
         slip, around, thrust = self._now
         r = self._radius
         f, g, A, B = push, torque / r, axial, torsional / r**2

@@ -108,8 +108,7 @@ def perpendicular(u, t):
 
 
 class NodalContact(Pointers):
-    """Contact of the nodes of a loaded `StepProblem` with the walls of its scene (see `Action.touches`); at_end:
-    whether forces are those of the end of a step."""
+    """Contact of nodes of a loaded `StepProblem` with walls; at_end: whether forces are those of a step's end."""
 
     def __init__(self, problem, walls, *, at_end):
         super().__init__()

@@ -40,8 +40,7 @@ class Fixed:
         return True
 
     def failed(self, h):
-        """A step of length h (s) failed: True to repeat it with the shorter `length`, False to halve it without error
-        tests."""
+        """A step of length h (s) failed: True to repeat it with the shorter `length`, False to halve it."""
         return False
 
     def watch(self, scene, duration, load_factor, impulse_error):

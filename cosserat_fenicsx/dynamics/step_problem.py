@@ -138,8 +138,7 @@ class TensionsInSteps(ThreadLengths):
         return np.maximum(self._lengths(self._length) - left, 0.0) / (self._softness * left)
 
     def halfway(self, t):
-        """Take the tensions whose work is that of the step, at the time t (s) of its middle; those before are
-        returned."""
+        """Take the tensions whose work is that of the step of the middle t (s); returns those before."""
         own, self._left = self.values, self.left_at(t, self._problem.load_factor)
         self.put(self._mean(self._lengths(self._length))[0])
         return own
@@ -375,8 +374,7 @@ class StepProblem(Equations):
         return self.model.comm.allreduce(fem.assemble_scalar(form))
 
     def clamp_forces(self):
-        """(points, 6) force and moment that held every clamped point in the last step, those of other supports and
-        joints there included; on all ranks."""
+        """(points, 6) force and moment that held every clamped point in the last step; on all ranks."""
         clamps = self.model.clamps
         if not clamps.count:
             return np.empty((0, 6))

@@ -75,8 +75,7 @@ class TimeLoop:
         self._stepper.recall(memory["stepper"])
 
     def over(self, marks, save_all, progress):
-        """Compute the motion from its current time to the last of the `Mark`s, the first at the start; the history.
-        save_all: whether every step is saved."""
+        """The history up to the last of the `Mark`s, the first at the start; save_all: whether of every step."""
         comm, model = self.model.comm, self.model
         try:
             with self._store.ending(self.history), Progress([marks[-1].time], progress, comm, "t (s) =") as bar:

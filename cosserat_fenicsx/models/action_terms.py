@@ -392,8 +392,7 @@ class Term:
         return self.memory[-1].x.array
 
     def find_friction(self):
-        """Store the friction of the state, and no other memory; returns the largest elastic slip that has changed it,
-        dimensionless."""
+        """Store the friction of the state, no other memory; returns the largest elastic slip that changed it."""
         before = self.held.copy()
         self._store(self.memory[-1:])
         changed = np.abs(self.held - before).reshape(-1, 3).max(axis=1)
@@ -497,8 +496,7 @@ class Delays:
             delayed.undo()
 
     def far_ends(self, stepped):
-        """(actions, 4) numbers of their far ends, means over the steps since this was last called; NaN where the state
-        is not that after a step."""
+        """(actions, 4) means of their far ends since this was last called; NaN where no step led to the state."""
         passed = self._passed
         self._forget()
         return passed[:, 1:] / passed[:, :1] if stepped else np.full((len(passed), 4), np.nan)

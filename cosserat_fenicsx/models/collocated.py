@@ -275,8 +275,7 @@ class CollocatedPlanar(Collocated, MovingPlanar):
 
 
 class Turning:
-    """Mixin of moving spatial models, first among the bases; turning: rates of the directors R(q) of the nodes at the
-    beginning of a step, (3 x 3) row by row."""
+    """Mixin, first among the bases; turning: rates of the directors R(q) of the nodes at the step's start (3 x 3)."""
 
     def _motion_fields(self):
         super()._motion_fields()
@@ -389,8 +388,7 @@ class ConservingStep(SpatialStep):
 
 
 def compile_conserving(step):
-    """The `MotionForms` of the energy-conserving scheme, from a `ConservingStep`: the residual has all terms of the
-    step except loads, and no equation |q| = 1."""
+    """The `MotionForms` of a `ConservingStep`: the residual has all terms but loads, and no |q| = 1."""
     model, dx, body, h = step.model, step.dx, step.body, step.model.h
     q_m = (parts_of(step.nodal0)[1] + parts_of(step.nodal)[1]) / 2
     test = energy.Variation(*parts_of(step.phi), *parts_of(along(step.phi)))

@@ -212,13 +212,11 @@ class Formulation:
         return spatial.unit_quaternion(state, test)
 
     def rows_of_moments(self, q):
-        """(nodes, components after r, 3): matrices from moments at nodes with q (nodes, 4) to residual rows; only one
-        where all nodes have the same."""
+        """(nodes, components after r, 3) from moments at nodes to residual rows; one if all are equal."""
         return _LAST_ROWS
 
     def turned_rows(self, q, moments):
-        """(nodes, c, c), c the components after r: derivative by q of the residual rows of moments (nodes, 3), where
-        `galerkin`."""
+        """(nodes, c, c) derivative by q of residual rows of moments (nodes, 3), where `galerkin`."""
         raise NotImplementedError
 
 
@@ -343,8 +341,7 @@ class _Resultant(namedtuple("_Resultant", "force moment symbols data")):
 
 
 def resultant_at_rest(action, scene, t):
-    """(6,) force (N) and moment (N m), inertial, of a point action with its station at rest in the reference, at the
-    time t (s) and with its initial memory."""
+    """(6,) force (N) and moment (N m), inertial, of a point action at rest, at the time t (s)."""
     work, rod = work_of(action), action.station.rod
     if work is None:
         return np.zeros(6)

@@ -320,8 +320,7 @@ class Moving(Damped):
         raise NotImplementedError
 
     def rates(self):
-        """A function from the nodes' unknowns and their rates, (.., components) each, to velocities and angular
-        velocities (.., 6), inertial, dimensionless."""
+        """A function from the nodes' unknowns and their rates to velocities (.., 6), inertial, dimensionless."""
         raise NotImplementedError
 
     def _momenta_of(self, p):

@@ -181,8 +181,7 @@ def bending_lengths(data, lengths, counts):
 
 
 def bounded(data, stiff, sizes, lengths, structures):
-    """The bounded K of the second variation; sizes of elements, `bending_lengths`, and the numbers of the structures
-    that elements belong to, (elements,)."""
+    """The bounded K of the second variation, by sizes of elements, `bending_lengths`, and their structures' numbers."""
     strong, weak = (bend(data.J, axis=2, keepdims=True) for bend in (np.max, np.min))
     lengths, sizes = lengths[:, None, None], sizes[:, None, None]
     least = stiff * strong / lengths**2

@@ -38,8 +38,7 @@ class Layout:
 
     @classmethod
     def of(cls, scene, elements):
-        """`elements` per rod, more only where supports, loads, joints and kinks need an element end; a SceneError for
-        more than `MOST_ELEMENTS` in all."""
+        """`elements` per rod, more where supports, loads, joints, kinks need it; a SceneError for too many in all."""
         return _equal(scene, elements)
 
     def finer(self, scene, factor):

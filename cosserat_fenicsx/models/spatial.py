@@ -138,8 +138,7 @@ class SpatialModel(RodModel):
         return self._gather_nodes(local[: self.owned_nodes])
 
     def change_of(self, motion):
-        """This rank's part of the change of the solver's vector, at the state, that corresponds to a vector (r, theta)
-        in the second variation's numbering."""
+        """This rank's change of the solver's vector by (r, theta) in the second variation's numbering."""
         state, nodal = self.state.x.array, self.nodal
         moved, change = np.zeros(6 * len(nodal)), np.zeros_like(state)
         self.second_variations[0].numbering.to_local(motion, moved)

@@ -181,8 +181,7 @@ def together(surfaces):
 
 
 def coloured(pyvista, bodies, factors, scale=1.0):
-    """The surfaces of `Body`s as one mesh, with their values over `scale` as "value"; factors: of each, see
-    `surface_of`."""
+    """The surfaces of `Body`s as one mesh, values over `scale` as "value"; factors: of each, see `surface_of`."""
     surface = together([surface_of(pyvista, body, factor) for body, factor in zip(bodies, factors, strict=True)])
     surface["value"] = _at_points(bodies, scale)
     return surface
@@ -422,8 +421,7 @@ def colour_of(name, among=EVERY, where="plot"):
 
 
 def seen(colour, values, peak):
-    """The `Colour` for a list of arrays of values up to a size `peak`: where none is negative, its colours begin at 0,
-    so that all of them are used."""
+    """The `Colour` for arrays of values up to `peak`: where none is negative, its colours begin at 0."""
     least = min(float(np.nan_to_num(array).min()) for array in values)
     return replace(colour, signed=colour.signed and not (peak and least >= -_UNSIGNED * peak))
 

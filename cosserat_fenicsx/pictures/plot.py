@@ -359,8 +359,7 @@ def shifts(shapes, right):
 
 
 def around(lines, points, up):
-    """Points (n, 3), m: those of the lines of one shape, and at its place the heights of all points along `up`, an axis
-    of space."""
+    """Points (n, 3), m: of the lines of one shape, and at its place the heights of all points along the axis `up`."""
     first, axis = np.concatenate(lines), int(np.argmax(np.abs(up)))
     ends = np.repeat(first.mean(axis=0)[None], 2, axis=0)
     ends[:, axis] = points[:, axis].min(), points[:, axis].max()

@@ -112,8 +112,7 @@ class Drawn:
         return made
 
     def shown(self, everywhere):
-        """The points (n, 3) that a picture of points `everywhere` shows: those of the rods that move, where their
-        motion could not be seen in all."""
+        """The points (n, 3) of `everywhere` that a picture shows: of rods whose motion could not be seen in all."""
         if not self._unseen:
             return everywhere
         rods = zip(self.lines, *(self.bodies(share) for share in _EXTREMES), strict=True)

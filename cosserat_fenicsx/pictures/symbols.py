@@ -211,8 +211,7 @@ class Symbols:
         self._add(mark, self._box(pose.place + (_SPRING + 0.05) * a * down, _frame_along(down), (a, a, 0.1 * a)))
 
     def along(self, mark, line, radius, top, text):
-        """A row of arrows for a load along a rod, of lengths in proportion to `top`; line: the centreline (n, 3), m;
-        radius: that the rod is drawn with, m."""
+        """A row of arrows of a load along a rod, of lengths by `top`; line: (n, 3), m; radius: that is drawn, m."""
         way = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1)))
         count = arrows_along(way[-1], self._size)
         places, x = np.linspace(0, way[-1], count), np.linspace(0, way[-1], len(mark.vector))

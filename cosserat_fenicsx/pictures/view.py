@@ -124,8 +124,7 @@ class Labels:
         self.left_out = []
 
     def fix(self, text, places, *, size, colour="black"):
-        """A label at the first of some places where no other label is: [(point (3,), m, and how many pixels (2,) from
-        there the middle of the label is)]."""
+        """A label at the first of some places [(point (3,), m, pixels (2,) to its middle)] where no other is."""
         for point, away in places:
             box = _box(text, self._view.pixels(point) + away, size)
             if self._free(box):
@@ -140,8 +139,7 @@ class Labels:
         self._covered = np.maximum(self._covered, self._cells(lines))
 
     def part(self, ends):
-        """Let labels, and lines from them to their points, cross the line between two points (2, 3), m, as little as
-        those of other labels."""
+        """Let labels, and lines to their points, cross the line between two points (2, 3), m, as little as possible."""
         self._leaders.append(tuple(self._view.pixels(ends)))
 
     def reserve(self, low, high):
@@ -179,8 +177,7 @@ class Labels:
         return True
 
     def evenly(self, texts, *, size, away):
-        """Labels [(text, point (3,), m)] of the ticks of an axis, in order, every n-th of them, such that as many as
-        possible have room; away: as of `fix`."""
+        """Labels [(text, point (3,), m)] of every n-th tick of an axis, as many as have room; away: as of `fix`."""
         boxes, best = [_box(text, self._view.pixels(point) + away, size) for text, point in texts], []
         for n, first in ((n, first) for n in range(1, len(texts) + 1) for first in range(n)):
             some = range(first, len(texts), n)

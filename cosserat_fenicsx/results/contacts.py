@@ -184,8 +184,7 @@ def slanted(path, obstacle):
 
 
 def lifting(path):
-    """Sentences on rods that touch an obstacle in the last state without pressing on it: stability does not see that
-    they may lift off."""
+    """Sentences on rods that touch an obstacle at last without pressing on it: stability does not see them lift off."""
     obstacles = [action for action in path.scene.actions if action.gaps is not None]
     for obstacle in obstacles if len(path) and path.counts_modes else ():
         last = path[len(path) - 1]
@@ -208,8 +207,7 @@ def _grazing(scene, rod, s, gap):
 
 
 def refuse_grazing(state, owner):
-    """Refuse (SceneError with rod and place) small motions about an `Equilibrium` of rods that touch an obstacle
-    without pressing on it, which may lift off."""
+    """Refuse small motions about an `Equilibrium` of rods that touch an obstacle without pressing on it."""
     for obstacle in state.scene.actions:
         for rod in state.scene.rods:
             if obstacle.gaps is not None and obstacle.acts_on(rod):

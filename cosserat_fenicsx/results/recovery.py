@@ -84,8 +84,7 @@ def _turned(c, a):
 
 
 def at_nodes(values):
-    """(nodes, k) from values at the nodes of every element of a rod (elements, p + 1, k); at shared nodes the values of
-    the element before."""
+    """(nodes, k) from values (elements, p + 1, k) of a rod; at shared nodes those of the element before."""
     return np.concatenate([values[:1, 0], values[:, 1:].reshape(-1, values.shape[2])])
 
 
@@ -166,8 +165,7 @@ class Threads:
         self._threads = [thread for thread in result.scene.actions if thread.is_thread]
 
     def at_gauss(self):
-        """(n, elements, points, 6) the force T t and the moment R a x T t about the axis, of all threads, at the Gauss
-        points, inertial, dimensionless."""
+        """(n, elements, points, 6) force T t and moment R a x T t of all threads, inertial, dimensionless."""
         found = np.zeros((*self._records["gauss_fields"].shape[:3], 6))
         for thread in self._threads:
             places, R, v, k = self._strained(thread)
@@ -260,8 +258,7 @@ class _Places:
         self.frames = rod.curve.frame(self.s)
 
     def turned(self, records):
-        """(n, elements, points, 3, 3) directors, and (n, elements, points, 3) u - u_R, material, dimensionless; the
-        latter at the Gauss points alone."""
+        """(n, elements, points, 3, 3) directors and (n, elements, points, 3) u - u_R, material, dimensionless."""
         q = records["rq"][:, self._nodes, 3:]
         here, slope = self._basis @ q, self._slopes @ q / self._h
         squared = np.einsum("...i,...i", here, here)[..., None]

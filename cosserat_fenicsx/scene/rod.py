@@ -227,8 +227,7 @@ class Station:
 
 
 def station_named(where, text, rods):
-    """The station 'rod.start', 'rod.end' or 'rod@s', s in m, of rods {name: rod}; a SceneError of `where` for another
-    text, an unknown rod, or a place beyond it."""
+    """The station 'rod.start', 'rod.end' or 'rod@s' (m) of {name: rod}; a SceneError of `where` for others."""
     known = ", ".join([*rods][:_NAMED]) + (", ..." if len(rods) > _NAMED else "")
     expected = f"expected 'rod.start', 'rod.end' or 'rod@s' with s in m and the rod one of {known}"
     if not isinstance(text, str):

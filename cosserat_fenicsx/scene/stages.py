@@ -154,8 +154,7 @@ def refuse_stages(owner, scene):
 
 
 def named_stages(scene, known):
-    """The stages of a scene with stations and rods in place of their names, and with what is released by its place;
-    `known`: its `Places`, to which it adds."""
+    """A scene's stages with stations for names, released things by place; `known`: its `Places`, added to."""
     found = []
     for i, stage in enumerate(scene.stages):
         instance("Scene", f"stages[{i}]", stage, Stage, "a Stage")

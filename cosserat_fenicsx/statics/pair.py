@@ -273,8 +273,7 @@ class Pair(Pointers):
         return np.concatenate(parts, axis=1)
 
     def run(self, count, numbers=None):
-        """Solve cases in C, with their `numbers`, or as the scene that is loaded: (which are decided (cases,), values
-        and estimated errors (cases, queries))."""
+        """Solve cases in C: (which are decided (cases,), values and estimated errors (cases, queries))."""
         c, from_buffer = self._cases, self._ffi.from_buffer
         numbers = self._empty if numbers is None else np.ascontiguousarray(numbers)
         undecided, (found, errors) = np.zeros(count, np.int32), np.zeros((2, count, len(self._queries)))
@@ -458,8 +457,7 @@ class Loaded(Pointers):
         return self.model._section_data(data._replace(K=given, J=given)).K[:, 0].astype(int)
 
     def stretched(self, K, J):
-        """{name: (cases, n)} numbers of the law, from K and J (cases, rods, 3), N and N m^2: of an element (elements,
-        3) where `law_places` says so."""
+        """{name: (cases, n)} of the law, from K and J (cases, rods, 3); of an element if `law_places` says so."""
         model, order = self.model, self._order
         force, cases, sizes = model.signature.formulation.force, len(K), self._lengths[0]
         along, turning = ((x.reshape(cases, -1) / unit)[:, order] for x, unit in self._in_units(K, J))

@@ -260,8 +260,7 @@ class Part(Pointers):
 
 
 def oriented(model, vectors):
-    """Modes of one eigenvalue as changes of the unknowns (owned entries), combined by `orienting`, of the largest
-    displacement 1 (in the model's unit of length)."""
+    """Modes of one eigenvalue as owned unknowns, combined by `orienting`, of the largest displacement 1."""
     if not vectors:  # the eigensolver has not converged
         return []
     modes = np.array([model.change_of(vector) for vector in vectors])

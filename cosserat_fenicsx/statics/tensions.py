@@ -185,8 +185,7 @@ class Tensions(ThreadLengths):
         return None
 
     def take(self, share=1.0, by_load=0.0):
-        """Subtract a share of the last step for the residual from the tensions, and add a change of the load factor
-        times `slope`."""
+        """Subtract a share of the last step from the tensions, and add a change of the load factor times `slope`."""
         self.put(self.values - share * self._step + by_load * self.slope)
 
     def gaps(self):
@@ -194,8 +193,7 @@ class Tensions(ThreadLengths):
         return self._lengths(self._length) - self._left * (1 + self._softness * self.values)
 
     def too_short(self, load_factor, most):
-        """(tendon, its length, m) of one whose tension would exceed `most` on the way to a load factor, by the
-        compliance at the problem's state; or None."""
+        """(tendon, length, m) of one whose tension exceeds `most` on the way to a load factor; or None."""
         problem = self._problem
         problem.function(problem.x, problem.b)
         problem.factor()
@@ -208,8 +206,7 @@ class Tensions(ThreadLengths):
         return (self._tendons[k], float(length)) if beyond[k] > 0 else None
 
     def keep(self):
-        """For what linearises about the state: tendons remain taut or slack. (tendons,) which are about to be either;
-        they remain slack."""
+        """(tendons,) which are about to be taut or slack, and remain slack where the problem is linearised."""
         edges = (self.values <= _EDGE) & (np.abs(self.gaps()) <= _EDGE * self._left)
         self._active = (self.values > 0) & ~edges
         return edges
@@ -246,8 +243,7 @@ class Tensions(ThreadLengths):
         return K + stretch.T @ stretch, np.vstack([held, rows[on & (compliance == 0)]])
 
     def pivots(self):
-        """(number of negative eigenvalues of S, logarithm of its determinant's absolute value) at the problem's
-        state."""
+        """(number of negative eigenvalues of S, logarithm of its determinant's size) at the problem's state."""
         problem, on = self._problem, self.values > 0
         problem.function(problem.x, problem.b)
         problem.factor()

@@ -122,8 +122,7 @@ def executor_of(task, workers, executor):
 
 
 def by_executor(executor, task, cases, numbers):
-    """(number of a case, what `computed` gives) by an executor, as they are done; the rest is canceled at an exception;
-    numbers: an iterator of those to compute."""
+    """(number of a case, what `computed` gives) by an executor, as done; the rest is canceled at an exception."""
     pending, done = {}, queue.SimpleQueue()  # `wait` would look at all that are pending, for each that is done
     try:
         while True:

@@ -72,8 +72,7 @@ DEPTH = Quantity("measured depth", unit="m", shown="m", dimension="length")
 
 
 def over_depth(widths, quantity):
-    """A Figure, panels of some widths (inches) in rows that share the depth, which runs downwards and has this label,
-    and the unit of lengths with its size."""
+    """A Figure, panels of widths (inches) over the depth, downwards, and the unit of lengths with its size."""
     figure, panels, rows = beside(widths, 7.5)
     panels[0].invert_yaxis()
     for row in rows:

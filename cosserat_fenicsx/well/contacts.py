@@ -53,8 +53,7 @@ def side_in_space(tangents, outward):
 
 
 def high_side(tangents, north=False):
-    """(n, 3) unit vectors to the high side of a hole with tangents (n, 3); zero where it is vertical, or to the
-    north."""
+    """(n, 3) unit vectors to the high side by tangents (n, 3); where it is vertical zero, or to the north."""
     high = tangents * tangents[:, 2:] - (0.0, 0.0, 1.0)
     size = np.linalg.norm(high, axis=1, keepdims=True)
     vertical = np.array([1.0, 0.0, 0.0]) - tangents[:, :1] * tangents if north else 0.0

@@ -211,8 +211,7 @@ class _Friction:
                       error, torque_error, np.zeros(len(below), dtype=bool))  # fmt: skip
 
     def unresolved(self):
-        """Errors of forces (N) by the decay of Legendre's coefficients of the load: Gauss's rule has the square of what
-        is cut off."""
+        """Errors of forces (N) by the decay of the load's Legendre coefficients, squared by Gauss's rule."""
         load = np.sqrt(self.points**2 + self._b2)
         cut_off = (load @ _RULE.series[-2:].T) ** 2
         return cut_off.sum(axis=1) * self._length / np.maximum(load.max(axis=1), np.finfo(float).tiny)

@@ -131,8 +131,7 @@ def span_of(part):
 
 
 def bent(EI, half, gap, tension, curvature):
-    """`Bent` of arrays: bending stiffness (N m^2), half the span, how far joints stand out (m), effective tension (N),
-    curvature of the hole (1/m)."""
+    """`Bent` of arrays: EI (N m^2), half the span, how far joints stand out (m), tension (N), curvature (1/m)."""
     EI, half, gap, tension, curvature = (
         np.array(x, dtype=float) for x in np.broadcast_arrays(EI, half, gap, tension, curvature)
     )

@@ -152,8 +152,7 @@ def count(f, box, spacing):
 
 
 def each(f, starts, stride):
-    """Newton's method from many points at once, with steps of at most `stride`. Returns (n,) complex, NaN where it has
-    not settled."""
+    """(n,) complex by Newton's method from many points, in steps of at most `stride`; NaN where it has not settled."""
     s = np.array(starts, dtype=complex)
     size, open_ = np.full(len(s), np.inf), np.arange(len(s))
     for _ in range(_SET.steps):

@@ -97,8 +97,7 @@ class Chord:
         return float(np.dot(lagrange(places, place), [point.load_factor for point in points]))
 
     def at(self, place):
-        """(coordinate, `PathPoint`) of the path at a coordinate, or beside it where the tangent is almost singular;
-        None where Newton's method fails."""
+        """(coordinate, `PathPoint`) at a coordinate, or beside it by a singular tangent; None without convergence."""
         for aside in _SEARCH.aside:
             point = self._point(place + aside)
             if point is not None:
@@ -116,8 +115,7 @@ class Chord:
         return point
 
     def comes_and_goes(self):
-        """A coordinate where the number of negative modes, counted at interpolated states, is not monotonic; None
-        where it is. Sets `dips` and `varies`."""
+        """A coordinate where the count of negative modes is not monotonic, or None. Sets `dips`, `varies`."""
         track, (_, a), (_, b) = self.track, self.known[0], self.known[-1]
         counts, logarithms = [a.negative_modes], [a.logarithm]
         for place in _SEARCH.probes:

@@ -203,8 +203,7 @@ class Track:
         return replace(solved, iterations=solved.iterations + limited.iterations)
 
     def on_plane(self, numbers, load_factor, normal, weight):
-        """Newton's method for x and eta from (numbers, eta) in the plane <normal, dx> + weight d eta = 0 through them;
-        returns a `Solved` and sets `failure`."""
+        """Newton's method for (numbers, eta) in the plane <normal, dx> + weight d eta = 0; returns a `Solved`."""
         self.put(numbers, load_factor)
         self.bordered.stay_in_plane(normal, weight, self.neutral)
         solved = self._solve(self.bordered)
@@ -252,8 +251,7 @@ class Track:
         return found + self.touching.removed if self.touching and found >= 0 else found
 
     def set_tangent(self, point, slope, step, weight):
-        """Set the unit tangent (`along`, `rise`) of a `PathPoint` from dx/d eta there, oriented along a step of the
-        path, (dx, d eta); weight: see `dot`."""
+        """Set the unit tangent of a `PathPoint` from dx/d eta, oriented along a step (dx, d eta)."""
         onward = slope, 1.0
         along, size = self.dot(onward, step, weight), math.sqrt(self.dot(onward, onward, weight))
         point.rise = math.copysign(1.0, along) / size
