@@ -25,8 +25,8 @@ def compared(only=""):
     a test fails."""
     with tempfile.TemporaryDirectory() as folder:
         told = Path(folder) / "found.xml"
-        words = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "--truths", "-o", "junit_family=xunit1",
-             f"--junitxml={told}"]  # fmt: skip
+        words = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "--truths", "-o",
+                 "junit_family=xunit1", f"--junitxml={told}"]  # fmt: skip
         takes = re.compile(r"def test_\w+\([^)]*\btruth\b")  # other files need not be imported
         files = [file for file in sorted((ROOT / "tests").glob("test_*.py")) if takes.search(file.read_text("utf-8"))]
         words += [*map(str, files), *(["-k", only] if only else [])]
@@ -47,8 +47,8 @@ def compared(only=""):
 def main(only="", out="out"):
     """Compare, write the table, and return its rows."""
     rows = compared(only)
-    judged = [(file.replace("_", " "), what, f"{error:.1e}" if error <= asked else f"**{error:.1e}, missed**", f"{asked:g}")
-              for file, what, error, asked in rows]  # fmt: skip
+    judged = [(file.replace("_", " "), what, f"{error:.1e}" if error <= asked else f"**{error:.1e}, missed**",
+               f"{asked:g}") for file, what, error, asked in rows]  # fmt: skip
     lines = table("tests of | problem and quantity | error | asked at most", judged)
     missed = sum(error > asked for _, _, error, asked in rows)
     print(write("truths", [*lines, "", f"{len(rows)} comparisons, {missed} missed. {in_words()}"], out))
