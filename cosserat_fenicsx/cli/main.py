@@ -152,8 +152,7 @@ def _common(parser):
 
 
 def main(arguments=None):
-    """Entry point of `cosserat`. Returns 0 done, 1 not converged (the partial path is written), 2 bad input, 130
-    interrupted (also written)."""
+    """Entry point of `cosserat`: 0 done, 1 not converged (a partial path is written), 2 bad input, 130 interrupted."""
     whole = parser()
     options = whole.parse_args(arguments)
     if options.command is None:

@@ -25,8 +25,7 @@ LawData = namedtuple("LawData", "K J A_axes S_axes G", defaults=(None, None, Non
 
 
 def law_data(along, scales, *, coupled):
-    """The `LawData` of `Stiffnesses` in the units `force` and `length` of `scales`; coupled: whether to return full
-    matrices, also for diagonal sections."""
+    """The `LawData` of `Stiffnesses` in units of `scales`; coupled: whether full matrices, even of diagonal ones."""
     force, length = scales.force, scales.length
     K, J = along.K / force, along.J / (force * length**2)
     if not coupled:

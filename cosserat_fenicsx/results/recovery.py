@@ -270,8 +270,7 @@ class _Places:
         return R, np.einsum("kji,nkj->nki", self.frames, k.reshape(len(q), -1, 3)).reshape(k.shape)
 
     def law(self, records):
-        """v and u - u_R without stress (n, elements, points, 6), and their derivatives by n and m (elements, points, 6,
-        6), material, dimensionless, in statics."""
+        """v, u - u_R without stress (n, elements, points, 6), derivatives by n, m (elements, points, 6, 6)."""
         along, sizes = self.rod.stiffness_at(self.s), np.repeat([1.0, self.length], 3)
         units = np.broadcast_to(np.eye(6)[:, None], (6, len(self.s), 6))
         by_unit = along.strains(units[..., :3] * self._scales.force, units[..., 3:] * self._scales.moment)

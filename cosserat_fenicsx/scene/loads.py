@@ -20,26 +20,6 @@ _ForceInTime = Annotated[NumbersInTime, VectorInTime(Several("force"))]
 _MomentInTime = Annotated[NumbersInTime, VectorInTime(Several("moment"))]
 
 
-@dataclass(frozen=True)
-class _WeightOffAxis(LineAction):
-    """The moment R a x rho A g per reference length of a rod with an eccentricity; `Weight` applies the force."""
-
-    rod: Rod
-    gravity: Numbers
-    permanent: bool = False
-
-    work = "moment_on_arm"
-
-    @property
-    def scaled(self):
-        """See `Action`."""
-        return not self.permanent
-
-    def data(self, rod, s):
-        force = rod.stiffness_at(s).mass[..., None] * np.asarray(self.gravity)
-        return action.vector(force, "N/m"), action.vector(mass_arm(rod, s), "m")
-
-
 class Load:
     """An action scaled by the load factor, or, if `permanent`, applied before; must be the first base of a class."""
 
@@ -49,6 +29,21 @@ class Load:
     def scaled(self):
         """See `Action`."""
         return not self.permanent
+
+
+@dataclass(frozen=True)
+class _WeightOffAxis(Load, LineAction):
+    """The moment R a x rho A g per reference length of a rod with an eccentricity; `Weight` applies the force."""
+
+    rod: Rod
+    gravity: Numbers
+    permanent: bool = False
+
+    work = "moment_on_arm"
+
+    def data(self, rod, s):
+        force = rod.stiffness_at(s).mass[..., None] * np.asarray(self.gravity)
+        return action.vector(force, "N/m"), action.vector(mass_arm(rod, s), "m")
 
 
 class PointLoad(Load, PointAction):

@@ -161,11 +161,10 @@ def _critical(scene, layout, count, load_factor, tol, degree, comm):
             moved(0.0)
             stability.whole.assemble()
             symmetric, modes = _below(most, *eigen.largest_of_pencil(slack, stability.whole.K, count + 2, 1 / most))
+        values, vectors = symmetric, modes
         if conservative:
-            values, vectors = symmetric, modes
             critical, corrected = values[:count], np.ones(len(values[:count]), dtype=bool)
         else:
-            values, vectors = symmetric, modes
             if len(symmetric):
                 found = static_bifurcations((slack, of_skew), (stability.whole.K, skew()), count)
                 values, vectors = _below(most, *found)

@@ -259,8 +259,7 @@ class Pair(Pointers):
     # -- cases -------------------------------------------------------------------------------------------------------
 
     def numbers(self, values, K=None, J=None):
-        """(cases, n) what C writes for cases: their parameters (cases, parameters), and K and J (cases, rods, 3), N and
-        N m^2, where these depend on them."""
+        """(cases, n) what C writes: parameters, and K, J (cases, rods, 3), N and N m^2, where these depend on them."""
         linear = self._rest + values @ self._derivatives
         parts = [linear]
         for of_loads in self._loads:

@@ -46,8 +46,7 @@ def true_tension(sections, tension, outside, inside):
 
 
 def stretch(sections, tension, outside, inside):
-    """Strain along the pipe: of the true tension and of the pressures by Poisson's ratio; where the areas are not
-    known, of the effective tension."""
+    """Strain along the pipe: of the true tension and the pressures, or, areas unknown, of the effective tension."""
     bore, whole = areas(sections)
     pressures = 2 * sections.poisson * (inside * bore - outside * whole)
     force = true_tension(sections, tension, outside, inside) - pressures
