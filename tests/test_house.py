@@ -42,7 +42,7 @@ def test_forms_know_ufl_alone():
 #: Modules that all subpackages may import; and the other subpackages that each subpackage may import.
 SHARED = set(
     "analytic checks code_cache compat errors interrupts kinds names new_files numerics parts progress "
-    "quantities ranks strands units".split()
+    "quantities ranks strands turning units".split()
 )
 ROOMS = {
     "scene": {"pictures"},

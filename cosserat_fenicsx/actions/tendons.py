@@ -1,9 +1,10 @@
-"""Tendons: threads along a rod, guided by its sections without friction, that are tightened or shortened to move it.
+"""Tendons: threads along a rod, guided by its sections, that are tightened or shortened to move it.
 
 A tendon runs through the points r + R a(s), a = R_R p(s), and has the tension T all along. Its energy is T times its
 length, whose variation is a force T t and a moment R a x T t in every section, t the direction of the tendon. It is
 anchored at both ends of the rod. What bends the rod also holds the tendon: one in the axis of a straight rod does not
-make it buckle, whatever its tension.
+make it buckle, whatever its tension. With friction the tension falls along the tendon (`turning`), the virtual work is
+the same, and there is no energy.
 
 And what changes the strains of a rod without stress: muscles, heat, growth, and pretension. They are no loads but a
 part of the law: the strain energy is that of (v - v_0, u - u_0), with v_0 and u_0 of the sections without stress.
@@ -13,7 +14,7 @@ Stability, modes, motions and derivatives follow from the law.
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Literal
 
 import numpy as np
 
@@ -21,7 +22,7 @@ from cosserat_fenicsx.checks import Numbers, NumbersInTime, refuse
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.kinds import Number
 from cosserat_fenicsx.numerics import PLACES
-from cosserat_fenicsx.parts import ForceSize, FunctionAlong, Length, Several, at_least, positive
+from cosserat_fenicsx.parts import ForceSize, Friction, FunctionAlong, Length, Several, at_least, positive
 from cosserat_fenicsx.scene import action
 from cosserat_fenicsx.scene.action import LineAction
 from cosserat_fenicsx.scene.loads import Load
@@ -65,7 +66,7 @@ class Helical(FunctionAlong):
 
 @dataclass(frozen=True)
 class Tendon(Load, LineAction):
-    """A tendon along a whole rod, with a given tension or of a given length, and without friction.
+    """A tendon along a whole rod, with a given tension or of a given length.
 
     The contact force of the rod does not include it: a rod pulled by a tendon alone has the contact force -T t, and its
     supports have no reaction.
@@ -80,12 +81,16 @@ class Tendon(Load, LineAction):
             and motions. A tendon does not push: where it would, its tension is zero, and it is shorter along the rod
             than its length.
         axial: of a tendon of given length, its stiffness EA, N; None where it does not stretch, in equilibria alone.
+        friction: its coefficient of Coulomb friction with the rod, of a tendon of given tension, in `solve`. It slides
+            towards its pulled end, where it has its tension; the tension falls with exp(-friction times the angle by
+            which the tendon turns, rad) on the way to the other end. A path on which it would slide back is refused.
+        pulled: "start" or "end" of the rod: where it is pulled, which matters with friction alone.
         jumps: times where a function of time is not smooth, s.
         permanent: whether it acts in full, before all that the load factor multiplies.
 
     Raises:
-        SceneError: not a rod, numbers that are not finite, a negative tension, an offset that jumps, both or none
-            of tension and shortening, or a tendon of given length that is permanent.
+        SceneError: not a rod, numbers that are not finite, a negative tension or friction, an offset that jumps, both
+            or none of tension and shortening, or a tendon of given length that is permanent or has friction.
     """
 
     rod: RodOrName
@@ -97,6 +102,8 @@ class Tendon(Load, LineAction):
     permanent: bool = False
     shortening: Annotated[float | Callable[[float], float], VectorInTime(Number("length"))] | None = None
     axial: Annotated[float, Number("force", positive())] | None = None
+    friction: Friction = 0.0
+    pulled: Literal["start", "end"] = "start"
 
     work, is_thread = "tendon", True
     traits = dict(dead=False, known_force=False, rates=False, turns=True, flat=True)
@@ -110,6 +117,8 @@ class Tendon(Load, LineAction):
             refuse(self, "axial", self.axial, "None, since the tension is given")
         if self.permanent and self.shortens:
             refuse(self, "permanent", True, "False: the load factor multiplies a shortening")
+        if self.friction and self.shortens:
+            refuse(self, "friction", self.friction, "0 for a tendon of given length, or a given tension")
 
     @property
     def shortens(self):
@@ -120,6 +129,16 @@ class Tendon(Load, LineAction):
     def scaled(self):
         """See `Action`."""
         return not (self.permanent or self.shortens)
+
+    @property
+    def follows(self):
+        """See `Action`."""
+        return self.rough
+
+    @property
+    def rough(self):
+        """See `Action`."""
+        return self.friction > 0
 
     def data(self, rod, s):
         s = np.asarray(s, dtype=float)
@@ -163,10 +182,12 @@ class Tendon(Load, LineAction):
         return isinstance(self.offset, FunctionAlong)
 
     def breaks(self, rod):
-        return tuple(self.offset.breaks) if self._winds else ()
+        if not self._winds:
+            return ()
+        return (*self.offset.breaks, *(self.offset.kinks if self.rough else ()))  # where it turns, its tension falls
 
     def kinks(self, rod):
-        return tuple(self.offset.kinks) if self._winds else ()
+        return tuple(self.offset.kinks) if self._winds and not self.rough else ()
 
 
 _NONE = (0.0, 0.0, 0.0)

@@ -126,7 +126,7 @@ def simulate(
             "that applies the loads slowly"
         )
     refuse_stages("simulate", scene)
-    _refuse_inextensible_tendons(scene)
+    _refuse_tendons(scene)
     if scene.rod_contact and (scene.rod_contact.stiffness is None or comm.size > 1):
         raise SceneError(
             "simulate: rods touch each other on one process, with elastic surfaces: expected one process, and a "
@@ -167,9 +167,13 @@ def simulate(
         return motion.over(marks, save_every is None, progress)
 
 
-def _refuse_inextensible_tendons(scene):
-    """Refuse (SceneError) tendons of given length that do not stretch."""
+def _refuse_tendons(scene):
+    """Refuse (SceneError) tendons of given length that do not stretch, and tendons with friction."""
     for load in scene.actions:
+        if load.rough:
+            raise SceneError(
+                f"simulate: {describe(load)} has friction, which acts in equilibria alone: expected friction=0"
+            )
         if load.shortens and load.axial is None:
             raise SceneError(
                 f"simulate: {describe(load)} does not stretch, and would be taut with a blow: expected its stiffness "

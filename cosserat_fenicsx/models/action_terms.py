@@ -8,6 +8,7 @@ import ufl
 from cosserat_fenicsx import compat
 from cosserat_fenicsx.models.rod_data import element_function, gauss_function
 from cosserat_fenicsx.models.signature import place_actions
+from cosserat_fenicsx.models.sliding import SlidingThread
 from cosserat_fenicsx.numerics import directors
 from cosserat_fenicsx.scene.signals import at, signals_of, values_at, with_values
 
@@ -137,6 +138,16 @@ class ActionTerms:
         return [function for term in self.terms if term.kind.refreshed for function in term.data]
 
     @property
+    def turns_with_position(self):
+        """Whether data depend on the position in a way that is not in the tangent."""
+        return any(term.kind.refreshed and not term.kind.slides for term in self.terms)
+
+    @property
+    def sliding(self):
+        """(`Term`, its `SlidingThread`s) of threads with friction."""
+        return [(term, term.sliding) for term in self.terms if term.sliding]
+
+    @property
     def tensions(self):
         """The Functions of the tensions of tendons of given length."""
         return [term.data[0] for term in self.terms if term.kind.finds_tension]
@@ -199,8 +210,11 @@ class Term:
     weight: Function: 1 where distributed actions act; 2 over the element length at the station of a point action,
     because the end-point rule gives each end half that length; 0 elsewhere. moves: whether any data depend on time;
     compiled_evolution: the compiled `evolution`; None without memory; acting: (action, rod) of those that depend on
-    time, with their values at the time of the last `put`; accepted: `held` of the last accepted state, or None.
+    time, with their values at the time of the last `put`; accepted: `held` of the last accepted state, or None;
+    sliding: the `SlidingThread`s of threads with friction.
     """
+
+    sliding = ()
 
     def __init__(self, rods, signature, nodes, kind):
         self.kind, self._rods, self._nodes, self._signature = kind, rods, nodes, signature
@@ -299,6 +313,9 @@ class Term:
             for action, rod, rows, *_ in self._where:
                 function.x.array.reshape(-1, action.memory[k].size)[rows] = self._scaled(action.memory[k], rod)
         self.accepted = self.held.copy() if self.finds_friction else None
+        if self.kind.slides:
+            self.sliding = [SlidingThread(model, self, action, rod, rows, at_points[0])
+                            for action, rod, rows, _, at_points, _ in self._where]  # fmt: skip
         if self._rest is not None:
             self._rest.x.array.reshape(-1, 3)[numbers] = self._interpolated(model.reference[model.slots]) @ model.axes.T
         if self._frame is not None:
@@ -370,6 +387,10 @@ class Term:
 
     def refresh(self):
         """Fill in the actions' data at the positions of the model's state."""
+        for thread in self.sliding:
+            thread.refresh()
+        if self.sliding:
+            return
         model = self._model
         r = self._interpolated(model.positions())
         for action, rod, rows, s, here, _ in self._where:

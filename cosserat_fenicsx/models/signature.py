@@ -136,6 +136,11 @@ class TermKind(namedtuple("TermKind", "work place sizes memory scaled evolve ref
         """Whether it is a thread of given length (`Action.shortens`), whose tension is found."""
         return self.thread and self.scaled == "full"
 
+    @property
+    def slides(self):
+        """Whether it is a thread with friction (`Action.rough`)."""
+        return self.thread and self.refreshed
+
 
 def place_actions(scene, layout):
     """Terms of the actions: [(`TermKind`, [(action, rod index, vertex or None)])]. Actions of one kind share a term if
@@ -153,8 +158,8 @@ def place_actions(scene, layout):
         data = at(action, 0.0).data(scene.rods[places[0][0]], np.zeros(1))
         scaled = "load" if action.scaled else "permanent" if action.permanent else "full"
         sizes, memory = (tuple(datum.size for datum in data) for data in (data, action.memory))
-        kind = TermKind(work, place, sizes, memory, scaled, action.evolve, action.refreshed is not None,
-                        traits_of(action, scene.rods).dead, action.is_thread)  # fmt: skip
+        refreshed, dead = action.refreshed is not None or action.rough, traits_of(action, scene.rods).dead
+        kind = TermKind(work, place, sizes, memory, scaled, action.evolve, refreshed, dead, action.is_thread)
         for (known, members), there in zip(terms, taken, strict=True):
             if known == kind and (kind.place == "law" or there.isdisjoint(places)):
                 break
@@ -302,6 +307,8 @@ def not_flat(scene):
             return _names_components(i, load)
         if not traits.flat:
             return f"loads[{i}], a {type(load).__name__}, may drive the rods out of their plane"
+        if load.rough:
+            return f"loads[{i}], a {type(load).__name__}, has friction, which only the spatial model knows"
     return ""
 
 

@@ -13,6 +13,7 @@ from cosserat_fenicsx.results.records import Records
 from cosserat_fenicsx.results.compared import all_cell_nodes, cell_nodes
 from cosserat_fenicsx.scene.action import without_stress
 from cosserat_fenicsx.scene.signals import at
+from cosserat_fenicsx.turning import Turning
 
 
 def element_contact(path, records, carried=0.0):
@@ -135,11 +136,15 @@ _INSIDE = 1e-9
 
 
 class TendonState(NamedTuple):
-    """A tendon in several states: its tension (n,), N, and its length along the rod (n,), m; `print` shows the first
-    and the last, and in how many states it is slack."""
+    """A tendon in several states: its tension (n,), N, with friction that at its pulled end; its length along the rod
+    (n,), m; s (elements + 1,), m, the arc lengths of the rod at the ends of its elements, and along (n, elements + 1)
+    the tension there, N, at a kink that just beyond it. `print` shows the first and the last state, and in how many it
+    is slack."""
 
     tension: np.ndarray
     length: np.ndarray
+    s: np.ndarray
+    along: np.ndarray
 
     @property
     def slack(self):
@@ -162,7 +167,7 @@ class Threads:
         self._result, self._records = result, result._all
         if self._records is None:  # on a disk
             self._records = Records.of(list(result._records))
-        self._threads = [thread for thread in result.scene.actions if thread.is_thread]
+        self._threads, self._shares = [thread for thread in result.scene.actions if thread.is_thread], {}
 
     def at_gauss(self):
         """(n, elements, points, 6) force T t and moment R a x T t of all threads, inertial, dimensionless."""
@@ -213,6 +218,25 @@ class Threads:
         full = thread.amplitude * np.array([np.reshape(at(thread, t).tension, -1)[0] for t in times], dtype=float)
         return full * records["load_factor"] if thread.scaled else full
 
+    def share(self, thread):
+        """Arc lengths s (elements + 1,), m, of the ends of elements, and the tension there over that at the pulled end,
+        (n, elements + 1)."""
+        share, breaks = self._left(thread), self._result.layout.breaks[self._result._rows(thread.rod)[0]]
+        return breaks * thread.rod.length, np.concatenate([share[:, :, 0], share[:, -1:, -1]], axis=1)
+
+    def _left(self, thread):
+        """(n, elements, points + 2) the share of the tension that friction leaves, at the begin, the Gauss points and
+        the end of every element."""
+        places, R, v, k = self._strained(thread)
+        if not thread.rough:
+            return np.ones((len(v), v.shape[1], v.shape[2] + 2))
+        if id(thread) not in self._shares:
+            t = _along(thread, places, v, k)[1]
+            t = np.einsum("...ij,...j->...i", R, t / np.linalg.norm(t, axis=-1, keepdims=True))
+            turning = Turning(self._result.scene, thread.rod, places.breaks, self._result.rule.gauss)
+            self._shares[id(thread)] = turning.left(t, thread.friction, thread.pulled == "start")[0]
+        return self._shares[id(thread)]
+
     def length(self, thread):
         """(n,) m."""
         places, _, v, k = self._strained(thread)
@@ -231,7 +255,9 @@ class Threads:
         arm, along = _along(thread, places, v, k)
         size = np.linalg.norm(along, axis=-1, keepdims=True)
         t, lever = along / size, np.concatenate([np.broadcast_to(np.eye(3), (*arm.shape, 3)), _skew(arm)], axis=-2)
-        tension = self.tension(thread)[:, None, None, None] / self._result.scales.force
+        share = self._left(thread)  # `places` are the Gauss points of elements, or their ends
+        share = share[..., [0, -1]] if places.ends else share[..., 1:-1]
+        tension = self.tension(thread)[:, None, None, None] / self._result.scales.force * share[..., None]
         across = (tension / size)[..., None] * (np.eye(3) - t[..., :, None] * t[..., None, :])
         return np.einsum("ekij,nekj->neki", lever, tension * t), lever @ across @ np.swapaxes(lever, -1, -2)
 
@@ -245,11 +271,13 @@ def _along(thread, places, v, k):
 
 
 class _Places:
-    """Points x (points,) in [0, 1] of the elements of a rod of a `Path` or `History`."""
+    """Points x (points,) in [0, 1] of the elements of a rod of a `Path` or `History`: its Gauss points, or `_INSIDE`
+    its ends."""
 
     def __init__(self, result, rod, x):
         i, _ = result._rows(rod)
         self.rod, self.cells, self._nodes = rod, result._cells(i), cell_nodes(result.layout, result.degree)[i][0]
+        self.ends = x[0] == _INSIDE
         self.breaks, self.length, self._scales = result.layout.breaks[i], result.scales.length, result.scales
         h = np.diff(self.breaks)[:, None]
         self._basis, self._slopes = result.rule.basis(x), result.rule.slopes

@@ -130,6 +130,8 @@ class Action(Part, family="load or action", homes=("cosserat_fenicsx.scene.loads
         is_thread: whether it is the tension of a thread along a rod, which is no part of the rod's contact force. Its
             `data` are then the tension, N, and the arm from the axis to the thread, m, and its derivative along the
             rod, inertial in the reference.
+        rough: whether it is a thread with friction, whose tension falls along the rod as it turns (`turning`). It then
+            has `friction`, `pulled` and `tension`, and no potential.
         shortens: whether it is a thread of given length, whose tension is found (statics.tensions). It then has
             `shortening` (m) and `axial` (N, or None), is not `scaled`, and the tension in its `data` is 0. In a stage
             it has the shares of the shortening that are done before and with the load factor, `wound`, its length in
@@ -140,7 +142,7 @@ class Action(Part, family="load or action", homes=("cosserat_fenicsx.scene.loads
 
     at_nodes, scaled, permanent, follows, memory, evolve, traits = False, True, False, False, (), None, None
     delayed, resists, touches, presses, gaps, in_law, is_thread = None, False, False, False, None, False, False
-    rods_touch = shortens = finds_friction = False
+    rods_touch = shortens = rough = finds_friction = False
     wound, base, begun = (0.0, 1.0), None, 0.0
     amplitude = 1.0
 

@@ -457,11 +457,22 @@ class Scene(Part):
     def _following(self):
         if not self.follows:
             return []
-        kinds = " and ".join(dict.fromkeys(type(load).__name__ for load in self._followers))
+        found = []
+        for load in self._followers:
+            if load.rough:
+                found.append(
+                    f"{describe(load)}: friction has no potential, and acts as while the tendon slides towards the "
+                    f"{load.pulled} of the rod: negative modes are those at the tensions as they are, and do not "
+                    "decide on stability"
+                )
+        kinds = " and ".join(dict.fromkeys(type(load).__name__ for load in self._followers if not load.rough))
+        if not kinds:
+            return found
         return [
+            *found,
             f"{kinds}: a follower load has no potential, so negative modes, which are those of the tangent's symmetric "
             "part, do not decide on stability: an equilibrium with some may be stable (Beck's column from pi^2 to "
-            "20.05 EI/L^2), one with none may flutter, which only dynamics can show"
+            "20.05 EI/L^2), one with none may flutter, which only dynamics can show",
         ]
 
     def _outside(self):

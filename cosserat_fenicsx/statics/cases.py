@@ -466,7 +466,7 @@ def _obstacle(scene):
     if scene.rod_contact:
         return "rods touch each other"
     for action in scene.actions:
-        if action.refreshed is not None or action.presses or action.touches:
+        if action.refreshed is not None or action.rough or action.presses or action.touches:
             return f"the {type(action).__name__} depends on the position"
         if any(map(callable, vars(action).values())):
             return f"the {type(action).__name__} is a function"

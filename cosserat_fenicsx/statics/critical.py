@@ -31,7 +31,7 @@ from cosserat_fenicsx.results.records import Event
 from cosserat_fenicsx.results.queries import Sensitivity, called
 from cosserat_fenicsx.statics.path.follower import Follower, standing
 from cosserat_fenicsx.statics.path.load_control import StepControl
-from cosserat_fenicsx.statics.problem import refuse_given_lengths, refuse_rod_contact
+from cosserat_fenicsx.statics.problem import refuse_given_lengths, refuse_rod_contact, refuse_rough_threads
 from cosserat_fenicsx.statics.sensitivity import Direct, parameters_of, sensitivity
 
 # Relative differences below which load factors are equal, and the derivatives of equal ones.
@@ -166,6 +166,7 @@ def derivatives_of(path, query, parameters):
     """See `Path.sensitivity`."""
     refuse_rod_contact("sensitivity", path.scene)
     if isinstance(query, Event):
+        refuse_rough_threads("sensitivity of an event", path.scene)
         refuse_given_lengths("sensitivity of an event", path.scene)
         return _of_event(path, query, parameters)
     return replace(sensitivity(path, query, parameters), quantity=called(query))

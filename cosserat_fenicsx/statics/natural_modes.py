@@ -31,7 +31,7 @@ from cosserat_fenicsx.scene.stages import refuse_stages
 from cosserat_fenicsx.scene.statical import without_mechanism
 from cosserat_fenicsx.statics.meshes import layers_of, until_two_meshes_agree
 from cosserat_fenicsx.statics.path.follower import standing
-from cosserat_fenicsx.statics.problem import check_arguments, refuse_rod_contact, solvers_of
+from cosserat_fenicsx.statics.problem import check_arguments, refuse_rod_contact, refuse_rough_threads, solvers_of
 from cosserat_fenicsx.statics.small_motions import Bodies, circulatory_part, corrected, resisting, softness, stiffness
 from cosserat_fenicsx.statics.stability import shapes_of
 
@@ -157,6 +157,7 @@ def admit(owner, scene, damped):
             )
     refuse_stages(owner, scene)
     refuse_rod_contact(owner, scene)
+    refuse_rough_threads(owner, scene)
     if damped is not None and not isinstance(damped, bool):
         refuse(owner, "damped", damped, "True, False, or None")
     if damped is False and _rotation(scene) is not None:

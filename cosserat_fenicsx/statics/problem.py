@@ -20,11 +20,13 @@ from cosserat_fenicsx.ranks import communicator
 from cosserat_fenicsx.parts import per_scene
 from cosserat_fenicsx.results.compared import NAMES, criteria_of
 from cosserat_fenicsx.results.records import Record
+from cosserat_fenicsx.scene.action import describe
 from cosserat_fenicsx.scene.scene import Scene
 from cosserat_fenicsx.scene.stages import refuse_stages
 from cosserat_fenicsx.scene.statical import check_no_mechanism
 from cosserat_fenicsx.statics.stability import NegativeModes
 from cosserat_fenicsx.statics.tensions import Tensions
+from cosserat_fenicsx.statics.thread_friction import ThreadFriction
 from cosserat_fenicsx.statics.touching import RodContacts
 
 
@@ -41,6 +43,7 @@ def check_arguments(scene, tol, elements, bound=NAMES, *, owner="solve"):
         refuse_rod_contact(owner, scene)
     if owner not in ("solve", "modes") or scene.rod_contact:
         refuse_given_lengths(owner, scene)
+    refuse_rough_threads(owner, scene, scene.rod_contact or owner != "solve")
     tolerance(owner, tol)
     criteria_of(bound)
     if elements is not None:
@@ -89,6 +92,17 @@ def refuse_rod_contact(owner, scene, comm=None):
                          "stages, and one process")  # fmt: skip
 
 
+def refuse_rough_threads(owner, scene, all_of_them=True):
+    """Refuse (SceneError) tendons with friction where a function, the `owner` of the message, does not have them; or
+    only those beside tendons of given length."""
+    for load in scene.all_loads:
+        if load.rough and (all_of_them or any(other.shortens for other in scene.all_loads)):
+            raise SceneError(
+                f"{owner}: {describe(load)} has friction, which equilibria by `solve` and derivatives of their states "
+                "alone know, without tendons of given length and rods that touch each other: expected friction=0"
+            )
+
+
 def refuse_given_lengths(owner, scene):
     """Refuse (SceneError) tendons of given length where a function, the `owner` of the message, does not have them."""
     for load in scene.all_loads:
@@ -109,8 +123,9 @@ class Problem(Equations):
 
     load_factor: of loads and prescribed motions; while `begins`, that of permanent loads, from 0 to 1, before all
     others. touching: the `RodContacts` of the scene, or None. fields: the `PackedExpression` of `CompiledForms.fields`,
-    or None; tensions: the `Tensions` of tendons of given length, or None; load_norm: Euclidean norm of the dead loads
-    at load factor 1, dimensionless; sweep: the `Sweep` that finds points in C, once it was asked for.
+    or None; tensions: the `Tensions` of tendons of given length, sliding: the `ThreadFriction`, or None; load_norm:
+    Euclidean norm of the dead loads at load factor 1, dimensionless; sweep: the `Sweep` that finds points in C, once it
+    was asked for.
     """
 
     ties_class, sweep, touching = TieRows, None, None
@@ -138,6 +153,7 @@ class Problem(Equations):
             size = len(forms.gauss) * forms.fields_size
             self.fields = PackedExpression(forms.fields, model.mesh, len(model.cell_dofs), size)
         self.tensions = Tensions(self) if model.actions.tensions else None
+        self.sliding = ThreadFriction(self) if any(term.kind.slides for term in model.actions.terms) else None
         self._loaded, self.begins, self._hooks = None, False, self.c.hooks
 
     def load(self, scene, layout):
@@ -165,8 +181,8 @@ class Problem(Equations):
         self.set_load_factor(0.0)
         self.numbering.from_local(self._state, self.x)
         self.set_state(self.x)
-        if self.tensions:
-            self.tensions.load()
+        for threads in filter(None, (self.tensions, self.sliding)):
+            threads.load()
         self.touching = RodContacts(self) if scene.rod_contact else None
         self.c.hooks = self._hooks | RESIDUAL * bool(self.touching)
         return anew
@@ -217,15 +233,26 @@ class Problem(Equations):
         if self.tensions:
             self.tensions.forget()
 
-    solve_without_tendons = Equations.solve
+    solve_at_tensions = Equations.solve
+
+    def solve_without_tendons(self, b, x):
+        """`solve`, at the tensions of tendons of given length."""
+        solved = self.solve_at_tensions(b, x)
+        if solved and self.sliding and not self.sliding.complete(x):
+            solved = False
+            self._fail(x)
+        return solved
+
+    def _fail(self, x):
+        self.c.singular = 1
+        x.set(np.nan)
 
     def solve(self, b, x):
-        solved = super().solve(b, x)
+        solved = self.solve_without_tendons(b, x)
         if solved and self.tensions:
             solved = self.tensions.complete(b, x)
             if not solved:
-                self.c.singular = 1
-                x.set(np.nan)
+                self._fail(x)
         return solved
 
     def multipliers(self):

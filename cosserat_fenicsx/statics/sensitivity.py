@@ -70,6 +70,11 @@ def parameters_of(scene, given, critical=False):
     found = [parameter_of(scene, each) for each in given]
     if path_dependent(scene):
         raise SceneError("sensitivity: a load of the scene has memory: expected loads that depend on the state alone")
+    if any(load.rough for load in scene.actions) and any(load.refreshed is not None for load in scene.actions):
+        raise SceneError(
+            "sensitivity: derivatives are not known where a tendon has friction and a wall's data turn with the "
+            "position: expected one of the two"
+        )
     for load in scene.actions:
         if critical and load.refreshed is not None:
             raise SceneError(
@@ -104,7 +109,9 @@ class Direct:
         self.model, self._scene, self._layout = self.problem.model, scene, layout
         self._parameters, self._scenes = parameters, scenes
         self._by_data = made_once(self.model, "data_derivative", DataDerivative)
-        self._refreshes = bool(self.model.actions.refreshed)
+        actions = self.model.actions
+        #: whether data depend on the position; and on what the tangent does not know
+        self._refreshes, self._follows = bool(actions.refreshed), actions.turns_with_position
         self.points, self.without = [], {}
 
     @classmethod
@@ -283,12 +290,12 @@ class Direct:
     def _rate(self, data, of_ties, of_lengths):
         """The change of the numbers with data and ties; data that depend on the position follow by iteration."""
         rate = self._response(*self.residual_change(data, of_ties), of_lengths)
-        for _ in range(_FOLLOWED if self._refreshes else 0):
+        for _ in range(_FOLLOWED if self._follows else 0):
             moved = [a + b for a, b in zip(data, self._data_along(rate), strict=True)]
             before, rate = rate, self._response(*self.residual_change(moved, of_ties), of_lengths)
             if self.model.largest(rate[0] - before[0]) <= _SETTLED * self.model.largest(rate[0]):
                 return before
-        if self._refreshes:
+        if self._follows:
             raise NotConverged("sensitivity: the iteration for loads that turn with the position did not converge")
         return rate
 

@@ -198,6 +198,8 @@ def circulatory_part(scene, layout, degree, comm):
 
 def conservative_along(path):
     """Whether the loads have a potential in the neighbourhood of every point of a path; each rank computes it alone."""
+    if any(load.rough for load in path.scene.actions):
+        return False
     with circulatory_part(path.scene, path.layout, path.degree, MPI.COMM_SELF) as part:
         return all(part.vanishes(record.rq, record.load_factor) for record in path._records)
 

@@ -93,6 +93,8 @@ class Track:
 
     def begin_here(self):
         """Begin the path at the problem's state and load factor."""
+        if self.problem.sliding:
+            self.problem.sliding.accept()
         self.origin = PathPoint(self.problem.load_factor, self.problem.numbers(), self._negative_modes(), 0)
         self.origin.touches = self.touching and self.touching.memory
         self.history = [self.origin]
@@ -109,6 +111,8 @@ class Track:
     def keep(self, point):
         """Accept the problem's state as a point of the path; path-dependent loads update their history variables."""
         self.problem.commit()
+        if self.problem.sliding:
+            self.problem.sliding.accept()
         self.steps += 1
         self.history = [*self.history[-2:], point]
 

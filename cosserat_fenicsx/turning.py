@@ -1,0 +1,123 @@
+"""How far the direction of a thread along a rod turns, and the share of its tension that friction leaves (Euler).
+
+A thread that slides over what guides it has T' = -mu |t'| T on the way from its pulled end, with the unit direction t:
+the tension there times exp(-mu times the turning up to a place). The directions at the Gauss points of the elements
+are interpolated over an element and halves of its neighbours; |t'| of the polynomials is integrated in parts, since it
+has a kink where a curve in a plane bends back. At stations and kinks t may jump, by the angle between its two sides.
+"""
+
+import numpy as np
+from numpy.polynomial.polynomial import polypow
+
+from cosserat_fenicsx.numerics import gauss
+
+# Gauss points of a part of an element; samples to find where |t'| is least, and Newton's iterations to that place.
+_POINTS, _WEIGHTS = (gauss(4).points + 1) / 2, gauss(4).weights / 2
+_SAMPLES, _ITERATIONS = np.linspace(0.0, 1.0, 9), 5
+# A lower bound of lengths, for divisions.
+_TINY = 1e-150
+
+
+class Turning:
+    """The turning of a thread along a rod.
+
+    Args:
+        scene: a `Scene`; rod: its rod. breaks: (elements + 1,) ends of its elements over its length, from 0 to 1.
+        places: (points,) Gauss points of an element, in [0, 1], ascending.
+    """
+
+    def __init__(self, scene, rod, breaks, places):
+        count, points = len(breaks) - 1, len(places)
+        fixed = [*(x.s / rod.length for x in scene.stations(rod)), *np.divide(rod.breaks, rod.length), 0.0, 1.0]
+        edges = np.unique(np.abs(np.subtract.outer(fixed, breaks)).argmin(axis=1))
+        self._jumps = edges[1:-1]  # elements that begin at one
+        at = (breaks[:-1, None] + np.diff(breaks)[:, None] * places).ravel()
+        self._near, self._coefficients = [], []
+        for begin, end in zip(edges[:-1], edges[1:], strict=True):
+            size = min(2, end - begin) * points
+            for k in range(begin, end):
+                first = np.clip(k * points - (size - points) // 2, begin * points, end * points - size)
+                near = np.arange(first, first + size)
+                x = (at[near] - breaks[k]) / (breaks[k + 1] - breaks[k])
+                middle, half = (x[0] + x[-1]) / 2, (x[-1] - x[0]) / 2 or 1.0
+                powers = np.linalg.inv(np.vander((x - middle) / half, increasing=True))
+                # of polynomials in x, from those in (x - middle)/half
+                shift = np.zeros((size, size))
+                for j in range(size):
+                    shift[j, : j + 1] = polypow((-middle / half, 1 / half), j)
+                self._near.append(np.pad(near, (0, 2 * points - size), mode="edge"))
+                self._coefficients.append(np.pad(shift.T @ powers, ((0, 2 * points - size), (0, 2 * points - size))))
+        self._near, self._coefficients = np.array(self._near), np.array(self._coefficients)
+        self._inside, self._count = np.concatenate([[0.0], places, [1.0]]), count
+
+    def _polynomials(self, t):
+        """(.., elements, powers, 3) coefficients of the polynomials of directions t (.., elements, points, 3)."""
+        return self._coefficients @ t.reshape(*t.shape[:-3], -1, 3)[..., self._near, :]
+
+    def along(self, t):
+        """The turning, rad, from the start to the begin, the Gauss points and the end of every element, (.., elements,
+        points + 2), of the directions at the Gauss points, (.., elements, points, 3); and a function from changes of
+        the directions to those of the turning."""
+        c = self._polynomials(t)
+        k = c[..., 1:, :] * np.arange(1, c.shape[-2])[:, None]
+        bend = _least(k)[..., None]
+        ends = np.sort(np.concatenate([np.broadcast_to(self._inside, (*bend.shape[:-1], len(self._inside))), bend], -1))
+        sizes = np.diff(ends)
+        x = ends[..., :-1, None] + sizes[..., None] * _POINTS
+        powers = np.vander(x.ravel(), k.shape[-2], increasing=True).reshape(*x.shape[:-2], -1, k.shape[-2])
+        rate = powers @ k
+        size = np.linalg.norm(rate, axis=-1)
+        weights = (sizes[..., None] * _WEIGHTS).reshape(size.shape)
+        which = np.arange(len(self._inside)) + (bend < self._inside)  # among the ends
+        away = self._steps(c)
+        far = np.linalg.norm(away, axis=-1)
+
+        def up_to(rates, angles):
+            parts = (weights * rates).reshape(*sizes.shape, -1).sum(axis=-1)
+            inside = np.cumsum(np.concatenate([np.zeros((*parts.shape[:-1], 1)), parts], axis=-1), axis=-1)
+            passed = np.zeros(inside.shape[:-1])
+            passed[..., 1:] = np.cumsum(inside[..., :-1, -1], axis=-1)
+            for j, begin in enumerate(self._jumps):
+                passed[..., begin:] += angles[..., j, None]
+            return passed[..., None] + np.take_along_axis(inside, which, axis=-1)
+
+        def change(dt):
+            d = self._polynomials(dt)
+            rates = powers @ (d[..., 1:, :] * np.arange(1, d.shape[-2])[:, None])
+            moved = (self._steps(d) * away).sum(axis=-1) / np.maximum(far * np.sqrt(1 - far**2 / 4), _TINY)
+            return up_to((rates * rate).sum(axis=-1) / np.maximum(size, _TINY), moved)
+
+        return up_to(size, 2 * np.arcsin(np.minimum(far / 2, 1.0))), change
+
+    def _steps(self, c):
+        """(.., jumps, 3) changes of the direction at the jumps."""
+        return c[..., self._jumps, 0, :] - c[..., self._jumps - 1, :, :].sum(axis=-2)
+
+    def left(self, t, friction, from_start):
+        """The share of the tension that friction leaves, as `along` gives the turning, and its function of changes;
+        from_start: whether the thread is pulled at the start of the rod."""
+        turned, change = self.along(t)
+
+        def way(values):
+            return values if from_start else values[..., -1:, -1:] - values
+
+        share = np.exp(-friction * way(turned))
+        return share, lambda dt: -friction * share * way(change(dt))
+
+
+def _least(k):
+    """(..,) where in [0, 1] the size of polynomials k (.., powers, 3) is least."""
+
+    def at(x, order=0):
+        c = k
+        for _ in range(order):
+            c = c[..., 1:, :] * np.arange(1, c.shape[-2])[:, None]
+        return x[..., None] ** np.arange(c.shape[-2]) @ c
+
+    sampled = np.linalg.norm(np.vander(_SAMPLES, k.shape[-2], increasing=True) @ k, axis=-1)
+    x = _SAMPLES[np.argmin(sampled, axis=-1)]
+    low, high = np.maximum(x - _SAMPLES[1], 0.0), np.minimum(x + _SAMPLES[1], 1.0)
+    for _ in range(_ITERATIONS):  # Gauss and Newton's: quadratic where the size vanishes
+        a, b = (at(x[..., None], order)[..., 0, :] for order in (0, 1))
+        x = np.clip(x - (a * b).sum(axis=-1) / np.maximum((b * b).sum(axis=-1), _TINY), low, high)
+    return x
