@@ -114,6 +114,8 @@ _LENGTHS = Pieces(Number("length", positive()))
 
 def value_at(given, x):
     """(n, ..) values of `Pieces` at x (n,); at an end the value of the piece before it."""
+    if len(given) == 1:
+        return np.full((len(x), *np.shape(given[0][1])), given[0][1])
     return np.array([value for _, value in given])[np.searchsorted([end for end, _ in given], x)]
 
 
@@ -256,11 +258,13 @@ class TubeWall(_Confined, LineAction):
 
     def _smooth(self, given, md):
         """(n,) values of `Pieces` along the axis, linear over a short length at jumps, where it would alternate."""
+        if len(given) == 1:
+            return np.full(len(md), given[0][1])
         ends, values = np.array([end for end, _ in given[:-1]]), np.array([value for _, value in given])
         half = _RAMP * min(radius for _, radius in self.radius)
         half = min(half, _OF_PIECE * np.diff(ends, prepend=0.0).min(initial=np.inf))
         knots = np.ravel(np.column_stack([ends - half, ends + half]))
-        return np.interp(md, knots, np.repeat(values, 2)[1:-1]) if len(ends) else np.full(len(md), values[0])
+        return np.interp(md, knots, np.repeat(values, 2)[1:-1])
 
     def breaks(self, rod):
         """See `Action`: element ends where sizes and coefficients jump."""

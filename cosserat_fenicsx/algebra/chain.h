@@ -104,14 +104,17 @@ typedef struct {
 typedef struct {
     int nodes, reach, at_end, most; /* nodes that may touch; how many on each side of one its force moves; whether
                                        forces are those of the end of the step, not of its mean; sweeps */
+    const int *points;              /* (nodes,) number of the point that a node is */
+    int coupled;                    /* points on each side of one that its force moves */
     const double *clearance, *stiffness, *friction, *damping, *arm; /* (nodes,); arm: radius of the rod's surface */
-    double h, share, smallest;      /* the step; changes that end the sweeps, of the first one and of all */
-    const double *tangent, *across, *start; /* (nodes, 3) of the tube, and an axis u across it, v = tangent x u;
-                                       (nodes, 2) from the tube's axis to the rod at the start, by u and v */
-    const float *compliance;        /* (nodes, 4, 2 reach + 1, 4) by each unit force of a node the motion of its
+    double h, known_for;            /* the step, and that for which the compliance was found */
+    double share, smallest;         /* changes that end the sweeps, of the first one and of all */
+    double *tangent, *across, *start; /* (nodes, 3) of the tube, and an axis u across it, v = tangent x u; (nodes, 2)
+                                       from the tube's axis to the rod at the start, by u and v */
+    float *compliance;              /* (nodes, 4, 2 reach + 1, 4) by each unit force of a node the motion of its
                                        neighbours, and of itself in the middle. Forces: along u and v, friction along
                                        the tube, and round it its moment alone; motions: see `motion_of` */
-    const float *turning;           /* (nodes, 4, 2 reach + 1, 2) by the same forces the rotations about u and v */
+    float *turning;                 /* (nodes, 4, 2 reach + 1, 2) by the same forces the rotations about u and v */
     double *motion, *forces, *earlier, *turned; /* (nodes, 4) motions and forces of these kinds; forces before the
                                        sweeps; (nodes, 2) */
     double *moved;                  /* (nodes, 6) displacement and rotation in the step with the forces */
@@ -368,11 +371,14 @@ void begin_newton(newton *n);
 int judge_residual(newton *n, const double *b, const double *change);
 int iterate(stepping *s);
 
+void begin_contact(contact *c, const int *slots, int count, const double *away, const double *tangent);
+void unit_forces(const contact *c, int first, int apart, int component, double *forces);
+void keep_responses(contact *c, int first, int apart, int component, const double *q, const double *changes);
 void find_motion(contact *c, const double *now);
 int settle(contact *c);
 int broken(const contact *c);
 void slips(const contact *c, double *size);
-double stored(const contact *c, int at_start);
+double gained(const contact *c);
 double lost(const contact *c, const double *before);
 
 int settle_pairs(pairs *c);

@@ -4,6 +4,7 @@
 #include "chain.h"
 
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
 enum { MOST_LOCAL = 60 };
@@ -161,6 +162,83 @@ static void add_by(const contact *c, int i, const float *by, int each, const dou
         to[j] += W[j] * v[0] + W[j + width] * v[1] + W[j + 2 * width] * v[2] + W[j + 3 * width] * v[3];
 }
 
+/* Where the nodes `slots` of a wall begin a step: vectors `away` from the axis of its tube and tangents of that, (count,
+   3). The axes across the tube stay as close to those before as can be. */
+void begin_contact(contact *c, const int *slots, int count, const double *away, const double *tangent)
+{
+    for (int k = 0; k < count; k++, away += 3, tangent += 3) {
+        double *t = c->tangent + 3 * slots[k], *u = c->across + 3 * slots[k], *x = c->start + 2 * slots[k], v[3];
+        memcpy(t, tangent, 3 * sizeof *t);
+        if (u[0] == 0 && u[1] == 0 && u[2] == 0) {
+            int least = fabs(t[1]) < fabs(t[0]);
+            if (fabs(t[2]) < fabs(t[least])) least = 2;
+            u[least] = 1;
+        }
+        const double along = dot3(u, t);
+        for (int j = 0; j < 3; j++) u[j] -= along * t[j];
+        const double size = sqrt(dot3(u, u));
+        for (int j = 0; j < 3; j++) u[j] /= size;
+        cross3(t, u, v);
+        x[0] = dot3(away, u), x[1] = dot3(away, v);
+    }
+}
+
+/* The rotation for a change d of the quaternion q. */
+static void rotation_by(const double *q, const double *d, double *turned)
+{
+    const double factor = 2 / (q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
+    turned[0] = factor * (q[0] * d[1] - q[1] * d[0] - q[3] * d[2] + q[2] * d[3]);
+    turned[1] = factor * (q[0] * d[2] - q[2] * d[0] + q[3] * d[1] - q[1] * d[3]);
+    turned[2] = factor * (q[0] * d[3] - q[3] * d[0] - q[2] * d[1] + q[1] * d[2]);
+}
+
+/* Axes u and v across the tube of node i, and the direction round it times the arm, at the start of the step. */
+static void axes_of(const contact *c, int i, double *v, double *round)
+{
+    const double *u = c->across + 3 * i, *x = c->start + 2 * i, arm = c->arm[i];
+    const double size = sqrt(x[0] * x[0] + x[1] * x[1]), share = size > 0 ? arm / size : 0;
+    cross3(c->tangent + 3 * i, u, v);
+    for (int k = 0; k < 3; k++) round[k] = share * (x[0] * v[k] - x[1] * u[k]);
+}
+
+/* Forces and moments (nodes, 6): the unit force of this component, see `compliance`, of the nodes from `first` on that
+   are `apart`. */
+void unit_forces(const contact *c, int first, int apart, int component, double *forces)
+{
+    memset(forces, 0, 6 * c->nodes * sizeof *forces);
+    for (int i = first; i < c->nodes; i += apart) {
+        const double *t = c->tangent + 3 * i, *u = c->across + 3 * i;
+        double *force = forces + 6 * i, v[3], round[3];
+        axes_of(c, i, v, round);
+        for (int k = 0; k < 3; k++) {
+            force[k] = component == 0 ? u[k] : component == 1 ? v[k] : component == 2 ? t[k] : 0;
+            force[3 + k] = component == 2 ? -round[k] : component == 3 ? c->arm[i] * t[k] : 0;
+        }
+    }
+}
+
+/* Keep the responses to these as compliance: changes of the nodes' unknowns (nodes, 7) with quaternions q (nodes, 4) */
+void keep_responses(contact *c, int first, int apart, int component, const double *q, const double *changes)
+{
+    const int reach = c->reach, width = 2 * reach + 1;
+    for (int i = first; i < c->nodes; i += apart)
+        for (int j = i - reach; j <= i + reach; j++) {
+            const size_t at = ((size_t)i * 4 + component) * width + j - i + reach;
+            float *by = c->compliance + 4 * at, *turning = c->turning + 2 * at;
+            if (j < 0 || j >= c->nodes || abs(c->points[j] - c->points[i]) > c->coupled) {
+                memset(by, 0, 4 * sizeof *by), memset(turning, 0, 2 * sizeof *turning);
+                continue;
+            }
+            const double *t = c->tangent + 3 * j, *u = c->across + 3 * j, *d = changes + 7 * j;
+            double v[3], round[3], turned[3];
+            axes_of(c, j, v, round);
+            rotation_by(q + 4 * j, d + 3, turned);
+            by[0] = dot3(u, d), by[1] = dot3(v, d), by[2] = dot3(t, d) - dot3(round, turned);
+            by[3] = c->arm[j] * dot3(t, turned);
+            turning[0] = dot3(u, turned), turning[1] = dot3(v, turned);
+        }
+}
+
 /* The motion of all nodes in the step from `before` to unknowns `now`: displacements and rotations, by the mean
    rotation; with them the work of a force and a moment in a step is exact. */
 void find_motion(contact *c, const double *now)
@@ -168,15 +246,10 @@ void find_motion(contact *c, const double *now)
     const double *before = c->before;
     double *moved = c->moved;
     for (int i = 0; i < c->nodes; i++, before += 7, now += 7, moved += 6) {
-        double q[4], d[4], size = 0;
+        double q[4], d[4];
         for (int k = 0; k < 3; k++) moved[k] = now[k] - before[k];
-        for (int k = 0; k < 4; k++) {
-            q[k] = (before[3 + k] + now[3 + k]) / 2, d[k] = now[3 + k] - before[3 + k];
-            size += q[k] * q[k];
-        }
-        moved[3] = 2 / size * (q[0] * d[1] - q[1] * d[0] - q[3] * d[2] + q[2] * d[3]);
-        moved[4] = 2 / size * (q[0] * d[2] - q[2] * d[0] + q[3] * d[1] - q[1] * d[3]);
-        moved[5] = 2 / size * (q[0] * d[3] - q[3] * d[0] - q[2] * d[1] + q[1] * d[2]);
+        for (int k = 0; k < 4; k++) q[k] = (before[3 + k] + now[3 + k]) / 2, d[k] = now[3 + k] - before[3 + k];
+        rotation_by(q, d, moved + 3);
     }
 }
 
@@ -310,17 +383,17 @@ int broken(const contact *c)
     return 0;
 }
 
-/* Stored energy of all nodes at the end of the step, whose motion is given, or at its start. */
-double stored(const contact *c, int at_start)
+/* Stored energy of all nodes at the end of the step, whose motion is given, over that at its start. */
+double gained(const contact *c)
 {
-    double sum = 0;
+    double end = 0, start = 0;
     for (int i = 0; i < c->nodes; i++) {
         double motion[4];
         const place p = motion_of(c, i, c->moved + 6 * i, motion);
-        const double deep = fmax((at_start ? p.R0 : p.R) - c->clearance[i], 0);
-        sum += c->stiffness[i] * deep * deep / 2;
+        const double deep = fmax(p.R - c->clearance[i], 0), before = fmax(p.R0 - c->clearance[i], 0);
+        end += c->stiffness[i] * deep * deep / 2, start += c->stiffness[i] * before * before / 2;
     }
-    return sum;
+    return end - start;
 }
 
 /* Energy that friction and damping took in a step whose forces are those of its end: by the mean of both ends, but no

@@ -11,9 +11,7 @@ from cosserat_fenicsx.algebra.building import Pointers, module
 from cosserat_fenicsx.algebra.elimination import condensed
 
 #: Hooks: requests of C to Python, see newton.c.
-STATE, RESIDUAL, TANGENT, INTERFACE, ADD_UP, SUM, MATRICES, COUNT, CONTACT, COMPLIANCE, NODES, MAPS = (
-    1 << k for k in range(12)
-)
+STATE, RESIDUAL, TANGENT, INTERFACE, ADD_UP, SUM, MATRICES, COUNT, CONTACT, NODES, MAPS = (1 << k for k in range(11))
 
 
 @cache
@@ -203,8 +201,6 @@ class Equations(Called):
             self._array(a, 1)[0] = numbering.comm.allreduce(float(a[0]))
         elif what == CONTACT:
             self._touch(self._array(a, numbering.size), self._array(b, numbering.size))
-        elif what == COMPLIANCE:
-            self.contact.find_compliance()
         elif what == MAPS:
             shape = ties.nodal.shape
             forces = self._array(b, 6 * shape[0]).reshape(-1, 6)

@@ -7,7 +7,7 @@
 #include <stdint.h>
 #include <string.h>
 
-enum { MAPS = 2048, RQ = 7, FOUND = 13, SMALL = 6 }; /* numbers of: r and q; c and its gradient; a node's motions */
+enum { MAPS = 1024, RQ = 7, FOUND = 13, SMALL = 6 }; /* numbers of: r and q; c and its gradient; a node's motions */
 
 static int python_hook(void *self, int what, double *a, double *b);
 

@@ -10,7 +10,7 @@ the rest.
 import numpy as np
 
 from cosserat_fenicsx.algebra.building import Pointers
-from cosserat_fenicsx.numerics import cross, lobatto_weights, small_rotations
+from cosserat_fenicsx.numerics import lobatto_weights, small_rotations
 
 
 class TouchingNodes:
@@ -100,13 +100,6 @@ _MOST, _SHARE, _OF_NEIGHBOURS, _SMALLEST = 200, 1e-6, 0.1, 1e-16
 _OF_NODES = "clearance", "stiffness", "friction", "damping", "arm", "multiplier"
 
 
-def perpendicular(u, t):
-    """(n, 3) unit vectors normal to unit vectors t (n, 3), as close to u as can be; where u is zero, any."""
-    u = np.where(u.any(axis=1, keepdims=True), u, np.eye(3)[np.argmin(np.abs(t), axis=1)])
-    u = u - (u * t).sum(axis=1, keepdims=True) * t
-    return u / np.linalg.norm(u, axis=1, keepdims=True)
-
-
 class NodalContact(Pointers):
     """Contact of nodes of a loaded `StepProblem` with walls; at_end: whether forces are those of a step's end."""
 
@@ -119,11 +112,13 @@ class NodalContact(Pointers):
         self._nodes = nodes = TouchingNodes(problem, slots[order])
         self._slots = np.empty(len(order), dtype=int)  # of the walls' nodes in turn: their places here
         self._slots[order] = np.arange(len(order))
+        self._ends = np.cumsum([len(place.slots) for place in touched])[:-1]
+        self._slots_of_walls = np.split(self._slots.astype(np.int32), self._ends)
         self._origin = np.concatenate([np.tile(p.origin, (len(p.slots), 1)) for p in touched])[order]
-        n, self._coupled = nodes.count, nodes.count - 1 if nodes.count <= _FEW else _NEIGHBOURS
+        n, coupled = nodes.count, nodes.count - 1 if nodes.count <= _FEW else _NEIGHBOURS
         # nodes at the same point have the same neighbours: how they share a force would matter otherwise
         of, along = nodes.points, np.arange(n)
-        reach = int((np.searchsorted(of, of + self._coupled, side="right") - 1 - along).max())
+        reach = int((np.searchsorted(of, of + coupled, side="right") - 1 - along).max())
         self._numbers = {name: np.zeros(n) for name in _OF_NODES}
         units = {"stiffness": scales.force / scales.length, "damping": model.time / scales.length}
         for name in ("stiffness", "damping"):
@@ -158,14 +153,14 @@ class NodalContact(Pointers):
         contact.most, contact.share, contact.smallest = _MOST, _SHARE if n <= _FEW else _OF_NEIGHBOURS, _SMALLEST
         contact.worse, contact.least, contact.rounding = _WORSE, _MISSED, _ROUNDING
         contact.exact, contact.rows = n <= _FEW, self.integers(nodes.rows)
+        contact.points, contact.coupled = self.integers(of), coupled
         of_unknowns = {name: np.zeros(problem.numbering.size) for name in ("load", "response")}
         contact.compliance = self._ffi.from_buffer("float[]", self._compliance)
         contact.turning = self._ffi.from_buffer("float[]", self._turning)
         arrays = {"fixed": nodes.fixed, **of_unknowns}
         for name, array in {**self._numbers, **self._vectors, **arrays}.items():
             setattr(contact, name, self.doubles(array))
-        self._known_for = np.nan  # the step length for which the compliance was computed, s
-        contact.stale, contact.usual, contact.missing = True, np.inf, 1.0
+        contact.known_for, contact.stale, contact.usual, contact.missing = np.nan, True, np.inf, 1.0
 
     # -- a step ------------------------------------------------------------------------------------------------------
 
@@ -175,14 +170,12 @@ class NodalContact(Pointers):
         scales = self._problem.model.scales
         points = now[:, :3] * scales.length + self._origin
         vectors, numbers = self._vectors, self._numbers
-        for place, at in zip(self._walls, np.split(self._slots, self._ends), strict=True):
-            tube = place.wall.tube_around(place.s, points[at], place.md)
+        for place, at in zip(self._walls, self._slots_of_walls, strict=True):
+            tube = place.wall.tube_around(place.s, here := points[at], place.md)
             place.md = tube.md
-            away = (points[at] - tube.position) / scales.length
-            u = perpendicular(vectors["across"][at], tube.tangent)
-            vectors["tangent"][at], vectors["across"][at] = tube.tangent, u
-            v = cross(tube.tangent, u)
-            vectors["start"][at] = np.column_stack([(away * u).sum(axis=1), (away * v).sum(axis=1)])
+            away, tangent = (here - tube.position) / scales.length, np.ascontiguousarray(tube.tangent)
+            buffers = (self._ffi.from_buffer("double[]", array) for array in (away, tangent))
+            self._lib.begin_contact(self.c, self._ffi.from_buffer("int[]", at), len(at), *buffers)
             numbers["clearance"][at], numbers["arm"][at] = tube.clearance / scales.length, tube.arm / scales.length
             numbers["friction"][at] = tube.friction
         self.c.h = h
@@ -195,13 +188,9 @@ class NodalContact(Pointers):
         self._slip_begun[:] = self._slip
         kinetic, speed = self._weaker.T
         numbers["friction"] *= kinetic + (1 - kinetic) * np.exp(-self._slip / speed)
-        if not abs(h - self._known_for) <= 1e-9 * h:
+        if not abs(h - self.c.known_for) <= 1e-9 * h:
             self.c.stale = True
         self._begun[:], self._law_begun[:] = vectors["force"], vectors["law"]
-
-    @property
-    def _ends(self):
-        return np.cumsum([len(place.slots) for place in self._walls])[:-1]
 
     def give_up(self):
         """Undo a failed step: restore the forces at its start."""
@@ -213,32 +202,6 @@ class NodalContact(Pointers):
         """Whether the forces violate the laws of contact after the last iteration."""
         return bool(self._lib.broken(self.c))
 
-    def find_compliance(self):
-        """Find the compliance by the current tangent."""
-        self._known_for, self.c.usual, self.c.stale = self.c.h, np.inf, False
-        nodes, n, reach, vectors = self._nodes, self.c.nodes, self.c.reach, self._vectors
-        t, u, arm = vectors["tangent"], vectors["across"], self._numbers["arm"][:, None]
-        v, out = cross(t, u), vectors["start"] / np.maximum(np.linalg.norm(vectors["start"], axis=1), 1e-300)[:, None]
-        tau, none = out[:, :1] * v - out[:, 1:] * u, np.zeros((n, 3))
-        # (n, 4, 6) forces and moments, whose works are the motions, and (n, 2, 3) axes of rotations, see `contact` in C
-        pairs = (u, none), (v, none), (t, -arm * tau), (none, arm * t)
-        units, about = np.stack([np.hstack(pair) for pair in pairs], axis=1), np.stack([u, v], axis=1)
-        turning = small_rotations(nodes.of_local(self._problem.state)[:, 3:])
-        apart = min(2 * reach + 1, n)
-        for first in range(apart):
-            sources = np.arange(first, n, apart)
-            j = sources[:, None] + np.arange(-reach, reach + 1)
-            inside, j = (j >= 0) & (j < n), np.clip(j, 0, n - 1)
-            inside &= np.abs(nodes.points[j] - nodes.points[sources, None]) <= self._coupled
-            for component in range(4):
-                force = np.zeros((n, 6))
-                force[sources] = units[sources, component]
-                found = nodes.of_vector(nodes.response(force))
-                turned = turning @ found[:, 3:, None]
-                moved = units @ np.concatenate([found[:, :3, None], turned], axis=1)
-                self._compliance[sources, component] = np.where(inside[..., None], moved[j, :, 0], 0.0)
-                self._turning[sources, component] = np.where(inside[..., None], (about @ turned)[j, :, 0], 0.0)
-
     # -- books -------------------------------------------------------------------------------------------------------
 
     def accept(self):
@@ -249,7 +212,7 @@ class NodalContact(Pointers):
     def books(self):
         """Stored and dissipated energy of the step, dimensionless."""
         vectors = self._vectors
-        gained = self._lib.stored(self.c, 0) - self._lib.stored(self.c, 1)
+        gained = self._lib.gained(self.c)
         if self.c.at_end:
             return gained, self._lib.lost(self.c, self._at_start)
         return gained, -float(np.vdot(vectors["force"], vectors["moved"])) - gained
@@ -269,7 +232,7 @@ class NodalContact(Pointers):
         kept |= {"md": md, "slip": self._slip.copy(), "across": self._vectors["across"].copy()}
         kept |= {"compliance": self._compliance.copy(), "turning": self._turning.copy()}
         kept["multiplier"] = self._numbers["multiplier"].copy()
-        return {**kept, "known_for": self._known_for, "usual": self.c.usual, "missing": self.c.missing,
+        return {**kept, "known_for": self.c.known_for, "usual": self.c.usual, "missing": self.c.missing,
                 "stale": bool(self.c.stale)}  # fmt: skip
 
     def recall(self, memory):
@@ -278,7 +241,7 @@ class NodalContact(Pointers):
         self._vectors["across"][:], self._slip[:] = memory["across"], memory["slip"]
         self._compliance[:], self._turning[:] = memory["compliance"], memory["turning"]
         self._numbers["multiplier"][:] = memory["multiplier"]
-        self._known_for, self.c.usual = float(memory["known_for"]), float(memory["usual"])
+        self.c.known_for, self.c.usual = float(memory["known_for"]), float(memory["usual"])
         self.c.missing, self.c.stale = float(memory["missing"]), bool(memory["stale"])
         for place, md in zip(self._walls, np.split(memory["md"], self._ends), strict=True):
             place.md = md

@@ -17,7 +17,7 @@ import numpy as np
 from dolfinx import fem
 
 from cosserat_fenicsx.algebra.building import Packed
-from cosserat_fenicsx.algebra.equations import COMPLIANCE, CONTACT, NODES, RESIDUAL, STATE, Equations
+from cosserat_fenicsx.algebra.equations import CONTACT, NODES, RESIDUAL, STATE, Equations
 from cosserat_fenicsx.algebra.tie_rows import TieRows
 from cosserat_fenicsx.dynamics.contact import NodalContact, TouchingNodes, motion_between
 from cosserat_fenicsx.dynamics.touching import RodsTouching
@@ -198,7 +198,7 @@ class StepProblem(Equations):
         self._laws = [*filter(None, [self.tensions, *self._at_stations, self.rods_touching])]
         self.touching = [self.contact, *self._laws] if walls else self._laws
         self.c.contact = self.contact.c if walls else self._ffi.NULL
-        of_contact = (COMPLIANCE | NODES * (model.comm.size > 1)) * bool(walls)
+        of_contact = NODES * (model.comm.size > 1) * bool(walls)
         self.c.hooks = self._hooks | (CONTACT | RESIDUAL) * bool(self._laws) | of_contact
         self._law_moves = any(term.moves and term.kind.place == "law" for term in model.actions.terms)
         self._begun = False  # the reactions of another scene are no initial guess

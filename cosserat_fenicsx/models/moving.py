@@ -398,7 +398,7 @@ class MovingSpatial(Moving, SpatialModel):
     def turned_over(self):
         """See `Moving`; a q of the other sign also satisfies |q| = 1."""
         q, before = (array.reshape(-1, 7)[:, 3:] for array in self._arrays[:2])  # node by node
-        here = bool(((q * before) @ np.ones(4) <= 0).any())
+        here = bool((np.einsum("ij,ij->i", q, before) <= 0).any())
         return self.comm.allreduce(here, op=MPI.LOR) if self.comm.size > 1 else here
 
     def set_velocity(self, linear, angular):
@@ -420,7 +420,12 @@ def six_of(I):
 
 def turned_by(dq, q):
     """(.., 3) the inertial rotations 2 vec(dq conj(q))/|q|^2 of changes dq of q, (.., 4) each."""
-    return (small_rotations(q) @ dq[..., None])[..., 0]
+    (a, b, c, d), (da, db, dc, dd) = (np.moveaxis(x, -1, 0) for x in (q, dq))
+    factor, turned = 2 / np.einsum("...i,...i->...", q, q), np.empty((*np.shape(a), 3))
+    turned[..., 0] = factor * (a * db - b * da - d * dc + c * dd)
+    turned[..., 1] = factor * (a * dc - c * da + d * db - b * dd)
+    turned[..., 2] = factor * (a * dd - d * da - c * db + b * dc)
+    return turned
 
 
 _OFF = 1e-9

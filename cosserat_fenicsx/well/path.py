@@ -24,8 +24,8 @@ from cosserat_fenicsx.well.survey import read_columns
 
 
 #: The arcs between stations, arrays over these: md of the start (m), there position (m, 3), tangent (3) and curvature
-#: vector (1/m, 3), and length (m).
-Sections = namedtuple("Sections", "start position tangent curvature length")
+#: vector (1/m, 3), length (m), and size of the curvature (1/m).
+Sections = namedtuple("Sections", "start position tangent curvature length bend")
 
 #: Measured depth (n,), position (n, 3), tangent (n, 3) and curvature vector (n, 3, 1/m) of points of the axis.
 Nearest = namedtuple("Nearest", "md position tangent curvature")
@@ -56,7 +56,8 @@ class WellPath(Part):
             object.__setattr__(self, name, np.array(getattr(self, name), dtype=float))
         length, tangent = np.diff(self.md), _tangents(self.inclination, self.azimuth)
         dogleg, curvature = _curvatures(self.inclination, self.azimuth, length)
-        sections = Sections(self.md[:-1], np.zeros_like(curvature), tangent[:-1], curvature, length)
+        bend = np.sqrt(_dot(curvature, curvature))
+        sections = Sections(self.md[:-1], np.zeros_like(curvature), tangent[:-1], curvature, length, bend)
         _, along, aside = _arc(sections, np.arange(len(length)), length)
         steps = along[:, None] * tangent[:-1] + aside[:, None] * curvature
         sections.position[1:] = np.cumsum(steps[:-1], axis=0)
@@ -214,10 +215,12 @@ class WellPath(Part):
     def _at(self, i, x):
         """Position, tangent and curvature vector, (..., 3), at arc lengths x (m) from the starts of sections i."""
         s = self.sections
-        t, k = s.tangent[i], s.curvature[i]
+        r, t, k = (array.take(i, axis=0) for array in (s.position, s.tangent, s.curvature))
+        if not k.any():
+            return r + x[..., None] * t, t, k
         cos, along, aside = (part[..., None] for part in _arc(s, i, x))
-        bent = along * (k * k).sum(axis=-1, keepdims=True)
-        return s.position[i] + along * t + aside * k, cos * t + along * k, cos * k - bent * t
+        bent = along * _dot(k, k)[..., None]
+        return r + along * t + aside * k, cos * t + along * k, cos * k - bent * t
 
     def _on_the_whole(self, points):
         s, every = self.sections, np.arange(len(self.sections.length))
@@ -244,10 +247,11 @@ class WellPath(Part):
     def _projected(self, points, i):
         """Arc length from the starts of sections i to the closest points on their circles, nearest to their middles."""
         s = self.sections
-        away = points - s.position[i]
-        k = np.sqrt((s.curvature * s.curvature).sum(axis=-1))[i]
-        x = (away * s.tangent[i]).sum(axis=-1)
-        angle = np.arctan2(k * x, 1.0 - (away * s.curvature[i]).sum(axis=-1))
+        away, k = points - s.position.take(i, axis=0), s.bend[i]
+        x = _dot(away, s.tangent.take(i, axis=0))
+        if not k.any():
+            return x
+        angle = np.arctan2(k * x, 1.0 - _dot(away, s.curvature.take(i, axis=0)))
         middle = k * s.length[i] / 2
         angle = (angle - middle + np.pi) % (2 * np.pi) - np.pi + middle
         return np.where(k > 0, angle / np.where(k > 0, k, 1.0), x)
@@ -263,6 +267,10 @@ class WellPath(Part):
 
     def __repr__(self):
         return f"WellPath({len(self.md)} stations, {self.length:g} m)"
+
+
+def _dot(u, v):
+    return np.einsum("...i,...i->...", u, v)
 
 
 def _tangents(inc, azi):
@@ -285,8 +293,7 @@ def _curvatures(inc, azi, length):
 
 def _arc(sections, i, x):
     """cos(kx), x sinc(kx), x^2/2 sinc(kx/2)^2 at x from the starts of sections i; sinc without pi."""
-    k = np.sqrt((sections.curvature * sections.curvature).sum(axis=-1))[i]
-    angle = k * x
+    angle = sections.bend[i] * x
     return np.cos(angle), x * np.sinc(angle / np.pi), x**2 / 2 * np.sinc(angle / (2 * np.pi)) ** 2
 
 
