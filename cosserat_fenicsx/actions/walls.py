@@ -115,7 +115,7 @@ _LENGTHS = Pieces(Number("length", positive()))
 def value_at(given, x):
     """(n, ..) values of `Pieces` at x (n,); at an end the value of the piece before it."""
     if len(given) == 1:
-        return np.full((len(x), *np.shape(given[0][1])), given[0][1])
+        return np.full((*np.shape(x), *np.shape(given[0][1])), given[0][1])
     return np.array([value for _, value in given])[np.searchsorted([end for end, _ in given], x)]
 
 

@@ -104,6 +104,8 @@ typedef struct {
 typedef struct {
     int nodes, reach, at_end, most; /* nodes that may touch; how many on each side of one its force moves; whether
                                        forces are those of the end of the step, not of its mean; sweeps */
+    int lanes, positions;           /* LANES nodes are solved at once, or 1 where all are close: node i is the one at
+                                       position i % positions in lane i / positions */
     const int *points;              /* (nodes,) number of the point that a node is */
     int coupled;                    /* points on each side of one that its force moves */
     const double *clearance, *stiffness, *friction, *damping, *arm; /* (nodes,); arm: radius of the rod's surface */
@@ -111,12 +113,14 @@ typedef struct {
     double share, smallest;         /* changes that end the sweeps, of the first one and of all */
     double *tangent, *across, *start; /* (nodes, 3) of the tube, and an axis u across it, v = tangent x u; (nodes, 2)
                                        from the tube's axis to the rod at the start, by u and v */
-    float *compliance;              /* (nodes, 4, 2 reach + 1, 4) by each unit force of a node the motion of its
-                                       neighbours, and of itself in the middle. Forces: along u and v, friction along
-                                       the tube, and round it its moment alone; motions: see `motion_of` */
-    float *turning;                 /* (nodes, 4, 2 reach + 1, 2) by the same forces the rotations about u and v */
-    double *motion, *forces, *earlier, *turned; /* (nodes, 4) motions and forces of these kinds; forces before the
-                                       sweeps; (nodes, 2) */
+    float *compliance;              /* (positions, 4, 2 reach + 1, 4, LANES) by each unit force of a node the motion of
+                                       its neighbours, and of itself in the middle. Forces: along u and v, friction
+                                       along the tube, and round it its moment alone; motions: see `motion_of` */
+    float *turning;                 /* (positions, 4, 2 reach + 1, 2, LANES) by the same forces the rotations about u
+                                       and v */
+    double *motion, *forces, *earlier, *turned; /* (positions, 4, LANES) motions and forces of these kinds; forces
+                                       before the sweeps; (positions, 2, LANES) */
+    double *walled;                 /* (positions, 10, LANES) work space, see contact.c */
     double *moved;                  /* (nodes, 6) displacement and rotation in the step with the forces */
     double *force, *law;            /* (nodes, 6) force and moment; (nodes, 3) normal force, friction round and along */
     double *multiplier;             /* (nodes,) of friction at its bound, the last ones */

@@ -96,7 +96,8 @@ _WORSE, _MISSED, _ROUNDING = 10.0, 1e-3, 1e-9
 # Sweeps over the nodes: largest number, and changes of the motion that end them, over the first one (with a complete
 # compliance, and with that of neighbours alone, which the next iteration corrects) and dimensionless.
 _MOST, _SHARE, _OF_NEIGHBOURS, _SMALLEST = 200, 1e-6, 0.1, 1e-16
-# Numbers of a node in C.
+# Numbers of positions and of nodes in C, see `contact`.
+_OF_POSITIONS = {"motion": 4, "forces": 4, "earlier": 4, "turned": 2, "walled": 10}
 _OF_NODES = "clearance", "stiffness", "friction", "damping", "arm", "multiplier"
 
 
@@ -123,26 +124,16 @@ class NodalContact(Pointers):
         units = {"stiffness": scales.force / scales.length, "damping": model.time / scales.length}
         for name in ("stiffness", "damping"):
             self._numbers[name][:] = np.concatenate([getattr(p, name) for p in touched])[order] / units[name]
-        sizes = {
-            "tangent": 3,
-            "across": 3,
-            "start": 2,
-            "motion": 4,
-            "forces": 4,
-            "earlier": 4,
-            "turned": 2,
-            "moved": 6,
-            "force": 6,
-            "law": 3,
-            "before": 7,
-            "now": 7,
-            "free": 6,
-            "last": 6,
-        }
+        sizes = {"tangent": 3, "across": 3, "start": 2, "moved": 6, "force": 6, "law": 3, "before": 7, "now": 7,
+                 "free": 6, "last": 6}  # fmt: skip
         self._vectors = {name: np.zeros((n, size)) for name, size in sizes.items()}
+        lanes = self._lib.LANES if n >= self._lib.LANES * (reach + 1) else 1  # their nodes must not move each other
+        positions = -(-n // lanes)
+        work = {name: np.zeros((positions, size, self._lib.LANES)) for name, size in _OF_POSITIONS.items()}
         # of half the numbers' accuracy: it guides iterations, and its reading takes most of their time
-        self._compliance = np.zeros((n, 4, 2 * reach + 1, 4), dtype=np.float32)
-        self._turning = np.zeros((n, 4, 2 * reach + 1, 2), dtype=np.float32)
+        self._compliance, self._turning = (
+            np.zeros((positions, 4, 2 * reach + 1, size, self._lib.LANES), dtype=np.float32) for size in (4, 2)
+        )
         self._weaker = np.concatenate([np.full((len(p.slots), 2), p.weaker) for p in touched])[order]
         self._weaker[:, 1] *= model.time / scales.length
         self._slip, self._slip_begun = np.full(n, np.nan), np.zeros(n)  # speeds of slip in the last step
@@ -153,11 +144,12 @@ class NodalContact(Pointers):
         contact.most, contact.share, contact.smallest = _MOST, _SHARE if n <= _FEW else _OF_NEIGHBOURS, _SMALLEST
         contact.worse, contact.least, contact.rounding = _WORSE, _MISSED, _ROUNDING
         contact.exact, contact.rows = n <= _FEW, self.integers(nodes.rows)
+        contact.lanes, contact.positions = lanes, positions
         contact.points, contact.coupled = self.integers(of), coupled
         of_unknowns = {name: np.zeros(problem.numbering.size) for name in ("load", "response")}
         contact.compliance = self._ffi.from_buffer("float[]", self._compliance)
         contact.turning = self._ffi.from_buffer("float[]", self._turning)
-        arrays = {"fixed": nodes.fixed, **of_unknowns}
+        arrays = {"fixed": nodes.fixed, **of_unknowns, **work}
         for name, array in {**self._numbers, **self._vectors, **arrays}.items():
             setattr(contact, name, self.doubles(array))
         contact.known_for, contact.stale, contact.usual, contact.missing = np.nan, True, np.inf, 1.0
