@@ -67,8 +67,8 @@ static inline vector absolute(vector a)
     return greater(a, -a);
 }
 
-/* The law of a wall for nodes: from the tube's axis to the rod at the start, by u and v; sizes; the last forces (normal,
-   friction round and along) and multiplier. */
+/* The law of a wall for nodes: from the tube's axis to the rod at the start, by u and v; sizes; the last forces
+   (normal, friction round and along) and multiplier. */
 typedef struct {
     vector start[2], clearance, stiffness, friction, damping, law[3], multiplier;
 } walled;
@@ -177,8 +177,8 @@ static void cross3(const double *a, const double *b, double *c)
     c[0] = a[1] * b[2] - a[2] * b[1], c[1] = a[2] * b[0] - a[0] * b[2], c[2] = a[0] * b[1] - a[1] * b[0];
 }
 
-/* Where nodes are across their tubes, by the axes u and v there: x from the tube's axis to the rod at the end, e and its
-   size where the force acts. The direction round the tube is tau = (-e[1], e[0]). */
+/* Where nodes are across their tubes, by the axes u and v there: x from the tube's axis to the rod at the end, e and
+   its size where the force acts. The direction round the tube is tau = (-e[1], e[0]). */
 typedef struct {
     vector x[2], R0, R, both, e[2], share;
 } place;
@@ -199,8 +199,8 @@ static inline place place_of(const contact *c, const vector *x0, const vector *m
     return p;
 }
 
-/* Where the nodes at position i are after their motion `moved` (6,), and this motion (4,): along u and v, the slip along
-   the tube, and what the rotation about the tube adds to the slip round it. */
+/* Where the nodes at position i are after their motion `moved` (6,), and this motion (4,): along u and v, the slip
+   along the tube, and what the rotation about the tube adds to the slip round it. */
 static place motion_of(const contact *c, int i, const walled *w, vector *motion)
 {
     vector tilt[2] = {0};
@@ -234,29 +234,40 @@ static inline void respond(vector W[4][4], const vector *v, vector *Wv)
     for (int k = 0; k < 4; k++) Wv[k] = W[0][k] * v[0] + W[1][k] * v[1] + W[2][k] * v[2] + W[3][k] * v[3];
 }
 
+/* Numbers of nodes by the forces v of others. */
+static inline vector by_forces(const float *W, int width, const vector *v)
+{
+    return widen(W) * v[0] + widen(W + width) * v[1] + widen(W + 2 * width) * v[2] + widen(W + 3 * width) * v[3];
+}
+
+/* Add numbers to the nodes at a position beyond the ends of lanes, whose nodes follow each other. */
+static void add_beyond(const contact *c, int j, const float *W, int width, int each, const vector *v, double *all)
+{
+    for (int k = 0; k < each; k++) {
+        const vector more = by_forces(W + LANES * k, width, v);
+        for (int lane = j < 0; lane < c->lanes && lane * c->positions + j < c->nodes; lane++) {
+            const int node = lane * c->positions + j;
+            all[LANES * (each * (node % c->positions) + k) + node / c->positions] += more[lane];
+        }
+    }
+}
+
 /* Add numbers of all neighbours of the nodes at position i, and of themselves, by their forces v: `each` of a node. */
 static inline void add_by(const contact *c, int i, const float *by, int each, const vector *v, double *all)
 {
-    const int reach = c->reach, width = LANES * each * (2 * reach + 1);
-    const float *W = by + (size_t)i * 4 * width;
-    for (int j = i - reach; j <= i + reach; j++)
-        for (int k = 0; k < each; k++, W += LANES) {
-            vector more = widen(W) * v[0];
-            for (int l = 1; l < 4; l++) more += widen(W + l * width) * v[l];
-            double *to = all + LANES * (each * j + k);
-            if (j >= 0 && j < c->positions)
-                keep(load(to) + more, to);
-            else /* at the ends of lanes, whose nodes follow each other */
-                for (int lane = j < 0; lane < c->lanes; lane++) {
-                    const int node = lane * c->positions + j;
-                    if (node < c->nodes)
-                        all[LANES * (each * (node % c->positions) + k) + node / c->positions] += more[lane];
-                }
-        }
+    const int reach = c->reach, width = LANES * each * (2 * reach + 1), step = LANES * each;
+    const float *W = by + (size_t)i * 4 * width + step * reach;
+    const int first = i < reach ? -i : -reach, last = i + reach < c->positions ? reach : c->positions - 1 - i;
+    double *to = all + step * (i + first);
+    const vector a[4] = {v[0], v[1], v[2], v[3]};
+    for (int j = step * first; j < step * (last + 1); j += LANES, to += LANES)
+        keep(load(to) + by_forces(W + j, width, a), to);
+    for (int j = -reach; j < first; j++) add_beyond(c, i + j, W + step * j, width, each, v, all);
+    for (int j = last + 1; j <= reach; j++) add_beyond(c, i + j, W + step * j, width, each, v, all);
 }
 
-/* Where the nodes `slots` of a wall begin a step: vectors `away` from the axis of its tube and tangents of that, (count,
-   3). The axes across the tube stay as close to those before as can be. */
+/* Where the nodes `slots` of a wall begin a step: vectors `away` from the axis of its tube and tangents of that,
+   (count, 3). The axes across the tube stay as close to those before as can be. */
 void begin_contact(contact *c, const int *slots, int count, const double *away, const double *tangent)
 {
     for (int k = 0; k < count; k++, away += 3, tangent += 3) {
@@ -456,7 +467,10 @@ static void leave_axes(contact *c)
         vector change[4], motion[4], turned[2];
         memcpy(&w, c->walled + (size_t)LANES * WALLED * i, sizeof w);
         const place before = motion_of(c, i, &w, change);
-        for (int k = 0; k < 4; k++) motion[k] = load(c->motion + LANES * (4 * i + k)), change[k] = motion[k] - change[k];
+        for (int k = 0; k < 4; k++) {
+            motion[k] = load(c->motion + LANES * (4 * i + k));
+            change[k] = motion[k] - change[k];
+        }
         for (int k = 0; k < 2; k++) turned[k] = load(c->turned + LANES * (2 * i + k));
         const place p = place_of(c, w.start, motion);
         const vector tilt = before.e[0] * turned[1] - before.e[1] * turned[0], inward = -w.law[0] * p.share;

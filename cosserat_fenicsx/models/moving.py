@@ -37,7 +37,7 @@ from cosserat_fenicsx.models.rod_data import (
     law_of,
     nodal_inertia,
 )
-from cosserat_fenicsx.numerics import cross, small_rotations, spun
+from cosserat_fenicsx.numerics import cross, spun
 from cosserat_fenicsx.scene.action import describe, is_axial
 from cosserat_fenicsx.scene.signals import signals_of
 
