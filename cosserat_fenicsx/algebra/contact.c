@@ -390,8 +390,8 @@ static inline void foretell_turning(vector W[4][4], const place *p, vector N, ve
    own. */
 static vector settle_nodes(contact *c, int i)
 {
-    walled *w = (walled *)(c->walled + (size_t)LANES * WALLED * i), here;
-    double *forces = c->forces + LANES * 4 * i;
+    double *w = c->walled + (size_t)LANES * WALLED * i, *forces = c->forces + LANES * 4 * i;
+    walled here;
     const vector none = {0};
     vector motion[4], W[4][4], by[3][4], slip[4], change[4], moving[4], T[2] = {none, none}, size = none;
     memcpy(&here, w, sizeof here);
