@@ -108,7 +108,7 @@ def _of_rod(path, obstacle, i):
         friction[also & (gap < 0)] = np.nan
     limit = obstacle.friction * pressure
     sticks = (gap < 0) & (np.linalg.norm(friction, axis=2) < _STICKS * limit)
-    return np.full(len(x), rod.name), x * rod.length, gap, normal, pressure, friction, sticks, _shares(path, i)
+    return np.full(len(x), rod.name), x * rod.length, gap, normal, pressure, friction, sticks, shares_of(path, i)
 
 
 def _gaps(path, obstacle, rod, x):
@@ -131,7 +131,7 @@ def _density(path, i):
     return nodal * path.scales.force / path.scales.length
 
 
-def _shares(path, i):
+def shares_of(path, i):
     """(nodes,) the length that belongs to each node of a rod in the quadrature with the nodes as points, m."""
     sizes = np.diff(path.layout.breaks[i]) * path.scene.rods[i].length
     p, shares = path.degree, np.zeros(len(sizes) * path.degree + 1)
@@ -172,7 +172,7 @@ def slanted(path, obstacle):
             gap, normal = _gaps(path, obstacle, rod, x)
             moved = path.motion(rod, x)[..., :3] * path.scales.length
             tangent = np.gradient(rod.curve.position(x * rod.length) + moved, x * rod.length, axis=1)
-            push = np.maximum(-gap, 0.0)[:, 1:-1] * _shares(path, i)[1:-1]  # an end may be pushed along its rod
+            push = np.maximum(-gap, 0.0)[:, 1:-1] * shares_of(path, i)[1:-1]  # an end may be pushed along its rod
             along = along + np.sum(push * np.abs(np.einsum("kni,kni->kn", tangent, normal))[:, 1:-1], axis=1)
             total = total + push.sum(axis=1)
     share = np.divide(along, total, out=np.zeros(len(path)), where=total > 0).max(initial=0.0)

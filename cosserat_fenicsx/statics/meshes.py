@@ -403,7 +403,8 @@ def _round_up(number):
     return step * math.ceil(number / step - 1e-9)
 
 
-def until_two_meshes_agree(owner, scene, on_mesh, tol, *, most, elements, degree, advice, progress, comm, gains=None):
+def until_two_meshes_agree(owner, scene, on_mesh, tol, *, most, elements, degree, advice, progress, comm, gains=None,
+                          least=None):  # fmt: skip
     """Solve an eigenproblem on successively halved meshes until the results of two of them agree to `tol`, relative:
     (what `on_mesh` returned, estimated relative errors (n,) or NaN).
 
@@ -411,7 +412,7 @@ def until_two_meshes_agree(owner, scene, on_mesh, tol, *, most, elements, degree
     layers (see `layers_of`) or None, and further results. most: elements per rod of the last mesh; elements: those of a
     given mesh, or None. gains: where the error is estimated by the gain of a halving, of order 2 p, instead of by the
     difference of two meshes, which is larger: of what `on_mesh` returned, the largest gain that is assumed, as a power
-    of 2. Raises NotConverged.
+    of 2. least: of what `on_mesh` returned, relative errors (n,) that two meshes may not show. Raises NotConverged.
     """
     layout = turning_in_law(scene, Layout.of(scene, elements or FIRST_ELEMENTS), [1.0], elements)
     coarse, best, worse = None, math.inf, 0
@@ -444,7 +445,7 @@ def until_two_meshes_agree(owner, scene, on_mesh, tol, *, most, elements, degree
                 )
             error = None
             if comparable:
-                error = _apart(numbers, coarse)
+                error = _apart(numbers, coarse) if least is None else np.maximum(_apart(numbers, coarse), least(found))
                 reached = error.max(initial=0.0)
                 # Differences may grow once before they converge; growth twice in a row is rounding.
                 worse = worse + 1 if reached > max(tol, best) else 0

@@ -32,7 +32,16 @@ from cosserat_fenicsx.scene.statical import without_mechanism
 from cosserat_fenicsx.statics.meshes import layers_of, until_two_meshes_agree
 from cosserat_fenicsx.statics.path.follower import standing
 from cosserat_fenicsx.statics.problem import check_arguments, refuse_rod_contact, refuse_rough_threads, solvers_of
-from cosserat_fenicsx.statics.small_motions import Bodies, circulatory_part, corrected, resisting, softness, stiffness
+from cosserat_fenicsx.statics.small_motions import (
+    Bodies,
+    circulatory_part,
+    corrected,
+    edges_of_contact,
+    resisting,
+    softness,
+    stiffness,
+    with_edges,
+)
 from cosserat_fenicsx.statics.stability import shapes_of
 
 _MOST_ELEMENTS = 128
@@ -126,7 +135,10 @@ def modes(
         found, error = until_two_meshes_agree(
             "modes", scene, on_mesh, tol, most=_MOST_ELEMENTS, elements=elements, degree=degree,
             advice="a larger tol or fewer modes", progress=progress, comm=comm,
-            gains=lambda found: 2 * degree - (_OF_EIGENVALUES if found.complex else _OF_SQUARES),
+            gains=lambda found: (
+                0 if found.edges.any() else 2 * degree - (_OF_EIGENVALUES if found.complex else _OF_SQUARES)
+            ),
+            least=lambda found: found.edges,
         )  # fmt: skip
     except NotConverged:
         if last and (last[0] > tol).any():  # meshes scatter by rounding
@@ -228,8 +240,8 @@ def _rotation(scene):
 #: What is computed on one mesh: squares, or complex eigenvalues (1/s), (n,); the lengths of boundary layers or None;
 #: their relative errors (n,) by rounding and by bounds in place of infinite stiffnesses; shapes (n, N, 6); the number
 #: of negative modes; the `Equilibrium`; whether the loads have a potential; whether the numbers are complex
-#: eigenvalues; and (r, q) and the contact force there.
-_OnMesh = namedtuple("_OnMesh", "numbers layers rounding shapes negative state conservative complex start")
+#: eigenvalues; (r, q) and the contact force there; and relative errors (n,) by the edges of contact with obstacles.
+_OnMesh = namedtuple("_OnMesh", "numbers layers rounding shapes negative state conservative complex start edges")
 
 
 class _Following:
@@ -243,8 +255,9 @@ class _Following:
         if self._before is not None and len(self._before) == len(found.numbers):
             order = assigned(self._before, found.numbers)
             found = found._replace(
-                numbers=found.numbers[order], rounding=found.rounding[order], shapes=found.shapes[order]
-            )
+                numbers=found.numbers[order], rounding=found.rounding[order], shapes=found.shapes[order],
+                edges=found.edges[order],
+            )  # fmt: skip
         self._before = found.numbers
         return found
 
@@ -264,16 +277,17 @@ def _on_mesh(scene, layout, count, load_factor, degree, comm, damped, near, rota
         K, rows, held = stiffness(problem)
         soft = softness(problem, K)
         if problem.tensions:
-            edges = problem.tensions.keep()
-            if edges.any():
+            between = problem.tensions.keep()
+            if between.any():
                 expected = "a load factor at which it has a tension, or is longer than its way along the rod"
-                problem.tensions.refuse("modes", edges, expected)
+                problem.tensions.refuse("modes", between, expected)
             K, held = problem.tensions.border(K, held)
         unit = max(float(rod.profile.range[1].mass) for rod in scene.rods)
         bodies, time = Bodies(model, unit), math.sqrt(unit * scales.length**2 / scales.force)
         layers = layers_of(model) if loaded else None
         state, (rq, n) = Equilibrium.of(model, load_factor), model.snapshot()
         refuse_grazing(state, "modes")
+        edges = edges_of_contact(model, state)
     with circulatory_part(scene, layout, degree, comm) as circulatory:
         conservative = circulatory.vanishes(rq, load_factor)
         if damped is None:
@@ -287,7 +301,9 @@ def _on_mesh(scene, layout, count, load_factor, degree, comm, damped, near, rota
         shapes = shapes_of(vectors.T, squares, rows, scales.length)
         rounding = np.where(squares == 0, 0.0, rounding / np.abs(np.where(squares == 0, 1.0, squares)))
         squares, rounding = corrected(soft, mass, None, squares, vectors, rounding, True)
-        return _OnMesh(squares / time**2, layers, rounding, shapes, negative, state, conservative, False, (rq, n))
+        squares, beside = with_edges(edges, mass, None, squares, vectors)
+        squares = squares / time**2
+        return _OnMesh(squares, layers, rounding, shapes, negative, state, conservative, False, (rq, n), beside)
     turning = None
     if rotation is not None:
         w = np.array(rotation.rate) * time
@@ -305,7 +321,8 @@ def _on_mesh(scene, layout, count, load_factor, degree, comm, damped, near, rota
     shapes = shapes_of(found.vectors.T, values, rows, scales.length)
     rounding = np.where(values == 0, 0.0, found.rounding / np.abs(np.where(values == 0, 1.0, values)))
     values, rounding = corrected(soft, mass, C, values, found.vectors, rounding, conservative)
-    return _OnMesh(values / time, layers, rounding, shapes, negative, state, conservative, True, (rq, n))
+    values, beside = with_edges(edges, mass, C, values, found.vectors)
+    return _OnMesh(values / time, layers, rounding, shapes, negative, state, conservative, True, (rq, n), beside)
 
 
 def _below_free(squares, negative):

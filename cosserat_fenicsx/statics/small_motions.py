@@ -22,6 +22,7 @@ from cosserat_fenicsx.models.spatial import CirculatoryModel, ResistingModel
 from cosserat_fenicsx.models.rod_data import nodal_inertia
 from cosserat_fenicsx.models.signature import Signature
 from cosserat_fenicsx.numerics import directors, lobatto_weights
+from cosserat_fenicsx.results.contacts import shares_of
 
 # Share of a first-order change of an eigenvalue that is assumed to remain as error: at most this, or this times the
 # relative change.
@@ -63,11 +64,69 @@ def softness(problem, K):
     return stiffness(problem, 2.0)[0] - K
 
 
+def edges_of_contact(model, state):
+    """(what K lacks, what of that is not known), sparse, where obstacles act at nodes: a node at the edge of a contact
+    acts with its whole share of the length, and the edge, where the gap vanishes, is elsewhere; its place is known as
+    well as the nodes on both sides agree on it, and to a part of that share, the smaller the more nodes touch. None
+    without an edge; a law of pressure is left out."""
+    lacking, unknown, at = [], [], []
+    rows, unit = model.rows_of_nodes, model.scales.force / model.scales.length
+    last = np.cumsum([len(state.s(rod)) for rod in state.scene.rods])
+    for i, (rod, of_nodes) in enumerate(zip(state.scene.rods, np.split(rows, last[:-1]), strict=True)):
+        s, shares = state.s(rod), shares_of(state, i)
+        for obstacle in state.scene.actions:
+            if obstacle.gaps is None or obstacle.law is not None or not obstacle.acts_on(rod):
+                continue
+            gap, normal = obstacle.gaps(rod, s, state.position(rod))
+            bounds = np.flatnonzero(np.diff(gap < 0, prepend=False, append=False))  # nodes touch from .. to before ..
+            begin, end = bounds[::2], bounds[1::2]
+            left, right = begin > 0, end < len(s)
+            inner, count = np.append(begin[left], end[right] - 1), np.append((end - begin)[left], (end - begin)[right])
+            side = np.repeat([-1, 1], [np.count_nonzero(left), np.count_nonzero(right)])
+            outer, share = inner + side, shares[inner]
+            way = np.abs(s[outer] - s[inner])
+            beyond = way * gap[inner] / (gap[inner] - gap[outer])  # from the last node that touches to the edge
+            middle = np.cumsum(shares)[inner] - share / 2
+            lacks = beyond - share / 2 - side * (middle - s[inner])
+            # the same by the two last nodes that touch
+            before = np.where(count > 1, inner - side, inner)
+            slope = (gap[inner] - gap[before]) / np.where(count > 1, np.abs(s[inner] - s[before]), 1.0)
+            other = np.clip(-gap[inner] / np.where(slope > 0, slope, np.inf), 0.0, way)
+            other = np.where((slope > 0) | (count == 1), other, way)
+            across = normal[inner, :, None] * normal[inner, None, :]
+            sticks = obstacle.sticks * (np.eye(3) - across) if obstacle.friction else 0.0
+            density = (obstacle.stiffness * across + sticks) / unit
+            lacking.append(density * lacks[:, None, None])
+            unknown.append(density * np.maximum(share / 2 / count, np.abs(beyond - other))[:, None, None])
+            at.append(of_nodes[inner, :3])
+    if not sum(map(len, at)):
+        return None
+    size = rows.max(initial=-1) + 1
+    return tuple(of_blocks(np.concatenate(x), np.concatenate(at), size) for x in (lacking, unknown))
+
+
+def of_blocks(blocks, of_node, size):
+    """A sparse matrix of blocks (..., n, n) in rows (..., n), -1 where clamped."""
+    i, j = (np.broadcast_to(x, blocks.shape).ravel() for x in (of_node[..., :, None], of_node[..., None, :]))
+    free = (i >= 0) & (j >= 0)
+    return sparse.csr_matrix((blocks.ravel()[free], (i[free], j[free])), shape=(size, size))
+
+
+def with_edges(edges, M, C, values, vectors):
+    """Eigenvalues with what `edges_of_contact` has, to first order, and their relative errors (n,) by what is not known
+    of it; the others as of `corrected`."""
+    if edges is None:
+        return values, np.zeros(len(values))
+    found, beside = (corrected(x, M, C, values, vectors, np.zeros(len(values)), True)[0] for x in edges)
+    return found, np.abs(beside - values) / np.where(values == 0, 1.0, np.abs(values))
+
+
 def corrected(softness, M, C, values, vectors, rounding, trusted):
-    """Eigenvalues without `softness`, to first order with left eigenvectors taken for right ones, unless that is within
-    their relative rounding errors (n,); and these with what is left, or with what rounding may hide of the change. M,
-    C: see the head of this file; C is None where `values` are squares of frequencies; values: (n,) dimensionless;
-    vectors: (size, n). trusted: whether the stiffness is symmetric, so that the left eigenvectors are known."""
+    """Eigenvalues without `softness`, by which K is too small, to first order with left eigenvectors taken for right
+    ones, unless that is within their relative rounding errors (n,); and these with what is left, or with what rounding
+    may hide of the change. M, C: see the head of this file; C is None where `values` are squares of frequencies;
+    values: (n,) dimensionless; vectors: (size, n). trusted: whether the stiffness is symmetric, so that the left
+    eigenvectors are known."""
     if softness is None:
         return values, rounding
     left = vectors.conj()
@@ -138,10 +197,7 @@ class Bodies:
         return block
 
     def _assembled(self, block):
-        of_node = self._rows[self._slots]
-        i, j = (np.broadcast_to(x, block.shape).ravel() for x in (of_node[..., :, None], of_node[..., None, :]))
-        free = (i >= 0) & (j >= 0)
-        return sparse.csr_matrix((block.ravel()[free], (i[free], j[free])), shape=(self.size, self.size))
+        return of_blocks(block, self._rows[self._slots], self.size)
 
 
 def hat(a):
