@@ -30,7 +30,7 @@ try:
     import ffcx.codegeneration.jit as ffcx_compiler
     import ffcx.naming as ffcx_names
     import ufl
-    from dolfinx import fem, jit
+    from dolfinx import cpp, fem, jit
     from dolfinx import mesh as dolfinx_mesh
     from petsc4py import PETSc
 except ImportError as missing:
@@ -143,6 +143,33 @@ if _VERSION < (0, 8):
         """Indices into `mesh.geometry.x` of the two ends of every local cell, shape (cells, 2)."""
         return mesh.geometry.dofmap.array.reshape(-1, 2)
 
+    def pieces(given, made):
+        """What a form or Expression of dolfinx was made from: code for `from_pieces`, the function spaces of its
+        arguments, its Functions and its Constants; given: the UFL; None where the release gives no such access."""
+        if not isinstance(given, ufl.Form):
+            return ("expression", made.ufcx_expression), [], *_read(made)
+        code, functions = made.ufcx_form, given.coefficients()
+        used = [functions[code.original_coefficient_position[i]] for i in range(code.num_coefficients)]
+        spaces = [a.ufl_function_space() for a in given.arguments()]
+        return ("form", code), spaces, used, list(given.constants())
+
+    def from_pieces(code, mesh, spaces, functions, constants):
+        """A form or an Expression without arguments of dolfinx from what `pieces` tells, on a mesh."""
+        kind, compiled = code
+        objects = [[x._cpp_object for x in part] for part in (spaces, functions, constants)]
+        mesh = mesh.ufl_domain().ufl_cargo()
+        if kind == "form":
+            return _Form(compiled, *objects, dict.fromkeys(_WHERE), mesh, _FFI, None)
+        made = fem.Expression.__new__(fem.Expression)
+        made._ufcx_expression, made._code, made._argument_function_space = compiled, None, None
+        made.read = functions, constants  # in place of UFL, for `_read`
+        address = _FFI.cast("uintptr_t", _FFI.addressof(compiled))
+        made._cpp_object = cpp.fem.create_expression_float64(address, *objects[1:], mesh, None)
+        return made
+
+    _Form, _FFI = type("Form", (fem.forms.FormMetaClass, cpp.fem.Form_float64), {}), _cffi_backend.FFI()
+    _WHERE = [getattr(cpp.fem.IntegralType, x) for x in ("cell", "exterior_facet", "interior_facet", "vertex")]
+
 else:  # the same functions, see above
     import basix.ufl
 
@@ -176,6 +203,9 @@ else:  # the same functions, see above
     def evaluate(expression, mesh, cells):
         values = expression.eval(mesh, cells)
         return values.reshape(len(cells), math.prod(values.shape[1:]))
+
+    def pieces(given, made):
+        return None
 
     def geometry_dofs(mesh):
         return mesh.geometry.dofmap if _VERSION < (0, 11) else mesh.geometry.dofmaps[0]
@@ -382,11 +412,17 @@ def expression_address(expression):
     Its kernel adds (points * components) values to A. w holds the values of the Functions on the cell, all of the first
     in the order of its dofs, then all of the next; c holds the values of the Constants in the same way.
     """
+    return _address(expression.ufcx_expression), *_read(expression)
+
+
+def _read(expression):
+    """The Functions and the Constants of a compiled expression, in the order of its code."""
+    if hasattr(expression, "read"):
+        return expression.read
     compiled, of_ufl = expression.ufcx_expression, expression.ufl_expression
     functions = ufl.algorithms.extract_coefficients(of_ufl)
-    positions = (compiled.original_coefficient_positions[i] for i in range(compiled.num_coefficients))
-    constants = ufl.algorithms.analysis.extract_constants(of_ufl)
-    return _address(compiled), [functions[i] for i in positions], list(constants)
+    used = [functions[compiled.original_coefficient_positions[i]] for i in range(compiled.num_coefficients)]
+    return used, list(ufl.algorithms.analysis.extract_constants(of_ufl))
 
 
 def _address(compiled):

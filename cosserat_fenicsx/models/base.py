@@ -13,7 +13,7 @@ from cosserat_fenicsx.compat import compiling
 from cosserat_fenicsx.forms.equilibrium import Section
 from cosserat_fenicsx.forms.law import stiffness_for
 from cosserat_fenicsx.models.action_terms import ActionTerms, Densities
-from cosserat_fenicsx.models.compiled import compile_static, threads_of
+from cosserat_fenicsx.models.compiled import compile_evolutions, compile_static, threads_of
 from cosserat_fenicsx.models.connections import Clamps, Ties, ties_of
 from cosserat_fenicsx.models.rod_data import (
     as_matrix,
@@ -105,6 +105,8 @@ class RodModel:
     time = 1.0
     #: bending stiffness that defines the units, N m^2; None to take each scene's own
     EI = None
+    #: of the determinate models, space of three components per node on which forces do work
+    displacements = None
     #: a `DataDerivative` and an `EnergyOfMotion`, see `made_once`
     data_derivative = energy_of_motion = None
 
@@ -229,9 +231,7 @@ class RodModel:
             self.carried_dofs = compat.cell_dofs(function.function_space)
         self.carries_force, self.force_is_unknown = not force.of_motion, force.unknown
         self.forms = self._compile(spaces)
-        evolutions = compat.expressions(self.mesh, [term.evolution(point) for term, point in self.evolving])
-        for (term, _), compiled in zip(self.evolving, evolutions, strict=True):
-            term.compiled_evolution = compiled
+        compile_evolutions(self)
         self.rule = ElementRule(self.nodes, self.forms.gauss, self.forms.weights)
         self._prepare_variations(spaces)
         self.clamps = Clamps(self)

@@ -6,7 +6,7 @@ that would differ and miss the code cache, which costs a second.
 """
 
 from collections import defaultdict, namedtuple
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from functools import partial
 
 import basix
@@ -54,7 +54,7 @@ class CompiledForms:
         density, node_density: force and moment per length of the distributed actions, at the Gauss points and at the
             nodes, (6,), components along the model's axes; tuples.
         gauss, weights: points in [0, 1] of one element, and their weights.
-        symbols: the `Symbols`, or None.
+        symbols: the `Symbols`, or None; see `symbols_of`.
     """
 
     gauss: np.ndarray
@@ -79,10 +79,113 @@ def along(w):
     return w.dx(0)
 
 
-def compile_static(model, spaces, displacements=None):
+# The `Pattern`s of this process by what they depend on, None for kinds that have none; and the most of them.
+_PATTERNS, _MOST_PATTERNS = {}, 256
+
+
+def compile_static(model, spaces):
     """The `CompiledForms` of a model in statics, from its mesh, data, terms of the actions, and UFL of its unknowns;
-    spaces: of the second variations; displacements: of the determinate models, space of three components per node on
-    which forces do work."""
+    spaces: of the second variations. On one process, models that differ in their meshes alone share the work of UFL."""
+    everywhere = [model.space, *spaces, model.displacements]
+    kind = type(model), replace(model.signature, counts=(), connections=None, slender=False)
+    pattern = _PATTERNS.get(kind) if model.comm.size == 1 else None
+    if pattern is not None:
+        return pattern.on(model, everywhere)
+    before, given = set(vars(model)), {}
+    found = _compile_static(model, spaces, given)
+    compile_evolutions(model, given)
+    if model.comm.size == 1 and kind not in _PATTERNS:
+        pattern = Pattern.of(model, everywhere, found, given) if before == set(vars(model)) else None
+        while len(_PATTERNS) >= _MOST_PATTERNS:
+            _PATTERNS.pop(next(iter(_PATTERNS)))
+        _PATTERNS[kind] = pattern
+    return found
+
+
+class Pattern(namedtuple("Pattern", "made_on_demand numbers evolutions leaves")):
+    """`CompiledForms` without a mesh: names of what each term made at the first call, attributes and each term's
+    evolution with the positions of forms and Expressions, and the code and the places (see `_held`) of each of these.
+    """
+
+    @classmethod
+    def of(cls, model, spaces, forms, given):
+        """The pattern of a model's forms, None where a part is unknown; given: {id of a form: its UFL}."""
+        held, leaves = _held(model), []
+
+        def place(x):
+            if isinstance(x, fem.Function) and not any(x is y for y in held):  # the alias of the unknowns
+                return -1 if np.shares_memory(x.x.array, model.state.x.array) else None
+            return next((i for i, y in enumerate(held) if x is y), None)
+
+        def without_mesh(value):
+            if isinstance(value, tuple):
+                return tuple(map(without_mesh, value))
+            if id(value) not in given:
+                return value
+            code, arguments, *others = compat.pieces(given[id(value)], value) or (None, [None], [], [])
+            places = [next((i for i, y in enumerate(spaces) if x is y), None) for x in arguments]
+            leaves.append((code, places, *([place(x) for x in part] for part in others)))
+            return _Leaf(len(leaves) - 1)
+
+        numbers = {field.name: without_mesh(getattr(forms, field.name)) for field in fields(forms)}
+        evolutions = [without_mesh(term.compiled_evolution) for term in model.actions.terms]
+        if any(None in part for _, *parts in leaves for part in parts):
+            return None
+        on_demand = [[name for name in ("rest", "frame") if getattr(term, f"_{name}")] for term in model.actions.terms]
+        return cls(on_demand, numbers | {"symbols": None}, evolutions, leaves)
+
+    def on(self, model, spaces):
+        """The `CompiledForms` of another model of this kind, without `Symbols`."""
+        for term, names in zip(model.actions.terms, self.made_on_demand, strict=True):
+            for name in names:
+                getattr(term, name)()
+        held = [*_held(model), compat.alias(model.state)]
+        made = [compat.from_pieces(code, model.mesh, [spaces[i] for i in places],
+                                   *([held[i] for i in part] for part in parts))
+                for code, places, *parts in self.leaves]  # fmt: skip
+
+        def with_mesh(value):
+            if isinstance(value, _Leaf):
+                return made[value.number]
+            return tuple(map(with_mesh, value)) if isinstance(value, tuple) else value
+
+        for term, evolution in zip(model.actions.terms, self.evolutions, strict=True):
+            term.compiled_evolution = with_mesh(evolution)
+        return CompiledForms(**{name: with_mesh(value) for name, value in self.numbers.items()})
+
+
+@dataclass(frozen=True)
+class _Leaf:
+    number: int
+
+
+def _held(model):
+    """The Functions and Constants of a model and of its terms, in the order of their attributes."""
+    values = [value for owner in (model, *model.actions.terms) for value in vars(owner).values()]
+    every = [x for value in values for x in (value if isinstance(value, tuple | list) else [value])]
+    return [x for x in every if isinstance(x, fem.Function | fem.Constant)]
+
+
+def compile_evolutions(model, given=None):
+    """Compile the updates of memory that forms of a model have named; given: takes {id of an Expression: its UFL}."""
+    updates = [term.evolution(point) for term, point in model.evolving]
+    for (term, _), (update, _), compiled in zip(model.evolving, updates, compat.expressions(model.mesh, updates),
+                                                strict=True):  # fmt: skip
+        term.compiled_evolution = compiled
+        if given is not None:
+            given[id(compiled)] = update
+    model.evolving = []
+
+
+def symbols_of(model):
+    """The `Symbols` of a model in statics; forms that were made by a `Pattern` are made anew, by UFL."""
+    if model.forms.symbols is None:
+        model.forms = replace(model.forms, symbols=_compile_static(model, model.variation_spaces, {}).symbols)
+    return model.forms.symbols
+
+
+def _compile_static(model, spaces, given):
+    """`compile_static` by UFL; given: takes {id of a compiled form or Expression: its UFL}."""
     force, data, dx = model.signature.formulation.force, model.data, measures(model)
     U, U_node = model.state, compat.alias(model.state)
 
@@ -111,8 +214,8 @@ def compile_static(model, spaces, displacements=None):
 
     acting = action_work(model, dx, test, point_at, (U, U_node), test_at=test_at)
     forces = ActionWork({}, {}, [])
-    if displacements is not None:
-        forces = action_work(model, dx, VirtualMotion(ufl.TestFunction(displacements), NONE), point_at, ())
+    if model.displacements is not None:
+        forces = action_work(model, dx, VirtualMotion(ufl.TestFunction(model.displacements), NONE), point_at, ())
 
     seconds, variations = [], []  # in small displacements and rotations, which satisfy |q| = 1 by construction
     for space, (_, _, small_motion) in zip(spaces, model.variations, strict=True):
@@ -123,11 +226,11 @@ def compile_static(model, spaces, displacements=None):
             second = ds(force.second_variation(n, motion, data, section, *pair, model.stiffness))
         seconds.append(_symmetric(second))
         variations.append(pair)
-    fields = model.fields_of(n, equilibrium.contact_moment(n, motion, section), motion.r_s)
+    strains = model.fields_of(n, equilibrium.contact_moment(n, motion, section), motion.r_s)
     contact = model.components_of(equilibrium.contact(motion, section)[0]) if model.carried else None
     lives = {live.number: live_parts(live, derivative, variations) for live in acting.live}
     found = compile_parts(
-        model, {"residual": residual, "tangent": tangent, **dict(enumerate(seconds))}, lives, fields,
+        model, {"residual": residual, "tangent": tangent, **dict(enumerate(seconds))}, lives, strains, given=given,
         advance=None if advance is None else model.components_of(advance), densities=action_densities(model, point_at),
         dead=acting.dead, permanent=acting.permanent, force=forces.dead, permanent_force=forces.permanent,
     )  # fmt: skip
@@ -137,11 +240,12 @@ def compile_static(model, spaces, displacements=None):
     return CompiledForms(**found, symbols=Symbols(_balance(model, residual, acting), contact, (U, U_node), seconds))
 
 
-def compile_parts(model, core, terms, fields, *, advance=None, densities=None, **works):
+def compile_parts(model, core, terms, fields, *, advance=None, densities=None, given=None, **works):
     """Compile UFL: one module for the model without actions (core: {name: form}), and one for each term of the actions
     (terms: {its number: {name: form}}; works: for a name {its number: form}). Names are attributes of `CompiledForms`
-    or of a subclass, or the numbers of second variations; forms may be None. densities: see `action_densities`. Returns
-    these attributes, symbols excepted; tuples of all forms of a name."""
+    or of a subclass, or the numbers of second variations; forms may be None. densities: see `action_densities`; given:
+    takes {id of a compiled form or Expression: its UFL}. Returns these attributes, symbols excepted; tuples of all
+    forms of a name."""
     densities = densities or {}
     points, weights = basix.make_quadrature(basix.CellType.interval, 2 * model.signature.points - 1)
     places = {"line": points, "node": model.nodes}
@@ -155,6 +259,10 @@ def compile_parts(model, core, terms, fields, *, advance=None, densities=None, *
         if form is not None:
             form.signature()
     compiled = [compat.together(model.mesh, list(parts.values()), expressions) for parts, expressions in groups]
+    if given is not None:
+        for (parts, expressions), made in zip(groups, compiled, strict=True):
+            every = [*parts.values(), *(a for a, _ in expressions)], [*made[0], *made[1]]
+            given |= {id(found): a for a, found in zip(*every, strict=True) if found is not None}
     found = defaultdict(tuple)
     for (parts, _), (forms, _) in zip(groups, compiled, strict=True):
         for name, form in zip(parts, forms, strict=True):
@@ -321,7 +429,7 @@ class DataDerivative:
     in statics; form: the compiled change of the residual at the model's state and data."""
 
     def __init__(self, model):
-        self._model, symbols = model, model.forms.symbols
+        self._model, symbols = model, symbols_of(model)
         live = (*symbols.unknowns, *model.carried, *model.actions.tensions)
         self._data = [f for f in symbols.balance.coefficients() if f not in live]
         self._directions = [fem.Function(f.function_space) for f in self._data]
@@ -364,7 +472,7 @@ class EnergyOfMotion:
     strains, which keeps its digits where the entries of the matrix would lose them."""
 
     def __init__(self, model):
-        (space,), (second,) = model.variation_spaces, model.forms.symbols.seconds
+        (space,), (second,) = model.variation_spaces, symbols_of(model).seconds
         self._model, self._motion = model, fem.Function(space)
         with compiling():
             (self._form,) = compat.forms(model.mesh, [ufl.action(ufl.action(second, self._motion), self._motion)])

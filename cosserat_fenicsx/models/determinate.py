@@ -96,12 +96,12 @@ class _KnownForce(RodModel):
     name = "determinate"
 
     def _compile(self, spaces):
-        self._displacements = compat.function_space(self.mesh, compat.lagrange(self.mesh, self.signature.degree, 3))
+        self.displacements = compat.function_space(self.mesh, compat.lagrange(self.mesh, self.signature.degree, 3))
         self._force = gauss_function(self.mesh, self.signature.points, self.force_size)
         lasting = any(kind.scaled != "load" for kind in self.signature.terms)
         self._permanent = gauss_function(self.mesh, self.signature.points, self.force_size) if lasting else None
         self._tree = Tree(self.signature, self.rods)
-        return compile_static(self, spaces, self._displacements)
+        return compile_static(self, spaces)
 
     def known_force(self):
         """The components of the contact force at the load factors, UFL."""
