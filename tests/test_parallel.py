@@ -9,6 +9,7 @@ from conftest import COMM
 from ended_motions import Stopped, stop_at
 from fake_string import scene
 from moving_scenes import right_angle
+from test_obstacles import pulled_bar
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.storage.store import Store
@@ -119,3 +120,11 @@ def test_critical_loads():
     assert found.relative(E) == pytest.approx([1.0, 1.0], rel=1e-8)
     path = cf.solve(scene, (0.0, 5.0), model="spatial", elements=6)
     assert path.sensitivity(path.events[0], [E]).relative(E) == pytest.approx(1.0, rel=1e-8)
+
+
+def test_friction_of_an_obstacle_at_rest():
+    """A bar that is pulled over a rough plane and released, with the closed form of one process."""
+    scene, _, w, mu, EA, F = pulled_bar()
+    path = cf.solve(scene, [1.0, 0.0], elements=16, model="planar", steps=cf.StepControl(adaptive=False))
+    moved = F**2 / (2 * EA * mu * w)
+    assert path.displacement(scene.rods[0].end)[:, 0] == pytest.approx([moved, moved / 2], rel=1e-7)

@@ -153,6 +153,8 @@ class TendonState(NamedTuple):
 
     def __str__(self):
         slack = f", slack in {self.slack.sum()} of {len(self.slack)} states" if self.slack.any() else ""
+        least = self.along[-1].min() if len(self.along) else 0.0
+        slack = f", friction leaves {least:.4g} N in the last" * bool(least < self.tension[-1:].sum()) + slack
         return f"tension {span_in_words(self.tension, 'N')}, length {span_in_words(self.length, 'm')}{slack}"
 
 

@@ -263,6 +263,8 @@ class Tracing:
                 f"A cable whose end is prescribed inwards is pressed before it sags:{way} pull by a Force in place of "
                 "the Prescribed displacement; otherwise try"
             )
+        elif rubs(scene) and abs(load_factor) < abs(here):
+            where = "Friction has not settled on the way back: try one step, steps=StepControl(adaptive=False), or"
         elif here and rubs(scene):
             where = "Friction may not hold more; otherwise try"
         elif here and self._options["control"] == "load":
