@@ -102,7 +102,7 @@ def test_the_rows_of_a_string_are_means_between_saved_states_and_of_order_2():
 
 
 def test_linear_controls_above_a_rod():
-    """A PI control as a `LinearControl` is that one; `ZTorque` is that of the string; which are refused."""
+    """A PI control as a `LinearControl` is that one; others, some of them late, are those of the string; refusals."""
 
     def moved(control, inertia, dt=4e-3):
         mixed = cf.drilling.mixed_scene(under(control, inertia), 250.0)
@@ -114,14 +114,15 @@ def test_linear_controls_above_a_rod():
         np.testing.assert_allclose(
             getattr(same, name), getattr(one, name), atol=1e-9 * np.abs(getattr(one, name)).max()
         )
-    for filtered in (0.02, 0.0):
-        control = cf.drilling.ZTorque(filter=filtered)
-        found, whole = moved(control, 0.0, 2e-3), cf.drilling.simulate(under(control, 0.0), 0.64, dt=1e-4)
+    Z = cf.drilling.ZTorque
+    late = replace(linear, delay=0.06)
+    for control, inertia in ((Z(), 0), (Z(filter=0.0), 0), (Z(filter=0.1, delay=0.04), 0), (late, 100)):
+        found, whole = moved(control, inertia, 2e-3), cf.drilling.simulate(under(control, inertia), 0.64, dt=1e-4)
         for name in ("drive_speed", "surface_torque"):
             true = np.interp(found.mean_times, whole.mean_times, getattr(whole, name))
-            assert np.abs(getattr(found, name) - true).max() < 1e-3 * np.abs(true).max(), (name, filtered)
-    drive = cf.drilling.TopDrive(1.0, 100.0, cf.drilling.ZTorque(delay=0.02))
-    with pytest.raises(cf.SceneError, match="delay = 0.02: expected 0 .s. above a rod; drilling.simulate has"):
+            assert np.abs(getattr(found, name) - true).max() < 1e-3 * np.abs(true).max(), (name, control)
+    drive = cf.drilling.TopDrive(1.0, 100.0, cf.drilling.ZTorque(filter=0.0, delay=0.02))
+    with pytest.raises(cf.SceneError, match="delay = 0.02: expected 0 .s., or a filter: ZTorque answers late"):
         cf.drilling.mixed_scene(replace(under(cf.drilling.Stiff(), 0.0), drive=drive), 250.0)
 
 

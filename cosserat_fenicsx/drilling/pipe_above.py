@@ -19,7 +19,7 @@ import numpy as np
 import ufl
 
 from cosserat_fenicsx.checks import positive, refuse, store
-from cosserat_fenicsx.drilling.linear_control import arrays_of, check_answer
+from cosserat_fenicsx.drilling.linear_control import arrays_of, check_answer, check_late
 from cosserat_fenicsx.drilling.scene import Drilling, Segment, segment_of
 from cosserat_fenicsx.drilling.signals import ScalarSignal
 from cosserat_fenicsx.drilling.top_drive import DriveControl, Gains, Hook, Sample, Sampler, StateSpace, TopDrive
@@ -46,7 +46,8 @@ class PipeAbove(PointAction):
     (`DelayLines`): with it the motion is as that of a rod of the whole length, without elements for the pipe. In the
     energy balance it counts as work of the loads. At rest it is the spring of the pipe between the rod and a held top.
 
-    The steps are at most half the travel time of a wave through the shortest part of the pipe; longer ones are halved.
+    The steps are at most half the travel time of a wave through the shortest part of the pipe, and half the delay of a
+    linear control; longer ones are halved.
     Only the schemes that step forwards can take it, and only the spatial model. A control that is called once a sample,
     of the drive or an autodriller of the hook, needs steps of one `dt` that its sample and its delay are multiples of.
 
@@ -107,7 +108,7 @@ class PipeAbove(PointAction):
         ]  # fmt: skip
         if gains.linear is not None:
             found += [*np.concatenate([x.ravel() for x in arrays_of(gains.linear)]), gains.linear.of_speed]
-            found.append(gains.linear.level or 0.0)
+            found += [gains.linear.level or 0.0, *([control.late] if control.late else [])]
         signals = [self.drive.signal(), hook.signal()]
         for called in filter(None, (control if control.sampled else None, hook.autodriller)):
             given = (getattr(called, x.name) for x in fields(called))
@@ -279,16 +280,17 @@ def _gains(drive, impedance):
     control = drive.control
     if control.sampled:
         return Gains(rigid=control.of_speed)
-    if control.late:
-        refuse(control, "delay", control.late, "0 (s) above a rod; drilling.simulate has controls that act late")
-    return control.gains(impedance)
+    gains = control.gains(impedance)
+    check_late(control, gains.linear, impedance)
+    return gains
 
 
 def _drive_end(drive, impedance, sampler):
     rigid, given, Kp, Ki, linear = _gains(drive, impedance)
     asked = sampler if sampler and rigid else drive.signal()
     return TopEnd(asked.mean, stiff=rigid, inertia=drive.inertia, Kp=Kp, Ki=Ki, given=given,
-                  control=drive.control, linear=linear, sampler=sampler)  # fmt: skip
+                  control=drive.control, linear=linear, late=drive.control.late if linear else 0.0,
+                  sampler=sampler)  # fmt: skip
 
 
 # Samples of an interpolation; least travel time of a part over the step, so that all of them are known.
@@ -305,8 +307,8 @@ class TopEnd:
 
     Args:
         mean: function (start, end) of times (s) that gives the mean of the speed Om asked for; None for the force of
-            the start. inertia: I. given: M0. linear: a `StateSpace` of the control; None for Kp and Ki. sampler: of a
-            control that is called once a sample, whose torque comes in the place of M0.
+            the start. inertia: I. given: M0. linear: a `StateSpace` of the control, whose output acts `late` (s); None
+            for Kp and Ki. sampler: of a control that is called once a sample, whose torque comes in the place of M0.
     """
 
     mean: Callable[[float, float], float] | None
@@ -317,26 +319,28 @@ class TopEnd:
     given: float = 0.0
     control: DriveControl | None = None
     linear: StateSpace | None = None
+    late: float = 0.0
     sampler: Sampler | None = None
 
     def rest(self, speed, force):
         """(om, phi) at the beginning of a motion, for a speed and a force handed down; phi balances that force without
-        a difference of speeds, where there is one. Then the state of a linear control, 0."""
+        a difference of speeds, where there is one. Of a linear control phi is its output, and its state follows, 0."""
         if self.mean is None:
             return speed, force
         if self.linear is not None:
             return speed, 0.0, *np.zeros(len(self.linear.A)).tolist()
         return speed, (force - self.given) / self.Ki if self.Ki else 0.0
 
-    def step(self, state, start, end, impedance, wave):
+    def step(self, state, start, end, impedance, wave, late=None):
         """The mean speed in a step from start to end (s), and the new state, by the implicit midpoint rule. state: see
-        `rest`. impedance: of the string, with its drag. wave: M - Z om that arrives."""
+        `rest`. impedance: of the string, with its drag. wave: M - Z om that arrives. late: the mean output of a linear
+        control that acts now, None for that of the step itself."""
         h, (om, phi, *x) = end - start, state
         if self.mean is None:
             return (phi - wave) / impedance, state
         asked = self.mean(start, end)
         if self.linear is not None:
-            return self._controlled(h, om, np.array(x), impedance, wave, asked)
+            return self._controlled(h, om, np.array(x), impedance, wave, asked, late)
         if self.stiff:
             return asked, (asked, 0.0)
         inert, turned = 2 * self.inertia / h, self.Ki * h / 2
@@ -345,21 +349,24 @@ class TopEnd:
         mean = push / (inert + self.Kp + turned + impedance)
         return mean, (2 * mean - om, phi + h * (asked - mean))
 
-    def _controlled(self, h, om, x, impedance, wave, asked):
+    def _controlled(self, h, om, x, impedance, wave, asked, late):
         """`step` of a linear control: its mean output is y = c + d u, with the mean u = (Om - om, M)."""
         A, B, C, D = arrays_of(self.linear)
         half = np.linalg.inv(np.eye(len(x)) - h / 2 * A)
         c, d = C @ half @ x, D + h / 2 * C @ half @ B
         fixed, by_speed = c + d @ (asked, wave - (self.linear.level or 0.0)), d[1] * impedance - d[0]
+        if late is not None:
+            fixed, by_speed = late, 0.0
         if self.linear.of_speed:
             mean = (asked + fixed) / (1 - by_speed)
         else:
-            check_answer(self.control, d[1], h)
+            if late is None:
+                check_answer(self.control, d[1], h)
             inert = 2 * self.inertia / h
             mean = (inert * om + fixed - wave) / (inert + impedance - by_speed)
         u = np.array([asked - mean, wave + impedance * mean - (self.linear.level or 0.0)])
         x = 2 * half @ (x + h / 2 * B @ u) - x
-        return mean, (2 * mean - om, 0.0, *x.tolist())
+        return mean, (2 * mean - om, float(c + d @ u), *x.tolist())
 
 
 class DelayLines:
@@ -369,9 +376,10 @@ class DelayLines:
     def __init__(self, impedance, time, drag, top):
         self._Z, self._time, self._drag = (np.array(x, dtype=float) for x in (impedance, time, drag))
         self._top, self._parts = top, len(self._Z)
-        self._delays = np.tile(self._time, 2)
+        # the output of a control that acts late is stored and read as waves are
+        self._delays = np.append(np.tile(self._time, 2), [top.late] if top.late else [])
         #: longest step, s
-        self.longest = self._time.min() / _LEAST
+        self.longest = self._delays.min() / _LEAST
         self.begin(0.0, 0.0)
 
     @property
@@ -382,11 +390,11 @@ class DelayLines:
     def begin(self, speed, force):
         """Begin at the time 0, after a steady motion with a speed and a force handed down."""
         down, up = force + self._Z * speed, force - self._Z * speed
-        self._first = np.concatenate([down, up])
+        self._first = np.concatenate([down, up, np.zeros(len(self._delays) - 2 * self._parts)])
         self._state = self._top.rest(speed, force)
         #: speed and force of the upper end, means over the last step, and the integral of the speed since the start
         self.at_top, self.passed = (speed, force), 0.0
-        self._take(np.empty(0), np.empty((0, 2 * self._parts)))
+        self._take(np.empty(0), np.empty((0, len(self._delays))))
         self._before = self._state, self.at_top, self.passed
 
     @property
@@ -399,7 +407,8 @@ class DelayLines:
         return float(self._delayed(t)[self._parts - 1])
 
     def _delayed(self, t):
-        """(2 n,) waves at a time (s): from above at the lower ends of parts, then from below at their upper ends."""
+        """(2 n,) waves at a time (s): from above at the lower ends of parts, then from below at their upper ends; then
+        the output of a control that acts late, if there is one."""
         asked, count = t - self._delays, self._count
         if not count:
             return self._first
@@ -414,30 +423,33 @@ class DelayLines:
         return np.where(asked < times[0], self._first, read)
 
     def _arrived(self, t, h):
-        """(2, n) waves in the middle of a step from t to t + h (s): from above, from below."""
+        """Waves in the middle of a step from t to t + h (s), (n,) from above, (n,) from below; and the output of a
+        control that acts then, or None."""
         if not self._count:  # before the start nothing changes; the spacing of the first step keeps impulses exact
             for k in range(-_SAMPLES, 0):
                 self._append(t + (k + 0.5) * h, self._first)
-        return self._delayed(t + h / 2).reshape(2, -1)
+        above, below, late = np.split(self._delayed(t + h / 2), [self._parts, 2 * self._parts])
+        return above, below, float(late[0]) if len(late) else None
 
     def meeting(self, t, h):
         """(2, n - 1) at the inner nodes in a step from t to t + h (s): the push of the waves, and the impedance."""
-        above, below = self._arrived(t, h)
+        above, below, _ = self._arrived(t, h)
         return np.array([above[:-1] - below[1:], self._Z[:-1] + self._Z[1:] + self._drag[1:-1]])
 
     def advance(self, t, h, speed, held=0.0):
         """Accept a step from t to t + h (s) with this mean speed of the lower end; held: friction at inner nodes."""
-        above, below = self._arrived(t, h)
+        above, below, late = self._arrived(t, h)
         Z, speeds = self._Z, np.empty(self._parts + 1)
         self._before = self._state, self.at_top, self.passed
-        speeds[0], self._state = self._top.step(self._state, t, t + h, Z[0] + self._drag[0], below[0])
+        speeds[0], self._state = self._top.step(self._state, t, t + h, Z[0] + self._drag[0], below[0], late)
         speeds[1:-1] = (above[:-1] - below[1:] - held) / (Z[:-1] + Z[1:] + self._drag[1:-1])
         speeds[-1] = speed
         self.at_top = speeds[0], below[0] + (Z[0] + self._drag[0]) * speeds[0]
         self.passed += h * speeds[0]
         #: forces at the inner nodes, means of both sides
         self.inner = (above[:-1] + below[1:] + (Z[1:] - Z[:-1]) * speeds[1:-1]) / 2
-        self._append(t + h / 2, np.concatenate([below + 2 * Z * speeds[:-1], above - 2 * Z * speeds[1:]]))
+        waves = below + 2 * Z * speeds[:-1], above - 2 * Z * speeds[1:]
+        self._append(t + h / 2, np.concatenate([*waves, [] if late is None else [self._state[1]]]))
 
     def _append(self, t, values):
         if self._count == len(self._times):
@@ -449,7 +461,7 @@ class DelayLines:
     def _take(self, times, values):
         """Take samples, with room for at least as many."""
         self._count = n = len(times)
-        self._times, self._values = np.zeros(2 * n + _SPARE), np.zeros((2 * n + _SPARE, 2 * self._parts))
+        self._times, self._values = np.zeros(2 * n + _SPARE), np.zeros((2 * n + _SPARE, len(self._delays)))
         self._times[:n], self._values[:n] = times, values
 
     def undo(self):
