@@ -116,6 +116,14 @@ def test_load_factors_are_the_next_along_the_path_or_the_next_of_load_control():
     np.testing.assert_allclose(load(path.rotation_angle(rod.end)[[0, 3]]), [5.0, 1.0], rtol=1e-9)
 
 
+def test_a_path_that_begins_nearly_linearly_takes_long_steps():
+    """Where they are no results: of a tenth of the way the first one, then to the load factors."""
+    _, scene = column()
+    assert cf.solve(scene, [0.05, 0.1], elements=4).steps.tolist() == [2, 3]
+    recorded = cf.solve(scene, (0.0, 0.1), elements=4).load_factors
+    np.testing.assert_allclose(recorded[:3], [0.0, 0.01, 0.03], rtol=1e-12)
+
+
 @pytest.mark.parametrize("far", [45.0, 20000.0])
 @pytest.mark.parametrize("control", ["auto", pytest.param("arc", marks=pytest.mark.serial)])
 def test_shallow_arch(control, far):

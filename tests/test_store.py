@@ -149,7 +149,7 @@ def test_other_formats_are_refused_in_words(user, kept, tmp_path):
     folder = copy(kept[user.call]["part"], tmp_path / "one")
     head = {**files.unsealed((folder / "stored.json").read_bytes()), "format": 99}
     (folder / "stored.json").write_bytes(files.sealed(head))
-    with pytest.raises(cf.SceneError, match="its format is 99: expected 5, that of this release"):
+    with pytest.raises(cf.SceneError, match="its format is 99: expected 6, that of this release"):
         user.go_on(folder)
     (folder / "stored.json").write_text(json.dumps(head))
     with pytest.raises(cf.SceneError, match="stored.json is damaged"):

@@ -280,7 +280,7 @@ static void condense(chain *s, int t, const double *F, int n, int k, int d)
    zeros. */
 static void keep_factors(chain *s, int t, const double *F, int n, int k)
 {
-    double *to = s->factor + (size_t)t * s->room * (s->wide + BESIDE), *inverse = s->inverse + (size_t)t * s->room;
+    double *to = s->factor + (size_t)s->start[t] * BESIDE, *inverse = s->inverse + (size_t)t * s->room;
     for (int j = 0; j < k; j++) {
         const int first = round_down(j + 1), end = round_up(n);
         for (int i = first; i <= j; i++) *to++ = 0;
@@ -370,10 +370,10 @@ void forward(chain *s, const double *b, double *interface)
         const size_t at = (size_t)t * s->room;
         const int *shape = s->shape + 4 * t, *rows = s->rows + at, *row = s->row + at, *column = s->column + at;
         const int n = s->done[2 * t], k = s->done[2 * t + 1], m = d + shape[0] + shape[1];
-        const double *l = s->factor + at * (s->wide + BESIDE);
+        const int *start = s->start + t;
+        const double *l = s->factor + (size_t)*start * BESIDE, *next = l + BESIDE * (start[1] - *start);
         double *z = s->forward + (size_t)t * s->wide;
-        const size_t next = s->room * (s->wide + BESIDE);
-        if (t + 1 < s->elements) fetch(l + next, l + next + s->wide * k);
+        if (t + 1 < s->elements) fetch(next, next + s->wide * k);
         for (int i = 0; i < n; i++) y[i] = i >= d && i < m ? b[rows[i - d]] : 0;
         for (int i = 0; i < carried; i++) y[carried_to(i, d + shape[0], shape)] += carry[i];
         for (int i = 0; i < n; i++) z[i] = y[row[i]];
@@ -395,11 +395,13 @@ void backward(chain *s, const double *interface, double *x)
         const size_t at = (size_t)t * s->room;
         const int *shape = s->shape + 4 * t, *column = s->column + at;
         const int n = s->done[2 * t], k = s->done[2 * t + 1], m = n - shape[2] - shape[3];
-        const double *u = s->factor + at * (s->wide + BESIDE), *inverse = s->inverse + at;
+        const double *u = s->factor + (size_t)s->start[t] * BESIDE, *inverse = s->inverse + at;
         double *z = s->forward + (size_t)t * s->wide;
         for (int j = 0; j < k; j++) u += round_up(n) - round_down(j + 1);
-        const size_t next = s->room * (s->wide + BESIDE);
-        if (t > 0) fetch(u - next, u - next + n * k);
+        if (t > 0) {
+            const double *next = u - BESIDE * (s->start[t] - s->start[t - 1]);
+            fetch(next, next + n * k);
+        }
         for (int i = k; i < n; i++) {
             if (i < m && s->ends[t] >= 0) x[column[i]] = interface[s->ends[t] + i - k];
             z[i] = column[i] < s->size ? x[column[i]] : interface[column[i] - s->size];

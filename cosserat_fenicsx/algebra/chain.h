@@ -46,7 +46,9 @@ typedef struct {
     const int *block;              /* (elements,) at the end of a segment where its matrix is in condensed; else -1 */
     double *front;                 /* (2, room, room) of the element in turn and of the one before */
     int wide;                      /* room, rounded up to a multiple of 4 */
-    double *factor, *inverse;      /* (elements, room, wide + 4) factors by columns; (elements, room) of the pivots */
+    double *factor, *inverse;      /* factors by columns, of the elements one after another; (elements, room) of the
+                                      pivots */
+    const int *start;              /* (elements + 1,) where those of an element begin, over 4 */
     int *row, *column, *done;      /* (elements, room) order of rows, unknowns of columns; (elements, 2) size of the
                                       front, eliminated */
     double *forward, *condensed;   /* (elements, wide); matrices of the segments on the interface */
@@ -216,6 +218,7 @@ typedef struct {
 typedef struct {
     double far, intended, slight, leap; /* distances from the predictor */
     int easy, hard;                 /* Newton iterations */
+    double linear, first;           /* see `is_linear`; largest growth after a first step that is */
     double step, smallest, largest; /* the next step; bounds */
     double shrink;                  /* factor of a step that is rejected */
     int rejections, patience, accepted; /* rejected steps without two accepted ones between, and most of them; whether
@@ -388,7 +391,8 @@ double lost(const contact *c, const double *before);
 int settle_pairs(pairs *c);
 
 double step_goal(const step_control *c, double here, double load_factor);
-double step_growth(const step_control *c, double off, int order, int iterations);
+double step_growth(const step_control *c, double off, int order, int iterations, int linear);
+int is_linear(const step_control *c, const newton *n, int known);
 int judge_step(step_control *c, int known, double off, double along, double size, double apart);
 void accept_step(step_control *c, double taken, double growth);
 int reject_step(step_control *c, double taken);

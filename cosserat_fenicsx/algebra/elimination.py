@@ -21,6 +21,10 @@ _DELAYS = 3
 _BESIDE = 4
 
 
+def _round_up(number):
+    return -(-number // _BESIDE) * _BESIDE
+
+
 class Elimination(Pointers):
     """The C structure `chain` for the elements of this rank.
 
@@ -36,10 +40,9 @@ class Elimination(Pointers):
         self.numbering = numbering
         rows = numbering.rows[cell_dofs][order].astype(np.int64)
         turn = np.repeat(np.arange(len(rows)), rows.shape[1])
-        number, inverse = np.unique(rows.ravel(), return_inverse=True)
-        first, last = np.full(len(number), len(rows)), np.full(len(number), -1)
-        np.minimum.at(first, inverse, turn)
-        np.maximum.at(last, inverse, turn)
+        number, at, inverse = np.unique(rows.ravel(), return_index=True, return_inverse=True)
+        first, last = turn[at], np.empty(len(number), dtype=turn.dtype)
+        last[inverse] = turn  # the latest of equal numbers
         kept = self._kept(number, last - first > 1, tied)
         multipliers = numbering.first_multiplier + np.arange(numbering.multipliers)
         self.interface = np.concatenate([kept, multipliers])
@@ -117,8 +120,10 @@ class Elimination(Pointers):
             ("block", block), *self._factors.items(),
         ):  # fmt: skip
             setattr(chain, name, self.integers(array))
-        chain.wide = wide = -(-room // _BESIDE) * _BESIDE
-        self._factors["factor"] = np.zeros((fronts, room, wide + _BESIDE))
+        chain.wide = wide = _round_up(room)
+        start = self._starts(room, delays)
+        chain.start = self.integers(start)
+        self._factors["factor"] = np.zeros(int(start[-1]) * _BESIDE if fronts == elements else 0)
         self._factors["inverse"] = np.zeros((fronts, room))
         for name, array in (
             ("front", np.zeros((2, room, room))), ("factor", self._factors["factor"]),
@@ -126,6 +131,15 @@ class Elimination(Pointers):
             ("diagonal", self.diagonal), ("carry", np.zeros(room)), ("work", np.zeros(room)),
         ):  # fmt: skip
             setattr(chain, name, self.doubles(array))
+
+    def _starts(self, room, delays):
+        """(elements + 1,) where the factors of an element's front begin, over _BESIDE: see `keep_factors` in C."""
+        n, k = self._shape.sum(axis=1) + delays, self._shape[:, :2].sum(axis=1) + delays
+        column = np.arange(room + 1)
+        before = np.cumsum([0, *(column + 1) // _BESIDE * _BESIDE])  # of columns of L, the numbers left out above
+        above = np.cumsum([0, *_round_up(column)])
+        size = k * _round_up(n) - before[k] + above[k] + (n - k) * _round_up(k)
+        return np.cumsum([0, *size // _BESIDE])
 
     def _find_places(self, at, ends, rows, slots):
         numbering, first, kept = self.numbering, self._shape[at, :2].sum(axis=1), self._shape[at, 2:].sum(axis=1)
@@ -226,6 +240,11 @@ class Interface:
         large = isinstance(self._solver, _Sparse) and isinstance(other._solver, _Sparse)
         if alike and large and self._size == len(known[0]) and not len(self.nodes):
             self._solver.near = _Near(self._solver, other._solver, ours, maps, count)
+
+    @property
+    def inertia(self):
+        """The `RepeatedInertia` of a large system whose signs were counted, else None."""
+        return vars(self._solver).get("_symmetric")
 
     def memory(self):
         """The entries of the last matrix."""

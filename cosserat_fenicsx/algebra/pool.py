@@ -7,6 +7,7 @@ puts aside what Python drops, until `garbage_cleanup`, since destruction is coll
 """
 
 import contextlib
+import ctypes
 import threading
 
 from mpi4py import MPI
@@ -90,6 +91,8 @@ class ProblemPool:
             if dropped:
                 idle[:] = [old for old in idle if not old[2]]
         self._release(dropped, comm)
+        if dropped and (trim := getattr(ctypes.CDLL(None), "malloc_trim", None)):
+            trim(0)  # MPI may keep glibc from returning what is freed; room that MUMPS never writes to would take it
 
     def _release(self, dropped, comm):
         for _, old, _ in dropped:

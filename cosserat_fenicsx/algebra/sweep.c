@@ -75,11 +75,22 @@ double step_goal(const step_control *c, double here, double load_factor)
     return fabs(left) < 2 * step ? here + left / 2 : here + copysign(step, left);
 }
 
-/* Factor from an accepted step's length to the next one's; off: distance from the predictor, whose error is of an order
-   in the length. */
-double step_growth(const step_control *c, double off, int order, int iterations)
+/* Whether the first step of a path is nearly linear: what follows Newton's first step is a small share of it. */
+int is_linear(const step_control *c, const newton *n, int known)
 {
-    const double growth = fmin(fmax(pow(c->intended / fmax(off, 1e-12), 1.0 / order), 0.5), 2);
+    double later = 0;
+    if (known > 1 || n->iterations > 4) return 0;
+    for (int i = 0; i < n->iterations - 1; i++) later += n->steps[i];
+    return n->iterations == 0 || later <= c->linear * n->steps[n->iterations - 1];
+}
+
+/* Factor from an accepted step's length to the next one's; off: distance from the predictor, whose error is of an order
+   in the length; linear: see `is_linear`, which does not count where longer first steps were rejected, as of slender
+   wires. */
+double step_growth(const step_control *c, double off, int order, int iterations, int linear)
+{
+    const double most = linear && c->rejections == 0 ? c->first : 2;
+    const double growth = fmin(fmax(pow(c->intended / fmax(off, 1e-12), 1.0 / order), 0.5), most);
     if (iterations >= c->hard) return 0.5;
     return iterations > c->easy ? fmin(growth, 1) : growth;
 }
@@ -275,7 +286,7 @@ static void take_step(sweep *s, const double *found, double goal, double off)
 {
     double *factors = s->known_load_factors;
     const double taken = fabs(goal - factors[s->known - 1]);
-    const int order = s->known < 2 ? 1 : 2;
+    const int order = s->known < 2 ? 1 : 2, linear = is_linear(s->control, s->newton, s->known);
     if (s->known == 3) {
         memmove(s->points, s->points + s->numbers, 2 * (size_t)s->numbers * sizeof *found);
         memmove(factors, factors + 1, 2 * sizeof *factors);
@@ -285,7 +296,7 @@ static void take_step(sweep *s, const double *found, double goal, double off)
     memcpy(s->points + (size_t)(s->known - 1) * s->numbers, found, s->numbers * sizeof *found);
     factors[s->known - 1] = goal;
     s->steps++;
-    accept_step(s->control, taken, step_growth(s->control, off, order, s->newton->iterations));
+    accept_step(s->control, taken, step_growth(s->control, off, order, s->newton->iterations, linear));
 }
 
 /* A step of each sweep that is GOING to its load factor. */
@@ -308,6 +319,7 @@ static void attempt(const group *g, int *judged, const double *goal)
         if (!in[k]) continue;
         off[k] = largest(s, found[k], guess[k]);
         judged[k] = isfinite(off[k]) ? judge(s, here[k], guess[k], found[k], off[k]) : REJECTED;
+        if (judged[k] == UNSURE && is_linear(s->control, s->newton, s->known)) judged[k] = ACCEPTED;
     }
     for (int k = 0; k < g->count; k++) unsure[k] = in[k] ? judged[k] : REJECTED; /* not where others fail */
     jumped(g, unsure, here, found, goal);

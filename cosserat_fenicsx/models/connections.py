@@ -48,9 +48,9 @@ class Connections:
 
         for joint in scene.joints:
             if joint.rigid:
-                one, other = sorted(find(layout.vertex(scene, end)) for end in (joint.first, joint.second))
+                one, other = find(layout.vertex(scene, joint.first)), find(layout.vertex(scene, joint.second))
                 if one != other:
-                    leader[other] = one
+                    leader[max(one, other)] = min(one, other)
         clamped = sorted({find(layout.vertex(scene, x.station)) for x in scene.supports if x.clamps})
         kinds = tuple(
             (type(tie).__name__, *(None if x is None else find(layout.vertex(scene, x)) for x in (tie.a, tie.b)))

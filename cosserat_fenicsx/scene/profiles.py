@@ -335,6 +335,8 @@ class Sections:
     def _index(self, s, side):
         if side not in ("left", "right"):
             refuse(f"Rod '{self.owner.name}'", "side", side, "'left' or 'right'")
+        if len(self.pieces) == 1:
+            return np.zeros(np.shape(s), dtype=int)
         return piece_at(self.breaks, s, side, self.owner.length)
 
     def _rows(self, s, index):

@@ -425,11 +425,12 @@ class Scene(Part):
             if isinstance(section, Profile) and rod.length > _LONGEST * section.height:
                 yield f"rod '{rod.name}' of {section.name} is {rod.length:g} m long: are all lengths in m?"
             across = max(getattr(section, name, 0.0) for name in ("diameter", "outer_diameter", "width", "height"))
-            size = f"rod '{rod.name}' is {across:g} m across and {rod.length:g} m long"
+            size = "rod '{}' is {:g} m across and {:g} m long"
             if across >= rod.length:
-                yield f"{size}: are all lengths in m?"
+                yield f"{size.format(rod.name, across, rod.length)}: are all lengths in m?"
             elif across > _THICKEST and isinstance(section, Circle | Rectangle):
                 if rod.material is not None and _METAL[0] <= rod.material.E <= _METAL[1]:
+                    size = size.format(rod.name, across, rod.length)
                     yield f'{size}, of solid metal: are all lengths in m (or texts, such as "20 mm")?'
 
     def _turned(self):

@@ -192,8 +192,10 @@ def resolving(scene, layout, degree, parts=4):
 def _varying(rod, loads):
     """Functions, of (n,) arc lengths over the rod's length, that vary along a rod, also of `loads`, values (n, m)."""
     functions = [lambda s, value=value: value(s * rod.length) for value in loads]
-    low, high = rod.profile.range
-    twisted = not isinstance(rod.curve, Line) and (low.J[0] != high.J[1] or rod.profile.coupled)
+    twisted = False
+    if not isinstance(rod.curve, Line):
+        low, high = rod.profile.range
+        twisted = low.J[0] != high.J[1] or rod.profile.coupled
     if rod.profile.uniform and not twisted:
         return functions
 

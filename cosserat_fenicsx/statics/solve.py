@@ -73,6 +73,7 @@ class Legs:
         self._known, self._so_far, self._strayed = known or {}, {}, []
         self._ends = {}  # the last point of each leg on the last mesh
         self._last = {}  # and on whichever mesh it was computed last
+        self._inertia = []  # of the equations where rods meet: the next mesh goes on with their factors
 
     @contextlib.contextmanager
     def _tracing(self, k, layout):
@@ -88,6 +89,7 @@ class Legs:
             self._prepare(tracer.path)
             try:
                 yield tracer
+                self._inertia = [part.interface and part.interface.inertia for part in solvers[2].parts]
             except (NotConverged, Interrupted) as failure:
                 if leg.leg is not None:
                     if failure.path is not None:

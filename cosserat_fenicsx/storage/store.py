@@ -31,7 +31,7 @@ from cosserat_fenicsx.storage import files, mark
 if TYPE_CHECKING:
     from mpi4py import MPI
 
-FORMAT = 5
+FORMAT = 6
 #: What says what a folder holds; and the files that did so in earlier releases.
 HEAD, EARLIER = "stored.json", ("motion.json", "drilling.json", "study.json")
 _START, _LATEST, _LINES = "start.npz", "checkpoint.npz", "rows.{}.jsonl"

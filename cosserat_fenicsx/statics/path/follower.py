@@ -21,6 +21,7 @@ from cosserat_fenicsx.statics.path.track import LIMITS, NEAR, Track, bends, betw
 #: Control parameters of the continuation, see `solve`.
 CONTROLS = ("auto", "load", "arc")
 _PATIENCE = 4  # rejected steps of load control after which arc length takes over
+_RECORDED = 2.0  # largest growth after the first step where steps are results
 _TRIES = 8  # largest number of halvings of the first step onto a branch
 
 
@@ -63,10 +64,12 @@ class Follower:
         """The smallest step of the load factor that was allowed."""
         return self._load.c.smallest
 
-    def begin(self, load_factors, start=None):
+    def begin(self, load_factors, start=None, *, recorded=True):
         """Begin the path over these load factors: apply the permanent loads in steps, and solve at load factor 0, from
-        the reference or from a state there (`start`, arguments of `Problem.begin_at`). Raises NotConverged."""
+        the reference or from a state there (`start`, arguments of `Problem.begin_at`); recorded: whether steps between
+        them are results. Raises NotConverged."""
         problem, track = self.track.problem, self.track
+        self._load.c.first = _RECORDED if recorded else LIMITS.first
         self._load.reach = float(max(map(abs, load_factors))) or 1.0
         if start is not None:
             return self._begin_at(start)
@@ -463,7 +466,7 @@ class ArcLength:
             track.failure = "the step crossed a point where stability changes"
             return self._shorten()
         off = max(off, LIMITS.intended / _STEPS.sure * bend)
-        growth = self._lib.step_growth(self._limits, off, order, solved.iterations)
+        growth = self._lib.step_growth(self._limits, off, order, solved.iterations, False)
         self._step = max(self._step, length * growth) if growth >= 1 else length * growth
         return point
 

@@ -148,7 +148,9 @@ class Continuation:
             return track.restore()
         numbers = track.problem.numbers()
         off = track.distance(numbers, predicted)
-        if adaptive and not self._near(numbers, predicted, off, load_factor):
+        newton = track.newton.c  # its last solution is the whole step, unless contact needs more of them
+        linear = solved.iterations == newton.iterations and self._lib.is_linear(self.c, newton, len(track.history))
+        if adaptive and not self._near(numbers, predicted, off, load_factor, linear):
             return track.restore()
         point = track.point(solved)
         changed = point.negative_modes != here.negative_modes
@@ -162,7 +164,7 @@ class Continuation:
         taken = abs(load_factor - here.load_factor)
         track.keep(point)
         if adaptive:
-            growth = self._lib.step_growth(self.c, off, len(track.history) - 1, solved.iterations)
+            growth = self._lib.step_growth(self.c, off, len(track.history) - 1, solved.iterations, linear)
             self._lib.accept_step(self.c, taken, growth)
         if on_step:
             on_step(point)
@@ -174,8 +176,9 @@ class Continuation:
         move, off = found - track.here.numbers[0], found - predicted
         return track.product(off, off) <= share**2 * track.product(move, move) + NOTHING**2
 
-    def _near(self, found, predicted, off, load_factor):
-        """Whether a step to a corrected point, at a distance `off` from the predictor, is one along the path."""
+    def _near(self, found, predicted, off, load_factor, linear):
+        """Whether a step to a corrected point, at a distance `off` from the predictor, is one along the path; linear:
+        see `is_linear` in C."""
         track = self.track
         here, sizes = track.here.numbers, (0.0, 0.0, 0.0)
         move, increment = found[0] - here[0], predicted[0] - here[0]
@@ -186,7 +189,7 @@ class Continuation:
         if track.touching and judged != lib.TOO_FAR:  # a contact bends the path at once
             return True
         change = load_factor - track.here.load_factor
-        if judged == lib.ACCEPTED or (judged == lib.UNSURE and not self._jumped(move, change)):
+        if judged == lib.ACCEPTED or (judged == lib.UNSURE and (linear or not self._jumped(move, change))):
             return True
         track.failure = next(words for name, words in _REASONS.items() if getattr(lib, name) == judged)
         return False
@@ -212,8 +215,8 @@ class Continuation:
         return through(known, places, load_factor)[0]
 
 
-# Seconds after which C returns, so that Ctrl-C is obeyed; load factors recorded between two returns.
-_SECONDS, _ROOM = 0.05, 64
+# Seconds after which C returns, so that Ctrl-C is obeyed; most load factors recorded between two returns, and numbers.
+_SECONDS, _ROOM, _NUMBERS = 0.05, 64, 2**20
 
 #: Recorded points: load factors, unknowns (k, unknowns), values of the fields (k, elements, n) or None, iterations
 #: since the point before, and steps so far.
@@ -234,11 +237,12 @@ class Sweep(Pointers):
         unknowns, numbers = problem.numbering.size, problem.numbering.size + problem.c.carries
         sweep.numbers, sweep.moves, sweep.turn = numbers, model.moves, model.turn
         sweep.change, sweep.patience = CHANGE, _SECONDS
-        sweep.fields, sweep.room = fields.c if fields else ffi.NULL, _ROOM
         shape = (fields.elements, fields.size) if fields else (0,)
-        self._points, work = np.zeros((3, numbers)), np.zeros((6, numbers))
+        sweep.fields = fields.c if fields else ffi.NULL
+        sweep.room = room = max(1, min(_ROOM, _NUMBERS // (unknowns + math.prod(shape))))
+        self._points, work = np.empty((3, numbers)), np.empty((6, numbers))  # most of a large one may stay unused
         self._recorded = Swept(
-            np.zeros(_ROOM), np.zeros((_ROOM, unknowns)), np.zeros((_ROOM, *shape)), *np.zeros((2, _ROOM), np.int32)
+            np.zeros(room), np.empty((room, unknowns)), np.empty((room, *shape)), *np.zeros((2, room), np.int32)
         )
         for name, array in (
             ("points", self._points), ("work", work), ("recorded_load_factors", self._recorded.load_factors),

@@ -150,7 +150,7 @@ class Tracing:
         first to the second is recorded; until: see `solve`. NotConverged and Interrupted have the path so far."""
         track = self.track
         try:
-            self._begin(load_factors)
+            self._begin(load_factors, recorded=free)
             k = 0
             while (k := self._swept_from(k, load_factors, free, until)) < len(load_factors):
                 load_factor, between = load_factors[k], free and k == 1
@@ -182,15 +182,15 @@ class Tracing:
             self.path.control, self.path.left = self._follower.used, self._follower.left
         return self.path
 
-    def _begin(self, load_factors):
+    def _begin(self, load_factors, *, recorded=True):
         if self._start is None:
-            self._follower.begin(load_factors)
+            self._follower.begin(load_factors, recorded=recorded)
             return
         ((point, values, n),) = self._starts(self._start.at_points([len(self._start) - 1]))
         multipliers = np.zeros_like(self.problem.multipliers())  # the equations are linear in these
         if self.problem.tensions:
             multipliers[-len(self.problem.tensions.values) :] = self.problem.tensions.values
-        self._follower.begin(load_factors, (values, n, multipliers))
+        self._follower.begin(load_factors, (values, n, multipliers), recorded=recorded)
 
     def _swept_from(self, k, load_factors, free, until):
         """Advance from the k-th load factor on in C while steps are accepted; the index of the next load factor."""

@@ -39,6 +39,12 @@ class Limits:
     leap: float = 1.0  # distance over the predicted increment above which a limit point may have been jumped over
     easy: int = 5  # Newton iterations of a step beyond which the next one does not grow,
     hard: int = 9  # and from which on it is halved
+    linear: float = (
+        0.05  # sizes of Newton's later steps over the first one's, up to which a path begins nearly linearly
+    )
+    first: float = (
+        4.0  # largest growth after such a first step, where it is not one that was halved; later steps double
+    )
 
 
 LIMITS = Limits()
