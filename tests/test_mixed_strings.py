@@ -54,7 +54,7 @@ def test_stick_slip_of_the_bit_is_that_of_the_string():
     """The bit slips at 3.5 s, sticks at 8.1 s, and slips again at 9.8 s; its drag is not on the inertia of the bit."""
     string = drilling()
     mixed = cf.drilling.mixed_scene(string, 3000.0)
-    history = cf.simulate(mixed.scene, 10.5, dt=0.005, **SMALL)
+    history = cf.simulate(mixed.scene, 10.5, dt=0.0075, **SMALL)
     whole = cf.drilling.simulate(string, 10.5, dt=5e-4, model="torsion")
     times, speed = mean_speeds(history, mixed.rod)
     off = np.abs(speed - np.interp(times, whole.times, whole.bit_speed))

@@ -146,11 +146,10 @@ def test_a_bar_is_pulled_and_released(truth):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("a", "ratio"), [(0.0, 1.834657811985932), (0.01, 1.7383388423482828)])
-def test_a_stiff_rope_on_a_bollard(a, ratio):
-    """Half a turn around a cylinder: it slips at T_2/T_1, less than exp(pi mu), because it is stiff and because
-    friction acts on its surface (shooting, with the stiff parts at both ends)."""
-    mu, R, EI, half, tail = 0.2, 0.1, 0.001, math.pi / 2, 0.4
+def test_a_stiff_rope_on_a_bollard():
+    """Half a turn around a cylinder: it slips at T_2/T_1, less than exp(pi mu), because it is stiff (1.8347 alone) and
+    because friction acts on its surface, at a from its axis (shooting, with the stiff parts at both ends)."""
+    mu, R, EI, half, tail, a, ratio = 0.2, 0.1, 0.001, math.pi / 2, 0.4, 0.01, 1.7383388423482828
     ends = [np.array((s * (R + a), 0, 0)) for s in (-1, 1)]
     down = np.array((0, 0, -tail))
     arc = cf.Rod(cf.Arc((0, 0, 0), ends[0], 2 * half, (0, 1, 0)), rope(EI))

@@ -219,7 +219,7 @@ def missed(found):
 def main(quick=False, out="out"):
     """Print the tables and write them to out/rods_in_wells.md. Returns [(well, operation, what `measure` found)],
     [(well, operation, s, largest estimated error)], and [(s, model)] of the operations in random wells."""
-    runs, fine, depths = (1, 1024, 1) if quick else (5, FINE, DEPTHS)
+    runs, fine, depths = (1, 512, 1) if quick else (5, FINE, DEPTHS)
     rows, sweeps = [], []
     for name in WELLS[:1] if quick else WELLS:
         hole = well(name)
