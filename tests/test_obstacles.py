@@ -191,6 +191,18 @@ def test_modes_about_a_rod_that_touches_along_a_part():
         assert (off < most).all() and not (found.error[k] < off).any()
 
 
+def test_buckling_of_a_rod_that_touches_along_a_part():
+    """Pressed along its axis beside what its weight holds on a plane; load factors of 128 elements. Two meshes may
+    agree on others that are 2 % off."""
+    section = cf.Stiffness((1e4, 1e4), 2e4, (2.0, 200.0), 50.0)
+    rod = cf.Rod(cf.Line((0, 0, 0.3), (2, 0, 0.3), d1=(0, 1, 0)), section)
+    floor = cf.Plane((0, 0, 0.220191), (0, 0, 1), contact_radius=0.0, stiffness=2265.77)
+    loads = [floor, cf.LineForce(rod, (0, 0, -13.1134), permanent=True), cf.Force(rod.end, (-1.0, 0, 0))]
+    found = cf.buckling(cf.Scene([rod], [cf.Clamp(rod.start)], loads), 2, tol=0.01)
+    off = np.abs(found.load_factors / [67.0764, 79.019] - 1)
+    assert (off < 0.01).all() and (off < found.error + 2e-3).all()
+
+
 def test_a_rod_slides_to_rest():
     """With the speed v on a rough plane: it stops after v/(mu g) on the way v^2/(2 mu g)."""
     mu, g, v = 0.3, 9.81, 2.0

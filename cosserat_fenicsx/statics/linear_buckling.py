@@ -20,7 +20,7 @@ from cosserat_fenicsx.statics.critical import Energies, critical_sensitivity
 from cosserat_fenicsx.statics.meshes import layers_of, until_two_meshes_agree
 from cosserat_fenicsx.statics.path.follower import standing
 from cosserat_fenicsx.statics.problem import check_arguments, solvers_of
-from cosserat_fenicsx.statics.small_motions import circulatory_part, static_bifurcations
+from cosserat_fenicsx.statics.small_motions import circulatory_part, edges_of_contact, static_bifurcations
 from cosserat_fenicsx.statics.stability import shapes_of
 
 _MOST_ELEMENTS = 256
@@ -91,9 +91,10 @@ def buckling(
     check_tensions(scene, [load_factor])
     comm = communicator(comm)
 
-    (critical, _, state, shapes, shared, conservative, most), error = until_two_meshes_agree(
+    (critical, _, state, shapes, shared, conservative, most, _), error = until_two_meshes_agree(
         "buckling", scene, lambda layout: _critical(scene, layout, count, load_factor, tol, degree, comm), tol,
         most=_MOST_ELEMENTS, elements=elements, degree=degree, advice="a larger tol", progress=progress, comm=comm,
+        least=lambda found: found[-1],
     )  # fmt: skip
     load_factors = load_factor + critical
     softness, rounding = shared
@@ -185,7 +186,20 @@ def _critical(scene, layout, count, load_factor, tol, degree, comm):
         state = Equilibrium.of(model, load_factor)
         refuse_grazing(state, "buckling")
         errors = np.array([softness, rounding])
-        return critical, layers, state, shapes, errors, conservative, load_factor + most
+        lacking, beside = _of_edges(edges_of_contact(model, state), stability.whole, chosen)
+        critical, beside = np.where(corrected, critical * (1 + lacking), critical), beside + ~corrected * abs(lacking)
+        return critical, layers, state, shapes, errors, conservative, load_factor + most, beside
+
+
+def _of_edges(edges, part, vectors):
+    """(2, n) shares of the energies of modes that the edges of contact lack, and of those that are not known."""
+    if edges is None:
+        return np.zeros((2, len(vectors)))
+    modes = [np.concatenate(part.model.comm.allgather(v.array_r)) for v in vectors]
+    energies = [(part.K * v).dot(v) for v in vectors]
+    return np.array(
+        [[x @ (matrix @ x) / energy for x, energy in zip(modes, energies, strict=True)] for matrix in edges]
+    )
 
 
 def _stay_at(track, at_rest):
