@@ -40,6 +40,8 @@ def test_beside_the_axis(pulled, truth):
     state = path.tendon(tendon)
     truth(f"tendons: friction, pulled at its {pulled}, tension along it", state.along[-1], tension(state.s), 1e-8)
     assert state.tension == pytest.approx([0, T]) and state.along.max(axis=1) == pytest.approx(state.tension)
+    along_arc = cf.solve(arm(tendon), [1.0], elements=12, control="arc")
+    assert along_arc.position(ROD.end)[-1] == pytest.approx(path.position(ROD.end)[-1], abs=1e-10)
     assert path.model == "spatial" and not path.conservative
     assert any("while the tendon slides towards" in line for line in path.why)
 

@@ -458,17 +458,17 @@ class Scene(Part):
     def _following(self):
         if not self.follows:
             return []
-        found = []
+        found = {}  # each sentence once
         for load in self._followers:
             if load.rough:
-                found.append(
+                found[
                     f"{describe(load)}: friction has no potential, and acts as while the tendon slides towards the "
                     f"{load.pulled} of the rod: negative modes are those at the tensions as they are, and do not "
                     "decide on stability"
-                )
+                ] = None
         kinds = " and ".join(dict.fromkeys(type(load).__name__ for load in self._followers if not load.rough))
         if not kinds:
-            return found
+            return [*found]
         return [
             *found,
             f"{kinds}: a follower load has no potential, so negative modes, which are those of the tangent's symmetric "
