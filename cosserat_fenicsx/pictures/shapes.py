@@ -37,6 +37,8 @@ _SEEN, _MOVES = 0.02, 0.2
 _MEMORY = 200_000_000
 # Phases, as exp(i phase), that a picture has to hold.
 _EXTREMES = (1, -1, 1j, -1j)
+# Of sizes of the motion, from none to the largest, which stands out beside rods at rest.
+_COLOURS = ["#86a0bd", "#d9b29c", "#f08a4b", "#d63a2a", "#8c0c1e"]
 # Mean width of a letter of the titles, pixels.
 _LETTER = 15
 
@@ -180,16 +182,21 @@ def _height(everywhere):
 def _head(found, width):
     at = f" about the equilibrium at the load factor {found.load_factor:g}" if found.load_factor else ""
     what = f"{found.scene.title}: {found.title.lower()}" if found.scene.title else found.title
-    title = textwrap.fill(f"{what}{at}", width // _LETTER)
-    colours = textwrap.fill("coloured by the size of the motion: none is dark, the largest bright", width // _LETTER)
-    return f"{title}\n{colours}"
+    colours = "coloured by the size of the motion: none is pale blue, the largest dark red"
+    return "\n".join(textwrap.fill(text, width // _LETTER) for text in (f"{what}{at}", colours))
 
 
 def _below(shape, bodies, everywhere, width):
     """The lines under a title: notes on what is not to scale."""
     extent = float(np.ptp(everywhere, axis=0).max())
-    notes = [shape.note, *thicker(thickening(body, extent, len(bodies)) for body in bodies)]
+    notes = [shape.note, *thicker(_factors(bodies, extent))]
     return "\n".join(_filled(note, width) for note in notes)
+
+
+def _factors(bodies, extent):
+    """What the sections of each body are enlarged by: the few that move are drawn thicker than the many that do not."""
+    moves = [body.values.max() > _MOVES for body in bodies]
+    return [thickening(body, extent, sum(moves) if it else len(bodies)) for body, it in zip(bodies, moves, strict=True)]
 
 
 def _filled(text, width):
@@ -199,10 +206,13 @@ def _filled(text, width):
 
 def _add(plotter, pyvista, shape, bodies, everywhere):
     """Draw the equilibrium as grey lines, and rods; returns the mesh of the rods and what enlarges each of them."""
+    from matplotlib.colors import LinearSegmentedColormap
+
     extent = float(np.ptp(everywhere, axis=0).max())
-    factors = [thickening(body, extent, len(bodies)) for body in bodies]
+    factors = _factors(bodies, extent)
     surface = coloured(pyvista, bodies, factors)
-    plotter.add_mesh(surface, scalars="value", cmap="viridis", clim=(0, 1), show_scalar_bar=False)
+    colours = LinearSegmentedColormap.from_list("", _COLOURS)
+    plotter.add_mesh(surface, scalars="value", cmap=colours, clim=(0, 1), show_scalar_bar=False)
     add_lines(plotter, pyvista, shape.lines)
     return surface, factors
 

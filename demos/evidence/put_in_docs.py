@@ -92,7 +92,7 @@ FOLDERS = {
 MANY = ("benchmarks",)
 WIDTH, COLOURS, MARGIN = 1100, 256, 12  # pixels, number, pixels
 NARROW = 800, 4000  # pixels, of a picture for narrow pages
-SMALL, FEW = 600, 32  # pixels, colours
+SMALL, FEW = 600, 96  # pixels, colours
 #: Pictures with more small texts than others, and their sizes in pixels.
 LARGE = {"failures.png": (1380, 1380)}
 
