@@ -20,7 +20,7 @@ from cosserat_fenicsx.drilling import (
     TopDrive,
     ViscousDrag,
 )
-from cosserat_fenicsx.drilling.joints import fastest_rotor
+from cosserat_fenicsx.drilling.joints import Parting, fastest_rotor
 from cosserat_fenicsx.drilling.linear.characteristic import Steady
 from cosserat_fenicsx.well import Bit, Collar, Component, DrillString, MotorCurve, MudMotor, OscillationTool
 
@@ -372,7 +372,7 @@ def test_tool_that_halves_the_pull(truth):
     (lambda: OscillationTool(2.0, outer_diameter=0.127, spring=1e6, frequency=16.0), "either a force"),
     (lambda: above(OscillationTool(2.0, outer_diameter=0.127, spring=1e6, frequency=16.0, force=1e4)),
      "component below"),
-    (lambda: cf.drilling.mixed_scene(above(Collar(9.0, "NC46-65"), motor()), 10.0), "without MudMotor"),
+    (lambda: cf.drilling.mixed_scene(above(Collar(9.0, "NC46-65"), motor()), 10.0), "without OscillationTool, and"),
     (lambda: cf.drilling.natural_frequencies(above(motor()), 2, "fixed"), "lets the string turn"),
 ])  # fmt: skip
 def test_refused_by_name(make, words):
@@ -597,3 +597,30 @@ def test_limits_of_two_motors():
     found = cf.drilling.simulate(replace(weak, start="rest"), 3.0, dt=1e-3, progress=False)
     assert found.stalls[-1].tolist() == [True, False] and found.stalled[-1]
     assert "THE MOTOR 1 FROM THE TOP STALLS" in str(found)
+
+
+def test_motors_above_a_rod():
+    """As of the string by elements: pipe and collars, two motors, and a rod of collars below."""
+    ramps = [cf.signals.Table((0.0, 0.2), (0.0, q)) for q in (0.03, GIVEN["Q"])]
+    # the lowest rotor, which strings by elements have at the bit, is light
+    tools = motor(flow=ramps[0], leakage=2.5e-8, lost_torque=200.0), motor(flow=ramps[1], rotor_inertia=12.0)
+    drive = TopDrive(cf.signals.Table((0.0, 0.2), (0.0, GIVEN["Om"])), 100.0, cf.drilling.PI(800.0, 500.0))
+    collar, bit = Collar(30.0, "NC46-65"), BitOnRock(Rising(100.0, 150.0), inertia=20.0)
+    scene = above(collar, tools[0], collar, tools[1], length=100.0, drive=drive, bit=bit, drag=ViscousDrag(0.2, 0.2))
+    mixed = cf.drilling.mixed_scene(scene, 142.0)
+    motion = cf.simulate(mixed.scene, 0.4, dt=5e-4, elements=3, degree=2, start=1.0, progress=False)
+    found = mixed.as_drilling(motion)
+    whole = cf.drilling.simulate(scene, 0.4, model="torsion", dt=1e-4, elements=800, progress=False)
+    for name in ("bit_speed", "surface_torque", "motor_speeds"):
+        true, values = (np.reshape(getattr(x, name), (len(x), -1)) for x in (whole, found))
+        for own, other in zip(true.T, values.T, strict=True):
+            off = np.interp(found.mean_times, whole.mean_times, own) - other
+            errors = (
+                np.array([np.sqrt(np.mean(off**2)), np.abs(off[found.mean_times > 1e-3]).max()]) / np.abs(own).max()
+            )
+            assert (errors < [1e-3, 4e-3]).all(), (name, errors)
+    line, step = motor(), (3.0, 0.0, 1e-3, (2e3, 300.0), (1e3, 400.0))
+    chart = MotorCurve(GIVEN["Q"], [line.speed(0.0), 0.0], [0.0, line.stall_torque()])
+    both = [above(x).joints[0] for x in (line, motor(leakage=None, curves=[chart]))]
+    one, same = (Parting(x.tool, x.force).meet(*step) for x in both)
+    assert one == pytest.approx(same, rel=1e-9) and one[1] != 0

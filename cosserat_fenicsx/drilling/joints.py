@@ -47,6 +47,48 @@ class Joint:
         return self.tool.torque(rate) + self.damping * rate if curved else self.force(0.0) - self.lost
 
 
+@dataclass(frozen=True)
+class Parting:
+    """A motor between two parts of a waveguide, in steps of the implicit midpoint rule.
+
+    Attributes:
+        motor: the `MudMotor`. driven: `ScalarSignal` of the torque that its flow gives it at rest, N m.
+    """
+
+    motor: MudMotor
+    driven: ScalarSignal
+
+    def meet(self, turning, start, end, above, below):
+        """(speed of the upper side, speed of its rotor against that, mean over a step from start to end (s); speed of
+        the lower side at its end), rad/s.
+
+        Args:
+            turning: the lower side's speed at the start, rad/s. above, below: (wave M + Z om, or M - Z om, that arrives
+                there (N m), impedance Z with its drag).
+        """
+        (arriving, Z), (back, lower), lost = above, below, self.motor.lost_torque
+        inert = 2 * self.motor.rotor_inertia / (end - start)
+        free = (inert * turning - back) / (lower + inert) - arriving / Z  # without torque
+        give = 1 / Z + 1 / (lower + inert)
+        law, rate = self._law(start, end), 0.0
+        driven = float(law(0.0)) if law else self.driven.mean(start, end)
+        pushed = free + give * driven
+        if abs(pushed) > give * lost:
+            rubbed = math.copysign(give * lost, pushed)
+            rate = (pushed - rubbed) / (1 + give * self.motor.slope)
+            if law:  # its torque falls, so that the rate is between 0 and that under the torque at rest
+                rate = brentq(lambda x: x - free + rubbed - give * float(law(x)), 0.0, pushed - rubbed, xtol=1e-14)
+        first = (arriving + (free - rate) / give) / Z
+        return first, rate, 2 * (first + rate) - turning
+
+    def _law(self, start, end):
+        """`MudMotor.law_at` the mean flow of a step; None of a motor without curves."""
+        flow = self.motor.flow
+        if not self.motor.curves:
+            return None
+        return self.motor.law_at(self.driven.flow.mean(start, end) if callable(flow) else flow)
+
+
 def joints_of(laid, bottoms) -> tuple[Joint, ...]:
     """The `Joint`s of components in their places, from the top down; bottoms: measured depths of the lower ends of the
     segments, in which fluids may cut components."""

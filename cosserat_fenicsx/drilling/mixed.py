@@ -147,8 +147,9 @@ class MixedScene(InWords):
             "surface_torque": far[:, 3], "bit_speed": turned / dt, "bit_angle": np.cumsum(turned),
             "torque_on_bit": on_bit[:, 3],
             "hook_load": self.above.at_rest[0] - far[:, 1], "bit_velocity": moved / dt, "bit_advance": np.cumsum(moved),
-            "weight_on_bit": on_bit[:, 1],
+            "weight_on_bit": on_bit[:, 1], "motor_speed": far[:, 4:].sum(axis=1),
         }  # fmt: skip
+        rows |= dict(enumerate(far[:, 4:].T)) if far.shape[1] > 5 else {}
         ends = np.array([0.0, self.depth, self.drilling.bit_depth])
         return DrillingHistory(self.drilling, "rod below pipe", self.why, dt.mean(), ends, np.array([*rows.values()]).T)
 
@@ -181,12 +182,14 @@ def mixed_scene(drilling: Drilling, depth: float | None = None, *, wall_damping:
     instance("mixed_scene", "drilling", drilling, Drilling, "a Drilling")
     if not hasattr(drilling.string, "components"):
         refuse("mixed_scene", "drilling.string", drilling.string, "a DrillString; discs are no rod")
-    for joint in drilling.joints:
-        refuse("mixed_scene", "drilling.string", joint.tool, "a string without MudMotor and OscillationTool, which "
-               "part it: a Collar in its place; drilling.simulate has them")  # fmt: skip
     if drilling.start != "rest":
         refuse("mixed_scene", "drilling.start", drilling.start, "'rest', from which the rod starts")
     top = _depth(drilling, depth)
+    for joint in drilling.joints:
+        if not joint.turns or drilling.places[joint.segment].bottom > top - _NOTHING:
+            refuse("mixed_scene", "drilling.string", joint.tool, "a string without OscillationTool, and without a "
+                   f"MudMotor at or below the rod's upper end, {top:g} m: a deeper one, or a Collar in its place; "
+                   "drilling.simulate has them")  # fmt: skip
     damping = number(
         "mixed_scene", "wall_damping", wall_damping, "a number of s/m, not negative", lambda x: 0 <= x < math.inf
     )
@@ -213,7 +216,8 @@ def mixed_scene(drilling: Drilling, depth: float | None = None, *, wall_damping:
     hook_load = float(np.array([x.weight for _, x in parts]) @ heights[0]) - on_bit
     rough = drilling.hole and (drilling.friction or any(x.friction for x in drilling.hole.sections))
     pipe = PipeAbove(rod.start, tuple(above), drilling.drive, drilling.hook, hanging, drilling.drag,
-                     drilling if rough else None, follows_the_bit(drilling), (hook_load, on_bit))  # fmt: skip
+                     drilling if rough else None, follows_the_bit(drilling), (hook_load, on_bit),
+                     tuple((joint.segment, joint) for joint in drilling.joints))  # fmt: skip
     resting = replace(pipe, follows=False)
     weights = LineForce(rod, AlongPieces(weights) if len(weights) > 1 else weights[0][1])
     thrust = [Force(rod.end, tuple(-on_bit * along))] if on_bit else []

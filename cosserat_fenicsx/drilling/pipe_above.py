@@ -19,6 +19,7 @@ import numpy as np
 import ufl
 
 from cosserat_fenicsx.checks import positive, refuse, store
+from cosserat_fenicsx.drilling.joints import Parting
 from cosserat_fenicsx.drilling.linear_control import arrays_of, check_answer, check_late
 from cosserat_fenicsx.drilling.scene import Drilling, Segment, segment_of
 from cosserat_fenicsx.drilling.signals import ScalarSignal
@@ -65,6 +66,8 @@ class PipeAbove(PointAction):
             a pipe without a wall. Curvature of the hole does nothing else to its waves.
         follows: whether the load of the hook stays as at the start, so that the string follows a bit that drills;
             without a hook.
+        motors: (number of a part, `Joint` of a `MudMotor` at its lower end), the lowest part not among them, from the
+            top down.
         at_rest: hook load and weight on bit in the reference, N, which controls that are called once a sample see.
 
     Raises:
@@ -80,6 +83,7 @@ class PipeAbove(PointAction):
     rubs: Drilling | None = None
     follows: bool = False
     at_rest: tuple[float, float] = (0.0, 0.0)
+    motors: tuple = ()
 
     scaled = False
 
@@ -115,6 +119,11 @@ class PipeAbove(PointAction):
             found += [y for x in given for y in np.ravel(x).tolist() if isinstance(y, int | float)]
         if hook.autodriller is not None:
             signals.append(hook.autodriller.signal())
+        for part, joint in self.motors:
+            tool = joint.tool
+            found += [part, tool.per_radian, tool.slope, tool.lost_torque, tool.rotor_inertia]
+            found += tool.law.c.ravel().tolist() if tool.curves else []
+            signals.append(joint.force)
         for signal in signals:
             found += [signal(t) for t in (0.0, 1.0, 10.0)]
         return tuple(found)
@@ -171,7 +180,7 @@ class _InMotion:
         rubs, whole, count = pipe.rubs, lengths.sum(), np.ones(len(parts), dtype=int)
         if rubs or drag.axial or drag.torsion:
             apart = whole / min(_BEADS, max(whole / _APART, 2.0))
-            count = np.ceil(lengths / apart - 1e-9).astype(int)
+            count = np.maximum(np.ceil(lengths / apart - 1e-9).astype(int), 1 + bool(rubs and pipe.motors))
         axial = [(x.axial_impedance, x.length / x.axial_speed) for x in parts]
         torsional = [(x.torsional_impedance, x.length / x.torsional_speed) for x in parts]
         hook, control = pipe.hook or Hook(), pipe.drive.control
@@ -188,7 +197,11 @@ class _InMotion:
         rates = drag.axial, drag.torsion
         self._lines = [_lines(x, count, *more) for *more, x in zip(rates, ends, (axial, torsional), strict=True)]
         depths = np.append(0.0, np.cumsum(np.repeat(lengths / count, count)))
-        self._friction = PipeFriction(rubs, depths) if rubs else None
+        #: motors, of which `far_end` has the speeds
+        self.more = len(pipe.motors)
+        partings = {int(count[: part + 1].sum()): Parting(x.tool, x.force) for part, x in pipe.motors}
+        self._lines[1].part(partings)
+        self._friction = PipeFriction(rubs, depths, partings) if rubs else None
         self._damping = tuple(line.dashpot for line in self._lines)
         samples = (x.sample / 2 for x in (control, hook.autodriller) if x and x.sampled)
         self.longest = min(*(line.longest for line in self._lines), *samples)
@@ -236,7 +249,7 @@ class _InMotion:
         self._sample(t + h)
 
     def far_end(self):
-        return np.ravel([line.at_top for line in self._lines])
+        return np.concatenate([*(line.at_top for line in self._lines), self._lines[1].rates])
 
     @property
     def _parts(self):
@@ -377,9 +390,15 @@ class DelayLines:
         self._Z, self._time, self._drag = (np.array(x, dtype=float) for x in (impedance, time, drag))
         self._top, self._parts = top, len(self._Z)
         # the output of a control that acts late is stored and read as waves are
+        self._inertia = self._Z * self._time
         self._delays = np.append(np.tile(self._time, 2), [top.late] if top.late else [])
         #: longest step, s
         self.longest = self._delays.min() / _LEAST
+        self.part({})
+
+    def part(self, partings):
+        """Part it at inner nodes: {number of the node: `Parting`}."""
+        self._partings = partings
         self.begin(0.0, 0.0)
 
     @property
@@ -394,8 +413,15 @@ class DelayLines:
         self._state = self._top.rest(speed, force)
         #: speed and force of the upper end, means over the last step, and the integral of the speed since the start
         self.at_top, self.passed = (speed, force), 0.0
+        #: speeds of rotors, means over the last step; and of what is below them at its end
+        self.rates, self._turning = np.zeros((2, len(self._partings)))
+        self._turning += speed
         self._take(np.empty(0), np.empty((0, len(self._delays))))
-        self._before = self._state, self.at_top, self.passed
+        self._keep()
+
+    def _keep(self):
+        """Keep what `undo` restores."""
+        self._before = self._state, self.at_top, self.passed, self.rates.copy(), self._turning.copy()
 
     @property
     def speed(self):
@@ -440,15 +466,21 @@ class DelayLines:
         """Accept a step from t to t + h (s) with this mean speed of the lower end; held: friction at inner nodes."""
         above, below, late = self._arrived(t, h)
         Z, speeds = self._Z, np.empty(self._parts + 1)
-        self._before = self._state, self.at_top, self.passed
+        self._keep()
         speeds[0], self._state = self._top.step(self._state, t, t + h, Z[0] + self._drag[0], below[0], late)
         speeds[1:-1] = (above[:-1] - below[1:] - held) / (Z[:-1] + Z[1:] + self._drag[1:-1])
         speeds[-1] = speed
         self.at_top = speeds[0], below[0] + (Z[0] + self._drag[0]) * speeds[0]
         self.passed += h * speeds[0]
+        upper, lower = speeds[:-1].copy(), speeds[1:].copy()  # of the ends of parts
+        for k, (node, parting) in enumerate(self._partings.items()):
+            drag = self._drag[node] * self._inertia[node - 1 : node + 1] / self._inertia[node - 1 : node + 1].sum()
+            sides = (above[node - 1], Z[node - 1] + drag[0]), (below[node], Z[node] + drag[1])
+            lower[node - 1], self.rates[k], self._turning[k] = parting.meet(self._turning[k], t, t + h, *sides)
+            upper[node] = lower[node - 1] + self.rates[k]
         #: forces at the inner nodes, means of both sides
         self.inner = (above[:-1] + below[1:] + (Z[1:] - Z[:-1]) * speeds[1:-1]) / 2
-        waves = below + 2 * Z * speeds[:-1], above - 2 * Z * speeds[1:]
+        waves = below + 2 * Z * upper, above - 2 * Z * lower
         self._append(t + h / 2, np.concatenate([*waves, [] if late is None else [self._state[1]]]))
 
     def _append(self, t, values):
@@ -467,13 +499,14 @@ class DelayLines:
     def undo(self):
         """Take back the last step."""
         self._count -= 1
-        self._state, self.at_top, self.passed = self._before
+        self._state, self.at_top, self.passed, self.rates, self._turning = self._before
 
     def memory(self):
         """All that later steps depend on."""
         n = self._count
         arrays = {"times": self._times[:n], "values": self._values[:n], "first": self._first, "state": self._state,
                   "before": self._before[0], "top": [*self.at_top, self.passed]}  # fmt: skip
+        arrays |= {"rotors": [self.rates, self._turning]} if self._partings else {}
         return {name: np.array(x) for name, x in arrays.items()}
 
     def recall(self, memory):
@@ -481,5 +514,8 @@ class DelayLines:
         self._take(memory["times"], memory["values"])
         self._first = memory["first"].copy()
         *self.at_top, self.passed = memory["top"].tolist()
+        if self._partings:
+            self.rates, self._turning = memory["rotors"].copy()
         self._state, before = (tuple(memory[name].tolist()) for name in ("state", "before"))
-        self._before = before, self.at_top, self.passed
+        self._keep()
+        self._before = before, *self._before[1:]

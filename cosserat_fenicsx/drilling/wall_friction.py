@@ -229,10 +229,10 @@ _MOST, _ENOUGH = 60, 1e-13  # Newton steps; relative change of x that ends them
 
 class PipeFriction:
     """Friction at the inner nodes of a pipe that is the upper part of the string of a `Drilling` with a hole. scene:
-    the `Drilling`. depths: (n + 2,) measured depths of the nodes, m; the wall beside an end acts at the node next to
-    it."""
+    the `Drilling`. depths: (n + 2,) measured depths of the nodes, m; the wall beside an end, or one of the nodes
+    `parted`, acts at the node next to it, on the same side."""
 
-    def __init__(self, scene, depths):
+    def __init__(self, scene, depths, parted=()):
         pieces, middles = scene_pieces(scene), (depths[1:] + depths[:-1]) / 2
         inside = pieces.bottom[pieces.bottom < depths[-1]]
         md, self._lengths = (x.ravel() for x in points_between(np.unique([*depths, *middles, *inside])))
@@ -241,8 +241,14 @@ class PipeFriction:
         self._load = lateral_load(pieces, static_weight(scene), md)
         self._count = len(depths) - 2
         self._node = np.clip(np.searchsorted(middles, md) - 1, 0, self._count - 1)
+        for node in parted:
+            at = self._node == node - 1
+            self._node[at] += np.where(md[at] < depths[node], -1, 1)
         radius = pieces.radius[np.minimum(np.searchsorted(pieces.bottom, md), len(pieces.bottom) - 1)]
-        self._radius = self._summed(radius * self._lengths) / self._summed(self._lengths)
+        lengths = self._summed(self._lengths)
+        self._radius = np.where(
+            lengths > 0, self._summed(radius * self._lengths) / np.where(lengths > 0, lengths, 1), 1
+        )
         self.begin(0.0)
 
     def _summed(self, values):

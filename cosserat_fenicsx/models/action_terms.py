@@ -485,6 +485,7 @@ class Delays:
         actions = self._actions
         self._all = [(action.delayed(), StationNode(model, action.station)) for action in actions]
         self.longest = min((delayed.longest for delayed, _ in self._all), default=np.inf)
+        self._width = 4 + max((getattr(delayed, "more", 0) for delayed, _ in self._all), default=0)
         self._forget()
         if actions:
             model.actions.follow({id(x): delayed for x, (delayed, _) in zip(actions, self._all, strict=True)})
@@ -500,15 +501,16 @@ class Delays:
             delayed.begin(node.now())
 
     def _forget(self):
-        #: (actions, 5) since the last saved state: the time (s), and the integrals of the numbers of their far ends
-        self._passed = self._before = np.zeros((len(self._all), 5))
+        #: (actions, 1 + n) since the last saved state: the time (s), and the integrals of the numbers of their far ends
+        self._passed = self._before = np.zeros((len(self._all), 1 + self._width))
 
     def accept(self, t, h):
         """Accept the step from t to t + h (s) to the model's state."""
         self._before, self._passed = self._passed, self._passed.copy()
         for (delayed, node), passed in zip(self._all, self._passed, strict=True):
             delayed.accept(t, h, node.of_step(h / self._model.time))
-            passed += h * np.append(1.0, delayed.far_end())
+            numbers = np.append(1.0, delayed.far_end())
+            passed[: len(numbers)] += h * numbers
 
     def undo(self):
         """Take back the last step."""
@@ -517,10 +519,10 @@ class Delays:
             delayed.undo()
 
     def far_ends(self, stepped):
-        """(actions, 4) means of their far ends since this was last called; NaN where no step led to the state."""
+        """(actions, n) means of their far ends since this was last called; NaN where no step led to the state."""
         passed = self._passed
         self._forget()
-        return passed[:, 1:] / passed[:, :1] if stepped else np.full((len(passed), 4), np.nan)
+        return passed[:, 1:] / passed[:, :1] if stepped else np.full((len(passed), self._width), np.nan)
 
     def memory(self):
         kept = {str(i): delayed.memory() for i, (delayed, _) in enumerate(self._all)}

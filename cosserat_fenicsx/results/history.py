@@ -276,9 +276,9 @@ class History(RodResult):
         return wall_forces(self, wall)
 
     def far_end(self, action: Action) -> np.ndarray:
-        """(n, 4) velocity (m/s), force (N), angular velocity (rad/s) and torque (N m) at the far end of an action that
-        depends on earlier motion, such as the upper end of a `PipeAbove`: means over the time from the state saved
-        before; NaN where no step led to a state.
+        """(n, 4 or more) velocity (m/s), force (N), angular velocity (rad/s) and torque (N m) at the far end of an
+        action that depends on earlier motion, such as the upper end of a `PipeAbove`, and then the speeds of its motors
+        (rad/s): means over the time from the state saved before; NaN where no step led to a state.
 
         Args:
             action: of the scene.

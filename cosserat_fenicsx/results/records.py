@@ -60,7 +60,8 @@ class Instant(Record):
             inertial: those of the clamp and of other supports and joints together; NaN where no step led to the state.
         wall_forces: (touching nodes, 3) see `at_walls.WallForces`, dimensionless, wall by wall and rod by rod; NaN
             likewise.
-        far_ends: (actions, 4) of actions that depend on earlier motion, see `Action.delayed`, SI units; NaN likewise.
+        far_ends: (actions, n), n from 4 on, of actions that depend on earlier motion, see `Action.delayed`, SI units;
+            NaN likewise.
     """
 
     time: float = 0.0

@@ -41,7 +41,7 @@ _OF_RECORD = {"load_factor": "", "rq": "N7", "gauss_fields": "EG9", "negative_mo
               "steps": "", "reactions": "*", "neutral": "", "tie_forces": "T26"}  # fmt: skip
 _OF_POINT = _OF_RECORD | {"clamp_loads": "C6", "rod_forces": "EP3"}
 _OF_INSTANT = _OF_RECORD | {"time": "", "rates": "N6", "clamp_forces": "C6", "wall_forces": "*3",
-                              "far_ends": "*4"}  # fmt: skip
+                              "far_ends": "**"}  # fmt: skip
 _OF_LEDGER = {name: "3" if "momentum" in name else "" for name in Ledger._fields}
 _DENSITIES = {"densities_at_gauss_points": "EG6", "densities_at_nodes": "EP6"}
 _OF_PATH = ("control", "left", "rounding", "galerkin")

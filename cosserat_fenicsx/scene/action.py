@@ -106,7 +106,8 @@ class Action(Part, family="load or action", homes=("cosserat_fenicsx.scene.loads
             step from t (s) to t + h, `undo` (), which takes back the last step, `memory` and `recall` as of
             `dynamics.stepper.Stepper`, and `far_end` () -> four numbers on the last step, of which results keep the
             means between saved states: velocity (m/s), force (N), angular velocity (rad/s) and torque (N m) where it
-            ends. `motion` is a `models.action_terms.StationMotion`.
+            ends; and `more` ones after them, if it has that attribute. `motion` is a
+            `models.action_terms.StationMotion`.
         resists: whether it resists the motion of its `station`, along a direction and about the axis d3, in motions.
             Its `delayed` then also has `down` and `axis`, unit vectors (3,), inertial: the direction, and the axis at
             rest; `start` (h) at the begin of a step of the length h (s); and `forces` (free, compliance) -> (2,) force
