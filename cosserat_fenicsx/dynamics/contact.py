@@ -89,7 +89,7 @@ def motion_between(before, after):
 
 
 # Number of nodes up to which the compliance is complete; of more, neighbours on each side that it couples.
-_FEW, _NEIGHBOURS = 16, 24
+_FEW, _NEIGHBOURS = 16, 10
 # The compliance, which differs little from step to step, is updated where its relative error exceeds the second number
 # and this many times its smallest error. Responses below the third number (dimensionless) may be rounding.
 _WORSE, _MISSED, _ROUNDING = 10.0, 1e-3, 1e-9
