@@ -191,16 +191,22 @@ def test_modes_about_a_rod_that_touches_along_a_part():
         assert (off < most).all() and not (found.error[k] < off).any()
 
 
-def test_buckling_of_a_rod_that_touches_along_a_part():
-    """Pressed along its axis beside what its weight holds on a plane; load factors of 128 elements. Two meshes may
-    agree on others that are 2 % off."""
+@pytest.mark.parametrize(
+    ("height", "stiffness", "weight", "truths", "how"),
+    [(0.220191, 2265.77, 13.1134, (67.0764, 79.068), {"tol": 0.01}),
+     (0.121623942, 26649.9, 18.65368, (65.4450, 113.4047), {"elements": 450})],
+)  # fmt: skip
+def test_buckling_of_a_rod_that_touches_along_a_part(height, stiffness, weight, truths, how):
+    """Pressed along its axis beside what its weight holds on a plane; load factors by two-node elements of another
+    program, 1000 of them, whose contact stays where it is, and of 512 elements. Two meshes may agree on others that are
+    2 % off, and nodes that begin to touch within a difference quotient made the first one 73.3."""
     section = cf.Stiffness((1e4, 1e4), 2e4, (2.0, 200.0), 50.0)
     rod = cf.Rod(cf.Line((0, 0, 0.3), (2, 0, 0.3), d1=(0, 1, 0)), section)
-    floor = cf.Plane((0, 0, 0.220191), (0, 0, 1), contact_radius=0.0, stiffness=2265.77)
-    loads = [floor, cf.LineForce(rod, (0, 0, -13.1134), permanent=True), cf.Force(rod.end, (-1.0, 0, 0))]
-    found = cf.buckling(cf.Scene([rod], [cf.Clamp(rod.start)], loads), 2, tol=0.01)
-    off = np.abs(found.load_factors / [67.0764, 79.019] - 1)
-    assert (off < 0.01).all() and (off < found.error + 2e-3).all()
+    floor = cf.Plane((0, 0, height), (0, 0, 1), contact_radius=0.0, stiffness=stiffness)
+    loads = [floor, cf.LineForce(rod, (0, 0, -weight), permanent=True), cf.Force(rod.end, (-1.0, 0, 0))]
+    found = cf.buckling(cf.Scene([rod], [cf.Clamp(rod.start)], loads), 2, **how)
+    off = np.abs(found.load_factors / truths - 1)
+    assert (off < 0.01).all() and (off < np.nan_to_num(found.error) + 5e-4).all()
 
 
 def test_a_rod_slides_to_rest():

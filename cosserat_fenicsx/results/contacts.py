@@ -220,6 +220,20 @@ def refuse_grazing(state, owner):
                     )
 
 
+def step_without_switch(state, moved, step):
+    """The largest step, at most `step`, in which no node begins or ceases to touch an obstacle; from the `Equilibrium`
+    at the state, and at the state moved by `step`."""
+    for obstacle in state.scene.actions:
+        for rod in state.scene.rods:
+            if obstacle.gaps is not None and obstacle.acts_on(rod):
+                s = state.s(rod)
+                gap, there = (obstacle.gaps(rod, s, x.position(rod))[0] for x in (state, moved))
+                free = np.abs(gap) > _GRAZES * rod.length  # others are held by a support
+                rates = np.abs(there - gap)[free] / step
+                step = min(step, (np.abs(gap)[free] / np.maximum(2 * rates, 1e-300)).min(initial=np.inf))
+    return step
+
+
 def least_gap(path):
     """The smallest gap of a node from an obstacle in all states, m."""
     rods = list(zip(path.scene.rods, path.layout.node_s(path.rule.nodes), strict=True))

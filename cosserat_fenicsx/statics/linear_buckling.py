@@ -11,7 +11,7 @@ from cosserat_fenicsx.algebra import eigen
 from cosserat_fenicsx.checks import number, whole
 from cosserat_fenicsx.errors import NotConverged
 from cosserat_fenicsx.ranks import communicator
-from cosserat_fenicsx.results.contacts import refuse_grazing
+from cosserat_fenicsx.results.contacts import refuse_grazing, step_without_switch
 from cosserat_fenicsx.results.modes import Buckling
 from cosserat_fenicsx.results.shapes import Equilibrium
 from cosserat_fenicsx.scene.action import has_permanent
@@ -151,6 +151,11 @@ def _critical(scene, layout, count, load_factor, tol, degree, comm):
             return model.snapshot()[1]
 
         change, most = _extent(model, moved, rates[0], unit)
+        if model.scene.has_obstacles:  # where rods touch stays as it is
+            moved(0.0)
+            state = Equilibrium.of(model, load_factor)
+            moved(change)
+            change = step_without_switch(state, Equilibrium.of(model, load_factor + change), change)
         slack, symmetric, modes = None, np.empty(0), []
         if math.isfinite(most):
             sides = []
