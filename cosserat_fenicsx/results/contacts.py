@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from cosserat_fenicsx.checks import refuse
+from cosserat_fenicsx.checks import refuse, warn
 from cosserat_fenicsx.errors import NotConverged, SceneError
 from cosserat_fenicsx.quantities import Quantity, Units
 from cosserat_fenicsx.results import screen
@@ -166,20 +166,44 @@ def contacts_in_words(path):
 
 def slanted(path, obstacle):
     """A sentence where an obstacle pushes along rods: a rod touches beside its nodes, where the normal is another."""
-    along = total = np.zeros(len(path))
+    rods = []
     for i, (rod, x) in enumerate(zip(path.scene.rods, path.layout.node_s(path.rule.nodes), strict=True)):
-        if obstacle.acts_on(rod):
-            gap, normal = _gaps(path, obstacle, rod, x)
-            moved = path.motion(rod, x)[..., :3] * path.scales.length
-            tangent = np.gradient(rod.curve.position(x * rod.length) + moved, x * rod.length, axis=1)
-            push = np.maximum(-gap, 0.0)[:, 1:-1] * shares_of(path, i)[1:-1]  # an end may be pushed along its rod
-            along = along + np.sum(push * np.abs(np.einsum("kni,kni->kn", tangent, normal))[:, 1:-1], axis=1)
-            total = total + push.sum(axis=1)
-    share = np.divide(along, total, out=np.zeros(len(path)), where=total > 0).max(initial=0.0)
+        if len(path) and obstacle.acts_on(rod):
+            s, moved = x * rod.length, path.motion(rod, x)[..., :3] * path.scales.length
+            rods.append((rod, s, rod.curve.position(s) + moved, shares_of(path, i)))
+    return _slanted(obstacle, rods, "more elements there, or a tol, which puts a node there")
+
+
+def warn_of_slant(owner, state):
+    """Give a warning where `slanted` has a sentence, of an `Equilibrium`."""
+    rods = [(rod, state.s(rod), state.position(rod)[None], shares_of(state, i)) for i, rod in
+            enumerate(state.scene.rods)]  # fmt: skip
+    for obstacle in state.scene.actions:
+        if obstacle.gaps is not None:
+            on = [x for x in rods if obstacle.acts_on(x[0])]
+            for words in _slanted(obstacle, on, "more elements: estimated errors do not contain it"):
+                warn(f"{owner}: {words}")
+
+
+def _slanted(obstacle, rods, expected):
+    """`slanted`; rods: of each the rod, arc lengths (n,), m, points (states, n, 3), m, and `shares_of` its nodes.
+
+    Along each part that touches, the gap g pushes by the integral of k g g', which vanishes between two edges."""
+    along = total = 0.0
+    for rod, s, points, shares in rods:
+        gap, normal = (np.array(x) for x in zip(*(obstacle.gaps(rod, s, r) for r in points), strict=True))
+        slope = np.einsum("kni,kni->kn", np.gradient(points, s, axis=1), normal)
+        push = np.maximum(-gap, 0.0) * shares
+        push[:, [0, -1]] = 0.0  # an end may be pushed along its rod
+        begins = np.flatnonzero(push.ravel() == 0)  # each one, or the last one before a part that touches
+        parts = np.abs(np.add.reduceat((push * slope).ravel(), begins))
+        along = along + np.bincount(begins // len(s), parts, len(points))
+        total = total + push.sum(axis=1)
+    share = np.divide(along, total, out=np.zeros_like(total), where=total > 0).max(initial=0.0) if rods else 0.0
     if share > _SLANTED:
         yield (
             f"{describe(obstacle)} pushes along rods by up to {share:.2g} of its pressure, which no surface does: rods "
-            "touch it beside their nodes. Expected more elements there, or a tol, which puts a node there."
+            f"touch it beside their nodes. Expected {expected}."
         )
 
 

@@ -11,7 +11,7 @@ from cosserat_fenicsx.algebra import eigen
 from cosserat_fenicsx.checks import number, whole
 from cosserat_fenicsx.errors import NotConverged
 from cosserat_fenicsx.ranks import communicator
-from cosserat_fenicsx.results.contacts import refuse_grazing, step_without_switch
+from cosserat_fenicsx.results.contacts import refuse_grazing, step_without_switch, warn_of_slant
 from cosserat_fenicsx.results.modes import Buckling
 from cosserat_fenicsx.results.shapes import Equilibrium
 from cosserat_fenicsx.scene.action import has_permanent
@@ -108,6 +108,8 @@ def buckling(
             f"the accuracy tol = {tol:g} was not reached: {why} {error.max():.2g}. Ask for a larger tol, or for the "
             "events of `solve`."
         )
+    if comm.rank == 0:
+        warn_of_slant("buckling", state)
     bound = float(load_factors[0]) if len(load_factors) else most
     found = slice(0 if conservative else 1, None)  # without a potential the first one is the bound alone
     load_factors = load_factors[found]
