@@ -430,6 +430,19 @@ def test_static_motor_is_told_and_refused():
         answer(12e3)
 
 
+def test_a_motor_that_stands_in_a_hole():
+    """A trip without flow, and motions whose pumps start or whose bit stalls the motor."""
+    path = cf.well.WellPath.from_survey([0, 20], [0.7, 0.7], [0, 0], degrees=False)
+    well = {"hole": cf.well.Borehole(path, cf.well.HoleSection(20.0, 0.2159, 0.2)), "mud": cf.well.Mud(1200.0)}
+    still = DrillString([motor(flow=0.0), pipe(19.0)])
+    answer = cf.well.torque_and_drag(well["hole"], still, cf.well.TripOut(), mud=well["mud"], model="soft")
+    assert "mud motor: stands, since its flow does not turn it" in answer.why
+    for flow, law in ((cf.signals.Ramp(GIVEN["Q"], 0.0, 0.05), None), (GIVEN["Q"], Rising(2e4, 150.0))):
+        scene = above(motor(flow=flow), length=19.0, law=law, **well)
+        found = cf.drilling.simulate(scene, 0.5, model="torsion", progress=False)
+        assert (found.motor_speed[-1] > 1) == (law is None) and "the motor stalls" in " ".join(found.why)
+
+
 def test_scene_files():
     for name in ("mud_motor", "oscillation_tool"):
         scene = cf.read(Path(__file__).parent.parent / "demos" / "strings" / f"{name}.toml").scene

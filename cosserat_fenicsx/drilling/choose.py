@@ -118,6 +118,8 @@ def _operations(scene):
     bit, weight = scene.bit, _heaviest(scene)
     law = None if bit is None else bit.law.resistance(bit.most)
     torque = law.kinetic if law else 0.0
+    if any(torque >= motor.stall_torque() for motor in scene.motors):
+        torque = 0.0  # no steady state; `_stalls` tells it, and buckling hardly depends on the torque
     yield rotating(weight, torque)
     if scene.hook is not None:
         signal = scene.hook.signal()

@@ -381,8 +381,11 @@ def _flexible(given, model, tol, torque_convention, pieces, laid):
 
 
 def _on_motor(string, operation):
-    """A sentence on a motor under the torque on bit; a SceneError where it stalls."""
+    """A sentence on a motor under the torque on bit; a SceneError where that stalls it."""
     for motor in (part for part in string.components if isinstance(part, MudMotor)):
+        if operation.torque == 0 and motor.stall_torque() <= 0:  # as on a trip without flow
+            yield f"{motor.name}: stands, since its flow does not turn it"
+            continue
         speed = motor.running(type(operation).__name__, operation.torque)
         yield (
             f"{motor.name}: turns the bit by {speed / rpm:.4g} rpm beside the string's rotation, with "
