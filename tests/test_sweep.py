@@ -211,17 +211,17 @@ def test_which_steps_are_accepted():
 
 def test_how_long_the_next_step_is():
     lib, control = step_control(step=0.1, smallest=0.01, largest=9.0, shrink=0.5, patience=3)
-    assert lib.step_growth(control, LIMITS.intended / 2.25, 2, 3) == pytest.approx(1.5)
-    assert lib.step_growth(control, 1e-9, 2, LIMITS.easy) == 2.0
-    assert lib.step_growth(control, 1e-9, 2, LIMITS.easy + 1) == 1.0
-    assert lib.step_growth(control, 1e-9, 2, LIMITS.hard) == 0.5
+    assert lib.step_growth(control, LIMITS.intended / 2.25, 2, 3, False) == pytest.approx(1.5)
+    assert [lib.step_growth(control, 1e-9, 2, LIMITS.easy, linear) for linear in (False, True)] == [2.0, LIMITS.first]
+    assert lib.step_growth(control, 1e-9, 2, LIMITS.easy + 1, True) == 1.0
+    assert lib.step_growth(control, 1e-9, 2, LIMITS.hard, True) == 0.5
     lib.accept_step(control, 0.05, 1.5)  # a step that was short to land on a load factor does not shorten the next
     assert control.step == 0.1
     lib.accept_step(control, 0.1, 0.7)
     assert control.step == pytest.approx(0.07)
     assert not lib.reject_step(control, 0.07) and control.step == pytest.approx(0.035)
     lib.accept_step(control, 0.035, 1.0)
-    assert control.rejections == 1
+    assert control.rejections == 1 and lib.step_growth(control, 1e-9, 2, 3, True) == 2.0
     assert not lib.reject_step(control, 0.035) and lib.reject_step(control, 0.03) and control.rejections == 3
     lib.accept_step(control, 0.03, 1.0)
     lib.accept_step(control, 0.03, 1.0)

@@ -234,7 +234,7 @@ class Drilling(InWords, Part):
 
     @cached_property
     def motors(self) -> tuple:
-        """The `MudMotor`s of the string, from the top down."""
+        """Each `MudMotor` of the string, from the top down."""
         return tuple(x.tool for x in self.joints if x.turns)
 
     @property
