@@ -122,9 +122,12 @@ class Pattern(namedtuple("Pattern", "made_on_demand numbers evolutions leaves"))
                 return tuple(map(without_mesh, value))
             if id(value) not in given:
                 return value
-            code, arguments, *others = compat.pieces(given[id(value)], value) or (None, [None], [], [])
-            places = [next((i for i, y in enumerate(spaces) if x is y), None) for x in arguments]
-            leaves.append((code, places, *([place(x) for x in part] for part in others)))
+            if (pieces := compat.pieces(given[id(value)], value)) is None:
+                leaves.append((None, [None]))  # unknown
+            else:
+                code, arguments, *others = pieces
+                places = [next((i for i, y in enumerate(spaces) if x is y), None) for x in arguments]
+                leaves.append((code, places, *([place(x) for x in part] for part in others)))
             return _Leaf(len(leaves) - 1)
 
         numbers = {field.name: without_mesh(getattr(forms, field.name)) for field in fields(forms)}
