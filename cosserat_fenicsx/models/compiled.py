@@ -97,7 +97,7 @@ def compile_static(model, spaces):
     if model.comm.size == 1 and kind not in _PATTERNS:
         pattern = Pattern.of(model, everywhere, found, given) if before == set(vars(model)) else None
         while len(_PATTERNS) >= _MOST_PATTERNS:
-            _PATTERNS.pop(next(iter(_PATTERNS)))
+            _PATTERNS.pop(next(iter(_PATTERNS)), None)  # another thread may have done it
         _PATTERNS[kind] = pattern
     return found
 

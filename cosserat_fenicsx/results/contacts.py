@@ -176,8 +176,8 @@ def slanted(path, obstacle):
 
 def warn_of_slant(owner, state):
     """Give a warning where `slanted` has a sentence, of an `Equilibrium`."""
-    rods = [(rod, state.s(rod), state.position(rod)[None], shares_of(state, i)) for i, rod in
-            enumerate(state.scene.rods)]  # fmt: skip
+    known = enumerate(state.scene.rods if state.scene.has_obstacles else ())
+    rods = [(rod, state.s(rod), state.position(rod)[None], shares_of(state, i)) for i, rod in known]
     for obstacle in state.scene.actions:
         if obstacle.gaps is not None:
             on = [x for x in rods if obstacle.acts_on(x[0])]
@@ -230,31 +230,34 @@ def _grazing(scene, rod, s, gap):
     return f"Rod '{rod.name}' touches, at s = {s[where[0]]:.6g} m," if len(where) else ""
 
 
+def gaps_at(state):
+    """(obstacle, rod, number of the rod, arc lengths (n,) and gaps (n,) of its nodes, m, and normals (n, 3)) of an
+    `Equilibrium`, for each obstacle and each rod that it acts on."""
+    known = enumerate(state.scene.rods if state.scene.has_obstacles else ())
+    rods = [(rod, i, state.s(rod), state.position(rod)) for i, rod in known]
+    for obstacle in state.scene.actions:
+        for rod, i, s, r in rods if obstacle.gaps is not None else ():
+            if obstacle.acts_on(rod):
+                yield obstacle, rod, i, s, *obstacle.gaps(rod, s, r)
+
+
 def refuse_grazing(state, owner):
     """Refuse small motions about an `Equilibrium` of rods that touch an obstacle without pressing on it."""
-    for obstacle in state.scene.actions:
-        for rod in state.scene.rods:
-            if obstacle.gaps is not None and obstacle.acts_on(rod):
-                s = state.s(rod)
-                if where := _grazing(state.scene, rod, s, obstacle.gaps(rod, s, state.position(rod))[0]):
-                    raise SceneError(
-                        f"{owner}: {where} {describe(obstacle)} without pressing on it, and may lift off on one side, "
-                        "which no linear theory has: expected a permanent load or a load factor that presses it there, "
-                        "or a gap"
-                    )
+    for obstacle, rod, _, s, gap, _ in gaps_at(state):
+        if where := _grazing(state.scene, rod, s, gap):
+            raise SceneError(
+                f"{owner}: {where} {describe(obstacle)} without pressing on it, and may lift off on one side, which no "
+                "linear theory has: expected a permanent load or a load factor that presses it there, or a gap"
+            )
 
 
 def step_without_switch(state, moved, step):
     """The largest step, at most `step`, in which no node begins or ceases to touch an obstacle; from the `Equilibrium`
     at the state, and at the state moved by `step`."""
-    for obstacle in state.scene.actions:
-        for rod in state.scene.rods:
-            if obstacle.gaps is not None and obstacle.acts_on(rod):
-                s = state.s(rod)
-                gap, there = (obstacle.gaps(rod, s, x.position(rod))[0] for x in (state, moved))
-                free = np.abs(gap) > _GRAZES * rod.length  # others are held by a support
-                rates = np.abs(there - gap)[free] / step
-                step = min(step, (np.abs(gap)[free] / np.maximum(2 * rates, 1e-300)).min(initial=np.inf))
+    for (_, rod, _, _, gap, _), (*_, there, _) in zip(gaps_at(state), gaps_at(moved), strict=True):
+        free = np.abs(gap) > _GRAZES * rod.length  # others are held by a support
+        rates = np.abs(there - gap)[free] / step
+        step = min(step, (np.abs(gap)[free] / np.maximum(2 * rates, 1e-300)).min(initial=np.inf))
     return step
 
 

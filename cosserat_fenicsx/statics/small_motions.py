@@ -22,7 +22,7 @@ from cosserat_fenicsx.models.spatial import CirculatoryModel, ResistingModel
 from cosserat_fenicsx.models.rod_data import nodal_inertia
 from cosserat_fenicsx.models.signature import Signature
 from cosserat_fenicsx.numerics import directors, lobatto_weights
-from cosserat_fenicsx.results.contacts import shares_of
+from cosserat_fenicsx.results.contacts import gaps_at, shares_of
 
 # Share of a first-order change of an eigenvalue that is assumed to remain as error: at most this, or this times the
 # relative change.
@@ -69,36 +69,36 @@ def edges_of_contact(model, state):
     acts with its whole share of the length, and the edge, where the gap vanishes, is elsewhere; its place is known as
     well as the nodes on both sides agree on it, and to a part of that share, the smaller the more nodes touch. None
     without an edge; a law of pressure is left out."""
+    if not state.scene.has_obstacles:
+        return None
     lacking, unknown, at = [], [], []
     rows, unit = model.rows_of_nodes, model.scales.force / model.scales.length
-    last = np.cumsum([len(state.s(rod)) for rod in state.scene.rods])
-    for i, (rod, of_nodes) in enumerate(zip(state.scene.rods, np.split(rows, last[:-1]), strict=True)):
-        s, shares = state.s(rod), shares_of(state, i)
-        for obstacle in state.scene.actions:
-            if obstacle.gaps is None or obstacle.law is not None or not obstacle.acts_on(rod):
-                continue
-            gap, normal = obstacle.gaps(rod, s, state.position(rod))
-            bounds = np.flatnonzero(np.diff(gap < 0, prepend=False, append=False))  # nodes touch from .. to before ..
-            begin, end = bounds[::2], bounds[1::2]
-            left, right = begin > 0, end < len(s)
-            inner, count = np.append(begin[left], end[right] - 1), np.append((end - begin)[left], (end - begin)[right])
-            side = np.repeat([-1, 1], [np.count_nonzero(left), np.count_nonzero(right)])
-            outer, share = inner + side, shares[inner]
-            way = np.abs(s[outer] - s[inner])
-            beyond = way * gap[inner] / (gap[inner] - gap[outer])  # from the last node that touches to the edge
-            middle = np.cumsum(shares)[inner] - share / 2
-            lacks = beyond - share / 2 - side * (middle - s[inner])
-            # the same by the two last nodes that touch
-            before = np.where(count > 1, inner - side, inner)
-            slope = (gap[inner] - gap[before]) / np.where(count > 1, np.abs(s[inner] - s[before]), 1.0)
-            other = np.clip(-gap[inner] / np.where(slope > 0, slope, np.inf), 0.0, way)
-            other = np.where((slope > 0) | (count == 1), other, way)
-            across = normal[inner, :, None] * normal[inner, None, :]
-            sticks = obstacle.sticks * (np.eye(3) - across) if obstacle.friction else 0.0
-            density = (obstacle.stiffness * across + sticks) / unit
-            lacking.append(density * lacks[:, None, None])
-            unknown.append(density * np.maximum(share / 2 / count, np.abs(beyond - other))[:, None, None])
-            at.append(of_nodes[inner, :3])
+    of_nodes = np.split(rows, np.cumsum([len(state.s(rod)) for rod in state.scene.rods])[:-1])
+    for obstacle, _, i, s, gap, normal in gaps_at(state):
+        if obstacle.law is not None:
+            continue
+        shares = shares_of(state, i)
+        bounds = np.flatnonzero(np.diff(gap < 0, prepend=False, append=False))  # nodes touch from .. to before ..
+        begin, end = bounds[::2], bounds[1::2]
+        left, right = begin > 0, end < len(s)
+        inner, count = np.append(begin[left], end[right] - 1), np.append((end - begin)[left], (end - begin)[right])
+        side = np.repeat([-1, 1], [np.count_nonzero(left), np.count_nonzero(right)])
+        outer, share = inner + side, shares[inner]
+        way = np.abs(s[outer] - s[inner])
+        beyond = way * gap[inner] / (gap[inner] - gap[outer])  # from the last node that touches to the edge
+        middle = np.cumsum(shares)[inner] - share / 2
+        lacks = beyond - share / 2 - side * (middle - s[inner])
+        # the same by the two last nodes that touch
+        before = np.where(count > 1, inner - side, inner)
+        slope = (gap[inner] - gap[before]) / np.where(count > 1, np.abs(s[inner] - s[before]), 1.0)
+        other = np.clip(-gap[inner] / np.where(slope > 0, slope, np.inf), 0.0, way)
+        other = np.where((slope > 0) | (count == 1), other, way)
+        across = normal[inner, :, None] * normal[inner, None, :]
+        sticks = obstacle.sticks * (np.eye(3) - across) if obstacle.friction else 0.0
+        density = (obstacle.stiffness * across + sticks) / unit
+        lacking.append(density * lacks[:, None, None])
+        unknown.append(density * np.maximum(share / 2 / count, np.abs(beyond - other))[:, None, None])
+        at.append(of_nodes[i][inner, :3])
     if not sum(map(len, at)):
         return None
     size = rows.max(initial=-1) + 1
