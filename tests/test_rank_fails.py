@@ -20,7 +20,7 @@ import cosserat_fenicsx as cf
 from cosserat_fenicsx import ranks
 assert "mpi4py" not in sys.modules
 from mpi4py import MPI
-ranks.PATIENCE = 0.5
+ranks.PATIENCE = float(sys.argv[1])
 rank, wait = MPI.COMM_WORLD.rank, MPI.COMM_WORLD.barrier
 """
 SWEEP = """
@@ -42,11 +42,11 @@ cf.solve(scene, [1.0], elements=1)
 ALONE = "of 2 alone ended with"
 
 
-def run(program, folder, size=2):
+def run(program, folder, patience):
     """(what `mpirun` returned, s)."""
     clean = {name: value for name, value in os.environ.items() if not name.startswith(("OMPI_COMM", "PMIX", "ORTE"))}
     words, began = (
-        ["mpirun", "--oversubscribe", "-n", str(size), sys.executable, "-c", BEGIN + program],
+        ["mpirun", "--oversubscribe", "-n", "2", sys.executable, "-c", BEGIN + program, str(patience)],
         time.monotonic(),
     )
     done = subprocess.run(words, check=False, capture_output=True, encoding="utf-8", cwd=folder, timeout=60,
@@ -63,20 +63,20 @@ def run(program, folder, size=2):
     ("rank == 1 and threading.Thread(target=lambda: 1 / 0).start()\nrank == 0 and wait()", 1, "ZeroDivisionError"),
 ], ids=["depth_sweep", "solve", "exit", "exit with words", "exit of site", "thread"])  # fmt: skip
 def test_one_rank_fails(program, code, said, tmp_path):
-    done, seconds = run(program, tmp_path)
+    done, seconds = run(program, tmp_path, 0.5)
     assert done.returncode == code and said in done.stderr and done.stderr.count(ALONE) == 1
     assert seconds < 20
 
 
 @pytest.mark.parametrize(("program", "code", "said"), [
-    ("raise ValueError('all of them')", 1, "ValueError: all of them"),
+    ("raise ValueError('all of them')", 1, "all of them"),  # what ranks print before it may be mixed
     ("sys.exit(5)", 5, ""),
     ("time.sleep(2 * (rank == 0)); print('report' * (rank == 0)); sys.exit(0)", 0, "report"),
     ("try:\n    rank == 1 and sys.exit(3)\nexcept SystemExit as stop:\n    assert stop.code == 3\nwait()", 0, ""),
     ("try:\n    rank == 1 and 1 / 0\nexcept ArithmeticError:\n    wait()\nelse:\n    wait()", 0, ""),
 ], ids=["all raise", "all exit", "one ends early", "exit that is caught", "exception that is caught"])  # fmt: skip
 def test_ranks_that_end_together_or_well_are_left_alone(program, code, said, tmp_path):
-    done, _ = run(program, tmp_path)
+    done, _ = run(program, tmp_path, 10.0)  # as long as a loaded machine may need
     assert done.returncode == code and said in done.stdout + done.stderr and ALONE not in done.stderr
 
 
