@@ -372,6 +372,9 @@ def test_tool_that_halves_the_pull(truth):
     (lambda: OscillationTool(2.0, outer_diameter=0.127, spring=1e6, frequency=16.0), "either a force"),
     (lambda: above(OscillationTool(2.0, outer_diameter=0.127, spring=1e6, frequency=16.0, force=1e4)),
      "component below"),
+    (lambda: above(motor(), motor(flow=0.03)), "MudMotor.flow = 0.03: expected the flow of mud motor, 0.04 m.3/s at t"),
+    (lambda: above(motor(flow=Switched(0.04, 0.03, 2.0)), motor(flow=lambda t: 0.04)), "MudMotor.flow = 0.04: .*0.03 "),
+    (lambda: above(motor(), hole=straight(0, 21.0)), "Drilling.mud = None: expected a Mud .*since mud motor is"),
     (lambda: cf.drilling.mixed_scene(above(Collar(9.0, "NC46-65"), motor()), 10.0), "without OscillationTool, and"),
     (lambda: cf.drilling.natural_frequencies(above(motor()), 2, "fixed"), "lets the string turn"),
 ])  # fmt: skip
@@ -522,9 +525,9 @@ def three_bodies(scene):
 
 @pytest.mark.parametrize("model", ["torsion", "axial and torsional"])
 def test_two_motors_as_three_bodies(model, tmp_path):
-    """From their steady state both flows change over time; own integration of three bodies; resumed to the byte."""
-    ramps = [cf.signals.Table((0.0, 3.4, 3.5), (GIVEN["Q"], GIVEN["Q"], q)) for q in (0.03, 0.036)]
-    scene = two_motors({"flow": ramps[0]}, {"flow": ramps[1]})
+    """From their steady state the flow changes over time; own integration of three bodies; resumed to the byte."""
+    ramp = cf.signals.Table((0.0, 3.4, 3.5), (GIVEN["Q"], GIVEN["Q"], 0.032))
+    scene = two_motors({"flow": ramp}, {"flow": ramp})
     A, B, f = three_bodies(scene)
     start = np.linalg.solve(A, -f - B @ ([GIVEN["Q"]] * 2))
     true = solve_ivp(
@@ -594,9 +597,9 @@ def test_steady_start_of_two_motors_with_curves(model):
 
 
 def test_limits_of_two_motors():
-    """A stiff second motor without flow is a collar; one that gives less than is taken stalls, which is told."""
+    """A second motor whose friction holds it is a collar; one that gives less than is taken stalls, which is told."""
     size = {"outer_diameter": "6 3/4 in", "inner_diameter": 0.1, "length": 5.0}
-    stiff = motor(**{**size, "leakage": 1e-14, "flow": 0.0, "rotor_inertia": 1e-6})
+    stiff = motor(**{**size, "lost_torque": 1e6, "rotor_inertia": 1e-6})
     rows = []
     for upper in (stiff, Collar(**size)):
         scene = above(Bit(0.2), motor(), upper, law=Stribeck(5e3, 4e3, 3.0), drag=ViscousDrag(torsion=0.3))
@@ -604,8 +607,8 @@ def test_limits_of_two_motors():
     for name in ("bit_speed", "surface_torque"):
         first, second = (getattr(x, name) for x in rows)
         assert first == pytest.approx(second, abs=1e-4 * np.abs(second).max()), name
-    weak = above(Bit(0.2), motor(), Collar(9.0, "NC46-65"), motor(flow=0.004), start="steady")
-    with pytest.raises(cf.SceneError, match="mud motor: it stalls: with 0.004"):
+    weak = above(Bit(0.2), motor(), Collar(9.0, "NC46-65"), motor(leakage=1.4e-7), start="steady")
+    with pytest.raises(cf.SceneError, match="mud motor: it stalls: with 0.04 m.3/s it gives less than 918"):
         cf.drilling.simulate(weak, 1.0)
     found = cf.drilling.simulate(replace(weak, start="rest"), 3.0, dt=1e-3, progress=False)
     assert found.stalls[-1].tolist() == [True, False] and found.stalled[-1]
@@ -614,9 +617,9 @@ def test_limits_of_two_motors():
 
 def test_motors_above_a_rod():
     """As of the string by elements: pipe and collars, two motors, and a rod of collars below."""
-    ramps = [cf.signals.Table((0.0, 0.2), (0.0, q)) for q in (0.03, GIVEN["Q"])]
+    ramp = cf.signals.Table((0.0, 0.2), (0.0, GIVEN["Q"]))
     # the lowest rotor, which strings by elements have at the bit, is light
-    tools = motor(flow=ramps[0], leakage=2.5e-8, lost_torque=200.0), motor(flow=ramps[1], rotor_inertia=12.0)
+    tools = motor(flow=ramp, leakage=2.5e-8, lost_torque=200.0), motor(flow=ramp, rotor_inertia=12.0)
     drive = TopDrive(cf.signals.Table((0.0, 0.2), (0.0, GIVEN["Om"])), 100.0, cf.drilling.PI(800.0, 500.0))
     collar, bit = Collar(30.0, "NC46-65"), BitOnRock(Rising(100.0, 150.0), inertia=20.0)
     scene = above(collar, tools[0], collar, tools[1], length=100.0, drive=drive, bit=bit, drag=ViscousDrag(0.2, 0.2))

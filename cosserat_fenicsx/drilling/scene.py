@@ -30,6 +30,7 @@ from cosserat_fenicsx.units import rpm
 from cosserat_fenicsx.well.components import DrillString, in_columns
 from cosserat_fenicsx.well.hole import Borehole, Mud
 from cosserat_fenicsx.well.operations import doubt_on_bit
+from cosserat_fenicsx.well.tools import check_flows
 
 
 @dataclass(frozen=True)
@@ -175,11 +176,16 @@ class Drilling(InWords, Part):
             refuse(self, "friction", self.friction, "None, or a hole (Borehole) beside it, at whose wall it acts")
         if self.depth is None and self.hole is None and self.string.components[-1].length is None:
             refuse(self.string.components[-1], "length", None, "a length (m), where there is neither hole nor depth")
+        in_air = next((part.name for part in self.string.components if part.weight is None), None)
+        if in_air and self.fluids is None:
+            refuse(self, "mud", None, f"a Mud beside the hole, since {in_air} is given by its weight in air; Mud(0) "
+                   "for air")  # fmt: skip
         _ = self.segments
         if self.hole is not None and self.mud is not None:
             self.mud.doubt_depths(self.hole.length, self.bit_depth)
         if self.motor is not None and self.bit is None:
             refuse(self, "bit", None, f"a BitOnRock below {self.motor.name}, which turns it")
+        check_flows(self.motors)
         self._doubt_torques()
 
     def _doubt_torques(self):

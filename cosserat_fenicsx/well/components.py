@@ -478,7 +478,7 @@ def weight_in_mud(component, mud, md):
         return np.full(np.shape(md), component.weight)[()]
     if mud is None:
         raise SceneError(
-            f"torque_and_drag: mud = None: expected Mud(density), since {component.name} is given by its weight in air "
+            f"mud = None: expected Mud(density), since {component.name} is given by its weight in air "
             "(Mud(0) for air, or Component(weight=...) by the weight in mud)"
         )
     steel, bore = component.mass / component.material.density, math.pi / 4 * component.inner_diameter**2

@@ -41,7 +41,7 @@ from cosserat_fenicsx.well.operations import Operation
 from cosserat_fenicsx.well.pieces import checked_depth, free_span, pieces_of, prying, rings_of, sections_of
 from cosserat_fenicsx.well.rod.rod_answer import longest, rod_in_contact
 from cosserat_fenicsx.well.softstring import Chain, chain_of, soft_string
-from cosserat_fenicsx.well.tools import MudMotor
+from cosserat_fenicsx.well.tools import MudMotor, check_flows
 
 
 @dataclass(frozen=True)
@@ -382,7 +382,9 @@ def _flexible(given, model, tol, torque_convention, pieces, laid):
 
 def _on_motor(string, operation):
     """A sentence on a motor under the torque on bit; a SceneError where that stalls it."""
-    for motor in (part for part in string.components if isinstance(part, MudMotor)):
+    motors = [part for part in string.components if isinstance(part, MudMotor)]
+    check_flows(motors)
+    for motor in motors:
         if operation.torque == 0 and motor.stall_torque() <= 0:  # as on a trip without flow
             yield f"{motor.name}: stands, since its flow does not turn it"
             continue

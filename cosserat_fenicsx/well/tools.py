@@ -16,6 +16,7 @@ cubic through its points, and a straight line beyond them.
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import pairwise
 from typing import Annotated, Any
 
 import numpy as np
@@ -50,6 +51,8 @@ _BORE = 0.6
 _KEPT = 4096
 # Larger ones than tools have: displacement a revolution (m^3), flow (m^3/s), stroke (m).
 _MOST_A_TURN, _MOST_FLOW, _LONGEST_STROKE = 0.2, 0.2, 0.1
+# Relative difference up to which flows are the same; time (s) up to which smooth ones are compared.
+_SAME_FLOW, _MINUTE = 1e-3, 60.0
 
 
 def _doubt_size(owner, field, value, most, unit, such):
@@ -350,6 +353,21 @@ class MudMotor(_Tool):
             refuse(owner, "torque", torque, f"below the torque at which {self.name} stalls, {stall:.5g} N m at "
                    f"{self.flow_at(0.0):.4g} m^3/s: less weight on bit, more flow or another motor")  # fmt: skip
         return float(self.speed(torque))
+
+
+def check_flows(motors):
+    """Refuse `MudMotor`s of one string with different flows, which are compared at times up to the last one at which a
+    flow is not smooth, or a minute."""
+    for motor, other in pairwise(motors):
+        if motor.flow == other.flow:
+            continue
+        jumps = [0.0, *(t for x in (motor, other) for t in getattr(x.flow, "jumps", ()))]
+        changes = callable(motor.flow) or callable(other.flow)
+        for t in [*jumps, *(max(*jumps, _MINUTE) * (np.arange(99) * 0.618 % 1)).tolist()] if changes else [0.0]:
+            flow, expected = motor.flow_at(t), other.flow_at(t)
+            if not math.isclose(flow, expected, rel_tol=_SAME_FLOW, abs_tol=1e-9):
+                refuse(motor, "flow", flow, f"the flow of {other.name}, {expected:.4g} m^3/s at t = {t:.3g} s, since "
+                       "the mud flows through all motors of a string; what passes a rotor by is leakage")  # fmt: skip
 
 
 @dataclass(frozen=True, kw_only=True)
