@@ -49,15 +49,31 @@ def test_a_tripod_of_hinged_bars_carries_by_tension_alone():
     assert moved[2] == pytest.approx(-axial * length / (frame.rods[0].stiffness.axial * cosine), rel=1e-5)
 
 
-def test_rods_that_bend_most_are_cut_into_more_elements():
-    """Two meshes suffice: the second one has short elements where halves would not do, and says how good it is."""
+def lattice():
+    """A frame of 63 rods on clamped feet, and its uppermost points."""
     points = 3.0 * np.argwhere(np.ones((3, 3, 4)))
     near = np.isclose(np.linalg.norm(points[:, None] - points, axis=2), 3.0)
     feet = points[:, 2] == 0
     near[np.ix_(feet, feet)] = False
     edges = np.argwhere(np.triu(near))
     frame = cf.frame(points, edges, cf.Tube(0.1, 0.08), STEEL, clamped=np.flatnonzero(feet))
-    top = np.flatnonzero(points[:, 2] == 9.0).tolist()
+    return frame, np.flatnonzero(points[:, 2] == 9.0).tolist()
+
+
+@pytest.mark.parametrize(("force", "steps"), [(1e4, [1, 2]), (2e5, [4, 5])], ids=["nearly linear", "bends far"])
+def test_the_first_load_factor_of_many_rods_is_tried_at_once(force, steps):
+    """Where that is too far, a tenth of the way follows, as where it is asked for."""
+    frame, top = lattice()
+    scene = frame.scene([cf.Force(frame.at(k), (force, force / 2, -force / 10)) for k in top])
+    found = cf.solve(scene, [0.5, 1.0], elements=1)
+    slow = cf.solve(scene, [0.5, 1.0], elements=1, steps=cf.StepControl(first=0.1))
+    assert found.steps.tolist() == steps
+    np.testing.assert_allclose(found.displacement(frame.at(top[0])), slow.displacement(frame.at(top[0])), rtol=1e-9)
+
+
+def test_rods_that_bend_most_are_cut_into_more_elements():
+    """Two meshes suffice: the second one has short elements where halves would not do, and says how good it is."""
+    frame, top = lattice()
     scene = frame.scene([cf.Force(frame.at(k), (3e3, 1.5e3, -3e4)) for k in top])
     path, truth = cf.solve(scene, [1.0]), cf.solve(scene, [1.0], elements=8)
     assert len(frame) == 63 and min(path.elements) == 2 < max(path.elements) <= 4

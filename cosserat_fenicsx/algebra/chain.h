@@ -220,6 +220,7 @@ typedef struct {
     int easy, hard;                 /* Newton iterations */
     double linear, first;           /* see `is_linear`; largest growth after a first step that is */
     double step, smallest, largest; /* the next step; bounds */
+    double usual;                   /* the first step where the next one is a longer one that is tried first, else 0 */
     double shrink;                  /* factor of a step that is rejected */
     int rejections, patience, accepted; /* rejected steps without two accepted ones between, and most of them; whether
                                            the last one was accepted */

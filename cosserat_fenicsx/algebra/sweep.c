@@ -7,6 +7,7 @@
 #include <time.h>
 
 enum { COUNT = 128, FAILED_COUNT = -100 };
+enum { NEARLY_LINEAR = 4 }; /* most Newton iterations of a first step that is nearly linear */
 
 #define EACH(k, g, in) for (int k = 0; k < (g)->count; k++) if ((in)[k])
 
@@ -79,7 +80,7 @@ double step_goal(const step_control *c, double here, double load_factor)
 int is_linear(const step_control *c, const newton *n, int known)
 {
     double later = 0;
-    if (known > 1 || n->iterations > 4) return 0;
+    if (known > 1 || n->iterations > NEARLY_LINEAR) return 0;
     for (int i = 0; i < n->iterations - 1; i++) later += n->steps[i];
     return n->iterations == 0 || later <= c->linear * n->steps[n->iterations - 1];
 }
@@ -115,12 +116,16 @@ void accept_step(step_control *c, double taken, double growth)
 {
     c->step = growth >= 1 ? fmax(c->step, taken * growth) : taken * growth;
     if (c->accepted) c->rejections = 0;
-    c->accepted = 1;
+    c->accepted = 1, c->usual = 0;
 }
 
 /* Whether to give up. */
 int reject_step(step_control *c, double taken)
 {
+    if (c->usual) {
+        c->step = c->usual, c->usual = 0;
+        return 0;
+    }
     c->rejections++, c->accepted = 0;
     c->step = taken * c->shrink;
     return c->step < c->smallest || c->rejections >= c->patience;
@@ -303,7 +308,7 @@ static void take_step(sweep *s, const double *found, double goal, double off)
 static void attempt(const group *g, int *judged, const double *goal)
 {
     double *guess[LANES], *found[LANES], *here[LANES], off[LANES];
-    int in[LANES], unsure[LANES], negative[LANES];
+    int in[LANES], unsure[LANES], negative[LANES], most[LANES];
     for (int k = 0; k < g->count; k++) {
         sweep *s = g->sweep[k];
         guess[k] = s->work, found[k] = s->work + s->numbers, here[k] = s->points + (size_t)(s->known - 1) * s->numbers;
@@ -311,10 +316,14 @@ static void attempt(const group *g, int *judged, const double *goal)
         s->control->shrink = 0.5;
         if (!predict(s, goal[k], guess[k])) judged[k] = UNSURE;
     }
-    for (int k = 0; k < g->count; k++) in[k] = judged[k] == GOING;
+    for (int k = 0; k < g->count; k++) {
+        in[k] = judged[k] == GOING, most[k] = g->sweep[k]->newton->most;
+        if (g->sweep[k]->control->usual) g->sweep[k]->newton->most = NEARLY_LINEAR;
+    }
     reach(g, judged, guess, goal, found);
     for (int k = 0; k < g->count; k++) {
         const sweep *s = g->sweep[k];
+        s->newton->most = most[k];
         in[k] = in[k] && judged[k] == ACCEPTED;
         if (!in[k]) continue;
         off[k] = largest(s, found[k], guess[k]);

@@ -23,6 +23,7 @@ _PARALLEL = 1e-6
 # Samples along a rod that is curved or not uniform, at multiples of the golden ratio: no periodic curve or section
 # repeats at all of them.
 _SAMPLES, _GOLDEN = 401, (math.sqrt(5) - 1) / 2
+_A_FEW = 64  # rods of a large frame that are looked at first
 
 
 @dataclass(frozen=True)
@@ -96,10 +97,10 @@ def independent_in(plane, ties):
 
 
 def _find(scene):
-    tangents = [_sample(rod) for rod in scene.rods]
-    chords = np.array([rod.curve.position(0.0) - scene.origin(rod) for rod in scene.rods])
-    chords = chords[np.linalg.norm(chords, axis=1) > 1e-9 * np.array([rod.length for rod in scene.rods])]
-    drawn = _units(np.concatenate([*(frames[:, :, 2] for _, frames in tangents), chords]))
+    if len(scene.rods) > 2 * _A_FEW:  # of most frames in space a few rods show that there is no plane
+        _, drawn = _drawn(scene, scene.rods[:: len(scene.rods) // _A_FEW])
+        _lie_in(_normal_of(drawn), drawn)
+    tangents, drawn = _drawn(scene, scene.rods)
     acting = [_vectors(scene, load) for load in scene.loads]
     normal = _normal_of(drawn)
     if normal is None:
@@ -107,8 +108,7 @@ def _find(scene):
             drawn[0], [*acting, *(_motions(support, scene.horizon) for support in scene.supports)], scene
         )
     normal = normal * np.sign(normal[np.argmax(np.abs(normal))])
-    if np.abs(drawn @ normal).max() > _SMALLEST_ANGLE:
-        raise _Leaves("the rods do not lie in one plane")
+    _lie_in(normal, drawn)
     for i, (load, (inside, across)) in enumerate(zip(scene.loads, acting, strict=True)):
         bent = [np.linalg.norm(np.cross(v, normal)) for v in _units(across)]
         if max([*np.abs(_units(inside) @ normal), *bent], default=0.0) > _SMALLEST_ANGLE:
@@ -125,6 +125,20 @@ def _find(scene):
     plane = Plane(tuple(map(tuple, (e1, np.cross(normal, e1), normal))))
     _check_supports(scene, plane)
     return plane
+
+
+def _drawn(scene, rods):
+    """[`_sample`] of rods, and unit vectors (n, 3) along them and to their starts from that of their structure."""
+    samples = [_sample(rod) for rod in rods]
+    chords = np.array([rod.curve.position(0.0) - scene.origin(rod) for rod in rods])
+    chords = chords[np.linalg.norm(chords, axis=1) > 1e-9 * np.array([rod.length for rod in rods])]
+    return samples, _units(np.concatenate([*(frames[:, :, 2] for _, frames in samples), chords]))
+
+
+def _lie_in(normal, drawn):
+    """Raise `_Leaves` where directions (n, 3) do not lie in the plane with a normal; None where they are parallel."""
+    if normal is not None and np.abs(drawn @ normal).max() > _SMALLEST_ANGLE:
+        raise _Leaves("the rods do not lie in one plane")
 
 
 def _sample(rod):

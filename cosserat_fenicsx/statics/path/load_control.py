@@ -43,8 +43,9 @@ class StepControl:
     """How the load factor is stepped between the requested values.
 
     Args:
-        first: first step of the load factor; None for a tenth of the way to the farthest requested value. Where it is
-            rejected a few times, it is limited by the tangent stiffness at the first point.
+        first: first step of the load factor; None for a tenth of the way to the farthest requested value, or up to the
+            first one where many rods respond nearly linearly. Where it is rejected a few times, it is limited by the
+            tangent stiffness at the first point.
         smallest: smallest step over the farthest requested value, in (0, 1); the continuation fails where a smaller
             one would be needed. Where the structure is very soft at the first point, smaller steps are allowed.
         largest: largest step of the load factor; None for no bound.
@@ -269,6 +270,10 @@ class Sweep(Pointers):
         sweep.control, control.c.rejections, control.c.accepted = control.c, 0, False
         control.c.patience = min(patience, _FIRST_REJECTIONS if len(known) == 1 else patience) - 1
         sweep.every = every
+        interface = self._problem.interface
+        if len(known) == 1 and not every and control.control.first is None and interface and not interface.dense:
+            # Where it is accepted it saves a point and the count of its negative modes, with factors of a large system.
+            control.c.usual, control.c.step = control.c.step, control.reach
         for why, swept in self._calls(track, load_factors, counted, lambda: self._lib.run(sweep)):
             self._follow(track)
             if swept:
