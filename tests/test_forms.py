@@ -16,6 +16,7 @@ from mpi4py import MPI
 import cosserat_fenicsx as cf
 from cosserat_fenicsx import compat
 from cosserat_fenicsx.algebra.pool import PROBLEMS
+from cosserat_fenicsx.dynamics.schemes import SCHEMES
 from cosserat_fenicsx.dynamics.simulate import solvers_of as moving_solvers
 from cosserat_fenicsx.models import compiled
 from cosserat_fenicsx.models.connections import TiePattern, Ties
@@ -352,29 +353,39 @@ def test_blocks_of_a_problem(kind, model):
 
 
 @pytest.mark.once
-@pytest.mark.parametrize("model", ["determinate", "planar", "spatial"])
-def test_models_that_differ_in_their_meshes_share_the_work_of_ufl(model, monkeypatch):
-    """To the last digit of what UFL alone gives, also what actions remember, and derivatives, which ask UFL again."""
+@pytest.mark.parametrize("kind", ["determinate", "planar", "spatial", "momentum", "energy", "generalised-alpha"])
+def test_models_that_differ_in_their_meshes_share_the_work_of_ufl(kind, monkeypatch):
+    """To the last digit of what UFL alone gives, whichever is built first: also what actions remember, second functions
+    for one vector in P1, what resists small velocities, and derivatives, which ask UFL again."""
     load = "loads[0].force[2]"
     rod = cf.Rod(cf.Line((0, 0, 0), (2, 0, 0)), cf.Tube(0.1, 0.08), cf.Material(E=1e9, nu=0.3, density=2000.0))
     loads = [cf.Force(rod.end, (1e2, 0, -2e2)), cf.Weight((0, 0, -9.81), permanent=True)]
-    loads += [cf.Spring(rod.at(1.0), 1e3)] if model == "planar" else []
-    loads += [cf.Plane((0, 0, -0.06), (0, 0, 1), friction=0.3)] if model == "spatial" else []
-    scene, asked, by_ufl = cf.Scene([rod], [cf.Clamp(rod.start)], loads), [], compiled._compile_static
+    loads += [cf.Spring(rod.at(1.0), 1e3)] if kind in ("planar", "momentum") else []
+    loads += [cf.Plane((0, 0, -0.06), (0, 0, 1), friction=0.3)] if kind in ("spatial", "generalised-alpha") else []
+    scene, shared, on = cf.Scene([rod], [cf.Clamp(rod.start)], loads), set(), compiled.Pattern.on
+    damped = cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Dashpot(rod.end, 10.0)])
 
-    def solved():
+    def solved(elements):
         for idle in ("_idle_of_all", "_idle_of_one"):
             monkeypatch.setattr(PROBLEMS, idle, [])
-        path = cf.solve(scene, [0.5, 1.0], elements=6, model=model)
-        found = [path.position(rod.end), path.moment(rod.start)]
-        if model != "spatial":
-            found.append(path.sensitivity(lambda x: x.position(rod.end)[-1], [load])[load])
+        if kind in SCHEMES:
+            more = {"model": "planar"} if kind == "momentum" else {"degree": 1} if kind == "energy" else {}
+            history = cf.simulate(scene, 0.02, dt=0.004, scheme=kind, elements=elements, **more)
+            found = [history.position(rod.end), history.force(rod.start), history.dissipated]
+        else:
+            path = cf.solve(scene, [0.5, 1.0], elements=elements, model=kind)
+            found = [path.position(rod.end), path.moment(rod.start)]
+            if kind != "spatial":
+                found.append(path.sensitivity(lambda x: x.position(rod.end)[-1], [load])[load])
+            if kind == "determinate":
+                found.append(cf.modes(damped, 2, elements=elements).eigenvalues.view(float))
         return np.concatenate([np.ravel(x) for x in found])
 
-    monkeypatch.setattr(compiled, "_compile_static", lambda *given: asked.append(given) or by_ufl(*given))
+    monkeypatch.setattr(compiled.Pattern, "on", lambda self, model, *x: shared.add(type(model)) or on(self, model, *x))
     monkeypatch.setattr(compiled, "_PATTERNS", {})
-    alone = solved()
-    cf.solve(scene, [1.0], elements=4, model=model)
-    assert len(asked) == 1
-    assert np.array_equal(solved(), alone)
-    assert len(asked) == (1 if model == "spatial" else 2)
+    first = solved(6)
+    assert not shared
+    second = solved(4)
+    assert shared == {of for of, *_ in compiled._PATTERNS}
+    compiled._PATTERNS.clear()
+    assert np.array_equal(solved(4), second) and np.array_equal(solved(6), first)

@@ -109,6 +109,8 @@ class RodModel:
     displacements = None
     #: a `DataDerivative` and an `EnergyOfMotion`, see `made_once`
     data_derivative = energy_of_motion = None
+    #: see `compiled.together`
+    given = None
 
     def __init__(self, comm, signature):
         self.comm, self.signature, self.axes = comm, signature, np.eye(3)

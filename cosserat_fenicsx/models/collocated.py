@@ -8,6 +8,8 @@ And moving spatial models that carry the rates of the directors of the nodes fro
 with mass centres off the axis, and with the energy-conserving scheme (forms/energy.py).
 """
 
+from dataclasses import replace
+
 import numpy as np
 import ufl
 from dolfinx import fem
@@ -16,7 +18,7 @@ from cosserat_fenicsx import compat, numerics
 from cosserat_fenicsx.forms import energy, equilibrium, inertia, law, rotation, spatial
 from cosserat_fenicsx.forms.rotation import directors, rotation_matrix
 from cosserat_fenicsx.forms.spatial import parts_of
-from cosserat_fenicsx.models.compiled import along
+from cosserat_fenicsx.models.compiled import along, together
 from cosserat_fenicsx.models.moving import (
     MovingPlanar,
     MovingSpatial,
@@ -106,7 +108,7 @@ class PlanarCollocation(PlanarStep):
 
 
 def compile_collocated(step):
-    """The `MotionForms` at the end of a step, the changes of the six strains over it, and their rates at its end."""
+    """The `MotionForms` at the end of a step, with the changes of the six strains over it, and their rates there."""
     model, dx = step.model, step.dx
     increment = step.increment(step.nodal, step.nodal0)
     strains = [strains_of(motion, step.section) for motion in (step.before, step.after)]
@@ -129,7 +131,9 @@ def compile_collocated(step):
 
     of_step = virtual_work_of_step(model, of_stress, end_point)
     forms = step.compiled(residual, step.actions(end_point), step.actions(step.halfway_point), of_step)
-    return forms, strains[1] - strains[0], ufl.derivative(strains[1], step.state, step.velocity)
+    wanted = strains[1] - strains[0], ufl.derivative(strains[1], step.state, step.velocity)
+    _, (change, rate) = together(model, [], [(a, forms.gauss) for a in wanted])
+    return replace(forms, strain_change=change, strain_rate=rate)
 
 
 _STRAINS = 6
@@ -145,6 +149,7 @@ class Collocated:
     known_acceleration, known_strain_rate: Functions, the parts of the rates that do not depend on the increments.
     """
 
+    scheme = staticmethod(compile_collocated)
     #: components of a node's velocity
     rate_size = 0
 
@@ -158,13 +163,6 @@ class Collocated:
         self._gauss_nodes = compat.cell_nodes(self.known_strain_rate.function_space).ravel()
         self._node_rates = np.zeros((2, len(self.slots) * self.rate_size))
         self._strain_rates = np.zeros((3, len(self.known_strain_rate.x.array)))
-
-    def _compile(self, spaces):
-        self._motion_fields()
-        forms, change, rate = compile_collocated(self.step_forms(self))
-        strains = [(change, forms.gauss), (rate, forms.gauss)]
-        self._strain_change, self._strain_rate = compat.expressions(self.mesh, strains)
-        return forms
 
     def _at_gauss(self, expression):
         values = compat.evaluate(expression, self.mesh, self._local_cells).reshape(-1, _STRAINS)
@@ -188,7 +186,7 @@ class Collocated:
     def follow_velocities(self):
         """Set the strain rates at the beginning of a step from the velocities."""
         if self.damped:
-            self._strain_rates[0] = self._at_gauss(self._strain_rate)
+            self._strain_rates[0] = self._at_gauss(self.forms.strain_rate)
 
     def take_scheme(self, ahead):
         """Set the scheme of the next step, at whose beginning `start` and the state must be; ahead: (3, 4), rows v, a,
@@ -206,7 +204,7 @@ class Collocated:
         self._put_velocities(rates[0])
         self._node_rates[:] = rates[1:]
         if self.damped:
-            self._strain_rates[:] = self._ahead @ (self._at_gauss(self._strain_change), *self._strain_rates)
+            self._strain_rates[:] = self._ahead @ (self._at_gauss(self.forms.strain_change), *self._strain_rates)
 
     def take_accelerations(self):
         """Set the initial accelerations to those of the step just solved; everything else of it is discarded."""
@@ -214,7 +212,7 @@ class Collocated:
         rates = self._ahead[1] @ (self._increments(), self._velocities(), a, s)
         if self.damped:
             _, b, c = self._strain_rates
-            b[:] = self._ahead[1] @ (self._at_gauss(self._strain_change), *self._strain_rates)
+            b[:] = self._ahead[1] @ (self._at_gauss(self.forms.strain_change), *self._strain_rates)
             c[:] = 0.0
         a[:], s[:] = rates, 0.0
 

@@ -83,39 +83,51 @@ def along(w):
 _PATTERNS, _MOST_PATTERNS = {}, 256
 
 
-def compile_static(model, spaces):
-    """The `CompiledForms` of a model in statics, from its mesh, data, terms of the actions, and UFL of its unknowns;
-    spaces: of the second variations. On one process, models that differ in their meshes alone share the work of UFL."""
-    everywhere = [model.space, *spaces, model.displacements]
-    kind = type(model), replace(model.signature, counts=(), connections=None, slender=False)
+def shared(model, spaces, by_ufl):
+    """The `CompiledForms` that `by_ufl()` compiles from a model's mesh, data and terms of the actions; spaces: of all
+    their arguments. On one process, models that differ in their meshes alone share the work of UFL."""
+    signature = model.signature
+    kind = (
+        type(model),
+        replace(signature, counts=(), connections=None, slender=False),
+        bool(signature.connections.clamped),
+    )
     pattern = _PATTERNS.get(kind) if model.comm.size == 1 else None
     if pattern is not None:
-        return pattern.on(model, everywhere)
-    before, given = set(vars(model)), {}
-    found = _compile_static(model, spaces, given)
-    compile_evolutions(model, given)
+        return pattern.on(model, spaces)
+    before, model.given = {*vars(model), "given"}, {}
+    found = by_ufl()
+    compile_evolutions(model)
     if model.comm.size == 1 and kind not in _PATTERNS:
-        pattern = Pattern.of(model, everywhere, found, given) if before == set(vars(model)) else None
+        pattern = Pattern.of(model, spaces, found) if before == set(vars(model)) else None
         while len(_PATTERNS) >= _MOST_PATTERNS:
             _PATTERNS.pop(next(iter(_PATTERNS)), None)  # another thread may have done it
         _PATTERNS[kind] = pattern
+    del model.given
     return found
 
 
-class Pattern(namedtuple("Pattern", "made_on_demand numbers evolutions leaves")):
-    """`CompiledForms` without a mesh: names of what each term made at the first call, attributes and each term's
-    evolution with the positions of forms and Expressions, and the code and the places (see `_held`) of each of these.
+def compile_static(model, spaces):
+    """The `CompiledForms` of a model in statics, from its UFL of its unknowns; spaces: of the second variations."""
+    return shared(model, [model.space, *spaces, model.displacements], partial(_compile_static, model, spaces))
+
+
+class Pattern(namedtuple("Pattern", "made_on_demand kind numbers evolutions leaves")):
+    """`CompiledForms` without a mesh: names of what each term made at the first call, class, attributes and each term's
+    evolution with the positions of forms and Expressions, and the code and the places of each of these: numbers of
+    spaces, and of what `_held` tells; of the alias of a Function there, its number and that of all.
     """
 
     @classmethod
-    def of(cls, model, spaces, forms, given):
-        """The pattern of a model's forms, None where a part is unknown; given: {id of a form: its UFL}."""
-        held, leaves = _held(model), []
+    def of(cls, model, spaces, forms):
+        """The pattern of a model's forms, None where a part is unknown."""
+        held, leaves, given = _held(model), [], model.given
 
         def place(x):
-            if isinstance(x, fem.Function) and not any(x is y for y in held):  # the alias of the unknowns
-                return -1 if np.shares_memory(x.x.array, model.state.x.array) else None
-            return next((i for i, y in enumerate(held) if x is y), None)
+            if (found := next((i for i, y in enumerate(held) if x is y), None)) is None and isinstance(x, fem.Function):
+                vectors = (y.x if isinstance(y, fem.Function) else None for y in held)
+                found = next((len(held) + i for i, y in enumerate(vectors) if x.x is y), None)  # see `compat.alias`
+            return found
 
         def without_mesh(value):
             if isinstance(value, tuple):
@@ -135,14 +147,17 @@ class Pattern(namedtuple("Pattern", "made_on_demand numbers evolutions leaves"))
         if any(None in part for _, *parts in leaves for part in parts):
             return None
         on_demand = [[name for name in ("rest", "frame") if getattr(term, f"_{name}")] for term in model.actions.terms]
-        return cls(on_demand, numbers | {"symbols": None}, evolutions, leaves)
+        return cls(on_demand, type(forms), numbers | {"symbols": None}, evolutions, leaves)
 
     def on(self, model, spaces):
         """The `CompiledForms` of another model of this kind, without `Symbols`."""
         for term, names in zip(model.actions.terms, self.made_on_demand, strict=True):
             for name in names:
                 getattr(term, name)()
-        held = [*_held(model), compat.alias(model.state)]
+        held = dict(enumerate(_held(model)))
+        of_all = len(held)
+        for i in {i for _, _, functions, _ in self.leaves for i in functions if i >= of_all}:
+            held[i] = compat.alias(held[i - of_all])
         made = [compat.from_pieces(code, model.mesh, [spaces[i] for i in places],
                                    *([held[i] for i in part] for part in parts))
                 for code, places, *parts in self.leaves]  # fmt: skip
@@ -154,7 +169,7 @@ class Pattern(namedtuple("Pattern", "made_on_demand numbers evolutions leaves"))
 
         for term, evolution in zip(model.actions.terms, self.evolutions, strict=True):
             term.compiled_evolution = with_mesh(evolution)
-        return CompiledForms(**{name: with_mesh(value) for name, value in self.numbers.items()})
+        return self.kind(**{name: with_mesh(value) for name, value in self.numbers.items()})
 
 
 @dataclass(frozen=True)
@@ -169,26 +184,33 @@ def _held(model):
     return [x for x in every if isinstance(x, fem.Function | fem.Constant)]
 
 
-def compile_evolutions(model, given=None):
-    """Compile the updates of memory that forms of a model have named; given: takes {id of an Expression: its UFL}."""
-    updates = [term.evolution(point) for term, point in model.evolving]
-    for (term, _), (update, _), compiled in zip(model.evolving, updates, compat.expressions(model.mesh, updates),
-                                                strict=True):  # fmt: skip
+def together(model, forms, expressions):
+    """See `compat.together`, on the mesh of a model, which notes {id of a compiled form or Expression: its UFL} where
+    `shared` asks for it."""
+    made = compat.together(model.mesh, forms, expressions)
+    if model.given is not None:
+        every = zip([*forms, *(a for a, _ in expressions)], [*made[0], *made[1]], strict=True)
+        model.given |= {id(found): a for a, found in every if found is not None}
+    return made
+
+
+def compile_evolutions(model):
+    """Compile the updates of memory that forms of a model have named."""
+    _, updates = together(model, [], [term.evolution(point) for term, point in model.evolving])
+    for (term, _), compiled in zip(model.evolving, updates, strict=True):
         term.compiled_evolution = compiled
-        if given is not None:
-            given[id(compiled)] = update
     model.evolving = []
 
 
 def symbols_of(model):
     """The `Symbols` of a model in statics; forms that were made by a `Pattern` are made anew, by UFL."""
     if model.forms.symbols is None:
-        model.forms = replace(model.forms, symbols=_compile_static(model, model.variation_spaces, {}).symbols)
+        model.forms = replace(model.forms, symbols=_compile_static(model, model.variation_spaces).symbols)
     return model.forms.symbols
 
 
-def _compile_static(model, spaces, given):
-    """`compile_static` by UFL; given: takes {id of a compiled form or Expression: its UFL}."""
+def _compile_static(model, spaces):
+    """`compile_static` by UFL."""
     force, data, dx = model.signature.formulation.force, model.data, measures(model)
     U, U_node = model.state, compat.alias(model.state)
 
@@ -233,7 +255,7 @@ def _compile_static(model, spaces, given):
     contact = model.components_of(equilibrium.contact(motion, section)[0]) if model.carried else None
     lives = {live.number: live_parts(live, derivative, variations) for live in acting.live}
     found = compile_parts(
-        model, {"residual": residual, "tangent": tangent, **dict(enumerate(seconds))}, lives, strains, given=given,
+        model, {"residual": residual, "tangent": tangent, **dict(enumerate(seconds))}, lives, strains,
         advance=None if advance is None else model.components_of(advance), densities=action_densities(model, point_at),
         dead=acting.dead, permanent=acting.permanent, force=forces.dead, permanent_force=forces.permanent,
     )  # fmt: skip
@@ -243,12 +265,11 @@ def _compile_static(model, spaces, given):
     return CompiledForms(**found, symbols=Symbols(_balance(model, residual, acting), contact, (U, U_node), seconds))
 
 
-def compile_parts(model, core, terms, fields, *, advance=None, densities=None, given=None, **works):
+def compile_parts(model, core, terms, fields, *, advance=None, densities=None, **works):
     """Compile UFL: one module for the model without actions (core: {name: form}), and one for each term of the actions
     (terms: {its number: {name: form}}; works: for a name {its number: form}). Names are attributes of `CompiledForms`
-    or of a subclass, or the numbers of second variations; forms may be None. densities: see `action_densities`; given:
-    takes {id of a compiled form or Expression: its UFL}. Returns these attributes, symbols excepted; tuples of all
-    forms of a name."""
+    or of a subclass, or the numbers of second variations; forms may be None. densities: see `action_densities`.
+    Returns these attributes, symbols excepted; tuples of all forms of a name."""
     densities = densities or {}
     points, weights = basix.make_quadrature(basix.CellType.interval, 2 * model.signature.points - 1)
     places = {"line": points, "node": model.nodes}
@@ -261,11 +282,7 @@ def compile_parts(model, core, terms, fields, *, advance=None, densities=None, g
     for form in (form for parts, _ in groups for form in parts.values()):
         if form is not None:
             form.signature()
-    compiled = [compat.together(model.mesh, list(parts.values()), expressions) for parts, expressions in groups]
-    if given is not None:
-        for (parts, expressions), made in zip(groups, compiled, strict=True):
-            every = [*parts.values(), *(a for a, _ in expressions)], [*made[0], *made[1]]
-            given |= {id(found): a for a, found in zip(*every, strict=True) if found is not None}
+    compiled = [together(model, list(parts.values()), expressions) for parts, expressions in groups]
     found = defaultdict(tuple)
     for (parts, _), (forms, _) in zip(groups, compiled, strict=True):
         for name, form in zip(parts, forms, strict=True):

@@ -28,6 +28,8 @@ from cosserat_fenicsx.models.compiled import (
     measures,
     nonzero,
     section_of,
+    shared,
+    together,
 )
 from cosserat_fenicsx.models.connections import ties_of
 from cosserat_fenicsx.models.spatial import Damped, PlanarModel, SpatialModel
@@ -53,6 +55,7 @@ class MotionForms(CompiledForms):
         live_tangent: its derivative, where this is not part of the tangent; a tuple.
         kinetic, strain: energies of the state; dissipated: energy dissipated in the step.
         of_step, of_step_at_nodes: the two results of `virtual_work_of_step`, compiled, or None.
+        strain_change, strain_rate: of the six strains over the step, and their rates; or None.
     """
 
     momentum: object = None
@@ -63,6 +66,8 @@ class MotionForms(CompiledForms):
     live_tangent: tuple = ()
     of_step: object = None
     of_step_at_nodes: object = None
+    strain_change: object = None
+    strain_rate: object = None
 
 
 class StepForms:
@@ -176,7 +181,8 @@ class StepForms:
         found |= {name: found[name][0] for name in once}
         if working is None:
             found["live"] = found["residual"][1:]
-        step, step_at_nodes = compat.expressions(model.mesh, zip(of_step, (found["gauss"], model.nodes), strict=True))
+        pairs = list(zip(of_step, (found["gauss"], model.nodes), strict=True))
+        _, (step, step_at_nodes) = together(model, [], pairs)
         return MotionForms(**found, of_step=step, of_step_at_nodes=step_at_nodes)
 
 
@@ -262,7 +268,7 @@ class Moving(Damped):
 
     def _compile(self, spaces):
         self._motion_fields()
-        return self.scheme(self.step_forms(self))
+        return shared(self, [self.space], lambda: self.scheme(self.step_forms(self)))
 
     def _motion_fields(self):
         """Make the Functions that the forms need in addition to those of a `RodModel`."""

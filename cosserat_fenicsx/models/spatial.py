@@ -23,6 +23,7 @@ from cosserat_fenicsx.models.compiled import (
     action_work,
     along,
     compile_parts,
+    shared,
     measures,
     nonzero,
     section_of,
@@ -164,7 +165,7 @@ class CirculatoryModel(SpatialModel):
     """
 
     def _compile(self, spaces):
-        return CompiledForms(**compile_parts(self, {0: self._form(*spaces)}, {}, None))
+        return shared(self, spaces, lambda: CompiledForms(**compile_parts(self, {0: self._form(*spaces)}, {}, None)))
 
     def _form(self, rotations):
         """h with d omega(w, psi) = h(w, psi) - h(psi, w): h(w, psi) = D_w omega(psi) + omega(w x psi)/2, because the
@@ -239,8 +240,11 @@ class ResistingModel(Damped, CirculatoryModel):
     """A `SpatialModel` whose only form, stored as the second variation, is the virtual work of what resists small
     velocities: -d(virtual work)/d(velocities), of the viscous law and of all actions, at a state at rest."""
 
-    def _form(self, rotations):
+    def _compile(self, spaces):
         self._viscous_fields()
+        return super()._compile(spaces)
+
+    def _form(self, rotations):
         U, U_node, dx = self.state, compat.alias(self.state), measures(self)
         test, velocity = small_motion_of(ufl.TestFunction(rotations)), small_motion_of(ufl.TrialFunction(rotations))
         motion, section = self.motion_of(U, U_node), section_of(self)
