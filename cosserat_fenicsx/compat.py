@@ -316,8 +316,12 @@ def _compiled_one_by_one(forms, pairs):
     """(compiled, module, code) of each form and of each (UFL expression, points), which are in one module."""
     if not forms and not pairs:
         return []
-    found, module, code = _compiled("forms", forms, beside=pairs) if forms else _compiled("expressions", pairs)
-    return [(compiled, module, code) for compiled in found]
+    names = _names_of(pairs, "")
+    once = dict(zip(names, pairs, strict=True))  # those of two actions of one kind have one name, and are one code
+    beside = list(once.values())
+    found, module, code = _compiled("forms", forms, beside=beside) if forms else _compiled("expressions", beside)
+    made = dict(zip(once, found[len(forms) :], strict=True))
+    return [(compiled, module, code) for compiled in (*found[: len(forms)], *map(made.get, names))]
 
 
 def together(mesh, forms, expressions):

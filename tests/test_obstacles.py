@@ -167,6 +167,21 @@ def test_a_stiff_rope_on_a_bollard():
         cf.solve(scene, [ratio * (1 + 1e-3) - 1], elements=20, model="planar")
 
 
+def test_a_rod_on_two_rough_posts():
+    """Pulled along its axis by nearly all that both hold, each by its own coefficient; and by more."""
+    rod = cf.Rod(cf.Line((0, 0, 0), (2, 0, 0)), cf.Stiffness((1e6, 1e6), 1e6, (1e5, 1e5), 1e5, mass=1.0))
+    places = ((0.5, 0.2), (1.5, 0.4))
+    posts = [cf.Cylinder((x, 0, -0.11), (0, 1, 0), 0.1, friction=mu, contact_radius=0.01) for x, mu in places]
+    pull, held = cf.Force(rod.end, (0.3 * 2.0 * 9.81, 0, 0)), cf.Spring(rod.start, rotational=1e-3)  # its spin
+    scene = cf.Scene([rod], [], [*posts, held, cf.Weight(permanent=True), pull])
+    path = cf.solve(scene, [0.99], elements=20, model="planar")
+    for post in posts:
+        x, _, z = path.contacts(post).force[-1] / 9.81
+        assert z == pytest.approx(1.0, rel=1e-2) and 0.96 * post.friction < -x / z < 1.001 * post.friction
+    with pytest.raises(cf.NotConverged, match="Friction may not hold more"):
+        cf.solve(scene, [1.01], elements=20, model="planar")
+
+
 @pytest.mark.parametrize("friction, way", [(0.0, "move it upwards in one Stage"), (0.4, "sags: pull by a Force")])
 def test_a_slack_cable_that_is_pressed_is_told_another_way(friction, way):
     rod = cf.Rod(cf.Line((0, 0, 0), (100, 0, 0)), cf.Circle(0.05), cf.Material(E=1e9, nu=0.3, density=2000.0))

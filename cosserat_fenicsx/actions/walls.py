@@ -147,16 +147,15 @@ class Stage:
         self.anchor = self.last.copy()
 
 
+class TubeAxis(Part, family="axis of a tube", homes=("cosserat_fenicsx.well.path",)):
+    """Base of axes of tubes, with `nearest` as of `WellPath`, which scenes with walls store as data."""
+
+
 class _Confined(Pressing):
     """Shared by walls along rods and at stations."""
 
     scaled, wall_work = False, staticmethod(wall_work)
     traits = {"dead": False, "known_force": False, "rates": False, "turns": True, "flat": False}
-
-    def validate(self):
-        if not callable(getattr(self.path, "nearest", None)):
-            refuse(self, "path", self.path, "the axis of the tube, such as a WellPath")
-        super().validate()
 
     def data(self, rod, s):
         """See `Action`: as where the rod lies on the axis, to which the spring leads again."""
@@ -212,7 +211,7 @@ class TubeWall(_Confined, LineAction):
     """
 
     rod: RodOrName
-    path: object
+    path: TubeAxis
     radius: Annotated[float | Numbers, _LENGTHS]
     contact_radius: Annotated[float | Numbers, _LENGTHS]
     stiffness: WallStiffness = 1e9
@@ -301,7 +300,7 @@ class TubeRing(_Confined, PointAction):
     """
 
     station: StationOrName
-    path: object
+    path: TubeAxis
     clearance: Annotated[Length, at_least(0)]
     contact_radius: Length
     stiffness: Annotated[Stiffness, positive()] = 1e9

@@ -34,7 +34,8 @@ class Damping(Part):
 
     Kelvin-Voigt: to n and m are added Kt v_t and Jt u_t, the rates of the material strains, eqs. (2)-(3). A mode of a
     beam with the angular frequency omega decays as exp(-time omega^2 t/2). Drag: every section feels the force and the
-    moment -drag times its momentum and its angular momentum; modes decay as exp(-drag t/2).
+    moment -drag times its momentum and its angular momentum, and so do each `PointMass` at the rod and the mass of an
+    `AddedMass`; modes decay as exp(-drag t/2). For drag on the rod alone see `LinearDrag`.
 
     Args:
         time: s; Kt and Jt are `time` times the stiffnesses, and so are the couplings of a `Stiffness.matrix`.

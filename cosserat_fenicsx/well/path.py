@@ -18,6 +18,7 @@ from scipy.interpolate import CubicSpline
 
 from cosserat_fenicsx.checks import File, Numbers, finite_array, instance, refuse, store, warn
 from cosserat_fenicsx.errors import SceneError
+from cosserat_fenicsx.actions.walls import TubeAxis
 from cosserat_fenicsx.parts import Length, Number, Part, at_least, between
 from cosserat_fenicsx.units import deg_per_30m, foot
 from cosserat_fenicsx.well.survey import read_columns
@@ -32,7 +33,7 @@ Nearest = namedtuple("Nearest", "md position tangent curvature")
 
 
 @dataclass(frozen=True, eq=False)
-class WellPath(Part):
+class WellPath(TubeAxis):
     """The axis of a hole, of circular arcs and straight lines. Made by `from_survey`, `from_csv` or `from_xlsx`.
 
     Attributes:
