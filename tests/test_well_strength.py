@@ -310,6 +310,19 @@ def test_strength_limits_the_weight_on_bit_of_a_weak_string(well):
     assert use.largest == pytest.approx(1 / 1.1, rel=1e-3)
 
 
+def test_the_most_weight_on_bit_says_that_strength_leaves_out_compressed_pipe():
+    """Slender pipe buckles between its joints at pi^2 EI/(2 L)^2 = 43 kN, long before it does in its hole."""
+    path = W.WellPath.from_survey([0, 800, 1250, 2500], [0, 0, 90, 90], [0] * 4)
+    hole = W.Borehole(path, [W.HoleSection(2500.0, "6 in", 0.2)])
+    for spacing, joint, incomplete in ((9.45, "4.75 in", True), (None, "3.5 in", False)):
+        pipe = W.DrillPipe(size="3 1/2 in 13.30 lb/ft", tool_joint=joint, joint_spacing=spacing)
+        answer = W.torque_and_drag(
+            hole, W.DrillString([W.Bit("6 in"), pipe]), W.RotaryDrilling(1e3, 0.0), mud=W.Mud(1200.0), model="soft"
+        )
+        most = answer.most_weight_on_bit("S135")
+        assert most.weight > 6e4 and most.incomplete == incomplete == ("NOT KNOWN" in str(most))
+
+
 @pytest.mark.slow
 def test_the_most_weight_on_bit_of_the_rod():
     """A pipe above its bit in a straight hole without friction: it buckles at Dawson and Paslay's load; or yields where

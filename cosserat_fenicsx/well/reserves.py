@@ -15,6 +15,7 @@ from cosserat_fenicsx.results.result import Result, by_name
 from cosserat_fenicsx.well.buckled import LockUp, buckled_string
 from cosserat_fenicsx.well.pieces import sections_of
 from cosserat_fenicsx.well.softstring import chain_of, soft_string
+from cosserat_fenicsx.well.strength import MODES, UNKNOWN
 from cosserat_fenicsx.well.utilisation import Utilisation, strengths_of
 
 _PARTS, _LIMITS = ("component",), ("limit",)
@@ -117,6 +118,8 @@ class MostWeightOnBit(Result):
         counts: (limits,) whether it counts: the kind of buckling that was not asked for does not.
         model: "soft", "buckled", or "rod", of which the first limit alone is known, NaN elsewhere, with a weight within
             it and at most 0.4 % below it, 4 % where beyond it no equilibrium was found.
+        incomplete: whether strength leaves out pipe whose bending between its tool joints is not known, in compression;
+            see `Utilisation`.
     """
 
     limits: np.ndarray
@@ -127,6 +130,7 @@ class MostWeightOnBit(Result):
     operation: str
     safety: float
     model: str = "buckled"
+    incomplete: bool = False
 
     _rows_axis = "limit"
     _quantities = by_name(
@@ -166,6 +170,11 @@ class MostWeightOnBit(Result):
             f"{self.operation}: at most {self._told('weight', units, form='.4g')} on bit, limited by "
             f"{self.limit}{where}; strength with a safety factor of {self.safety:g}."
         )
+        if self.incomplete:
+            yield (
+                "NOT KNOWN: how much compressed pipe bends between its tool joints, which strength leaves out: see "
+                "`utilisation` at this weight."
+            )
         if self.model == "rod":
             yield "By the exact rod in contact. '-': not reached up to this weight, and not looked for beyond it."
         else:
@@ -231,7 +240,7 @@ def most_weight_of(answer, grade, wear, safety, buckling, model, progress=None):
     limits, weights, md, counts = map(np.array, zip(*rows, strict=True))
     place = np.searchsorted(least.md, md).clip(max=len(least.md) - 1)
     part = np.where(np.isnan(md), "", least.value("component_name")[place])
-    return MostWeightOnBit(limits, weights, md, part, counts, answer.operation.name, safety)
+    return _told(answer, strengths, MostWeightOnBit(limits, weights, md, part, counts, answer.operation.name, safety))
 
 
 def _by_rod(answer, start, strengths, safety, buckling, progress):
@@ -262,9 +271,16 @@ def _by_rod(answer, start, strengths, safety, buckling, progress):
     md = high[1][first][1]
     reached = np.where(of_first, md, np.nan)
     part = answer.value("component_name")[min(np.searchsorted(answer.md, np.nan_to_num(md)), len(answer.md) - 1)]
-    return MostWeightOnBit(np.array(names), np.where(of_first, low[0], np.nan), reached,
-                           np.where(of_first & ~np.isnan(reached), part, ""), np.full(len(names), True),
-                           answer.operation.name, safety, "rod")  # fmt: skip
+    return _told(answer, strengths, MostWeightOnBit(
+        np.array(names), np.where(of_first, low[0], np.nan), reached, np.where(of_first & ~np.isnan(reached), part, ""),
+        np.full(len(names), True), answer.operation.name, safety, "rod",
+    ))  # fmt: skip
+
+
+def _told(answer, strengths, most):
+    """A `MostWeightOnBit` that knows whether it is incomplete, by the tension of the soft string."""
+    use = Utilisation(_solved(answer, "soft", most.weight), strengths)
+    return replace(most, incomplete=bool((use.contact_mode == MODES[UNKNOWN]).any()))
 
 
 def _between(low, high, above):
