@@ -28,10 +28,18 @@ from cosserat_fenicsx.scene.supports import InitialVelocity, Joint, Support
 
 # Largest load over the largest EA, and over EI/L^2 where a rod's EA is infinite: beyond, rounding errors dominate.
 _MOST_STRAIN, _MOST_BENDING = 1e6, 1e15
+# Largest load over EA where Young's modulus is doubted: of metals, and of others.
+_MOST_OF_METAL, _MOST_OF_SOFT = 0.02, 10.0
 # Largest prescribed displacement over the longest rod, and largest prescribed rotation, rad.
 _MOST_MOTION = 1e6
 # Samples of a distributed load along a rod.
 _SAMPLES = 9
+# Young's moduli below this, Pa, are probably mistakes in units; of materials of these densities, kg/m^3, below this.
+_SOFTEST, _RUBBER, _SOFTEST_RUBBER = 1e6, (900.0, 1500.0), 1e4
+# Densities, kg/m^3, and moduli, Pa, of steel and cast iron; rolled profiles are of these.
+_STEEL, _METAL = (7000.0, 8200.0), (5e10, 5e11)
+_ROUNDING = "beyond which rounding errors dominate"
+_UNITS = 'are the units SI (N, m, Pa; steel has 210e9, or "210 GPa")'
 
 #: share: the size over the largest one allowed; scaled: whether the load factor multiplies it; words: text that gives
 #: the load or support and its size; most: the largest size allowed, as text.
@@ -41,11 +49,13 @@ Magnitude = namedtuple("Magnitude", "share scaled words most")
 def magnitudes(scene):
     """The `Magnitude`s of the loads and prescribed motions of a scene."""
     length = max(rod.length for rod in scene.rods)
-    K, J = (max(float(getattr(rod.profile.range[1], name).max()) for rod in scene.rods) for name in "KJ")
-    most, limit = _MOST_STRAIN * K, f"{_MOST_STRAIN:g} EA = {_MOST_STRAIN * K:.3g} N"
-    if np.isinf(K):
-        most = _MOST_BENDING * J / length**2
-        limit = f"{_MOST_BENDING:g} EI/L^2 = {most:.3g} N"
+    K, J = ([float(getattr(rod.profile.range[1], name).max()) for rod in scene.rods] for name in "KJ")
+    most, k = max((size * _doubted(rod)[1], k) for k, (size, rod) in enumerate(zip(K, scene.rods, strict=True)))
+    doubt, strain = _doubted(scene.rods[k])
+    limit = f"{strain:g} EA = {most:.3g} N, {f'where {doubt}' if strain < _MOST_STRAIN else _ROUNDING}"
+    if np.isinf(most):
+        most = _MOST_BENDING * max(J) / length**2
+        limit = f"{_MOST_BENDING:g} EI/L^2 = {most:.3g} N, {_ROUNDING}"
     found = []
     for load in scene.loads:
         if load.scaled or load.permanent:
@@ -56,8 +66,25 @@ def magnitudes(scene):
             moves = [getattr(now, name, None) for now in _sampled(support, scene.horizon)]
             size = max((float(np.linalg.norm(move)) for move in moves if move is not None), default=0.0)
             words = f"{describe(support)}: a {name} of {size:.3g} {unit}"
-            found.append(Magnitude(size / most, True, words, f"{most:.3g} {unit}"))
+            found.append(Magnitude(size / most, True, words, f"{most:.3g} {unit}, {_ROUNDING}"))
     return tuple(found)
+
+
+def _doubted(rod):
+    """Why a rod's Young's modulus may be in wrong units, or "", and the largest load over EA that is plausible then."""
+    if rod.material is None:
+        return "", _MOST_STRAIN
+    E, density = rod.material.E, rod.material.density
+    metal = f"of a material of {density:g} kg/m^3" if _STEEL[0] <= (density or 0) <= _STEEL[1] else ""
+    if isinstance(rod.section_at(0.0), Profile):
+        metal = metal or "of a rolled profile"
+    if metal and not _METAL[0] <= E <= _METAL[1]:
+        low = E < _METAL[0]
+        told = f"E = {E:g} Pa {metal} is {'less' if low else 'more'} than that of steel or cast iron"
+        return told, _MOST_OF_METAL if low else _MOST_STRAIN
+    if E < (_SOFTEST_RUBBER if _RUBBER[0] <= (density or 0) <= _RUBBER[1] else _SOFTEST):
+        return f"E = {E:g} Pa is softer than most rubbers", _MOST_OF_SOFT
+    return "", _MOST_STRAIN
 
 
 def _sampled(item, until):
@@ -86,10 +113,7 @@ def check_magnitudes(scene, load_factor):
         factor = abs(load_factor) if scaled else 1.0
         if share * factor > 1:
             times = f" times the load factor {factor:g}" if factor != 1 else ""
-            raise SceneError(
-                f"{words}{times}: expected at most {most}, beyond which rounding errors dominate. Are the units SI "
-                "(N, m, Pa)?"
-            )
+            raise SceneError(f"{words}{times}: expected at most {most}: {_UNITS}?")
 
 
 def check_tensions(scene, load_factors, leg=None):
@@ -105,12 +129,8 @@ def check_tensions(scene, load_factors, leg=None):
                 )
 
 
-# Young's moduli below this, Pa, are probably mistakes in units; of materials of these densities, kg/m^3, below this.
-_SOFTEST, _RUBBER, _SOFTEST_RUBBER = 1e6, (900.0, 1500.0), 1e4
 # Places along a rod at which tendons are compared with its surface.
 _ALONG_TENDON = 33
-# Densities, kg/m^3, and moduli, Pa, of steel and cast iron; rolled profiles are of these.
-_STEEL, _METAL = (7000.0, 8200.0), (5e10, 5e11)
 # Solid bars of metal that are thicker, m, are probably given in mm.
 _THICKEST = 1.5
 # Rolled profiles that are longer, over their heights, are probably given in mm.
@@ -402,21 +422,8 @@ class Scene(Part):
 
     def _softness(self):
         """Warnings about Young's moduli that may be in wrong units."""
-        asked = {}
-        for rod in self.rods:
-            if rod.material is not None:
-                E, density = rod.material.E, rod.material.density
-                steel = f"of a material of {density:g} kg/m^3" if _STEEL[0] <= (density or 0) <= _STEEL[1] else ""
-                if isinstance(rod.section_at(0.0), Profile):
-                    steel = steel or "of a rolled profile"
-                if steel and not _METAL[0] <= E <= _METAL[1]:
-                    asked[E] = f"{steel} is {'less' if E < _METAL[0] else 'more'} than that of steel or cast iron"
-                elif E < (_SOFTEST_RUBBER if _RUBBER[0] <= (density or 0) <= _RUBBER[1] else _SOFTEST):
-                    asked[E] = "is softer than most rubbers"
-        return [
-            f'E = {E:g} Pa {why}: are the units SI (N, m, Pa; steel has 210e9, or "210 GPa")?'
-            for E, why in sorted(asked.items())
-        ]
+        asked = {doubt: rod.material.E for rod in self.rods if (doubt := _doubted(rod)[0])}
+        return [f"{doubt}: {_UNITS}?" for doubt in sorted(asked, key=asked.get)]
 
     def _thickness(self):
         """Warnings about dimensions that may be in wrong units."""
