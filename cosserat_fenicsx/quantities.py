@@ -378,3 +378,11 @@ def size_of(where, unit, dimension):
     if not isinstance(unit, str) or unit not in known:
         raise SceneError(f"{where} = {unit!r}: {nearest(unit, [name for name in known if name.isalpha()])}")
     return known[unit]
+
+
+def length_unit_of(given):
+    """The unit of length of text, such as "500 ft", or of a size (m); "m" where there is none."""
+    if isinstance(given, str):
+        found = _VALUE.match(given)
+        return found[2] if found and found[2] in _LENGTHS else "m"
+    return next((name for name, size in _LENGTHS.items() if math.isclose(size, given, rel_tol=1e-5)), "m")

@@ -168,6 +168,8 @@ def test_a_survey_from_a_workbook(tmp_path):
     ("md,azim,azimuth,inc\n0,0,0,0\n10,5,5,20", {}, "no column 'azi' in"),
     ("0,0,0\n10,5,20\n", {}, "expected a row of names, such as"),
     ("md,inc,azi\n0,0,0\n", {}, "1 stations below the row of names"),
+    ("MD (ft),inc,azi\n0,0,0\n9000,1,2\n8530.5,1,2", {}, r"md\[2\] = 8530.5: expected more .* before, 9000 ft"),
+    ("md,inc,azi\n30,0,0\n100,5,20", {"length_unit": "ft"}, r"md\[0\] = 30.0: expected 0 ft"),
 ])  # fmt: skip
 def test_files_that_are_refused(text, given, words, tmp_path):
     (tmp_path / "survey.csv").write_text(text, encoding="utf-8")
@@ -188,6 +190,7 @@ def test_files_that_are_refused(text, given, words, tmp_path):
     ([0], [0], [0], None, "at least two stations"),
     ([0, 1, 2], [0, 9], [0, 0], None, "3 numbers"),
     ([0, 100, 200], [0, 90, 90], [0, 0, 180], None, "turns by 180 degrees between md = 100 and 200 m"),
+    (["0 ft", "100 ft", "90 ft"], [0, 5, 9], [0, 9, 9], None, r"md\[2\] = 90.0: expected more .* before, 100 ft"),
 ])  # fmt: skip
 def test_surveys_that_are_refused(md, inc, azi, degrees, words):
     with pytest.raises(cf.SceneError, match=words):

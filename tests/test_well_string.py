@@ -186,7 +186,7 @@ def test_the_soft_string_says_what_it_leaves_out():
     (lambda: drag(cf.well.TripOut(), string=cf.well.DrillString([cf.well.Collar(3000, "NC46-65")])),
      "500 m above the surface"),
     (lambda: drag(cf.well.TripOut(), hole=cf.well.Borehole(PATH, cf.well.HoleSection(2500, 0.15, 0))),
-     "bit: 0.2159 m wide"),
+     r"bit: 0.2159 m \(8.5 in\) wide at md = .* the hole there, 0.15 m \(5.9055 in\)"),
     (lambda: drag(cf.well.TripOut(), model="rod?"), "torque_and_drag.model = 'rod.'"),
     (lambda: drag(cf.well.TripOut(), torque_convention="none"), "'coulomb' or 'johancsik'"),
     (lambda: drag(cf.well.TripOut), "expected an operation, such as TripOut"),
@@ -335,7 +335,7 @@ def test_field_units(text, dimension, value):
     ("tol = 2e-2", 'model = "rod"\ntorque_convention = "johancsik"', "the law that the rod in contact follows"),
     ("tol = 2e-2", 'torque_convention = "api"', "expected 'coulomb' or 'johancsik'"),
     ("friction = [0.1, 0.2, 0.3]", "friction = [[0.1, 0.2, 0.3]]", "a number, or 2, one for each section"),
-    ('"Bit", diameter = "8.5 in"', '"Bit", diameter = "8.75 in"', "bit: 0.22225 m wide"),
+    ('"Bit", diameter = "8.5 in"', '"Bit", diameter = "8.75 in"', "bit: 0.22225 m .8.75 in. wide"),
     ("[string]", '[string]\norder = "top down"', "bit, fills up; where the list .* order='bit up'"),
     ("tol = 2e-2", "tol = 2e-2\nelements = 4", "unknown key 'elements'"),
 ])  # fmt: skip

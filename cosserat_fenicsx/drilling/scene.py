@@ -216,7 +216,7 @@ class Drilling(InWords, Part):
     @cached_property
     def laid(self) -> list:
         """The components in their places, from the bit up."""
-        return self.string.laid(self.bit_depth)
+        return self.string.laid(self.bit_depth, str if self.hole is None else self.hole.path.told)
 
     @cached_property
     def fluids(self) -> Mud | None:

@@ -587,8 +587,9 @@ class DrillString(InWords, Part):
             weight = units.told(place.weight_in(mud), "N/m", "force per length", ".2f", "N/m")
             yield in_words(place.component, where, f"{weight} in mud", units)
 
-    def laid(self, depth):
-        """The components in their places with the lower end at a measured depth (m), from the bit up.
+    def laid(self, depth, told=str):
+        """The components in their places with the lower end at a measured depth (m), from the bit up; told: makes
+        messages of sentences with lengths in m, see `WellPath.told`.
 
         Raises:
             SceneError: the string is longer or shorter than the depth.
@@ -598,15 +599,15 @@ class DrillString(InWords, Part):
             top = 0.0 if part.length is None else bottom - part.length
             top = 0.0 if abs(top) < 1e-9 * depth else top
             if top < 0 or bottom <= 0:
-                raise SceneError(
+                raise SceneError(told(
                     f"DrillString: {part.name} reaches {-top:.6g} m above the surface at the depth {depth:.6g} m: "
                     "expected a string that is no longer; the uppermost component fills up where it has no length"
-                )
+                ))  # fmt: skip
             places.append(Laid(top, bottom, part))
             bottom = top
         if places[-1].top > 0:
-            raise SceneError(
+            raise SceneError(told(
                 f"DrillString: it ends {places[-1].top:.6g} m below the surface at the depth {depth:.6g} m: expected "
                 "an uppermost component without a length, which fills up"
-            )
+            ))  # fmt: skip
         return places

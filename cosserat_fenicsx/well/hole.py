@@ -13,7 +13,7 @@ from cosserat_fenicsx import units as constants
 from cosserat_fenicsx.actions.fluids import AddedMass, LinearDrag
 from cosserat_fenicsx.actions.walls import value_at
 from cosserat_fenicsx.checks import File, Numbers, doubt_width, number, positive, refuse, store, warn
-from cosserat_fenicsx.quantities import Units, in_si, size_of
+from cosserat_fenicsx.quantities import Units, in_si, length_unit_of, size_of
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.parts import Depth, Diameter, FileName, Friction, Number, Part, WallStiffness, at_least
 from cosserat_fenicsx.results.screen import InWords
@@ -145,11 +145,12 @@ class Borehole(InWords, Part):
             try:
                 rows = [(_depth(i, md, unit or 1.0), *angles) for i, (md, *angles) in enumerate(stations)]
                 md, inc, azi = np.array(rows, dtype=float).T
+                given = next((row[0] for row in stations if isinstance(row[0], str)), unit or 1.0)
             except (ValueError, TypeError, OverflowError) as problem:
                 if isinstance(problem, SceneError):
                     raise
                 refuse("Borehole", "stations", stations, "rows of three numbers: md, inclination, azimuth")
-            path = WellPath.from_survey(md, inc, azi, degrees)
+            path = WellPath.of_unit(md, inc, azi, degrees, length_unit_of(given))
         if tortuosity is not None:
             path = made_crooked(path, **tortuosity.arguments())
         return cls(path, sections, wall_stiffness)
@@ -166,13 +167,14 @@ class Borehole(InWords, Part):
         above = 0.0
         for section in self.sections:
             if section.to <= above:
-                raise SceneError(f"HoleSection.to = {section.to:g}: expected more than {above:g} m, the section above")
+                told = f"HoleSection.to = {section.to:g} m: expected more than {above:g} m, the section above"
+                raise SceneError(self.path.told(told))
             above = section.to
         if abs(self.path.length - above) > 1e-3 * self.length:
             ratio = max(self.path.length, above) * constants.foot / self.length
             feet = ": 3.28 times as deep, as feet are that are taken for metres" if abs(ratio - 1) < 0.05 else ""
-            warn(f"Borehole: the survey ends at {self.path.length:.6g} m and the sections at {above:.6g} m; "
-                          f"the hole ends at the shallower one{feet}")  # fmt: skip
+            told = f"Borehole: the survey ends at {self.path.length:.6g} m and the sections at {above:.6g} m; "
+            warn(self.path.told(f"{told}the hole ends at the shallower one{feet}"))
 
     def sentences(self, units: Units) -> list[str]:
         """On its path and its sections, in some units."""

@@ -19,6 +19,7 @@ from scipy.interpolate import CubicSpline
 from cosserat_fenicsx.checks import File, Numbers, finite_array, instance, refuse, store, warn
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.actions.walls import TubeAxis
+from cosserat_fenicsx.quantities import Units, length_unit_of, size_of
 from cosserat_fenicsx.parts import Length, Number, Part, at_least, between
 from cosserat_fenicsx.units import deg_per_30m, foot
 from cosserat_fenicsx.well.survey import read_columns
@@ -44,9 +45,10 @@ class WellPath(TubeAxis):
         dogleg: (n - 1,) angle between the tangents at both ends of each section, rad.
         dogleg_severity: (n - 1,) dogleg per length, rad/m: over `units.deg_per_30m` in degrees per 30 m.
         crooked: the `Tortuosity` by which `tortuosity` made it from a plan, or None.
+        unit: the unit of length of its survey, which messages have.
     """
 
-    crooked = None
+    crooked, unit = None, "m"
 
     md: np.ndarray
     inclination: np.ndarray
@@ -85,7 +87,19 @@ class WellPath(TubeAxis):
             SceneError: fewer than two stations, numbers that are missing or out of their range, depths that do not
                 ascend from 0, or two stations of opposite directions, between which no arc is defined.
         """
-        return cls(*checked_survey(md, inc, azi, degrees))
+        texts = [x for x in md if isinstance(x, str)] if isinstance(md, list | tuple) else []
+        return cls.of_unit(md, inc, azi, degrees, length_unit_of(texts[0] if texts else 1.0))
+
+    @classmethod
+    def of_unit(cls, md, inc, azi, degrees, unit):
+        """From measured depths (m) that were given in this unit."""
+        path = cls(*checked_survey(md, inc, azi, degrees, unit))
+        store(path, unit=unit)
+        return path
+
+    def told(self, text):
+        """A sentence with its lengths in the unit of the survey."""
+        return Units({"length": self.unit}).sentence(text)
 
     @classmethod
     def from_csv(
@@ -112,7 +126,7 @@ class WellPath(TubeAxis):
         Raises:
             SceneError: the file cannot be read, a column is missing or not of numbers; see also `from_survey`.
         """
-        return cls.from_survey(*read_columns("WellPath.from_csv", file, (md, inc, azi), degrees, length_unit))
+        return cls.of_unit(*read_columns("WellPath.from_csv", file, (md, inc, azi), degrees, length_unit))
 
     @classmethod
     def from_xlsx(
@@ -140,7 +154,7 @@ class WellPath(TubeAxis):
             SceneError: see `from_csv`; or the workbook cannot be read or has no such sheet.
             InstallationError: openpyxl is missing.
         """
-        return cls.from_survey(*read_columns("WellPath.from_xlsx", file, (md, inc, azi), degrees, length_unit, sheet))
+        return cls.of_unit(*read_columns("WellPath.from_xlsx", file, (md, inc, azi), degrees, length_unit, sheet))
 
     def position(self, md: float | Numbers) -> np.ndarray:
         """(..., 3) north, east, down at measured depths, m."""
@@ -262,7 +276,7 @@ class WellPath(TubeAxis):
         md = np.asarray(md, dtype=float)
         slack = 1e-9 * self.length
         if not ((md >= -slack) & (md <= self.length + slack)).all():
-            refuse("WellPath", "md", md, f"measured depths from 0 to {self.length:g} m")
+            refuse("WellPath", "md", md, self.told(f"measured depths from 0 to {self.length:g} m"))
         i = np.clip(np.searchsorted(self.md, md, side="right") - 1, 0, len(self.md) - 2)
         return i, md - self.md[i]
 
@@ -301,9 +315,10 @@ def _arc(sections, i, x):
 _FULL = math.radians(360)
 
 
-def checked_survey(md, inc, azi, degrees):
-    """Measured depths (m), inclinations and azimuths (rad) as arrays, see `WellPath.from_survey`."""
-    who = "WellPath"
+def checked_survey(md, inc, azi, degrees, given="m"):
+    """Measured depths (m), inclinations and azimuths (rad) as arrays, see `WellPath.from_survey`; messages have depths
+    in the unit in which they were given."""
+    who, length = "WellPath", size_of("WellPath", given, "length")
     instance(who, "degrees", degrees, (bool, type(None)), "True (degrees), False (radians) or None")
     columns = {}
     for name, values, unit in (("md", md, "m"), ("inc", inc, "degrees or radians"), ("azi", azi, "degrees or radians")):
@@ -313,16 +328,19 @@ def checked_survey(md, inc, azi, degrees):
         if len(columns[name]) != len(columns["md"]):
             refuse(who, name, values, f"{len(columns['md'])} numbers, as many as there are measured depths")
     md, inc, azi = columns.values()
+    told = [f"{depth:.10g}" for depth in md / length]
     if (np.diff(np.sort(md)) >= 1e-6).all() and (np.diff(md) < 0).any():
         i = int(np.argmax(np.diff(md) < 0)) + 1
         rows = "the surface down: sort the stations by depth"
-        refuse(who, f"md[{i}]", float(md[i]), f"more than the station before, {md[i - 1]:g} m, from {rows}")
+        refuse(who, f"md[{i}]", float(told[i]), f"more than the station before, {told[i - 1]} {given}, from {rows}")
     if md[0] != 0:
-        refuse(who, "md[0]", float(md[0]), "0 m: add the station (0, 0, azimuth) where the well starts vertically")
+        expected = f"0 {given}: add the station (0, 0, azimuth) where the well starts vertically"
+        refuse(who, "md[0]", float(told[0]), expected)
     if md[-1] > 1e6:
         refuse(who, "md[-1]", float(md[-1]), "at most 1e+06 m")
     for i in np.flatnonzero(np.diff(md) < 1e-6) + 1:
-        refuse(who, f"md[{i}]", float(md[i]), f"more than the station before, {md[i - 1]:g} m (ascending depths)")
+        before = f"more than the station before, {told[i - 1]} {given}"
+        refuse(who, f"md[{i}]", float(told[i]), f"{before} (ascending depths)")
     if degrees is not False:
         _doubt_degrees(inc, azi, degrees)
         inc, azi = np.radians(inc), np.radians(azi)
@@ -330,13 +348,13 @@ def checked_survey(md, inc, azi, degrees):
     for name, values, least, most in (("inc", inc, 0.0, math.pi), ("azi", azi, -_FULL, _FULL)):
         for i in np.flatnonzero((values < least) | (values > most * (1 + 1e-12))):
             refuse(who, f"{name}[{i}]", float(columns[name][i]),
-                   f"{least / one:g} to {most / one:.6g} ({unit}), at md = {md[i]:g} m")  # fmt: skip
+                   f"{least / one:g} to {most / one:.6g} ({unit}), at md = {told[i]} {given}")  # fmt: skip
     inc = np.minimum(inc, math.pi)
     # rounding errors would decide the plane of such an arc
     for i in np.flatnonzero(_curvatures(inc, azi, np.diff(md))[0] > math.pi - 1e-6):
         raise SceneError(
-            f"WellPath: the hole turns by 180 degrees between md = {md[i]:g} and {md[i + 1]:g} m: expected less (no "
-            "arc is defined by two opposite directions)"
+            f"WellPath: the hole turns by 180 degrees between md = {told[i]} and {told[i + 1]} {given}: expected less "
+            "(no arc is defined by two opposite directions)"
         )
     return md, inc, azi
 
@@ -398,7 +416,7 @@ def tortuosity(path: WellPath, amplitude: float | str, period: float | str, seed
     instance(given, "path", path, WellPath, "a WellPath")
     amplitude, period, seed = math.radians(given.amplitude), given.period, given.seed
     if period > path.length / 2:
-        refuse(given, "period", period, f"a length (m), at most half of the path's, {path.length / 2:g}")
+        refuse(given, "period", period, path.told(f"a length (m), at most half of the path's, {path.length / 2:g} m"))
     if path.length / period * _STATIONS > _MOST:
         expected = f"at least {path.length * _STATIONS / _MOST:.3g} m, for {_MOST} stations at most"
         refuse(given, "period", period, expected)

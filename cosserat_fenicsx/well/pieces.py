@@ -13,6 +13,7 @@ import numpy as np
 
 from cosserat_fenicsx.checks import instance, number, warn
 from cosserat_fenicsx.errors import SceneError
+from cosserat_fenicsx.units import inch
 from cosserat_fenicsx.well.components import DrillString, weight_in_mud
 from cosserat_fenicsx.well.hole import Borehole, Mud
 from cosserat_fenicsx.well.operations import Operation
@@ -172,11 +173,10 @@ def pieces_of(hole, string, operation, mud, depth):
     """The `Pieces` of a string whose lower end is at a measured depth (m), and its components in their places. Raises
     SceneError: a string that does not fit the hole: too long, too short, too wide, or a hole that ends above it."""
     if not 0 < depth <= hole.length * (1 + 1e-12):
-        raise SceneError(
-            f"torque_and_drag: depth = {depth:.10g} m: expected a measured depth in the hole, which ends at "
-            f"{hole.length:.10g} m (survey {hole.path.length:.10g} m, sections {hole.sections[-1].to:.10g} m)"
-        )
-    laid = string.laid(depth)
+        told = f"torque_and_drag: depth = {depth:.10g} m: expected a measured depth in the hole, which ends at "
+        told += f"{hole.length:.10g} m (survey {hole.path.length:.10g} m, sections {hole.sections[-1].to:.10g} m)"
+        raise SceneError(hole.path.told(told))
+    laid = string.laid(depth, hole.path.told)
     if mud is not None:
         mud.doubt_depths(hole.length, depth)
     ends = [place.top for place in laid]
@@ -224,15 +224,19 @@ def down_along(t, n, angle):
     return t * cos - n * sin, n * cos + t * sin
 
 
+def _across(diameter):
+    return f"{diameter:g} m ({diameter / inch:.5g} in)"
+
+
 def _check_widths(hole, laid):
     above = 0.0
     for section in hole.sections:
         for place in laid:
             wide = 2 * place.component.contact_radius
             if place.bottom > above and place.top < section.to and wide > section.diameter * (1 + 1e-9):
+                where = f"{max(above, place.top):g} to {min(section.to, place.bottom):g} m"
                 raise SceneError(
-                    f"{place.component.name}: {wide:g} m wide at md = {max(above, place.top):g} to "
-                    f"{min(section.to, place.bottom):g} m: expected at most the diameter of the hole there, "
-                    f"{section.diameter:g} m"
+                    f"{place.component.name}: {_across(wide)} wide at md = {hole.path.told(where)}: expected at most "
+                    f"the diameter of the hole there, {_across(section.diameter)}"
                 )
         above = section.to

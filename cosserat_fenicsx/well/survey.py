@@ -15,7 +15,7 @@ import numpy as np
 
 from cosserat_fenicsx import checks, units
 from cosserat_fenicsx.checks import bytes_of, instance, positive, text_of, warn
-from cosserat_fenicsx.quantities import size_of
+from cosserat_fenicsx.quantities import length_unit_of, size_of
 from cosserat_fenicsx.errors import SceneError, nearest
 from cosserat_fenicsx.results.result import import_library
 
@@ -51,9 +51,9 @@ _SPELT = (
 
 
 def read_columns(who, file, names, degrees, length_unit, sheet=None):
-    """Three columns of a survey in a file: depths (m), inclinations, azimuths; and its `degrees`. who:
-    "WellPath.from_csv" or "WellPath.from_xlsx", which decides how the file is read, and has the arguments; names: of
-    the columns of measured depth, inclination and azimuth."""
+    """Three columns of a survey in a file: depths (m), inclinations, azimuths; its `degrees`, and the unit of depths
+    there. who: "WellPath.from_csv" or "WellPath.from_xlsx", which decides how the file is read, and has the arguments;
+    names: of the columns of measured depth, inclination and azimuth."""
     workbook = who == "WellPath.from_xlsx"
     file = Path(
         instance(who, "file", file, str | os.PathLike, f"the name of {'an .xlsx' if workbook else 'a .csv'} file")
@@ -93,8 +93,9 @@ def read_columns(who, file, names, degrees, length_unit, sheet=None):
                 f"{file}: '{heading[column].strip()}': unit '{unit}' is not known: expected {', '.join(known)}; or say "
                 f"it by {field}"
             )
-    depth = depth * _length_unit(who, file, heading[columns[0]], says[0], length_unit, depth.max())
-    return depth, inclination, azimuth, _degrees(file, [heading[x] for x in columns[1:]], says[1:], degrees)
+    unit = _length_unit(who, file, heading[columns[0]], says[0], length_unit, depth.max())
+    degrees = _degrees(file, [heading[x] for x in columns[1:]], says[1:], degrees)
+    return depth * unit, inclination, azimuth, degrees, length_unit_of(unit)
 
 
 def _sheet_of(who, file, sheet):
