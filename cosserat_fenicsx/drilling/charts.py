@@ -14,15 +14,15 @@ from cosserat_fenicsx.pictures.animation import MOST_FRAMES, check_name, frame_r
 from cosserat_fenicsx.pictures.charts import (
     COLOURS,
     STYLES,
-    arrange,
     chosen_unit,
+    draw_chart,
     empty_figure,
     ledger,
     legend,
+    logarithmic,
     room_for,
     scale,
     stacked,
-    styled,
     unit_of,
 )
 from cosserat_fenicsx.quantities import Quantity
@@ -430,7 +430,8 @@ def bounce_figure(answer):
     panel.axhline(weight / pressing, color="black", linestyle="--", label="static weight on bit")
     panel.fill_between(x, 0, 1, where=y > weight / pressing, transform=panel.get_xaxis_transform(), color="tab:red",
                        alpha=0.15, linewidth=0, label="the bit lifts off")  # fmt: skip
-    panel.set(xlabel=along, ylabel=across, yscale="log", xlim=(x[0], x[-1]))
+    panel.set(xlabel=along, ylabel=across, xlim=(x[0], x[-1]))
+    logarithmic(panel)
     legend(panel)
     return figure
 
@@ -465,7 +466,7 @@ def response_figure(answer):
         panels[3].plot(f, np.abs(answer.drive_impedance[order]), "--", color="black", label=drive)
     panels[3].set_ylabel(f"impedance at the\nsurface ({unit})")
     for panel in (panels[0], *panels[2:]):
-        panel.set_yscale("log")
+        logarithmic(panel)
     if f[-1] > _DECADES * f[0] and np.ptp(np.diff(f)) > 1e-6 * f[-1]:
         panels[-1].set_xscale("log")
     legend(panels[2], panels[3])
@@ -525,8 +526,8 @@ class Stage:
     def __init__(self, history, speed):
         self._history, self._speed = history, speed
         self._along = moves_along(history)
-        with styled():
-            self._figure = self._constant_parts(history)
+        self._figure = draw_chart(lambda: self._constant_parts(history))
+        self._figure.set_layout_engine("none")  # found once: it would take half of the time of each frame
 
     def _constant_parts(self, history):
         figure = empty_figure(9.6, 6.0)
@@ -559,8 +560,6 @@ class Stage:
         self._now = over.axvline(0.0, color="black", linewidth=0.8)
         string.grid(visible=False)
         figure.suptitle(self._title(float(history.profile_times[0])))
-        arrange(figure)
-        figure.set_layout_engine("none")  # found once: it would take half of the time of each frame
         return figure
 
     def _shown(self):

@@ -39,6 +39,8 @@ _ENERGY, _DONE = Quantity("stored energy", unit="J"), Quantity("work, losses", u
 _UNACCOUNTED = Quantity("not accounted for", unit="J")
 # Lines of up to this many points have markers.
 _FEW = 40
+# Ranges of logarithmic axes, high over low, below which powers of ten are too few.
+_FEW_DECADES = 100
 # Energies below this share of the largest are not drawn.
 _LITTLE = 1e-9
 # Requested width in pixels, and units, of the current chart.
@@ -79,12 +81,12 @@ def asked(width=None, units="SI"):
         _units.reset(tokens[1])
 
 
-def _write(figure, file):
+def _write(figure, file, dpi=None):
     known = figure.canvas.get_supported_filetypes()
     if file.suffix.removeprefix(".") not in known:
         raise SceneError(f"{file}: expected a name that ends in .{', .'.join(sorted(known))}")
     picture = io.BytesIO()  # complete in memory first: a full disk leads matplotlib to other exceptions than OSError
-    figure.savefig(picture, format=file.suffix[1:], dpi=figure.dpi)
+    figure.savefig(picture, format=file.suffix[1:], dpi=dpi or figure.dpi)
     with replaced(file) as fresh:
         fresh.write_bytes(picture.getvalue())
 
@@ -184,6 +186,17 @@ def _in_columns(panel, names):
     lines = ["\n".join(textwrap.wrap(line, letters)) for line in names]
     longest = max(len(line) for text in lines for line in text.split("\n"))
     return lines, max(1, min(len(names), int(room / ((_LETTER * longest + 4) * size))))
+
+
+def logarithmic(panel):
+    """Make the vertical axis of a drawn panel logarithmic, with numbers between powers of ten where these are few."""
+    from matplotlib.ticker import LogFormatter
+
+    panel.set_yscale("log")
+    low, high = panel.get_ylim()
+    if high < _FEW_DECADES * low:
+        panel.yaxis.set_major_formatter(LogFormatter())
+        panel.yaxis.set_minor_formatter(LogFormatter(minor_thresholds=(math.inf, 0.5)))
 
 
 def ledger(times, stored, done, balance, title, about=""):
@@ -355,6 +368,6 @@ def draw_both(plot, file, comm=Alone):
     def write():
         for name, figure, pixels in figures:
             name.parent.mkdir(parents=True, exist_ok=True)
-            figure.savefig(name, dpi=pixels * figure.dpi)
+            _write(figure, name, pixels * figure.dpi)
 
     on_first(comm, write)

@@ -35,6 +35,8 @@ _WALL = "peru"
 # Minimum drawn radius over the extent of the drawing; the picture says which rods are enlarged.
 _SMALLEST_RADIUS = 1 / 120
 _FEW_RODS = 10  # most rods that are enlarged to it
+# Half the least thickness of flat sections, and their largest radius for its sake, over that of round ones.
+_FLAT, _BROAD = 0.35, 3.0
 # Pieces of a drawn rod: at most, at least, and of all rods together where these are many.
 _PIECES, _FEWEST_PIECES, _ALL_PIECES = 200, 12, 12_000
 
@@ -151,10 +153,11 @@ def _resampled(outline, corners):
 
 
 def thickening(body, size, rods=1):
-    """The factor by which the sections of a `Body`, or of anything with a `radius` (m), are enlarged in a drawing of
-    extent `size`, m, with a number of rods: less where they would hide each other."""
+    """The factor by which the sections of a `Body` are enlarged in a drawing of extent `size`, m, with a number of
+    rods: less where they would hide each other, more where they are flat, and could not be seen from the side."""
     smallest = size * _SMALLEST_RADIUS / max(1.0, math.sqrt(rods / _FEW_RODS))
-    return max(1.0, smallest / body.radius)
+    thin = float(np.ptp(body.outline, axis=1).min()) / 2
+    return max(1.0, smallest / body.radius, min(_FLAT * smallest / thin, _BROAD * smallest / body.radius))
 
 
 def points_of(body, factor):

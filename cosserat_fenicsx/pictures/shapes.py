@@ -33,6 +33,8 @@ _WIDTH, _HEIGHTS, _TITLE, _LINE = 640, (560, 680), 90, 38
 _STEEPEST = 1.0
 # Largest displacement in a picture, over the structure's size, that could not be seen; least share of it that moves.
 _SEEN, _MOVES = 0.02, 0.2
+# Displacement of a rod over its length and its rotation, below which it only twists.
+_IN_PLACE = 0.01
 # Memory for frames of a film, which are drawn once, bytes.
 _MEMORY = 200_000_000
 # Phases, as exp(i phase), that a picture has to hold.
@@ -88,17 +90,24 @@ class Drawn:
         size = float(np.ptp(np.concatenate(self.lines), axis=0).max())
         moved, turned = (np.linalg.norm(found.shapes[k, :, part], axis=1).max() for part in (slice(0, 3), slice(3, 6)))
         self.factor = min(amplitude * size / (moved or 1e-300), _STEEPEST / (turned or 1e-300))
-        self._by_turning = found.twists(k)
-        self._peak = turned if self._by_turning else moved
-        if self._by_turning:
+        share = self.factor * moved / size
+        self.by_turning = found.twists(k) or (share < _SEEN and self._turns_in_place())
+        self._peak = turned if self.by_turning else moved
+        if self.by_turning:
             angle = math.degrees(math.atan(self.factor * turned))
             self.note = f"largest rotation drawn as {angle:.0f} degrees"
         else:
-            share = self.factor * moved / size
             self.note = f"largest displacement drawn as {100 * share:.2g} % of the structure's size"
-        self._unseen = not self._by_turning and share < _SEEN
+        self._unseen = not self.by_turning and share < _SEEN
         if self._unseen:
             self.note += ", around the rods that move"
+
+    def _turns_in_place(self):
+        """Whether the rod that turns most turns about its own axis, which hardly moves."""
+        sizes = [[np.linalg.norm(motion[:, part], axis=1).max() for part in (slice(0, 3), slice(3, 6))]
+                 for motion in self._motions]  # fmt: skip
+        k = int(np.argmax([turned for _, turned in sizes]))
+        return sizes[k][0] < _IN_PLACE * sizes[k][1] * self._rest[k][0].length
 
     def bodies(self, share=1.0):
         """The `Body` of every rod, displaced by `share` of the amplitude, from -1 to 1, or exp(i phase) of a complex
@@ -108,7 +117,7 @@ class Drawn:
         for (rod, line, frames), whole in zip(self._rest, self._motions, strict=True):
             motion = np.real(share * whole)
             moved, turned = motion[:, :3], motion[:, 3:]
-            values = np.linalg.norm(turned if self._by_turning else moved, axis=1) / self._peak
+            values = np.linalg.norm(turned if self.by_turning else moved, axis=1) / self._peak
             directors = _turned(frames, self.factor * turned)
             made.append(body_of(rod, self._x, line + self.factor * moved, directors, values))
         return made
@@ -159,17 +168,17 @@ def _panels(found, shown, amplitude):
         seen = shape.shown(everywhere)
         bodies = shape.bodies()
         _add(plotter, pyvista, shape, bodies, seen)
-        text = f"{_filled(f'k = {k}: {found.label(k)}{_most_at(found, k)}', _WIDTH)}\n"
+        text = f"{_filled(f'k = {k}: {found.label(k)}{_most_at(found, k, shape)}', _WIDTH)}\n"
         text += _below(shape, bodies, seen, _WIDTH)
         plotter.add_text(text, position="upper_edge", color="black", font_size=11)
         frame(plotter, seen, panel=True)
     return plotter
 
 
-def _most_at(found, k):
-    """Where a mode moves most, in words; nothing of one rod alone."""
-    place, _ = found.farthest(k)
-    return f", most at {place}" if place is not None and len(found.scene.rods) > 1 else ""
+def _most_at(found, k, shape):
+    """Where a mode moves most, in words; nothing of one rod alone, or of rods that turn."""
+    shown = len(found.scene.rods) > 1 and not shape.by_turning
+    return f", most at {found.farthest(k)[0]}" if shown else ""
 
 
 def _height(everywhere):
@@ -228,7 +237,7 @@ class _Stage:
         self._plotter = stage(pyvista, size)
         self._surface, self._factors = _add(self._plotter, pyvista, self._shape, bodies, self._everywhere)
         below = _below(self._shape, bodies, self._everywhere, size[0])
-        text = f"{_head(found, size[0])}\nk = {k}: {found.label(k)}{_most_at(found, k)}\n{below}"
+        text = f"{_head(found, size[0])}\nk = {k}: {found.label(k)}{_most_at(found, k, self._shape)}\n{below}"
         self._plotter.add_text(text, position="upper_edge", color="black", font_size=10)
         frame(self._plotter, self._everywhere, panel=True)
         self.at = lru_cache(maxsize=max(1, _MEMORY // (3 * size[0] * size[1])))(self._draw)

@@ -127,10 +127,10 @@ class _Shapes:
     """One rod in all states shown, at arc lengths x (n,) over its length."""
 
     def __init__(self, result, rod, colours, x, shown):
-        self.name, self._outlines = rod.name, outlines(rod, x * rod.length)
-        self.radius = float(np.linalg.norm(self._outlines, axis=2).max())
+        self.name, self.outline = rod.name, outlines(rod, x * rod.length)
+        self.radius = float(np.linalg.norm(self.outline, axis=2).max())
         if rod.profile.constant:
-            self._outlines = self._outlines[:1]
+            self.outline = self.outline[:1]
         positions, turns, values = [], [], []
         for k in map(int, shown):
             line, directors = result.sample(k, rod, x)
@@ -152,8 +152,8 @@ class _Shapes:
             "name": self.name,
             "nodes": states.shape[1],
             "texels": states.shape[2] // 4,
-            "corners": self._outlines.shape[1],
-            "outline": floats(factor / size * self._outlines),
+            "corners": self.outline.shape[1],
+            "outline": floats(factor / size * self.outline),
             "rest": floats((self.rest - middle) / size),
             "states": floats(states),
         }

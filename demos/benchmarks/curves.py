@@ -26,5 +26,7 @@ def charted(xlabel, ylabel, lines, equal=False):
 
 
 def curve(file, lines, across, up):
-    """Draw {name: (x, y)} into a file: up to ten points as points, a name "" without legend; `across`, `up`: labels."""
-    charted(across, up, [(name or None, x, y, "o" if len(x) <= 10 else "-") for name, (x, y) in lines.items()])(file)
+    """Draw {name: (x, y)} into a file: up to ten points as points, up to sixty as points on a line; a name "" without
+    legend; `across`, `up`: labels."""
+    styles = {name: "o" if len(x) <= 10 else ".-" if len(x) <= 60 else "-" for name, (x, _) in lines.items()}
+    charted(across, up, [(name or None, x, y, styles[name]) for name, (x, y) in lines.items()])(file)
