@@ -193,7 +193,7 @@ def test_what_resists_velocities_is_left_out_of_undamped_modes_and_told():
 @pytest.mark.serial
 @pytest.mark.filterwarnings("ignore::cosserat_fenicsx.SceneWarning")
 def test_of_hundreds_of_negative_squares_only_the_lowest_are_looked_for(monkeypatch):
-    """A rod as heavy as one of steel with E = 210 Pa: the weight buckles it at every node, and all modes took minutes."""
+    """As of steel with E = 210 Pa: the weight buckles the rod at every node, and all these modes took minutes."""
     wanted, found = [], eigen.largest_of_operator
 
     def counted(operator, size, count, known):

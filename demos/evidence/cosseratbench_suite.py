@@ -10,7 +10,7 @@ of a solver; `solve` reads a scenario by its attributes alone, so that it needs 
 Rods are straight when free of stress and stay on the line between their ends until they are moved to where they start.
 Equilibria are solved as such, in one frame; motions begin with all nodes held where the scenario has them. What can
 touch something is reported as unsupported by the suite, for want of `ROD_CONTACT`, `CYLINDER_CONTACT` or
-`PLANE_CONTACT` of this adapter, which does not translate contacts to the package's `RodContact`, `Cylinder` and `Plane`.
+`PLANE_CONTACT` of this adapter, which does not translate contacts to `RodContact`, `Cylinder` and `Plane`.
 """
 
 import argparse
