@@ -76,6 +76,8 @@ def test_one_reading_far_off_does_not_move_the_friction():
     with pytest.warns(cf.SceneWarning, match=r"left out: the hook load \d+ N of trip in at 2600 m, \+1"):
         found = cf.well.calibrate_friction(hole, string, off, mud=cf.well.Mud(1200.0))
     assert found.kept.sum() == len(read) - 1 and found.friction == pytest.approx(clean.friction, abs=3e-3)
+    words = " ".join(found.details(units="field").split())
+    assert "klbf of trip in at 8530 ft" in words and "left out" in [x.get_label() for x in found.plot().axes[0].lines]
     with pytest.warns(cf.SceneWarning, match="misfit"):
         moved = cf.well.calibrate_friction(hole, string, off, mud=cf.well.Mud(1200.0), leave_out=False)
     assert abs(moved.friction[0] - clean.friction[0]) > 0.02

@@ -16,7 +16,7 @@ from typing import Annotated
 import numpy as np
 from numpy.polynomial import legendre
 
-from cosserat_fenicsx.checks import File, Numbers, Rows, positive, refuse, store, text_of, vector
+from cosserat_fenicsx.checks import File, Numbers, Rows, positive, refuse, store, text_of, vector, warn
 from cosserat_fenicsx.quantities import LARGEST
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.numerics import directors, gauss
@@ -513,6 +513,9 @@ class Arc(_Uniform):
 
     def validate(self):
         axis, out, radius = self._axis_and_arm("angle")
+        if abs(self.angle) > 2 * math.pi * (1 + 1e-9):
+            warn(f"Arc.angle = {self.angle:g} rad are {abs(self.angle) / (2 * math.pi):.3g} turns, one over the other: "
+                 f"{self.angle:g} degrees are '{self.angle:g} deg'; a Helix winds on")  # fmt: skip
         frame = start_frame(self, math.copysign(1, self.angle) * np.cross(axis, out), axis)
         self._wind(axis, self.angle, radius * abs(self.angle), frame)
 

@@ -340,7 +340,8 @@ def _points_named(where, names, sets):
     names = [names] if isinstance(names, str) else list(names)
     for name in names:
         if name not in sets:
-            raise SceneError(f"{where}: no points are named {name!r}: {_known(name, sets)}")
+            more = "" if sets else "; frame(mesh.points, edges, ...) takes numbers of points"
+            raise SceneError(f"{where}: no points are named {name!r}: {_known(name, sets)}{more}")
     return np.unique(np.concatenate([*(sets[name] for name in names), np.empty(0, dtype=int)])).astype(int)
 
 

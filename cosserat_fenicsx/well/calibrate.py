@@ -237,7 +237,7 @@ class FrictionFit(Charted):
         if np.isfinite(self.block_interval).all():
             low, high = (self._told("block_weight", units, x) for x in self.block_interval)
             yield f"block weight {self._told('block_weight', units)}, from {low} to {high}"
-        yield from (f"DOUBTFUL: {doubt}" for doubt in self.doubts)
+        yield from (f"DOUBTFUL: {units.sentence(doubt)}" for doubt in self.doubts)
 
     def _deviations(self, units):
         """The standard deviations of the readings in words, hook loads before torques."""
@@ -346,7 +346,7 @@ def calibrate_friction(
             *_causes(readings, found.residuals * sd, misfit, None if unknown_block else with_block),
         )
     if doubts:
-        warn(f"calibrate_friction: {'; '.join(doubts)}")
+        warn(hole.path.told(f"calibrate_friction: {'; '.join(doubts)}"))
     return FrictionFit(
         hole.with_friction(friction), friction, np.maximum(ends[:sections], 0.0), block,
         ends[-1] if unknown_block else np.full(2, np.nan), confidence, found.correlation,
@@ -401,15 +401,13 @@ def _check_determined(hole, sensitivity, unknown_block):
     least = _SET.singular * np.linalg.norm(sensitivity)
     silent = [name for name, size in zip(names, effects, strict=False) if size <= least]
     if silent:
-        raise SceneError(
-            f"calibrate_friction: no reading depends on friction of {' and '.join(silent)}: expected readings with "
-            "the string there, of hook loads up or down or of torques where it rotates"
-        )
+        told = f"calibrate_friction: no reading depends on friction of {' and '.join(silent)}: expected readings with "
+        told += "the string there, of hook loads up or down or of torques where it rotates"
+        raise SceneError(hole.path.told(told))
     _, sizes, rows = np.linalg.svd(sensitivity, full_matrices=False)
     if sizes[-1] > _SET.singular * sizes[0]:
         return
     open_ones = [name for name, share in zip(names, np.abs(rows[-1]), strict=True) if share > 0.1]
-    raise SceneError(
-        f"calibrate_friction: the measurements do not separate {' and '.join(open_ones)}: expected readings with "
-        "friction there, at several depths, and both up and down or rotating where block_weight is None"
-    )
+    told = f"calibrate_friction: the measurements do not separate {' and '.join(open_ones)}: expected readings with "
+    told += "friction there, at several depths, and both up and down or rotating where block_weight is None"
+    raise SceneError(hole.path.told(told))

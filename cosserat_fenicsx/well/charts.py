@@ -179,6 +179,11 @@ def fit_figure(fit):
                 panel.errorbar(measured, depth, xerr=sd, fmt="o", markersize=5, color=colour,
                                label=f"{operation.name}{on_bit}")  # fmt: skip
                 panel.plot(computed, depth, "-x", linewidth=1, color=colour)
+        out = [(x.value / size, x.at.depth / length) for (x, _), kept in zip(rows, fit.kept, strict=True)
+               if x.query == query and not kept]  # fmt: skip
+        if out:
+            panel.plot(*np.transpose(out), "o", color="white", markersize=3, markeredgecolor="black", label="left out",
+                       zorder=5)  # fmt: skip
         panel.plot([], [], "-x", color=GREY, linewidth=1, label="computed")
     legend(*panels, title="measured, with standard deviations", title_fontsize=8)
     told = [

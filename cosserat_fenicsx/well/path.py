@@ -98,8 +98,9 @@ class WellPath(TubeAxis):
         return path
 
     def told(self, text):
-        """A sentence with its lengths in the unit of the survey."""
-        return Units({"length": self.unit}).sentence(text)
+        """A sentence with its lengths in the unit of the survey; its loads in field units where these are feet."""
+        loads = {"force": "klbf", "moment": "ft-lbf"} if self.unit == "ft" else {}
+        return Units({"length": self.unit, **loads}).sentence(text)
 
     @classmethod
     def from_csv(
