@@ -190,13 +190,14 @@ def _in_columns(panel, names):
 
 def logarithmic(panel):
     """Make the vertical axis of a drawn panel logarithmic, with numbers between powers of ten where these are few."""
-    from matplotlib.ticker import LogFormatter
+    from matplotlib.ticker import LogLocator
 
     panel.set_yscale("log")
     low, high = panel.get_ylim()
     if high < _FEW_DECADES * low:
-        panel.yaxis.set_major_formatter(LogFormatter())
-        panel.yaxis.set_minor_formatter(LogFormatter(minor_thresholds=(math.inf, 0.5)))
+        panel.yaxis.set_minor_locator(LogLocator(subs=(2, 5)))
+        panel.yaxis.set_major_formatter("{x:g}")
+        panel.yaxis.set_minor_formatter("{x:g}")
 
 
 def ledger(times, stored, done, balance, title, about=""):

@@ -36,7 +36,7 @@ _WALL = "peru"
 _SMALLEST_RADIUS = 1 / 120
 _FEW_RODS = 10  # most rods that are enlarged to it
 # Half the least thickness of flat sections, and their largest radius for its sake, over that of round ones.
-_FLAT, _BROAD = 0.35, 3.0
+_FLAT, _BROAD = 0.35, 5.0
 # Pieces of a drawn rod: at most, at least, and of all rods together where these are many.
 _PIECES, _FEWEST_PIECES, _ALL_PIECES = 200, 12, 12_000
 
