@@ -6,6 +6,7 @@ import pickle
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -16,7 +17,7 @@ import cosserat_fenicsx as cf
 from cosserat_fenicsx import interrupts, progress
 from cosserat_fenicsx.cli import main as cli
 from cosserat_fenicsx.pictures.charts import asked
-from cosserat_fenicsx.pictures.drawing import colour_of, default_colour, known, peak_of, quantity, seen
+from cosserat_fenicsx.pictures.drawing import colour_of, default_colour, known, peak_of, quantity, seen, thickening
 from cosserat_fenicsx.pictures.plot import tangled
 from cosserat_fenicsx.pictures.shapes import Drawn
 from cosserat_fenicsx.pictures.signs import Resting, has_sign, loads_of, signs_of, without_sign
@@ -543,6 +544,30 @@ def test_a_twist_is_drawn_by_its_rotation():
     (k,) = (k for k in range(4) if found.twists(k))
     assert found.farthest(k) == (None, None)
     assert Drawn(found, k, 0.1).note == "largest rotation drawn as 45 degrees"
+
+
+@pytest.mark.serial
+def test_a_twist_is_drawn_as_such_where_another_rod_holds_it():
+    """The arm's end moves a little: the picture showed nothing but the arm."""
+    steel, k = cf.Material(E=200e9, nu=0.3, density=8000.0), 1e14
+    beam = cf.Rod(cf.Line((0, 0, 0), (10, 0, 0)), cf.Rectangle(2.0, 2.0), steel, name="beam")
+    arm = cf.Rod(
+        cf.Line((0, 0, 0), (0, 1, 0)), cf.Stiffness((k, k), k, (k, k), k, mass=1e-3, inertia=(1e-3,) * 3), name="arm"
+    )
+    supports = [cf.Pin(beam.start), *(cf.Roller(beam.end, x) for x in ((0, 1, 0), (0, 0, 1))),
+                cf.Roller(arm.end, (0, 0, 1))]  # fmt: skip
+    found = cf.modes(cf.Scene([beam, arm], supports, joints=[cf.Joint(beam.start, arm.start)]), 3, elements=2)
+    drawn = [Drawn(found, k, 0.1) for k in range(3)]
+    assert [shape.by_turning for shape in drawn] == [False, False, True] and not found.twists(2)
+    assert drawn[2].note == "largest rotation drawn as 45 degrees"
+
+
+def test_flat_sections_are_seen_from_the_side():
+    """Half the thickness over the extent; round sections are as they were."""
+    round_, flat = (SimpleNamespace(outline=np.array([[(-a, -b), (a, -b), (a, b), (-a, b)]]), radius=np.hypot(a, b))
+                    for a, b in ((1e-3, 1e-3), (1e-2, 5e-4)))  # fmt: skip
+    assert thickening(round_, 1.0) * round_.radius == pytest.approx(1 / 120)
+    assert 1 / 600 < thickening(flat, 1.0) * 5e-4 < 1 / 120 and thickening(flat, 1e-3) == 1.0
 
 
 @pytest.mark.serial

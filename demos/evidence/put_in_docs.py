@@ -12,6 +12,7 @@ narrow/.
 """
 
 import argparse
+import io
 import re
 from pathlib import Path
 
@@ -93,13 +94,15 @@ MANY = ("benchmarks",)
 WIDTH, COLOURS, MARGIN = 1100, 256, 12  # pixels, number, pixels
 NARROW = 800, 4000  # pixels, of a picture for narrow pages
 SMALL, FEW = 600, 96  # pixels, colours
+_LARGER = 1.6  # most that mixed colours may add to a file
 #: Pictures with more small texts than others, and their sizes in pixels.
 LARGE = {"failures.png": (1380, 1380)}
 
 
 def kept(picture, file, most=(WIDTH, WIDTH), colours=COLOURS):
     """Write the picture (.png) as the documentation keeps it: without white margins, at most 1100 pixels wide and high,
-    or `most` (width, height). Neighbouring colours of the palette are mixed, else bars of colours have bands."""
+    or `most` (width, height). Neighbouring colours of the palette are mixed, else bars of colours have bands; not where
+    large areas have one colour, which makes the file much larger."""
     image = Image.open(picture).convert("RGB")
     rows, columns = np.nonzero((np.asarray(image) < 250).any(axis=2))
     box = columns.min() - MARGIN, rows.min() - MARGIN, columns.max() + MARGIN, rows.max() + MARGIN
@@ -107,7 +110,12 @@ def kept(picture, file, most=(WIDTH, WIDTH), colours=COLOURS):
     image.thumbnail(most, Image.Resampling.LANCZOS)
     palette = image.quantize(colours, Image.Quantize.FASTOCTREE)
     palette.putpalette([255 if value > 252 else value for value in palette.getpalette()])  # white is kept white
-    image.quantize(palette=palette, dither=Image.Dither.FLOYDSTEINBERG).save(file, "PNG", optimize=True)
+    written = {}
+    for dither in (Image.Dither.NONE, Image.Dither.FLOYDSTEINBERG):
+        image.quantize(palette=palette, dither=dither).save(found := io.BytesIO(), "PNG", optimize=True)
+        written[dither] = found.getvalue()
+    plain, mixed = written.values()
+    Path(file).write_bytes(mixed if len(mixed) < _LARGER * len(plain) else plain)
 
 
 def main(names, out="out", docs=ROOT / "docs"):
