@@ -138,7 +138,8 @@ def _unknown_in_words(path):
     for field, what in (("axial_max", "Stresses"), ("von_mises", "Von Mises stresses")):
         names = [name for name, values in fields.items() if np.isnan(values[field]).any()]
         if names:
-            yield f"{what} of {some_of(names)} are not computed, or not everywhere: see the sections there."
+            why = "a rolled Profile has normal ones alone, and a section without a shape none"
+            yield f"{what} of {some_of(names)} are not computed, or not everywhere: {why}."
             fields = {name: values for name, values in fields.items() if name not in names}  # each is named once
 
 
