@@ -46,6 +46,25 @@ def test_kelvin_voigt_and_drag_of_the_rod_and_as_an_action():
     np.testing.assert_allclose(again.eigenvalues, found.eigenvalues, rtol=1e-6)
 
 
+@pytest.mark.serial
+def test_a_stepped_rod_with_a_tip_mass_and_an_oblique_dashpot(truth):
+    """Sections that jump and bend unequally, Kelvin-Voigt and drag, which slows the mass too; roots by shooting through
+    both pieces. Estimates are at least the errors."""
+    stiff = cf.Stiffness((400.0, 300.0), 900.0, (1.0, 1.7), 1.1, mass=1.0, inertia=(2e-3, 3e-3, 5e-3))
+    thin = cf.Stiffness((150.0, 200.0), 500.0, (0.3, 0.2), 0.25, mass=0.5, inertia=(5e-4, 8e-4, 1.3e-3))
+    line = cf.Line((0, 0, 0), (1 / 3, 2 / 3, 2 / 3), d1=(0, 0, 1))
+    rod = cf.Rod(line, [(0.4, stiff), (None, thin)], damping=cf.Damping(time=0.004, drag=0.3))
+    loads = [cf.PointMass(rod.end, 0.2, (1e-3, 2e-3, 4e-3)), cf.Dashpot(rod.end, 0.6, direction=(1, -1, 0.5))]
+    exact = np.array([-0.16300679749947 + 2.54459736318609j, -1.15101396950535 + 2.27582137351785j,
+                      -0.31769362175323 + 9.15127759601428j, -0.52712024055066 + 13.49579838223156j,
+                      -0.66811761783810 + 14.27488153712484j, -1.69541122766444 + 27.73836110697201j])  # fmt: skip
+    for tol, degree, most in ((1e-6, 4, 1e-8), (1e-2, 2, 1e-2)):
+        found = cf.modes(cf.Scene([rod], [cf.Clamp(rod.start)], loads), 6, tol=tol, degree=degree)
+        at = np.abs(found.eigenvalues[:, None] / exact - 1).argmin(axis=0)
+        truth(f"stepped rod with an oblique dashpot, degree {degree}", found.eigenvalues[at], exact, most)
+        assert (found.error[at] + 1e-10 > np.abs(found.eigenvalues[at] / exact - 1)).all()
+
+
 BECK = {
     10.0: [5.17578505732j, 18.5865406058j, 57.8508704062j],
     21.0: [-2.12520036617 + 10.9373182007j, 2.12520036617 + 10.9373182007j, 53.297504332j],
