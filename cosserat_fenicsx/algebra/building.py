@@ -30,7 +30,7 @@ from cosserat_fenicsx.errors import InstallationError
 
 SOURCES = tuple(
     Path(__file__).with_name(f"{name}.c")
-    for name in ("chain", "ties", "newton", "lanes", "sweep", "compared", "contact")
+    for name in ("chain", "ties", "newton", "lanes", "sweep", "compared", "wall_law", "contact")
 )
 # What -ffast-math would add hides numbers that are not finite, and changes sums. Python's own -fwrapv slows loops down.
 _FLAGS = ("-O3", "-fno-math-errno", "-ffp-contract=fast", "-fno-wrapv", "-fopenmp-simd", "-fvisibility=hidden", "-g0")

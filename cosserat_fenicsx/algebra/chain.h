@@ -104,24 +104,25 @@ typedef struct {
 /* Contact of nodes with the wall of a tube in a time step, whose nodes move linearly with the forces: see contact.c.
    All vectors are inertial. */
 typedef struct {
-    int nodes, reach, at_end, most; /* nodes that may touch; how many on each side of one its force moves; whether
+    int nodes, reach, at_end, most; /* nodes that may touch; how many on each side of one its force moves much; whether
                                        forces are those of the end of the step, not of its mean; sweeps */
     int lanes, positions;           /* LANES nodes are solved at once, or 1 where all are close: node i is the one at
                                        position i % positions in lane i / positions */
-    const int *points;              /* (nodes,) number of the point that a node is */
-    int coupled;                    /* points on each side of one that its force moves */
     const double *clearance, *stiffness, *friction, *damping, *arm; /* (nodes,); arm: radius of the rod's surface */
     double h, known_for;            /* the step, and that for which the compliance was found */
     double share, smallest;         /* changes that end the sweeps, of the first one and of all */
     double *tangent, *across, *start; /* (nodes, 3) of the tube, and an axis u across it, v = tangent x u; (nodes, 2)
                                        from the tube's axis to the rod at the start, by u and v */
-    float *compliance;              /* (positions, 4, 2 reach + 1, 4, LANES) by each unit force of a node the motion of
-                                       its neighbours, and of itself in the middle. Forces: along u and v, friction
-                                       along the tube, and round it its moment alone; motions: see `motion_of` */
-    float *turning;                 /* (positions, 4, 2 reach + 1, 2, LANES) by the same forces the rotations about u
-                                       and v */
-    double *motion, *forces, *earlier, *turned; /* (positions, 4, LANES) motions and forces of these kinds; forces
-                                       before the sweeps; (positions, 2, LANES) */
+    float *compliance;              /* (positions, 4, 6, LANES) by each unit force of a node its own motion. Forces:
+                                       along u and v, friction along the tube, and round it its moment alone; motions:
+                                       see `motion_of`, and rotations about u and v */
+    float *right, *left;            /* (positions, 6, 6, LANES) by each motion of the node before or after it, which
+                                       forces beyond cause, that of a node */
+    double *responses;              /* (nodes, 3, 6, 6) by each unit force or moment of a node the motions of the one
+                                       before, of its own and of the next */
+    double *motion, *forces, *late; /* (positions, 6, LANES) motions; (positions, 4, LANES) forces of these kinds, and
+                                       of their changes what later sweeps take along */
+    double passing[2][24];          /* (6, LANES) from lane to lane, to the right and to the left */
     double *walled;                 /* (positions, 10, LANES) work space, see contact.c */
     double *moved;                  /* (nodes, 6) displacement and rotation in the step with the forces */
     double *force, *law;            /* (nodes, 6) force and moment; (nodes, 3) normal force, friction round and along */
@@ -382,6 +383,7 @@ int iterate(stepping *s);
 void begin_contact(contact *c, const int *slots, int count, const double *away, const double *tangent);
 void unit_forces(const contact *c, int first, int apart, int component, double *forces);
 void keep_responses(contact *c, int first, int apart, int component, const double *q, const double *changes);
+void find_transfers(contact *c);
 void find_motion(contact *c, const double *now);
 int settle(contact *c);
 int broken(const contact *c);

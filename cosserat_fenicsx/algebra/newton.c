@@ -186,13 +186,14 @@ static int find_compliance(problem *p, const double *x)
     for (int i = 0; i < c->nodes; i++)
         for (int k = 0; k < 4; k++) q[4 * i + k] = c->now[7 * i + 3 + k] + c->fixed[7 * i + 3 + k];
     for (int first = 0; first < apart; first++)
-        for (int component = 0; component < 4; component++) {
+        for (int component = 0; component < 6; component++) {
             unit_forces(c, first, apart, component, forces);
             memset(c->load, 0, p->size * sizeof *c->load);
             add_forces(c, forces, 0, 1, c->load);
             if (solve(p, c->load, c->response) || at_nodes(p, c->response, 0, c->now)) return FAILED;
             keep_responses(c, first, apart, component, q, c->now);
         }
+    find_transfers(c);
     return 0;
 }
 

@@ -3,8 +3,8 @@
 Every Newton iteration has a tangent of the rods without contact, by whose inverse, the compliance, the nodes that may
 touch respond linearly to their forces. With it the laws of all nodes are solved exactly (algebra/contact.c) before the
 step is taken. So Newton's method sees smooth equations alone, whatever sticks, slips, touches or lifts off, and its
-tangent stays valid. Where many nodes may touch, the compliance couples neighbours alone; the next iteration corrects
-the rest.
+tangent stays valid. Along a rod forces on one side of a node move the other side by this node's motion alone, so that
+one matrix from node to node passes all of it on; what rods pass to each other otherwise the next iteration corrects.
 """
 
 import numpy as np
@@ -88,16 +88,18 @@ def motion_between(before, after):
     return np.concatenate([change[:, :3], turned[..., 0]], axis=1)
 
 
-# Number of nodes up to which the compliance is complete; of more, neighbours on each side that it couples.
+# Number of nodes up to which one is loaded at a time to find the compliance; of more, how far those that are loaded
+# together reach on each side.
 _FEW, _NEIGHBOURS = 16, 10
 # The compliance, which differs little from step to step, is updated where its relative error exceeds the second number
 # and this many times its smallest error. Responses below the third number (dimensionless) may be rounding.
 _WORSE, _MISSED, _ROUNDING = 10.0, 1e-3, 1e-9
-# Sweeps over the nodes: largest number, and changes of the motion that end them, over the first one (with a complete
-# compliance, and with that of neighbours alone, which the next iteration corrects) and dimensionless.
-_MOST, _SHARE, _OF_NEIGHBOURS, _SMALLEST = 200, 1e-6, 0.1, 1e-16
+# Sweeps over the nodes: largest number, and changes of the motion that end them, over the first one (of few nodes, and
+# of many, which the next iteration corrects) and dimensionless.
+_MOST, _SHARE, _OF_NEIGHBOURS, _SMALLEST = 200, 1e-6, 1e-3, 1e-16
 # Numbers of positions and of nodes in C, see `contact`.
-_OF_POSITIONS = {"motion": 4, "forces": 4, "earlier": 4, "turned": 2, "walled": 10}
+_OF_POSITIONS = {"motion": 6, "forces": 4, "late": 4, "walled": 10}
+_TRANSFERS = {"compliance": 4, "right": 6, "left": 6}
 _OF_NODES = "clearance", "stiffness", "friction", "damping", "arm", "multiplier"
 
 
@@ -117,8 +119,7 @@ class NodalContact(Pointers):
         self._slots_of_walls = np.split(self._slots.astype(np.int32), self._ends)
         self._origin = np.concatenate([np.tile(p.origin, (len(p.slots), 1)) for p in touched])[order]
         n, coupled = nodes.count, nodes.count - 1 if nodes.count <= _FEW else _NEIGHBOURS
-        # nodes at the same point have the same neighbours: how they share a force would matter otherwise
-        of, along = nodes.points, np.arange(n)
+        of, along = nodes.points, np.arange(n)  # nodes at the same point, as of two walls, count as one
         reach = int((np.searchsorted(of, of + coupled, side="right") - 1 - along).max())
         self._numbers = {name: np.zeros(n) for name in _OF_NODES}
         units = {"stiffness": scales.force / scales.length, "damping": model.time / scales.length}
@@ -131,12 +132,14 @@ class NodalContact(Pointers):
         positions = -(-n // lanes)
         work = {name: np.zeros((positions, size, self._lib.LANES)) for name, size in _OF_POSITIONS.items()}
         # of half the numbers' accuracy: it guides iterations, and its reading takes most of their time
-        self._compliance, self._turning = (
-            np.zeros((positions, 4, 2 * reach + 1, size, self._lib.LANES), dtype=np.float32) for size in (4, 2)
-        )
+        self._transfers = {
+            name: np.zeros((positions, size, 6, self._lib.LANES), dtype=np.float32) for name, size in _TRANSFERS.items()
+        }
         self._weaker = np.concatenate([np.full((len(p.slots), 2), p.weaker) for p in touched])[order]
         self._weaker[:, 1] *= model.time / scales.length
-        self._slip, self._slip_begun = np.full(n, np.nan), np.zeros(n)  # speeds of slip in the last step
+        # speeds of slip in the last step, where they decide on friction
+        self._weakens = bool((self._weaker[:, 0] != 1.0).any())
+        self._slip, self._slip_begun = np.full(n, np.nan if self._weakens else 0.0), np.zeros(n)
         self._begun, self._law_begun = (self._vectors[name].copy() for name in ("force", "law"))
         self._at_start = self.doubles(self._law_begun)
         self.c = contact = self._ffi.new("contact *")
@@ -145,11 +148,10 @@ class NodalContact(Pointers):
         contact.worse, contact.least, contact.rounding = _WORSE, _MISSED, _ROUNDING
         contact.exact, contact.rows = n <= _FEW, self.integers(nodes.rows)
         contact.lanes, contact.positions = lanes, positions
-        contact.points, contact.coupled = self.integers(of), coupled
         of_unknowns = {name: np.zeros(problem.numbering.size) for name in ("load", "response")}
-        contact.compliance = self._ffi.from_buffer("float[]", self._compliance)
-        contact.turning = self._ffi.from_buffer("float[]", self._turning)
-        arrays = {"fixed": nodes.fixed, **of_unknowns, **work}
+        for name, array in self._transfers.items():
+            setattr(contact, name, self._ffi.from_buffer("float[]", array))
+        arrays = {"fixed": nodes.fixed, "responses": np.zeros((n, 3, 6, 6)), **of_unknowns, **work}
         for name, array in {**self._numbers, **self._vectors, **arrays}.items():
             setattr(contact, name, self.doubles(array))
         contact.known_for, contact.stale, contact.usual, contact.missing = np.nan, True, np.inf, 1.0
@@ -171,18 +173,23 @@ class NodalContact(Pointers):
             numbers["clearance"][at], numbers["arm"][at] = tube.clearance / scales.length, tube.arm / scales.length
             numbers["friction"][at] = tube.friction
         self.c.h = h
+        if self._weakens:
+            self._weaken(h, now)
+        if not abs(h - self.c.known_for) <= 1e-9 * h:
+            self.c.stale = True
+        self._begun[:], self._law_begun[:] = vectors["force"], vectors["law"]
+
+    def _weaken(self, h, now):
+        """Take the coefficients of friction by the slip in the last step."""
         if np.isnan(self._slip).any():  # the first step
             velocity = self._nodes.of_local(self._problem.model.velocity.x.array)
-            vectors["moved"][:] = h * np.concatenate(
+            self._vectors["moved"][:] = h * np.concatenate(
                 [velocity[:, :3], (small_rotations(now[:, 3:]) @ velocity[:, 3:, None])[..., 0]], axis=1
             )
             self.accept()
         self._slip_begun[:] = self._slip
         kinetic, speed = self._weaker.T
-        numbers["friction"] *= kinetic + (1 - kinetic) * np.exp(-self._slip / speed)
-        if not abs(h - self.c.known_for) <= 1e-9 * h:
-            self.c.stale = True
-        self._begun[:], self._law_begun[:] = vectors["force"], vectors["law"]
+        self._numbers["friction"] *= kinetic + (1 - kinetic) * np.exp(-self._slip / speed)
 
     def give_up(self):
         """Undo a failed step: restore the forces at its start."""
@@ -198,8 +205,9 @@ class NodalContact(Pointers):
 
     def accept(self):
         """Accept the step; its slip speeds give the coefficients of friction of the next one."""
-        self._lib.slips(self.c, self._ffi.from_buffer("double[]", self._slip))
-        self._slip /= self.c.h
+        if self._weakens:
+            self._lib.slips(self.c, self._ffi.from_buffer("double[]", self._slip))
+            self._slip /= self.c.h
 
     def books(self):
         """Stored and dissipated energy of the step, dimensionless."""
@@ -222,7 +230,7 @@ class NodalContact(Pointers):
         kept = {name: self._vectors[name].copy() for name in ("force", "law")}
         md = np.concatenate([place.md for place in self._walls])
         kept |= {"md": md, "slip": self._slip.copy(), "across": self._vectors["across"].copy()}
-        kept |= {"compliance": self._compliance.copy(), "turning": self._turning.copy()}
+        kept |= {name: array.copy() for name, array in self._transfers.items()}
         kept["multiplier"] = self._numbers["multiplier"].copy()
         return {**kept, "known_for": self.c.known_for, "usual": self.c.usual, "missing": self.c.missing,
                 "stale": bool(self.c.stale)}  # fmt: skip
@@ -231,7 +239,8 @@ class NodalContact(Pointers):
         for name in ("force", "law"):
             self._vectors[name][:] = memory[name]
         self._vectors["across"][:], self._slip[:] = memory["across"], memory["slip"]
-        self._compliance[:], self._turning[:] = memory["compliance"], memory["turning"]
+        for name, array in self._transfers.items():
+            array[:] = memory[name]
         self._numbers["multiplier"][:] = memory["multiplier"]
         self.c.known_for, self.c.usual = float(memory["known_for"]), float(memory["usual"])
         self.c.missing, self.c.stale = float(memory["missing"]), bool(memory["stale"])

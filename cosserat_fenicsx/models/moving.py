@@ -403,8 +403,8 @@ class MovingSpatial(Moving, SpatialModel):
 
     def turned_over(self):
         """See `Moving`; a q of the other sign also satisfies |q| = 1."""
-        q, before = (array.reshape(-1, 7)[:, 3:] for array in self._arrays[:2])  # node by node
-        here = bool((np.einsum("ij,ij->i", q, before) <= 0).any())
+        products = self._arrays[0] * self._arrays[1]  # node by node
+        here = bool((sum(products[3 + k :: 7] for k in range(4)) <= 0).any())
         return self.comm.allreduce(here, op=MPI.LOR) if self.comm.size > 1 else here
 
     def set_velocity(self, linear, angular):

@@ -1,0 +1,230 @@
+/* The law of a wall for one node, by its compliance: of the normal force and of Coulomb friction. Four nodes at once,
+   for contact.c. */
+#include "chain.h"
+
+#include <math.h>
+
+enum { MOST_LOCAL = 60 };
+
+/* ---- four nodes at once ------------------------------------------------------------------------------------------ */
+
+/* Nodes far apart are solved together, one in each lane of a vector: the forces of one do not move the others. */
+typedef double vector __attribute__((vector_size(LANES * sizeof(double))));
+typedef double place_of_vector __attribute__((vector_size(LANES * sizeof(double)), aligned(sizeof(double)), may_alias));
+typedef float place_of_floats __attribute__((vector_size(LANES * sizeof(float)), aligned(sizeof(float)), may_alias));
+typedef __typeof__((vector){0} < (vector){0}) mask;
+
+static inline vector load(const double *from)
+{
+    return *(const place_of_vector *)from;
+}
+
+static inline vector widen(const float *from)
+{
+    return __builtin_convertvector(*(const place_of_floats *)from, vector);
+}
+
+static inline void keep(vector a, double *to)
+{
+    *(place_of_vector *)to = a;
+}
+
+static inline int any(mask m)
+{
+    int found = 0;
+    for (int k = 0; k < LANES; k++) found |= m[k] != 0;
+    return found;
+}
+
+static inline vector choose(mask m, vector yes, vector no)
+{
+    return (vector)((m & (mask)yes) | (~m & (mask)no));
+}
+
+static inline vector only(mask m, vector a)
+{
+    return (vector)(m & (mask)a);
+}
+
+static inline vector root(vector a)
+{
+    for (int k = 0; k < LANES; k++) a[k] = sqrt(a[k]); /* hypot is slow */
+    return a;
+}
+
+static inline vector greater(vector a, vector b)
+{
+    return choose(a < b, b, a);
+}
+
+static inline vector absolute(vector a)
+{
+    return greater(a, -a);
+}
+
+/* The law of a wall for nodes: from the tube's axis to the rod at the start, by u and v; sizes; the last forces
+   (normal, friction round and along) and multiplier. */
+typedef struct {
+    vector start[2], clearance, stiffness, friction, damping, law[3], multiplier;
+} walled;
+enum { WALLED = sizeof(walled) / sizeof(vector) };
+
+/* Node of a lane at a position, or -1. */
+static inline int node_of(const contact *c, int i, int lane)
+{
+    const int node = lane * c->positions + i;
+    return lane < c->lanes && node < c->nodes ? node : -1;
+}
+
+static walled walled_at(const contact *c, int i)
+{
+    walled w = {0};
+    for (int lane = 0, j; lane < c->lanes && (j = node_of(c, i, lane)) >= 0; lane++) {
+        for (int k = 0; k < 2; k++) w.start[k][lane] = c->start[2 * j + k];
+        w.clearance[lane] = c->clearance[j], w.stiffness[lane] = c->stiffness[j];
+        w.friction[lane] = c->friction[j], w.damping[lane] = c->damping[j], w.multiplier[lane] = c->multiplier[j];
+        for (int k = 0; k < 3; k++) w.law[k][lane] = c->law[3 * j + k];
+    }
+    return w;
+}
+
+/* The normal force of a node, and its derivative by the distance R from the axis at the end of the step; R0: at its
+   start. By the discrete gradient of k <R - clearance>^2/2, so that its work is the change of this energy (Gonzalez, J.
+   Nonlinear Sci. 6 (1996) 449), or at the end of the step; times 1 + damping * (R - R0)/h (Hunt & Crossley, J. Appl.
+   Mech. 42 (1975) 440). */
+static inline vector normal_force(const contact *c, const walled *w, vector R0, vector R, vector *slope)
+{
+    const vector none = {0}, k = w->stiffness;
+    const vector p0 = greater(R0 - w->clearance, none), p = greater(R - w->clearance, none);
+    vector n, by_R;
+    if (c->at_end)
+        n = k * p, by_R = only(p > 0, k);
+    else {
+        const mask both = (p0 > 0) & (p > 0), either = ~both & ((p0 > 0) | (p > 0));
+        n = only(both, k * (p0 + p) / 2), by_R = only(both, k / 2);
+        if (any(either)) {
+            const vector way = R - R0; /* at least the penetration, in size */
+            const vector less = k * (p * p + p0 * p0) / (2 * absolute(way));
+            n = choose(either, less, n);
+            by_R = choose(either, choose(p > 0, k * p / way - less / way, less / -way), by_R);
+        }
+    }
+    const vector by_h = w->damping / c->h, factor = 1 + by_h * (R - R0);
+    *slope = only(factor > 0, by_R * factor + n * by_h);
+    return only(factor > 0, n * factor);
+}
+
+/* The normal force N where R = R_now - give (N - now), of nodes that are `live`: by Newton's method within bounds. */
+static inline vector settle_normal(const contact *c, const walled *w, mask live, vector R0, vector R_now, vector give)
+{
+    const vector now = w->law[0];
+    vector slope, R = R_now, n = normal_force(c, w, R0, R, &slope);
+    const vector other = R_now - give * (n - now);
+    vector low = choose(R_now < other, R_now, other), high = greater(R_now, other);
+    live &= (give > 0) & (high > low);
+    for (int j = 0; j < MOST_LOCAL && any(live); j++) {
+        const vector off = n - now - (R_now - R) / give;
+        high = choose(live & (off > 0), R, high), low = choose(live & ~(off > 0), R, low);
+        vector next = R - off / (slope + 1 / give), steep = slope;
+        next = choose((next >= low) & (next <= high), next, (low + high) / 2);
+        const mask done = absolute(next - R) <= 1e-15 * (absolute(R) + w->clearance);
+        R = choose(live, next, R), next = normal_force(c, w, R0, R, &slope);
+        n = choose(live, next, n), slope = choose(live, slope, steep);
+        live &= ~(done | (slope == steep)) & (high > low); /* it is linear there */
+    }
+    return n;
+}
+
+/* T with |T| <= most that makes the slip A T + b zero, or else opposite to T: the minimum of T A T/2 + b T in that
+   disc, by Newton's method for the multiplier (More & Sorensen, SIAM J. Sci. Stat. Comput. 4 (1983) 553), from the
+   given one. From above its step goes below, and from there it rises to the solution. `live`: where it is asked for;
+   zero elsewhere. */
+static inline void settle_friction(const vector A[3], const vector b[2], vector most, mask live, vector *multiplier,
+                                   vector T[2])
+{
+    const vector trace = A[0] + A[2], floor = 1e-14 * trace, none = {0};
+    vector shift = *multiplier, size = none;
+    T[0] = T[1] = none;
+    live &= (most > 0) & (trace > 0);
+    for (int j = 0; j < MOST_LOCAL && any(live); j++) {
+        const vector a = A[0] + shift + floor, d = A[2] + shift + floor, inverse = 1 / (a * d - A[1] * A[1]);
+        const vector x = -(d * b[0] - A[1] * b[1]) * inverse, y = -(a * b[1] - A[1] * b[0]) * inverse;
+        const vector square = x * x + y * y, length = root(square);
+        T[0] = choose(live, x, T[0]), T[1] = choose(live, y, T[1]), size = choose(live, length, size);
+        live &= ~(((shift == 0) & (length <= most)) | (absolute(length - most) <= 1e-12 * most));
+        const vector steep = (d * x * x - 2 * A[1] * x * y + a * y * y) * inverse;
+        const vector next = greater(shift + square * (length - most) / (steep * most), none);
+        live &= absolute(next - shift) > 1e-16 * (shift + trace);
+        shift = choose(live, next, shift);
+    }
+    *multiplier = shift;
+    const vector less = choose(size > most, most / size, 1 + none);
+    T[0] *= less, T[1] *= less;
+}
+
+static double dot3(const double *a, const double *b)
+{
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+static void cross3(const double *a, const double *b, double *c)
+{
+    c[0] = a[1] * b[2] - a[2] * b[1], c[1] = a[2] * b[0] - a[0] * b[2], c[2] = a[0] * b[1] - a[1] * b[0];
+}
+
+/* Where nodes are across their tubes, by the axes u and v there: x from the tube's axis to the rod at the end, e and
+   its size where the force acts. The direction round the tube is tau = (-e[1], e[0]). */
+typedef struct {
+    vector x[2], R0, R, both, e[2], share;
+} place;
+
+/* moved: motion along u and v in the step. */
+static inline place place_of(const contact *c, const vector *x0, const vector *moved)
+{
+    place p;
+    vector m[2];
+    for (int k = 0; k < 2; k++) {
+        p.x[k] = x0[k] + moved[k];
+        m[k] = c->at_end ? p.x[k] : x0[k] + p.x[k];
+    }
+    p.R0 = root(x0[0] * x0[0] + x0[1] * x0[1]), p.R = root(p.x[0] * p.x[0] + p.x[1] * p.x[1]);
+    const vector size = c->at_end ? p.R : root(m[0] * m[0] + m[1] * m[1]);
+    p.both = c->at_end ? p.R : p.R0 + p.R, p.share = only(p.both > 0, size / p.both);
+    for (int k = 0; k < 2; k++) p.e[k] = only(size > 0, m[k] / size);
+    return p;
+}
+
+/* Where the nodes at position i are after their motion `moved` (6,), and this motion (4,): along u and v, the slip
+   along the tube, and what the rotation about the tube adds to the slip round it. */
+static place motion_of(const contact *c, int i, const walled *w, vector *motion)
+{
+    vector tilt[2] = {0};
+    for (int k = 0; k < 4; k++) motion[k] = tilt[0];
+    for (int lane = 0, j; lane < c->lanes && (j = node_of(c, i, lane)) >= 0; lane++) {
+        const double *t = c->tangent + 3 * j, *u = c->across + 3 * j, *moved = c->moved + 6 * j, arm = c->arm[j];
+        double v[3];
+        cross3(t, u, v);
+        motion[0][lane] = dot3(u, moved), motion[1][lane] = dot3(v, moved), motion[2][lane] = dot3(t, moved);
+        motion[3][lane] = arm * dot3(t, moved + 3);
+        tilt[0][lane] = arm * dot3(u, moved + 3), tilt[1][lane] = arm * dot3(v, moved + 3);
+    }
+    const place p = place_of(c, w->start, motion);
+    motion[2] += p.e[1] * tilt[0] - p.e[0] * tilt[1];
+    return p;
+}
+
+static inline vector slip_round(const place *p, const vector *motion)
+{
+    return p->e[0] * motion[1] - p->e[1] * motion[0] + motion[3];
+}
+
+static inline vector dot4(const vector *a, const vector *b)
+{
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3];
+}
+
+/* The motion of nodes themselves by their forces v, (4,) each; W (4, 4): their compliance. */
+static inline void respond(vector W[4][4], const vector *v, vector *Wv)
+{
+    for (int k = 0; k < 4; k++) Wv[k] = W[0][k] * v[0] + W[1][k] * v[1] + W[2][k] * v[2] + W[3][k] * v[3];
+}
