@@ -29,6 +29,7 @@ from torsion_scenes import string as string_of
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx import drilling, well
+from cosserat_fenicsx.drilling.choose import model_of, on_same_mesh
 from cosserat_fenicsx.drilling.elements import AxialTorsional
 from cosserat_fenicsx.drilling.linear.impedances import axial, torsional
 from cosserat_fenicsx.drilling.linear.roots import Box, all_roots
@@ -528,6 +529,12 @@ def test_where_friction_allows_no_longer_step_a_shorter_one_is_compared(model):
     # Where it sticks and slips, rounding grows: by the compiler's options errors are 0.8 to 13 % of the largest torque.
     assert 0 < found.errors.peak < 5
     assert 0 < found.errors.largest_torque == found.errors.least_torque < 0.2 * np.abs(found.surface_torque).max()
+    # Such friction amplifies short waves, whose speed depends on the ratio of step and element: so another one counts.
+    more = [x() for x in on_same_mesh(scene, model, model_of(scene, model))]
+    assert [(x.dt, len(x.depths)) for x in more] == [(found.dt / 2, len(found.depths))] * (model != "torsion")
+    for x in more:
+        off = np.abs(np.subtract(cycle_of(found.rows, 4.5), cycle_of(x.advance(math.ceil(9 / x.dt - 1e-6)), 4.5)))
+        assert found.errors.largest_torque >= 2 * off[2:].max() * (1 - 1e-9) > 0
 
 
 def test_a_mesh_that_cannot_be_coarser_is_compared_with_a_finer_one():

@@ -1,5 +1,7 @@
 """The choice of the model of a drill-string in motion, its reasons, and what the model leaves out."""
 
+from functools import partial
+
 import numpy as np
 
 from cosserat_fenicsx.checks import refuse
@@ -152,6 +154,15 @@ def with_step(scene, name, model, factor: float):
     if len(other.depths) - 1 > 1.2 * asked or asked * factor > 1.2 * (len(model.depths) - 1):
         refuse("simulate", "elements", asked, f"at least {len(other.depths) - 1}, one in each component")
     return other
+
+
+def on_same_mesh(scene, name, model):
+    """Functions that return models with half the step of another one, on its mesh, where the friction at the wall of a
+    string by elements falls with the slip. Such friction amplifies waves of all lengths, the short ones too, whose
+    speed on a mesh depends on the ratio of step and element, which `with_step` keeps."""
+    if isinstance(model, TorsionWaves) or scene.friction is None or not scene.friction.decays:
+        return ()
+    return (partial(model_of, scene, name, model.dt / 2, len(model.depths) - 1 - len(scene.joints)),)
 
 
 def model_of(scene, name, dt=None, elements=None):

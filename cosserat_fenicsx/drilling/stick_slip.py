@@ -1,6 +1,7 @@
 """Starts, stops, period and peaks of the motion of a bit, and their errors by the time step."""
 
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -200,8 +201,8 @@ def cycle_of(rows, since=0.0, slow=_SLOW):
     return Cycle(period, float(speed.max()), float(torque.min()), float(torque.max()))
 
 
-def step_errors(dt, other_model, rows, since=0.0):
-    """A `Cycle` of errors of a motion by its step, from a run with twice the step and one with half of it.
+def step_errors(dt, other_model, rows, since=0.0, more=()):
+    """A `Cycle` of errors of a motion by its step, from a run with twice the step and one with half of it, and more.
 
     The errors are twice the larger one of the two differences: twice the error where it is of first order in the step,
     six times where it is of second order. Where fronts pass or the bit barely sticks, errors have no order, and of two
@@ -213,12 +214,13 @@ def step_errors(dt, other_model, rows, since=0.0):
     Args:
         dt: step of the motion, s. other_model: function of the ratio of steps that returns a `StringModel` at rest.
         rows: of the motion, see `StringModel.advance`. since: see `cycle_of`.
+        more: functions that return further `StringModel`s of the same motion.
     """
     here, found = np.array(cycle_of(rows, since)), []
-    for factor in (2.0, 0.5):
+    for k, make in enumerate((partial(other_model, 2.0), partial(other_model, 0.5), *more)):
         try:
-            other = other_model(factor)
-            if factor > 1 and other.dt < _LONGER * dt:
+            other = make()
+            if k == 0 and other.dt < _LONGER * dt:
                 continue
             there = cycle_of(other.advance(int(np.ceil(rows[-1, 0] / other.dt - 1e-6))), since)
         except (SceneError, NotConverged):  # of that step
