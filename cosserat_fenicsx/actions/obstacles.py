@@ -97,6 +97,10 @@ class Obstacle(Pressing, LineAction):
         distance, normal = self.beside(points)
         return distance - self.radius_of(rod, s), normal
 
+    def kinks(self, rod, s, points):
+        """See `Action`."""
+        return *self.gaps(rod, s, points), self.begins_with(self.stiffness), self.sticks if self.friction else 0.0
+
     def _at_rest(self, rod):
         s = np.linspace(0.0, rod.length, _SAMPLES)
         return s, *self.gaps(rod, s, rod.curve.position(s))

@@ -39,6 +39,8 @@ _RAMP, _OF_PIECE = 0.05, 0.25
 _BESIDE = 1e-9
 # Points along a tube in a picture.
 _DRAWN = 201
+# A depth at which the pressure of a law has its derivative at zero, m.
+_SHALLOW = 1e-12
 
 
 class ContactLaw(Part, family="contact law"):
@@ -74,6 +76,13 @@ class Pressing:
 
     def _law_data(self):
         return () if self.law is None else self.law.data()
+
+    def begins_with(self, stiffness):
+        """The derivative of the pressure by the depth where contact begins, N/m^2."""
+        if self.law is None:
+            return stiffness
+        numbers = [datum.value.item() for datum in self._law_data()]
+        return float(type(self.law).pressure(_SHALLOW, stiffness, *numbers)) / _SHALLOW
 
 
 @dataclass(frozen=True)
@@ -270,6 +279,15 @@ class TubeWall(_Confined, LineAction):
         along = [end - self.begins for given in (self.radius, self.friction) for end, _ in given[:-1]]
         along += [end for given in (self.contact_radius, self.slip) for end, _ in given[:-1]]
         return tuple(sorted({end for end in along if 0 < end < rod.length}))
+
+    def kinks(self, rod, s, points):
+        """See `Action`."""
+        near = self.path.nearest(points, s + self.begins)
+        away = near.position - points
+        size = np.linalg.norm(away, axis=1)
+        normal = away / np.maximum(size, np.finfo(float).tiny)[:, None]
+        stiffness = self.begins_with(min(self.stage.wall, self.stage.most) * self.stiffness)
+        return self.sizes(s, near.md)[0] - size, normal, stiffness, 0.0
 
     def tube(self):
         s = np.linspace(0.0, self.rod.length, _DRAWN)

@@ -340,6 +340,16 @@ def inertia_of(starts, columns, null):
     return found
 
 
+def gmres(matrix, most):
+    """PETSc's GMRES on this rank, of at most that many iterations, preconditioned from the right."""
+    ksp = PETSc.KSP().create(PETSc.COMM_SELF)
+    ksp.setType("gmres")
+    ksp.setPCSide(PETSc.PC.Side.RIGHT)
+    ksp.setTolerances(atol=0.0, max_it=most)
+    ksp.setOperators(matrix)
+    return ksp
+
+
 class RepeatedFactors:
     """Solves with sparse matrices of one pattern on this rank, by LU factors; its symbolic analysis is made once.
 
@@ -358,7 +368,7 @@ class RepeatedFactors:
         self._keeps, self._old, self._ksp = size >= _KEPT, None, None  # `_old`: are the factors of an earlier matrix?
         self._near, self._by_near = near if self._keeps else None, None
         if self._near:
-            self._by_near = self._gmres()
+            self._by_near = gmres(self._matrix, _MOST_REUSES)
             self._by_near.getPC().setType("python")
             self._by_near.getPC().setPythonContext(near)
 
@@ -366,18 +376,10 @@ class RepeatedFactors:
         """A solver without factors; one that failed keeps its error."""
         if self._ksp is not None:
             self._ksp.destroy()
-        self._ksp = self._gmres()
+        self._ksp = gmres(self._matrix, _MOST_REUSES)
         self._pc = self._ksp.getPC()
         self._pc.setType("lu")
         self._factor = _mumps(self._pc, self._matrix)
-
-    def _gmres(self):
-        ksp = PETSc.KSP().create(PETSc.COMM_SELF)
-        ksp.setType("gmres")
-        ksp.setPCSide(PETSc.PC.Side.RIGHT)
-        ksp.setTolerances(atol=0.0, max_it=_MOST_REUSES)
-        ksp.setOperators(self._matrix)
-        return ksp
 
     def factor(self, values):
         """Take the matrix of these entries (entries,); False where it is found to be singular."""

@@ -241,6 +241,23 @@ def gaps_at(state):
                 yield obstacle, rod, i, s, *obstacle.gaps(rod, s, r)
 
 
+def kinks_at(state):
+    """(number of a rod, function) for each rod that a wall acts on in an `Equilibrium`; the function takes arc lengths
+    (n,) over the rod's and returns gaps (n,), m, and the stiffness (n, 3, 3), N/m^2, where contact begins."""
+    for action in state.scene.actions:
+        for i, rod in enumerate(state.scene.rods if action.presses and not action.touches else ()):
+            if action.acts_on(rod):
+
+                def kinks(x, action=action, rod=rod):
+                    s = x * rod.length
+                    points = rod.curve.position(s) + state.between(rod, x, state.displacement)
+                    gap, normal, along, across = action.kinks(rod, s, points)
+                    outer = normal[:, :, None] * normal[:, None]
+                    return gap, across * np.eye(3) + (along - across) * outer
+
+                yield i, kinks
+
+
 def refuse_grazing(state, owner):
     """Refuse small motions about an `Equilibrium` of rods that touch an obstacle without pressing on it."""
     for obstacle, rod, _, s, gap, _ in gaps_at(state):
@@ -249,16 +266,6 @@ def refuse_grazing(state, owner):
                 f"{owner}: {where} {describe(obstacle)} without pressing on it, and may lift off on one side, which no "
                 "linear theory has: expected a permanent load or a load factor that presses it there, or a gap"
             )
-
-
-def step_without_switch(state, moved, step):
-    """The largest step, at most `step`, in which no node begins or ceases to touch an obstacle; from the `Equilibrium`
-    at the state, and at the state moved by `step`."""
-    for (_, rod, _, _, gap, _), (*_, there, _) in zip(gaps_at(state), gaps_at(moved), strict=True):
-        free = np.abs(gap) > _GRAZES * rod.length  # others are held by a support
-        rates = np.abs(there - gap)[free] / step
-        step = min(step, (np.abs(gap)[free] / np.maximum(2 * rates, 1e-300)).min(initial=np.inf))
-    return step
 
 
 def least_gap(path):

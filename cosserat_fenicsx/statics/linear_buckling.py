@@ -11,7 +11,7 @@ from cosserat_fenicsx.algebra import eigen
 from cosserat_fenicsx.checks import number, whole
 from cosserat_fenicsx.errors import NotConverged
 from cosserat_fenicsx.ranks import communicator
-from cosserat_fenicsx.results.contacts import refuse_grazing, step_without_switch, warn_of_slant
+from cosserat_fenicsx.results.contacts import refuse_grazing, warn_of_slant
 from cosserat_fenicsx.results.modes import Buckling
 from cosserat_fenicsx.results.shapes import Equilibrium
 from cosserat_fenicsx.scene.action import has_permanent
@@ -20,8 +20,8 @@ from cosserat_fenicsx.statics.critical import Energies, critical_sensitivity
 from cosserat_fenicsx.statics.meshes import layers_of, until_two_meshes_agree
 from cosserat_fenicsx.statics.path.follower import standing
 from cosserat_fenicsx.statics.problem import check_arguments, solvers_of
-from cosserat_fenicsx.statics.small_motions import circulatory_part, edges_of_contact, static_bifurcations
-from cosserat_fenicsx.statics.stability import shapes_of
+from cosserat_fenicsx.statics.small_motions import circulatory_part, edges_of_contact, static_bifurcations, switched
+from cosserat_fenicsx.statics.stability import add_to, shapes_of
 
 _MOST_ELEMENTS = 256
 # Central difference of the second variation: largest displacement over the unit of length and rotation (rad); largest
@@ -91,10 +91,10 @@ def buckling(
     check_tensions(scene, [load_factor])
     comm = communicator(comm)
 
-    (critical, _, state, shapes, shared, conservative, most, _), error = until_two_meshes_agree(
+    (critical, _, state, shapes, shared, conservative, most, *_), error = until_two_meshes_agree(
         "buckling", scene, lambda layout: _critical(scene, layout, count, load_factor, tol, degree, comm), tol,
         most=_MOST_ELEMENTS, elements=elements, degree=degree, advice="a larger tol", progress=progress, comm=comm,
-        least=lambda found: found[-1],
+        least=lambda found: found[-2], places=lambda found: found[-1] and found[-1].places,
     )  # fmt: skip
     load_factors = load_factor + critical
     softness, rounding = shared
@@ -153,17 +153,19 @@ def _critical(scene, layout, count, load_factor, tol, degree, comm):
             return model.snapshot()[1]
 
         change, most = _extent(model, moved, rates[0], unit)
-        if model.scene.has_obstacles:  # where rods touch stays as it is
-            moved(0.0)
-            state = Equilibrium.of(model, load_factor)
-            moved(change)
-            change = step_without_switch(state, Equilibrium.of(model, load_factor + change), change)
+        moved(0.0)
+        state = Equilibrium.of(model, load_factor)
+        refuse_grazing(state, "buckling")
+        if edges := edges_of_contact(model, state):
+            stability.whole.lacking = edges.lacking
         slack, symmetric, modes = None, np.empty(0), []
         if math.isfinite(most):
             sides = []
             for step in (change, -change):
                 moved(step)
                 stability.whole.assemble(stress_alone=True)
+                # where rods touch stays as it is
+                add_to(stability.whole.K, switched(model, state, Equilibrium.of(model, load_factor + step)))
                 sides.append((stability.whole.K.copy(), skew()))
             slack, of_skew = (_decrease(*parts, change) for parts in zip(*sides, strict=True))
             moved(0.0)
@@ -190,23 +192,10 @@ def _critical(scene, layout, count, load_factor, tol, degree, comm):
         softness = np.where(corrected, remaining, 1.0) * found.softness
         whole = [np.concatenate(model.comm.allgather(vector.array_r)) for vector in vectors]
         shapes = shapes_of(whole, values, model.rows_of_nodes, model.scales.length)[:count]
-        state = Equilibrium.of(model, load_factor)
-        refuse_grazing(state, "buckling")
-        errors = np.array([softness, rounding])
-        lacking, beside = _of_edges(edges_of_contact(model, state), stability.whole, chosen)
-        critical, beside = np.where(corrected, critical * (1 + lacking), critical), beside + ~corrected * abs(lacking)
-        return critical, layers, state, shapes, errors, conservative, load_factor + most, beside
-
-
-def _of_edges(edges, part, vectors):
-    """(2, n) shares of the energies of modes that the edges of contact lack, and of those that are not known."""
-    if edges is None:
-        return np.zeros((2, len(vectors)))
-    modes = [np.concatenate(part.model.comm.allgather(v.array_r)) for v in vectors]
-    energies = [(part.K * v).dot(v) for v in vectors]
-    return np.array(
-        [[x @ (matrix @ x) / energy for x, energy in zip(modes, energies, strict=True)] for matrix in edges]
-    )
+        errors, beside = np.array([softness, rounding]), np.zeros(len(chosen))
+        if edges:
+            beside = along(edges.unknown, chosen, model.comm) / [(stability.whole.K * v).dot(v) for v in chosen]
+        return critical, layers, state, shapes, errors, conservative, load_factor + most, beside, edges
 
 
 def _stay_at(track, at_rest):
@@ -365,5 +354,12 @@ def _energies(problem, part, vectors):
     modes = [np.where(rows >= 0, vector[rows], 0.0) for vector in whole]
     energies = Energies(problem, modes, part.resistance)
     bounded = energies.here()
+    more = 0.0 if part.lacking is None else along(part.lacking, vectors, model.comm)
     with _less_bounded(model):
-        return np.array([bounded, energies.here()])
+        return np.array([bounded, energies.here()]) + more
+
+
+def along(matrix, vectors, comm):
+    """(n,) x^T A x of a sparse matrix of scipy and PETSc vectors."""
+    whole = [np.concatenate(comm.allgather(v.array_r)) for v in vectors]
+    return np.array([x @ (matrix @ x) for x in whole])

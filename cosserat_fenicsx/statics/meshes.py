@@ -16,7 +16,6 @@ from cosserat_fenicsx.models.formulation import traits_of
 from cosserat_fenicsx.parts import FunctionAlong, per_scene
 from cosserat_fenicsx.results.accuracy import (
     LONGEST_IN_LAYER,
-    contact_edges,
     element_differences,
     expected_differences,
     layer_lengths,
@@ -265,6 +264,8 @@ class Grading:
 
 
 _GRADING = Grading()
+#: Times that element ends are moved to the edges of contact, before elements are halved.
+MOST_MOVES = 3
 # Moments at Gauss points may be smaller than those at the ends of a rod, by less than this factor.
 _SURELY = 0.5
 
@@ -323,17 +324,16 @@ def plainly_resolved(path):
     return layers and twisted and turn <= min(_GRADING.turned, path.degree / 2)
 
 
-def with_edges(scene, path):
-    """The layout with element ends, moved or new, where contact with walls begins and ends at the points of a path;
-    None where all edges of contact are at element ends, or there are too many."""
-    edges = contact_edges(path)
-    if edges is None or not loose_edges(path, edges) or max(map(len, edges)) > _GRADING.most_edges:
+def with_edges(scene, layout, edges):
+    """The layout with element ends, moved or new, where contact with walls begins and ends, for every rod the places
+    over its length; None where all edges of contact are at element ends, or there are too many."""
+    if edges is None or not loose_edges(layout, edges) or max(map(len, edges)) > _GRADING.most_edges:
         return None
-    breaks, layout = [], path.layout
+    breaks = []
     for i, pieces in enumerate(layout.pieces(scene)):
         moved, taken = layout.breaks[i].copy(), {piece.start for piece in pieces} | {len(layout.breaks[i]) - 1}
         more = []
-        for x in edges[i].tolist():
+        for x in np.asarray(edges[i]).tolist():
             near = int(np.argmin(np.abs(layout.breaks[i] - x)))
             if near not in taken:
                 moved[near] = x
@@ -344,9 +344,9 @@ def with_edges(scene, path):
     return Layout(tuple(breaks))
 
 
-def loose_edges(path, edges):
+def loose_edges(layout, edges):
     """Whether an edge of contact (see `contact_edges`) is not at the end of an element."""
-    for breaks, found in zip(path.layout.breaks, edges, strict=True):
+    for breaks, found in zip(layout.breaks, edges, strict=True):
         cells = np.clip(np.searchsorted(breaks, found) - 1, 0, len(breaks) - 2)
         off = np.minimum(np.abs(found - breaks[cells]), np.abs(found - breaks[cells + 1]))
         if (off > _GRADING.beside * np.diff(breaks)[cells]).any():
@@ -406,7 +406,7 @@ def _round_up(number):
 
 
 def until_two_meshes_agree(owner, scene, on_mesh, tol, *, most, elements, degree, advice, progress, comm, gains=None,
-                          least=None):  # fmt: skip
+                          least=None, places=None):  # fmt: skip
     """Solve an eigenproblem on successively halved meshes until the results of two of them agree to `tol`, relative:
     (what `on_mesh` returned, estimated relative errors (n,) or NaN).
 
@@ -414,10 +414,11 @@ def until_two_meshes_agree(owner, scene, on_mesh, tol, *, most, elements, degree
     layers (see `layers_of`) or None, and further results. most: elements per rod of the last mesh; elements: those of a
     given mesh, or None. gains: where the error is estimated by the gain of a halving, of order 2 p, instead of by the
     difference of two meshes, which is larger: of what `on_mesh` returned, the largest gain that is assumed, as a power
-    of 2. least: of what `on_mesh` returned, relative errors (n,) that two meshes may not show. Raises NotConverged.
+    of 2. least: of what `on_mesh` returned, relative errors (n,) that two meshes may not show; places: the edges of
+    contact, see `with_edges`. Raises NotConverged.
     """
     layout = turning_in_law(scene, Layout.of(scene, elements or FIRST_ELEMENTS), [1.0], elements)
-    coarse, best, worse = None, math.inf, 0
+    coarse, best, worse, moves = None, math.inf, 0, 0
     failed = False  # whether the last mesh could not be solved
     before = coarse_layout = None  # relative differences of the halving before; the mesh of `coarse`
     with MeshProgress(owner, tol, progress, comm) as bar:
@@ -439,6 +440,12 @@ def until_two_meshes_agree(owner, scene, on_mesh, tol, *, most, elements, degree
             if layered is not None:
                 coarse, before, layout = None, None, layered
                 continue
+            edges = places(found) if places else None
+            moved = with_edges(scene, layout, edges) if moves < MOST_MOVES else None
+            if moved is not None:
+                layout, moves = moved, moves + 1
+                continue
+            moves = 0
             comparable = coarse is not None and len(coarse) == len(numbers)
             if coarse is not None and not comparable and largest >= most:
                 raise NotConverged(
@@ -447,8 +454,10 @@ def until_two_meshes_agree(owner, scene, on_mesh, tol, *, most, elements, degree
                 )
             error = None
             if comparable:
-                error = _apart(numbers, coarse) if least is None else np.maximum(_apart(numbers, coarse), least(found))
-                reached = error.max(initial=0.0)
+                # an edge beside the end of its element has an error in proportion to the length of elements
+                error = _apart(numbers, coarse) * (1 if edges is None else 2)
+                hidden = 0.0 if least is None else least(found)
+                reached = np.maximum(error, hidden).max(initial=0.0)
                 # Differences may grow once before they converge; growth twice in a row is rounding.
                 worse = worse + 1 if reached > max(tol, best) else 0
                 if worse == 2 or (reached > tol and largest >= most):
@@ -458,9 +467,11 @@ def until_two_meshes_agree(owner, scene, on_mesh, tol, *, most, elements, degree
                     )
                 best = min(best, reached)
             if best <= tol:
-                if gains is not None and before is None:
+                if gains is not None and before is None and edges is None:
                     before = _difference_before(scene, on_mesh, coarse, coarse_layout)
-                return found, error if gains is None or before is None else error / _gain(before, error, gains(found))
+                if gains is not None and before is not None:
+                    error = error / _gain(before, error, gains(found))
+                return found, np.maximum(error, hidden)
             before = error if comparable and len(error) else None
             coarse, coarse_layout, layout = numbers, layout, layout.finer(scene, 2)
 

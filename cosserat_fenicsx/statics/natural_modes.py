@@ -34,13 +34,13 @@ from cosserat_fenicsx.statics.path.follower import standing
 from cosserat_fenicsx.statics.problem import check_arguments, refuse_rod_contact, refuse_rough_threads, solvers_of
 from cosserat_fenicsx.statics.small_motions import (
     Bodies,
+    beside_edges,
     circulatory_part,
     corrected,
     edges_of_contact,
     resisting,
     softness,
     stiffness,
-    with_edges,
 )
 from cosserat_fenicsx.statics.stability import shapes_of
 
@@ -135,10 +135,8 @@ def modes(
         found, error = until_two_meshes_agree(
             "modes", scene, on_mesh, tol, most=_MOST_ELEMENTS, elements=elements, degree=degree,
             advice="a larger tol or fewer modes", progress=progress, comm=comm,
-            gains=lambda found: (
-                0 if found.edges.any() else 2 * degree - (_OF_EIGENVALUES if found.complex else _OF_SQUARES)
-            ),
-            least=lambda found: found.edges,
+            gains=lambda found: 2 * degree - (_OF_EIGENVALUES if found.complex else _OF_SQUARES),
+            least=lambda found: found.beside, places=lambda found: found.edges and found.edges.places,
         )  # fmt: skip
     except NotConverged:
         if last and (last[0] > tol).any():  # meshes scatter by rounding
@@ -242,8 +240,8 @@ def _rotation(scene):
 #: What is computed on one mesh: squares, or complex eigenvalues (1/s), (n,); the lengths of boundary layers or None;
 #: their relative errors (n,) by rounding and by bounds in place of infinite stiffnesses; shapes (n, N, 6); the number
 #: of negative modes; the `Equilibrium`; whether the loads have a potential; whether the numbers are complex
-#: eigenvalues; (r, q) and the contact force there; and relative errors (n,) by the edges of contact with obstacles.
-_OnMesh = namedtuple("_OnMesh", "numbers layers rounding shapes negative state conservative complex start edges")
+#: eigenvalues; (r, q) and the contact force there; relative errors (n,) by edges of contact; and the `Edges` or None.
+_OnMesh = namedtuple("_OnMesh", "numbers layers rounding shapes negative state conservative complex start beside edges")
 
 
 class _Following:
@@ -258,7 +256,7 @@ class _Following:
             order = assigned(self._before, found.numbers)
             found = found._replace(
                 numbers=found.numbers[order], rounding=found.rounding[order], shapes=found.shapes[order],
-                edges=found.edges[order],
+                beside=found.beside[order],
             )  # fmt: skip
         self._before = found.numbers
         return found
@@ -277,7 +275,11 @@ def _on_mesh(scene, layout, count, load_factor, degree, comm, damped, near, rota
         model, scales = problem.model, problem.model.scales
         negative = stability.count() if loaded else 0
         K, rows, held = stiffness(problem)
-        soft = softness(problem, K)
+        soft, state = softness(problem, K), Equilibrium.of(model, load_factor)
+        refuse_grazing(state, "modes")
+        edges = edges_of_contact(model, state)
+        if edges:
+            K = K + edges.lacking
         if problem.tensions:
             between = problem.tensions.keep()
             if between.any():
@@ -287,9 +289,7 @@ def _on_mesh(scene, layout, count, load_factor, degree, comm, damped, near, rota
         unit = max(float(rod.profile.range[1].mass) for rod in scene.rods)
         bodies, time = Bodies(model, unit), math.sqrt(unit * scales.length**2 / scales.force)
         layers = layers_of(model) if loaded else None
-        state, (rq, n) = Equilibrium.of(model, load_factor), model.snapshot()
-        refuse_grazing(state, "modes")
-        edges = edges_of_contact(model, state)
+        rq, n = model.snapshot()
     with circulatory_part(scene, layout, degree, comm) as circulatory:
         conservative = circulatory.vanishes(rq, load_factor)
         if damped is None:
@@ -303,9 +303,9 @@ def _on_mesh(scene, layout, count, load_factor, degree, comm, damped, near, rota
         shapes = shapes_of(vectors.T, squares, rows, scales.length)
         rounding = np.where(squares == 0, 0.0, rounding / np.abs(np.where(squares == 0, 1.0, squares)))
         squares, rounding = corrected(soft, mass, None, squares, vectors, rounding, True)
-        squares, beside = with_edges(edges, mass, None, squares, vectors)
+        beside = beside_edges(edges, mass, None, squares, vectors)
         squares = squares / time**2
-        return _OnMesh(squares, layers, rounding, shapes, negative, state, conservative, False, (rq, n), beside)
+        return _OnMesh(squares, layers, rounding, shapes, negative, state, conservative, False, (rq, n), beside, edges)
     turning = None
     if rotation is not None:
         w = np.array(rotation.rate) * time
@@ -323,8 +323,8 @@ def _on_mesh(scene, layout, count, load_factor, degree, comm, damped, near, rota
     shapes = shapes_of(found.vectors.T, values, rows, scales.length)
     rounding = np.where(values == 0, 0.0, found.rounding / np.abs(np.where(values == 0, 1.0, values)))
     values, rounding = corrected(soft, mass, C, values, found.vectors, rounding, conservative)
-    values, beside = with_edges(edges, mass, C, values, found.vectors)
-    return _OnMesh(values / time, layers, rounding, shapes, negative, state, conservative, True, (rq, n), beside)
+    beside = beside_edges(edges, mass, C, values, found.vectors)
+    return _OnMesh(values / time, layers, rounding, shapes, negative, state, conservative, True, (rq, n), beside, edges)
 
 
 def _below_free(squares, negative):

@@ -28,6 +28,7 @@ from cosserat_fenicsx.results.compared import NAMES, POSITION
 from cosserat_fenicsx.results.contacts import Passes, check_passes
 from cosserat_fenicsx.results.records import find_again, keep_confirmed, lost_at
 from cosserat_fenicsx.statics.meshes import (
+    MOST_MOVES,
     balanced,
     halved,
     loose_edges,
@@ -55,7 +56,6 @@ class Refinement:
     few_new: int = 4  # events that a mesh may have in addition to those of the one before, which a finer one may clear
     most_lost: int = 2  # finer meshes on which a path with events is not found again, before it is given up
     most_balancings: int = 4  # times that the error is equidistributed over the elements
-    most_moves: int = 3  # times that element ends are moved to the edges of contact, before elements are halved
     cheap: int = 800  # unknowns, of all points together, that are cheaper to solve than another mesh is to make
 
 
@@ -156,8 +156,8 @@ class _Search:
         self._layered = None
         if not resolved:
             self._layered = with_layers(self._scene, found.layout, layers) or with_turns(self._scene, found)
-        if self._layered is None and self._presses and self._moved < _REFINEMENT.most_moves:
-            self._layered = with_edges(self._scene, found)
+        if self._layered is None and self._presses and self._moved < MOST_MOVES:
+            self._layered = with_edges(self._scene, found.layout, contact_edges(found))
             self._moved += self._layered is not None
         if found.rounding > self._tol:  # refinement would increase it
             raise NotConverged(_rounding_hides(self._tol, found.rounding, elements, found.formulation), found)
@@ -281,7 +281,7 @@ class _Search:
         if self._factor < 2:
             return carry_error(fine, coarse, self._factor, self._order, before)
         # edges of slip move through elements from state to state
-        smooth = not (self._rubs or self._presses and loose_edges(fine, contact_edges(fine)))
+        smooth = not (self._rubs or self._presses and loose_edges(fine.layout, contact_edges(fine)))
         apart, gain = estimate_error(fine, coarse, before, smooth=smooth)
         self._halved, self._order = (fine, coarse), order_of(gain, fine.degree)
         if np.divide(fine.layout.counts, coarse.layout.counts).max() <= 2:  # else the coarse mesh is not fine enough

@@ -7,6 +7,7 @@ second variation. About a steady rotation they are those in the rotating frame.
 """
 
 import contextlib
+from collections import namedtuple
 
 import numpy as np
 from mpi4py import MPI
@@ -21,8 +22,8 @@ from cosserat_fenicsx.errors import NotConverged, SceneError
 from cosserat_fenicsx.models.spatial import CirculatoryModel, ResistingModel
 from cosserat_fenicsx.models.rod_data import nodal_inertia
 from cosserat_fenicsx.models.signature import Signature
-from cosserat_fenicsx.numerics import directors, lobatto_weights
-from cosserat_fenicsx.results.contacts import gaps_at, shares_of
+from cosserat_fenicsx.numerics import directors, gauss, lobatto_weights
+from cosserat_fenicsx.results.contacts import kinks_at, shares_of
 
 # Share of a first-order change of an eigenvalue that is assumed to remain as error: at most this, or this times the
 # relative change.
@@ -33,6 +34,9 @@ _OF_CHANGE = 8.0
 _HIDING = 4.0
 # Largest force, over EI/L^2, with which what resists velocities may act on the rods in a steady rotation.
 _DRIVEN = 1e-6
+
+# Places between two nodes, over their distance, where gaps are looked at; bisections of the place where one vanishes.
+_SAMPLED, _BISECTIONS = (0.0, 0.25, 0.5, 0.75), 45
 
 
 def stiffness(problem, bounds=1.0):
@@ -64,45 +68,79 @@ def softness(problem, K):
     return stiffness(problem, 2.0)[0] - K
 
 
+#: Edges of the contact of rods with walls: lacking: what K lacks (sparse), where nodes beside an edge act with all of
+#: their share of the length; unknown: what of that the state does not tell (sparse); places: for every rod those of its
+#: edges over its length.
+Edges = namedtuple("Edges", "lacking unknown places")
+
+
 def edges_of_contact(model, state):
-    """(what K lacks, what of that is not known), sparse, where obstacles act at nodes: a node at the edge of a contact
-    acts with its whole share of the length, and the edge, where the gap vanishes, is elsewhere; its place is known as
-    well as the nodes on both sides agree on it, and to a part of that share, the smaller the more nodes touch. None
-    without an edge; a law of pressure is left out."""
-    if not state.scene.has_obstacles:
+    """The `Edges` of an `Equilibrium`, where gaps vanish; None without an edge.
+
+    In an element with an edge K has the stiffness of walls on the part that touches, by a Gauss rule there instead of
+    at nodes. The state has the pressures of the nodes: their sum is off by the error of Lobatto's rule for a pressure
+    that rises from the edge, q times its slope, and moves the edge by about q over the shorter of element and contact.
+    """
+    if not any(action.presses for action in state.scene.actions):
         return None
-    lacking, unknown, at = [], [], []
-    rows, unit = model.rows_of_nodes, model.scales.force / model.scales.length
-    of_nodes = np.split(rows, np.cumsum([len(state.s(rod)) for rod in state.scene.rods])[:-1])
-    for obstacle, _, i, s, gap, normal in gaps_at(state):
-        if obstacle.law is not None:
-            continue
-        shares = shares_of(state, i)
-        bounds = np.flatnonzero(np.diff(gap < 0, prepend=False, append=False))  # nodes touch from .. to before ..
-        begin, end = bounds[::2], bounds[1::2]
-        left, right = begin > 0, end < len(s)
-        inner, count = np.append(begin[left], end[right] - 1), np.append((end - begin)[left], (end - begin)[right])
-        side = np.repeat([-1, 1], [np.count_nonzero(left), np.count_nonzero(right)])
-        outer, share = inner + side, shares[inner]
-        way = np.abs(s[outer] - s[inner])
-        beyond = way * gap[inner] / (gap[inner] - gap[outer])  # from the last node that touches to the edge
-        middle = np.cumsum(shares)[inner] - share / 2
-        lacks = beyond - share / 2 - side * (middle - s[inner])
-        # the same by the two last nodes that touch
-        before = np.where(count > 1, inner - side, inner)
-        slope = (gap[inner] - gap[before]) / np.where(count > 1, np.abs(s[inner] - s[before]), 1.0)
-        other = np.clip(-gap[inner] / np.where(slope > 0, slope, np.inf), 0.0, way)
-        other = np.where((slope > 0) | (count == 1), other, way)
-        across = normal[inner, :, None] * normal[inner, None, :]
-        sticks = obstacle.sticks * (np.eye(3) - across) if obstacle.friction else 0.0
-        density = (obstacle.stiffness * across + sticks) / unit
-        lacking.append(density * lacks[:, None, None])
-        unknown.append(density * np.maximum(share / 2 / count, np.abs(beyond - other))[:, None, None])
-        at.append(of_nodes[i][inner, :3])
+    rule, p, at, blocks, places = state.rule, state.degree, [], [], [np.empty(0) for _ in state.scene.rods]
+    of_nodes = np.split(model.rows_of_nodes, np.cumsum([len(state.s(rod)) for rod in state.scene.rods])[:-1])
+    samples = np.unique(np.concatenate([rule.nodes[:-1] + t * np.diff(rule.nodes) for t in _SAMPLED] + [[1.0]]))
+    nodes, gauss_points = np.searchsorted(samples, rule.nodes), gauss(p + 1)
+    for i, kinks in kinks_at(state):
+        breaks, rod = state.layout.breaks[i], state.scene.rods[i]
+        sizes = np.diff(breaks)
+        x = breaks[:-1, None] + sizes[:, None] * samples
+        gap, stiff = (found.reshape(*x.shape, *found.shape[1:]) for found in kinks(x.ravel()))
+        cells, first = np.nonzero((gap[:, 1:] < 0) != (gap[:, :-1] < 0))
+        low, high, begins = x[cells, first], x[cells, first + 1], gap[cells, first] >= 0
+        for _ in range(_BISECTIONS if len(cells) else 0):
+            middle = (low + high) / 2
+            before = (kinks(middle)[0] >= 0) == begins
+            low, high = np.where(before, middle, low), np.where(before, high, middle)
+        places[i] = np.sort(np.append(places[i], high))
+        ends = np.concatenate([[0.0], high, [1.0]])
+        for cell in np.unique(cells):
+            of_cell, h = cells == cell, sizes[cell] * rod.length
+            cut = np.concatenate([[0.0], (high[of_cell] - breaks[cell]) / sizes[cell], [1.0]])
+            inner = begins[of_cell][0] == (np.arange(len(cut) - 1) % 2)  # parts that touch
+            y = (cut[:-1, None] + np.diff(cut)[:, None] * (gauss_points.points + 1) / 2)[inner].ravel()
+            weights = (np.diff(cut)[:, None] * gauss_points.weights / 2)[inner].ravel()
+            basis, unit = rule.basis(y), model.scales.force / model.scales.length
+            lacks = np.einsum("g,ga,gb,gij->aibj", weights, basis, basis, kinks(breaks[cell] + sizes[cell] * y)[1])
+            touching = rule.lobatto * (gap[cell, nodes] < 0)
+            lacks[np.arange(p + 1), :, np.arange(p + 1)] -= touching[:, None, None] * stiff[cell, nodes]
+            edge = cut[1:-1]
+            off = np.where(begins[of_cell], 1 - edge, edge)  # Lobatto's rule is symmetric
+            q = np.abs(off**2 / 2 - np.maximum(off[:, None] - rule.nodes, 0.0) @ rule.lobatto)
+            which = np.flatnonzero(of_cell)
+            reach = np.where(begins[of_cell], ends[which + 2] - ends[which + 1], ends[which + 1] - ends[which])
+            q, basis = q / np.minimum(1.0, reach / sizes[cell]), rule.basis(edge)
+            unknown = np.einsum("g,ga,gb,gij->aibj", q, basis, basis, kinks(high[of_cell])[1])
+            size = 3 * (p + 1)
+            blocks.append(np.array([x.reshape(size, size) * h / unit for x in (lacks, unknown)]))
+            at.append(of_nodes[i][p * cell : p * cell + p + 1, :3].ravel())
+    if not blocks:
+        return None
+    size = model.rows_of_nodes.max(initial=-1) + 1
+    return Edges(*(of_blocks(x, np.array(at), size) for x in np.swapaxes(blocks, 0, 1)), places)
+
+
+def switched(model, here, there):
+    """What the stiffness of walls at nodes lacks `there` since other nodes touch than at another `Equilibrium`, `here`;
+    None where the same ones do."""
+    changes, at = [], []
+    of_nodes = np.split(model.rows_of_nodes, np.cumsum([len(here.s(rod)) for rod in here.scene.rods])[:-1])
+    for (i, kinks), (_, moved) in zip(kinks_at(here), kinks_at(there), strict=True):
+        x = here.s(here.scene.rods[i]) / here.scene.rods[i].length
+        (before, _), (after, stiff) = kinks(x), moved(x)
+        which = np.flatnonzero((before < 0) != (after < 0))
+        size = np.where(before < 0, 1.0, -1.0) * shares_of(here, i)
+        changes.append(size[which, None, None] * stiff[which] / (model.scales.force / model.scales.length))
+        at.append(of_nodes[i][which, :3])
     if not sum(map(len, at)):
         return None
-    size = rows.max(initial=-1) + 1
-    return tuple(of_blocks(np.concatenate(x), np.concatenate(at), size) for x in (lacking, unknown))
+    return of_blocks(np.concatenate(changes), np.concatenate(at), model.rows_of_nodes.max() + 1)
 
 
 def of_blocks(blocks, of_node, size):
@@ -112,13 +150,12 @@ def of_blocks(blocks, of_node, size):
     return sparse.csr_matrix((blocks.ravel()[free], (i[free], j[free])), shape=(size, size))
 
 
-def with_edges(edges, M, C, values, vectors):
-    """Eigenvalues with what `edges_of_contact` has, to first order, and their relative errors (n,) by what is not known
-    of it; the others as of `corrected`."""
+def beside_edges(edges, M, C, values, vectors):
+    """(n,) relative errors of eigenvalues by what the `Edges` leave unknown; arguments as of `corrected`."""
     if edges is None:
-        return values, np.zeros(len(values))
-    found, beside = (corrected(x, M, C, values, vectors, np.zeros(len(values)), True)[0] for x in edges)
-    return found, np.abs(beside - values) / np.where(values == 0, 1.0, np.abs(values))
+        return np.zeros(len(values))
+    found, _ = corrected(edges.unknown, M, C, values, vectors, np.zeros(len(values)), True)
+    return np.abs(found - values) / np.where(values == 0, 1.0, np.abs(values))
 
 
 def corrected(softness, M, C, values, vectors, rounding, trusted):

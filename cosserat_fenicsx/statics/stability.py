@@ -11,6 +11,7 @@ from functools import cached_property
 
 import numpy as np
 from petsc4py import PETSc
+from scipy import sparse
 
 from cosserat_fenicsx.algebra import eigen
 from cosserat_fenicsx.algebra.building import Packed, Pointers
@@ -49,6 +50,7 @@ class NegativeModes(Called):
     def load(self):
         """Take the numbers of the scene that the model was loaded with."""
         for part in self.parts:
+            part.lacking = None
             part.load()
 
     @property
@@ -71,6 +73,14 @@ class NegativeModes(Called):
             self.logarithm += logarithm
             return found - held
         return found
+
+
+def add_to(K, more):
+    """Add a sparse matrix of scipy, the same on all ranks, or None, to one of PETSc."""
+    more = sparse.coo_matrix(K.getSize()) if more is None or K.comm.rank else more.tocoo()
+    for i, j, value in zip(more.row.tolist(), more.col.tolist(), more.data.tolist(), strict=True):
+        K.setValue(i, j, value, addv=PETSc.InsertMode.ADD_VALUES)
+    K.assemble()
 
 
 # Ratio of the bending stiffnesses of the thickest and the thinnest rod from which on the second variation is scaled.
@@ -102,6 +112,8 @@ class Part(Pointers):
             self.model, variation.numbering, variation.cell_dofs, variation.tied, factors=False
         )
         self.tied = self._tie() if problem.ties else None
+        #: of scipy: what is added to K, which counts do not know
+        self.lacking = None
 
     def _tie(self):
         axes, pattern = self.variation.axes, self.model.signature.connections.pattern
@@ -155,7 +167,7 @@ class Part(Pointers):
             of_ties = self._of_ties(stress_alone)
             if self.model.comm.rank == 0:
                 self.problem.ties.add_to_matrix(self.K, self.variation.tied, of_ties)
-        self.K.assemble()
+        add_to(self.K, None if stress_alone else self.lacking)
 
     def _of_ties(self, stress_alone=False):
         """The part of ties, see `TieRows.second_variation`, after a count of pivots, with springs in their place."""

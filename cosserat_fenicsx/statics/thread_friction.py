@@ -10,9 +10,11 @@ each with one solution by the factors of K, whatever the mesh.
 """
 
 import numpy as np
+from petsc4py import PETSc
 
 from cosserat_fenicsx import compat
 from cosserat_fenicsx.algebra.building import Packed
+from cosserat_fenicsx.algebra.eigen import gmres
 from cosserat_fenicsx.compat import compiling
 from cosserat_fenicsx.errors import NotConverged
 
@@ -70,26 +72,23 @@ class ThreadFriction:
             return True
         if not np.isfinite(size):
             return False
-        basis, responses, columns = [right / size], [], []
-        for k in range(_MOST):
-            responses.append(self._moved(basis[k]))
-            image, column = basis[k] + self._changes(responses[k]), np.zeros(k + 2)
-            for _ in range(2):  # twice is enough
-                shares = np.array(basis) @ image
-                image, column[: k + 1] = image - shares @ np.array(basis), column[: k + 1] + shares
-            column[k + 1] = np.linalg.norm(image)
-            columns.append(column)
-            hessenberg = np.array([np.pad(c, (0, k + 2 - len(c))) for c in columns]).T
-            weights, *_ = np.linalg.lstsq(hessenberg, np.eye(k + 2)[0], rcond=None)
-            left = np.linalg.norm(np.eye(k + 2)[0] - hessenberg @ weights)
-            if left <= _SOLVED or column[k + 1] <= _SOLVED * np.abs(column).max():
-                break
-            basis.append(image / column[k + 1])
-        if not left <= np.sqrt(_SOLVED):
-            return False
-        for weight, response in zip(weights, responses, strict=True):
-            x.axpy(-size * weight, response)
-        return True
+        matrix = PETSc.Mat().createPython((len(right), len(right)), self, comm=PETSc.COMM_SELF)
+        b, t = (PETSc.Vec().createWithArray(y, comm=PETSc.COMM_SELF) for y in (right, np.zeros_like(right)))
+        solver = gmres(matrix, _MOST)
+        solver.getPC().setType("none")
+        solver.setGMRESRestart(_MOST)
+        solver.setTolerances(rtol=_SOLVED)
+        solver.solve(b, t)
+        found = solver.getResidualNorm() <= np.sqrt(_SOLVED) * size
+        if found:
+            x.axpy(-1.0, self._moved(t.array_r))
+        for used in (solver, matrix, b, t):
+            used.destroy()
+        return found
+
+    def mult(self, matrix, t, image):
+        """1 + C K^-1 G times changes of the tensions, for PETSc."""
+        image.array_w[:] = t.array_r + self._changes(self._moved(t.array_r))
 
     def accept(self):
         """Accept the state as the next one of a path; NotConverged where a thread has slid back since the last one."""
