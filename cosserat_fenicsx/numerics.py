@@ -144,13 +144,13 @@ def once_each(keys, make):
 def directors(q):
     """(k, 3, 3) rotation matrices of unit quaternions (k, 4), eq. (6); the columns are d_1, d_2, d_3."""
     a, b, c, d = q.T
-    return np.array(
-        [
-            [a * a + b * b - c * c - d * d, 2 * (b * c - a * d), 2 * (b * d + a * c)],
-            [2 * (b * c + a * d), a * a - b * b + c * c - d * d, 2 * (c * d - a * b)],
-            [2 * (b * d - a * c), 2 * (c * d + a * b), a * a - b * b - c * c + d * d],
-        ]
-    ).transpose(2, 0, 1)
+    (aa, bb, cc, dd), (ab, ac, ad), (bc, bd, cd) = q.T * q.T, a * q.T[1:], (b * c, b * d, c * d)
+    R = np.empty((3, 3, len(q)))
+    R[0, 1], R[0, 2], R[1, 0] = bc - ad, bd + ac, bc + ad
+    R[1, 2], R[2, 0], R[2, 1] = cd - ab, bd - ac, cd + ab
+    R *= 2
+    R[0, 0], R[1, 1], R[2, 2] = aa + bb - cc - dd, aa - bb + cc - dd, aa - bb - cc + dd
+    return R.transpose(2, 0, 1)
 
 
 def conjugate_product(p, q):

@@ -438,6 +438,8 @@ class DelayLines:
         asked, count = t - self._delays, self._count
         if not count:
             return self._first
+        if self._read[:2] == (t, count):  # a step asks for them several times
+            return self._read[2]
         times = self._times[:count]
         first = np.clip(np.searchsorted(times, asked) - _SAMPLES // 2, 0, count - _SAMPLES)
         at = first + _EACH[:, None]
@@ -446,7 +448,8 @@ class DelayLines:
         factors[_EACH, _EACH] = 1.0
         weights = factors.prod(axis=1)
         read = (weights * self._values[at, np.arange(len(asked))]).sum(axis=0)
-        return np.where(asked < times[0], self._first, read)
+        self._read = t, count, np.where(asked < times[0], self._first, read)
+        return self._read[2]
 
     def _arrived(self, t, h):
         """Waves in the middle of a step from t to t + h (s), (n,) from above, (n,) from below; and the output of a
@@ -488,11 +491,11 @@ class DelayLines:
             read = np.searchsorted(self._times, self._times[-1] - self._delays.max())
             self._take(*(x[max(int(read) - 2 * _SAMPLES, 0) :] for x in (self._times, self._values)))
         self._times[self._count], self._values[self._count] = t, values
-        self._count += 1
+        self._count, self._read = self._count + 1, ()
 
     def _take(self, times, values):
         """Take samples, with room for at least as many."""
-        self._count = n = len(times)
+        self._count, self._read = (n := len(times)), ()
         self._times, self._values = np.zeros(2 * n + _SPARE), np.zeros((2 * n + _SPARE, len(self._delays)))
         self._times[:n], self._values[:n] = times, values
 

@@ -426,7 +426,7 @@ def six_of(I):
 
 def turned_by(dq, q):
     """(.., 3) the inertial rotations 2 vec(dq conj(q))/|q|^2 of changes dq of q, (.., 4) each."""
-    (a, b, c, d), (da, db, dc, dd) = (np.moveaxis(x, -1, 0) for x in (q, dq))
+    (a, b, c, d), (da, db, dc, dd) = ([x[..., i] for i in range(4)] for x in (q, dq))
     factor, turned = 2 / np.einsum("...i,...i->...", q, q), np.empty((*np.shape(a), 3))
     turned[..., 0] = factor * (a * db - b * da - d * dc + c * dd)
     turned[..., 1] = factor * (a * dc - c * da + d * db - b * dd)
