@@ -306,6 +306,13 @@ def _why(drilling, top, damping):
     if drilling.hole is not None:
         yield "bending of the pipe above is left out: friction by the wall force of a soft string, with its tension"
         friction = drilling.friction
+        law, _, of_hole = law_of(friction)
+        most = law.still * (max(x.friction for x in drilling.hole.sections) if of_hole else 1.0)
+        if most:
+            yield (f"the wall bears the friction around it too, as in torque_and_drag: up to "
+                   f"{1 - 1 / math.hypot(1, most):.1%} less of it than in drilling.simulate")  # fmt: skip
+            yield ("the support of the rod's upper end has no friction: what the wall would bear there, about half "
+                   "the load on the first span, does not rub")  # fmt: skip
         if friction is not None and friction.decays:
             yield "friction at the rod's wall is the kinetic one, at rest too"
         if drilling.hole.wall_stiffness is None:

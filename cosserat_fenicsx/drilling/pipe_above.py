@@ -31,8 +31,8 @@ from cosserat_fenicsx.scene.rod import Station, StationOrName, is_known
 from cosserat_fenicsx.well.components import Laid, StringPart
 
 # Drag and friction act at nodes, so many in the pipe (errors of 3e-4 at a rate of 0.3 per s in 3000 m), or one in each
-# of these lengths (m) of a short one.
-_BEADS, _APART = 64, 15.0
+# of these lengths (m) of a short one; of down to the second ones where a short part makes the steps shorter anyway.
+_BEADS, _APART, _NEAREST = 64, 15.0, 4.0
 # Parts of a sample to which the delay of a control is rounded.
 _FINE = 1000
 
@@ -59,8 +59,8 @@ class PipeAbove(PointAction):
         drive: a `TopDrive`. Its speed is about the axis that points from the pipe into the rod.
         hook: a `Hook`; None for a rigid one at rest.
         tension: with which the pipe pulls at the rod's end in the reference, N: the weight of what hangs there.
-        drag: a `ViscousDrag` of the pipe, as dashpots at 64 or more nodes, or every 15 m of a short pipe; it shortens
-            the longest step; None for none.
+        drag: a `ViscousDrag` of the pipe, as dashpots at 64 or more nodes, or every 15 m of a short pipe, closer where
+            a part is short; it shortens the longest step; None for none.
         rubs: a `Drilling` with a hole, of whose string the pipe is the upper part: it rubs at the wall of the hole, at
             these nodes, with the friction of the `Drilling`, along and around the hole, see `pipe_friction`; None for
             a pipe without a wall. Curvature of the hole does nothing else to its waves.
@@ -179,8 +179,9 @@ class _InMotion:
         parts, lengths = pipe.segments, np.array([x.length for x in pipe.segments])
         rubs, whole, count = pipe.rubs, lengths.sum(), np.ones(len(parts), dtype=int)
         if rubs or drag.axial or drag.torsion:
-            apart = whole / min(_BEADS, max(whole / _APART, 2.0))
-            count = np.maximum(np.ceil(lengths / apart - 1e-9).astype(int), 1 + bool(rubs and pipe.motors))
+            apart, least = whole / min(_BEADS, max(whole / _APART, 2.0)), 1 + bool(rubs and pipe.motors)
+            apart = max(min(apart, lengths.min() / least), min(apart, _NEAREST))
+            count = np.maximum(np.ceil(lengths / apart - 1e-9).astype(int), least)
         axial = [(x.axial_impedance, x.length / x.axial_speed) for x in parts]
         torsional = [(x.torsional_impedance, x.length / x.torsional_speed) for x in parts]
         hook, control = pipe.hook or Hook(), pipe.drive.control
