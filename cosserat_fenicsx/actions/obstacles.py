@@ -97,7 +97,7 @@ class Obstacle(Pressing, LineAction):
         distance, normal = self.beside(points)
         return distance - self.radius_of(rod, s), normal
 
-    def kinks(self, rod, s, points):
+    def first_contact(self, rod, s, points):
         """See `Action`."""
         return *self.gaps(rod, s, points), self.begins_with(self.stiffness), self.sticks if self.friction else 0.0
 

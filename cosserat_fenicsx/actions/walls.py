@@ -280,7 +280,7 @@ class TubeWall(_Confined, LineAction):
         along += [end for given in (self.contact_radius, self.slip) for end, _ in given[:-1]]
         return tuple(sorted({end for end in along if 0 < end < rod.length}))
 
-    def kinks(self, rod, s, points):
+    def first_contact(self, rod, s, points):
         """See `Action`."""
         near = self.path.nearest(points, s + self.begins)
         away = near.position - points

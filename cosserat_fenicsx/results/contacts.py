@@ -241,21 +241,21 @@ def gaps_at(state):
                 yield obstacle, rod, i, s, *obstacle.gaps(rod, s, r)
 
 
-def kinks_at(state):
+def first_contacts_at(state):
     """(number of a rod, function) for each rod that a wall acts on in an `Equilibrium`; the function takes arc lengths
     (n,) over the rod's and returns gaps (n,), m, and the stiffness (n, 3, 3), N/m^2, where contact begins."""
     for action in state.scene.actions:
         for i, rod in enumerate(state.scene.rods if action.presses and not action.touches else ()):
             if action.acts_on(rod):
 
-                def kinks(x, action=action, rod=rod):
+                def first_contact(x, action=action, rod=rod):
                     s = x * rod.length
                     points = rod.curve.position(s) + state.between(rod, x, state.displacement)
-                    gap, normal, along, across = action.kinks(rod, s, points)
+                    gap, normal, along, across = action.first_contact(rod, s, points)
                     outer = normal[:, :, None] * normal[:, None]
                     return gap, across * np.eye(3) + (along - across) * outer
 
-                yield i, kinks
+                yield i, first_contact
 
 
 def refuse_grazing(state, owner):

@@ -119,8 +119,8 @@ class Action(Part, family="load or action", homes=("cosserat_fenicsx.scene.loads
             `tube_around` (arc lengths s (n,), points (n, 3) of the rod, measured depths (n,) near them) -> the
             `actions.walls.Around` of the points.
         presses: whether it is a wall with a force on the parts of rods that touch it alone, which has a kink where
-            contact begins. It then has a method `kinks`, which takes what that of `gaps` takes and returns gaps and
-            normals, and the stiffness (N/m^2) along and across the normal where contact begins.
+            contact begins. It then has a method `first_contact`, which takes what that of `gaps` takes and returns gaps
+            and normals, and the stiffness (N/m^2) along and across the normal where contact begins.
         gaps: None; or, of an obstacle, a method (rod, arc lengths s (n,), its points there (n, 3)) -> gaps (n,) between
             the rod's surface and the obstacle, m, and unit normals (n, 3) towards the free side. It then has
             `stiffness` (N/m^2), `friction`, with it `sticks` (N/m^2), `law` and `largest_step`, how far (m) a rod may

@@ -23,7 +23,7 @@ from cosserat_fenicsx.models.spatial import CirculatoryModel, ResistingModel
 from cosserat_fenicsx.models.rod_data import nodal_inertia
 from cosserat_fenicsx.models.signature import Signature
 from cosserat_fenicsx.numerics import directors, gauss, lobatto_weights
-from cosserat_fenicsx.results.contacts import kinks_at, shares_of
+from cosserat_fenicsx.results.contacts import first_contacts_at, shares_of
 
 # Share of a first-order change of an eigenvalue that is assumed to remain as error: at most this, or this times the
 # relative change.
@@ -87,16 +87,16 @@ def edges_of_contact(model, state):
     of_nodes = np.split(model.rows_of_nodes, np.cumsum([len(state.s(rod)) for rod in state.scene.rods])[:-1])
     samples = np.unique(np.concatenate([rule.nodes[:-1] + t * np.diff(rule.nodes) for t in _SAMPLED] + [[1.0]]))
     nodes, gauss_points = np.searchsorted(samples, rule.nodes), gauss(p + 1)
-    for i, kinks in kinks_at(state):
+    for i, contact in first_contacts_at(state):
         breaks, rod = state.layout.breaks[i], state.scene.rods[i]
         sizes = np.diff(breaks)
         x = breaks[:-1, None] + sizes[:, None] * samples
-        gap, stiff = (found.reshape(*x.shape, *found.shape[1:]) for found in kinks(x.ravel()))
+        gap, stiff = (found.reshape(*x.shape, *found.shape[1:]) for found in contact(x.ravel()))
         cells, first = np.nonzero((gap[:, 1:] < 0) != (gap[:, :-1] < 0))
         low, high, begins = x[cells, first], x[cells, first + 1], gap[cells, first] >= 0
         for _ in range(_BISECTIONS if len(cells) else 0):
             middle = (low + high) / 2
-            before = (kinks(middle)[0] >= 0) == begins
+            before = (contact(middle)[0] >= 0) == begins
             low, high = np.where(before, middle, low), np.where(before, high, middle)
         places[i] = np.sort(np.append(places[i], high))
         ends = np.concatenate([[0.0], high, [1.0]])
@@ -107,7 +107,7 @@ def edges_of_contact(model, state):
             y = (cut[:-1, None] + np.diff(cut)[:, None] * (gauss_points.points + 1) / 2)[inner].ravel()
             weights = (np.diff(cut)[:, None] * gauss_points.weights / 2)[inner].ravel()
             basis, unit = rule.basis(y), model.scales.force / model.scales.length
-            lacks = np.einsum("g,ga,gb,gij->aibj", weights, basis, basis, kinks(breaks[cell] + sizes[cell] * y)[1])
+            lacks = np.einsum("g,ga,gb,gij->aibj", weights, basis, basis, contact(breaks[cell] + sizes[cell] * y)[1])
             touching = rule.lobatto * (gap[cell, nodes] < 0)
             lacks[np.arange(p + 1), :, np.arange(p + 1)] -= touching[:, None, None] * stiff[cell, nodes]
             edge = cut[1:-1]
@@ -116,7 +116,7 @@ def edges_of_contact(model, state):
             which = np.flatnonzero(of_cell)
             reach = np.where(begins[of_cell], ends[which + 2] - ends[which + 1], ends[which + 1] - ends[which])
             q, basis = q / np.minimum(1.0, reach / sizes[cell]), rule.basis(edge)
-            unknown = np.einsum("g,ga,gb,gij->aibj", q, basis, basis, kinks(high[of_cell])[1])
+            unknown = np.einsum("g,ga,gb,gij->aibj", q, basis, basis, contact(high[of_cell])[1])
             size = 3 * (p + 1)
             blocks.append(np.array([x.reshape(size, size) * h / unit for x in (lacks, unknown)]))
             at.append(of_nodes[i][p * cell : p * cell + p + 1, :3].ravel())
@@ -131,9 +131,9 @@ def switched(model, here, there):
     None where the same ones do."""
     changes, at = [], []
     of_nodes = np.split(model.rows_of_nodes, np.cumsum([len(here.s(rod)) for rod in here.scene.rods])[:-1])
-    for (i, kinks), (_, moved) in zip(kinks_at(here), kinks_at(there), strict=True):
+    for (i, contact), (_, moved) in zip(first_contacts_at(here), first_contacts_at(there), strict=True):
         x = here.s(here.scene.rods[i]) / here.scene.rods[i].length
-        (before, _), (after, stiff) = kinks(x), moved(x)
+        (before, _), (after, stiff) = contact(x), moved(x)
         which = np.flatnonzero((before < 0) != (after < 0))
         size = np.where(before < 0, 1.0, -1.0) * shares_of(here, i)
         changes.append(size[which, None, None] * stiff[which] / (model.scales.force / model.scales.length))
