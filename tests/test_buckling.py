@@ -112,6 +112,16 @@ def test_critical_loads_of_slender_frames_scatter_little():
 
 
 @pytest.mark.serial
+def test_any_load_is_a_unit_of_load_factors():
+    """3000 EA of a soft column, as in numbers without units; `solve` refuses it."""
+    rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, 1.0)), cf.Circle(0.02), cf.Material(E=1.0, nu=0.3))
+    scene = cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Force(rod.end, (0, 0, -1.0))])
+    assert cf.buckling(scene).load_factors[0] == pytest.approx(np.pi**3 * 0.02**4 / 256, rel=1e-3)
+    with pytest.raises(cf.SceneError, match="at most 10 EA .*a Stiffness in its place is not doubted"):
+        cf.solve(scene, [1.0])
+
+
+@pytest.mark.serial
 @pytest.mark.parametrize("held", ["clamped", "hinged"])
 def test_rounding_of_slender_columns_is_small_and_told(held):
     """L/d from 10^2 to 10^5 against Engesser's load with EA and GA, to first order in P/EA; EA L^2/EI is 10^11.

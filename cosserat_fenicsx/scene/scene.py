@@ -38,6 +38,7 @@ _SAMPLES = 9
 _SOFTEST, _RUBBER, _SOFTEST_RUBBER = 1e6, (900.0, 1500.0), 1e4
 # Densities, kg/m^3, and moduli, Pa, of steel and cast iron; rolled profiles are of these.
 _STEEL, _METAL = (7000.0, 8200.0), (5e10, 5e11)
+_WAY_OUT = " (a Stiffness in its place is not doubted)"
 _ROUNDING = "beyond which rounding errors dominate"
 _UNITS = 'are the units SI (N, m, Pa; steel has 210e9, or "210 GPa")'
 
@@ -46,13 +47,14 @@ _UNITS = 'are the units SI (N, m, Pa; steel has 210e9, or "210 GPa")'
 Magnitude = namedtuple("Magnitude", "share scaled words most")
 
 
-def magnitudes(scene):
-    """The `Magnitude`s of the loads and prescribed motions of a scene."""
+def magnitudes(scene, doubts=True):
+    """The `Magnitude`s of the loads and prescribed motions of a scene; doubts: whether a Young's modulus is doubted."""
     length = max(rod.length for rod in scene.rods)
     K, J = ([float(getattr(rod.profile.range[1], name).max()) for rod in scene.rods] for name in "KJ")
-    most, k = max((size * _doubted(rod)[1], k) for k, (size, rod) in enumerate(zip(K, scene.rods, strict=True)))
-    doubt, strain = _doubted(scene.rods[k])
-    limit = f"{strain:g} EA = {most:.3g} N, {f'where {doubt}' if strain < _MOST_STRAIN else _ROUNDING}"
+    limits = [_doubted(rod) if doubts else ("", _MOST_STRAIN) for rod in scene.rods]
+    most, k = max((size * strain, k) for k, (size, (_, strain)) in enumerate(zip(K, limits, strict=True)))
+    doubt, strain = limits[k]
+    limit = f"{strain:g} EA = {most:.3g} N, {f'where {doubt}{_WAY_OUT}' if strain < _MOST_STRAIN else _ROUNDING}"
     if np.isinf(most):
         most = _MOST_BENDING * max(J) / length**2
         limit = f"{_MOST_BENDING:g} EI/L^2 = {most:.3g} N, {_ROUNDING}"
@@ -107,9 +109,10 @@ def _force(load, scene, length):
     return abs(load.amplitude) * size
 
 
-def check_magnitudes(scene, load_factor):
-    """Refuse (SceneError) loads and prescribed motions so large that rounding errors would dominate."""
-    for share, scaled, words, most in scene.magnitudes:
+def check_magnitudes(scene, load_factor, doubts=True):
+    """Refuse (SceneError) loads and prescribed motions so large that rounding errors would dominate; doubts: or that a
+    Young's modulus must be in wrong units."""
+    for share, scaled, words, most in scene.magnitudes if doubts else magnitudes(scene, doubts):
         factor = abs(load_factor) if scaled else 1.0
         if share * factor > 1:
             times = f" times the load factor {factor:g}" if factor != 1 else ""

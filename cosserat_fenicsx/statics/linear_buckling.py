@@ -87,7 +87,8 @@ def buckling(
     check_arguments(scene, tol, elements, owner="buckling")
     whole("buckling", "count", count)
     number("buckling", "load_factor", load_factor, "a finite number", math.isfinite)
-    check_magnitudes(scene, max(abs(load_factor), 1.0))
+    check_magnitudes(scene, load_factor)
+    check_magnitudes(scene, 1.0, doubts=False)  # any load is a unit of load factors
     check_tensions(scene, [load_factor])
     comm = communicator(comm)
 
