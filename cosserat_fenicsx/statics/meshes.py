@@ -467,10 +467,11 @@ def until_two_meshes_agree(owner, scene, on_mesh, tol, *, most, elements, degree
                     )
                 best = min(best, reached)
             if best <= tol:
-                if gains is not None and before is None and edges is None:
-                    before = _difference_before(scene, on_mesh, coarse, coarse_layout)
-                if gains is not None and before is not None:
-                    error = error / _gain(before, error, gains(found))
+                if gains is not None and edges is None:  # the place of an edge does not converge in the order p
+                    if before is None:
+                        before = _difference_before(scene, on_mesh, coarse, coarse_layout)
+                    if before is not None:
+                        error = error / _gain(before, error, gains(found))
                 return found, np.maximum(error, hidden)
             before = error if comparable and len(error) else None
             coarse, coarse_layout, layout = numbers, layout, layout.finer(scene, 2)
