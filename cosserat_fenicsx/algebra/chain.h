@@ -122,7 +122,7 @@ typedef struct {
                                        before, of its own and of the next */
     double *motion, *forces, *late; /* (positions, 6, LANES) motions; (positions, 4, LANES) forces of these kinds, and
                                        of their changes what later sweeps take along */
-    double passing[2][24];          /* (6, LANES) from lane to lane, to the right and to the left */
+    double passing[2][6 * LANES];   /* (6, LANES) from lane to lane, to the right and to the left */
     double *walled;                 /* (positions, 10, LANES) work space, see contact.c */
     double *moved;                  /* (nodes, 6) displacement and rotation in the step with the forces */
     double *force, *law;            /* (nodes, 6) force and moment; (nodes, 3) normal force, friction round and along */
