@@ -11,7 +11,6 @@ from functools import cached_property
 
 import numpy as np
 from petsc4py import PETSc
-from scipy import sparse
 
 from cosserat_fenicsx.algebra import eigen
 from cosserat_fenicsx.algebra.building import Packed, Pointers
@@ -77,9 +76,10 @@ class NegativeModes(Called):
 
 def add_to(K, more):
     """Add a sparse matrix of scipy, the same on all ranks, or None, to one of PETSc."""
-    more = sparse.coo_matrix(K.getSize()) if more is None or K.comm.rank else more.tocoo()
-    for i, j, value in zip(more.row.tolist(), more.col.tolist(), more.data.tolist(), strict=True):
-        K.setValue(i, j, value, addv=PETSc.InsertMode.ADD_VALUES)
+    if more is not None and K.comm.rank == 0:
+        more = more.tocoo()
+        for i, j, value in zip(more.row.tolist(), more.col.tolist(), more.data.tolist(), strict=True):
+            K.setValue(i, j, value, addv=PETSc.InsertMode.ADD_VALUES)
     K.assemble()
 
 
