@@ -275,6 +275,10 @@ class TestWhatAResultLeavesOpen:
         assert "does not see that it may lift off" in str(path) and "may lift off" in " ".join(path.why)
         pressed = dataclasses.replace(scene, loads=[*scene.loads, cf.LineForce(self.rod, (0, 0, -1.0), permanent=True)])
         assert cf.buckling(pressed, 1, elements=4).load_factors[0] > 20  # as long as it presses
+        rough = [dataclasses.replace(self.floor, friction=0.3), *pressed.loads[1:]]
+        for linear in (cf.buckling, cf.modes):
+            with pytest.warns(cf.SceneWarning, match="Plane has friction, and where rods cease to stick to it"):
+                linear(dataclasses.replace(pressed, loads=rough), 1, elements=4)
 
     def test_a_post_beside_the_nodes(self):
         """A bent cantilever on a thin post: the force is across the rod, at 0.22 rad (shooting: 0.19849, 0.88747 N);

@@ -29,7 +29,7 @@ from cosserat_fenicsx.scene.supports import InitialVelocity, Joint, Support
 # Largest load over the largest EA, and over EI/L^2 where a rod's EA is infinite: beyond, rounding errors dominate.
 _MOST_STRAIN, _MOST_BENDING = 1e6, 1e15
 # Largest load over EA where Young's modulus is doubted: of metals, and of others.
-_MOST_OF_METAL, _MOST_OF_SOFT = 0.02, 10.0
+_MOST_OF_METAL, _MOST_OF_SOFT = 0.5, 10.0
 # Largest prescribed displacement over the longest rod, and largest prescribed rotation, rad.
 _MOST_MOTION = 1e6
 # Samples of a distributed load along a rod.

@@ -158,7 +158,7 @@ class MostWeightOnBit(Result):
         return len(self.limits)
 
     def _about(self):
-        names = "operation", "safety", "model"
+        names = "operation", "safety", "model", "incomplete"
         return {"kind": "MostWeightOnBit"} | {name: getattr(self, name) for name in names}
 
     def _answer(self, units):
