@@ -144,11 +144,11 @@ def once_each(keys, make):
 def directors(q):
     """(k, 3, 3) rotation matrices of unit quaternions (k, 4), eq. (6); the columns are d_1, d_2, d_3."""
     a, b, c, d = q.T
-    (aa, bb, cc, dd), (ab, ac, ad), (bc, bd, cd) = q.T * q.T, a * q.T[1:], (b * c, b * d, c * d)
+    (aa, bb, cc, dd), (ab, ac, ad), e, f = q.T * q.T, 2 * a * q.T[1:], 2 * b, 2 * c
+    bc, bd, cd = e * c, e * d, f * d
     R = np.empty((3, 3, len(q)))
     R[0, 1], R[0, 2], R[1, 0] = bc - ad, bd + ac, bc + ad
     R[1, 2], R[2, 0], R[2, 1] = cd - ab, bd - ac, cd + ab
-    R *= 2
     R[0, 0], R[1, 1], R[2, 2] = aa + bb - cc - dd, aa - bb + cc - dd, aa - bb - cc + dd
     return R.transpose(2, 0, 1)
 

@@ -145,7 +145,7 @@ class Borehole(InWords, Part):
             try:
                 rows = [(_depth(i, md, unit or 1.0), *angles) for i, (md, *angles) in enumerate(stations)]
                 md, inc, azi = np.array(rows, dtype=float).T
-                given = next((row[0] for row in stations if isinstance(row[0], str)), unit or 1.0)
+                given = stations[-1][0] if isinstance(stations[-1][0], str) else unit or 1.0
             except (ValueError, TypeError, OverflowError) as problem:
                 if isinstance(problem, SceneError):
                     raise
