@@ -185,8 +185,8 @@ def warn_of_slant(owner, state):
                 warn(f"{owner}: {words}")
             if obstacle.friction and any((obstacle.gaps(rod, s, r[0])[0] < 0).any() for rod, s, r, _ in on):
                 warn(
-                    f"{owner}: {describe(obstacle)} has friction, and where rods cease to stick to it is taken to be at a "
-                    "node: estimated errors do not contain it. Expected a comparison with more elements"
+                    f"{owner}: {describe(obstacle)} has friction, and where rods cease to stick to it is taken to be "
+                    "at a node: estimated errors do not contain it. Expected a comparison with more elements"
                 )
 
 
