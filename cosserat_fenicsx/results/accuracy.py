@@ -93,7 +93,7 @@ def estimate_error(fine, coarse, before=None, *, smooth=True):
     else:
         seen = before / np.maximum(relative, 1e-300)
         gain = np.clip(part * (seen - 1), 1, part * 2.0 ** (p + 1))
-    if any(action.presses for action in fine.scene.actions):
+    if fine.scene.has_walls:
         gain = np.maximum(gain / _NEARLY, 1.0) if smooth else np.full_like(gain, 1 / _ROUGH)
     gain[relative == 0] = 2.0 ** (p + 1) / SAFETY_BELOW
     fine.set_errors(relative / gain)
@@ -347,7 +347,7 @@ def turns_of(path, most):
 def contact_edges(path):
     """For every rod the places where contact with a wall begins or ends, over its length, ascending, at all points of a
     path; None where the scene has no walls. The pressure is extrapolated from the last nodes in contact."""
-    if not any(action.presses for action in path.scene.actions):
+    if not path.scene.has_walls:
         return None
     pressures = np.linalg.norm(path._stacked("densities")[1][..., :3], axis=3)
     found = []

@@ -174,7 +174,7 @@ def slanted(path, obstacle):
     return _slanted(obstacle, rods, "more elements there, or a tol, which puts a node there")
 
 
-def warn_of_slant(owner, state):
+def warn_of_contact(owner, state):
     """Give a warning where `slanted` has a sentence, of an `Equilibrium`, and where rods touch what is rough."""
     known = enumerate(state.scene.rods if state.scene.has_obstacles else ())
     rods = [(rod, state.s(rod), state.position(rod)[None], shares_of(state, i)) for i, rod in known]
@@ -183,11 +183,12 @@ def warn_of_slant(owner, state):
             on = [x for x in rods if obstacle.acts_on(x[0])]
             for words in _slanted(obstacle, on, "more elements: estimated errors do not contain it"):
                 warn(f"{owner}: {words}")
-            if obstacle.friction and any((obstacle.gaps(rod, s, r[0])[0] < 0).any() for rod, s, r, _ in on):
-                warn(
-                    f"{owner}: {describe(obstacle)} has friction, and where rods cease to stick to it is taken to be "
-                    "at a node: estimated errors do not contain it. Expected a comparison with more elements"
-                )
+    rough = [describe(obstacle) for obstacle, *_, gap, _ in gaps_at(state) if obstacle.friction and (gap < 0).any()]
+    for obstacle in dict.fromkeys(rough):
+        warn(
+            f"{owner}: {obstacle} has friction, and where rods cease to stick to it is taken to be at a node: "
+            "estimated errors do not contain it. Expected a comparison with more elements"
+        )
 
 
 def _slanted(obstacle, rods, expected):

@@ -400,6 +400,11 @@ class Scene(Part):
         return any(load.gaps is not None for load in self.all_loads)
 
     @cached_property
+    def has_walls(self):
+        """Whether an action presses on the parts of rods that touch it alone, see `Action.presses`."""
+        return any(action.presses for action in self.actions)
+
+    @cached_property
     def rod_contact(self):
         """The action that keeps rods from passing through each other, see `Action.rods_touch`; or None."""
         return next((load for load in self.all_loads if load.rods_touch), None)

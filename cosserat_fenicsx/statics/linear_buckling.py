@@ -11,7 +11,7 @@ from cosserat_fenicsx.algebra import eigen
 from cosserat_fenicsx.checks import number, whole
 from cosserat_fenicsx.errors import NotConverged
 from cosserat_fenicsx.ranks import communicator
-from cosserat_fenicsx.results.contacts import refuse_grazing, warn_of_slant
+from cosserat_fenicsx.results.contacts import refuse_grazing, warn_of_contact
 from cosserat_fenicsx.results.modes import Buckling
 from cosserat_fenicsx.results.shapes import Equilibrium
 from cosserat_fenicsx.scene.action import has_permanent
@@ -110,7 +110,7 @@ def buckling(
             "events of `solve`."
         )
     if comm.rank == 0:
-        warn_of_slant("buckling", state)
+        warn_of_contact("buckling", state)
     bound = float(load_factors[0]) if len(load_factors) else most
     found = slice(0 if conservative else 1, None)  # without a potential the first one is the bound alone
     load_factors = load_factors[found]
@@ -165,8 +165,8 @@ def _critical(scene, layout, count, load_factor, tol, degree, comm):
             for step in (change, -change):
                 moved(step)
                 stability.whole.assemble(stress_alone=True)
-                # where rods touch stays as it is
-                add_to(stability.whole.K, switched(model, state, Equilibrium.of(model, load_factor + step)))
+                if scene.has_walls:  # where rods touch stays as it is
+                    add_to(stability.whole.K, switched(model, state, Equilibrium.of(model, load_factor + step)))
                 sides.append((stability.whole.K.copy(), skew()))
             slack, of_skew = (_decrease(*parts, change) for parts in zip(*sides, strict=True))
             moved(0.0)
@@ -195,7 +195,7 @@ def _critical(scene, layout, count, load_factor, tol, degree, comm):
         shapes = shapes_of(whole, values, model.rows_of_nodes, model.scales.length)[:count]
         errors, beside = np.array([softness, rounding]), np.zeros(len(chosen))
         if edges:
-            beside = along(edges.unknown, chosen, model.comm) / [(stability.whole.K * v).dot(v) for v in chosen]
+            beside = _quadratic(edges.unknown, chosen, model.comm) / [(stability.whole.K * v).dot(v) for v in chosen]
         return critical, layers, state, shapes, errors, conservative, load_factor + most, beside, edges
 
 
@@ -355,12 +355,12 @@ def _energies(problem, part, vectors):
     modes = [np.where(rows >= 0, vector[rows], 0.0) for vector in whole]
     energies = Energies(problem, modes, part.resistance)
     bounded = energies.here()
-    more = 0.0 if part.lacking is None else along(part.lacking, vectors, model.comm)
+    more = 0.0 if part.lacking is None else _quadratic(part.lacking, vectors, model.comm)
     with _less_bounded(model):
         return np.array([bounded, energies.here()]) + more
 
 
-def along(matrix, vectors, comm):
+def _quadratic(matrix, vectors, comm):
     """(n,) x^T A x of a sparse matrix of scipy and PETSc vectors."""
     whole = [np.concatenate(comm.allgather(v.array_r)) for v in vectors]
     return np.array([x @ (matrix @ x) for x in whole])

@@ -18,7 +18,7 @@ from cosserat_fenicsx.errors import NotConverged, SceneError
 from cosserat_fenicsx.interrupts import obey
 from cosserat_fenicsx.models.formulation import traits_of
 from cosserat_fenicsx.ranks import communicator
-from cosserat_fenicsx.results.contacts import refuse_grazing, warn_of_slant
+from cosserat_fenicsx.results.contacts import refuse_grazing, warn_of_contact
 from cosserat_fenicsx.results.modes import Modes, ModesAlong
 from cosserat_fenicsx.results.records import Event
 from cosserat_fenicsx.results.shapes import Equilibrium
@@ -146,7 +146,7 @@ def modes(
     if (error > tol).any():
         raise _rounded(tol, error)
     if comm.rank == 0:
-        warn_of_slant("modes", found.state)
+        warn_of_contact("modes", found.state)
     return _result(scene, found, error, comm, near or 0.0)
 
 

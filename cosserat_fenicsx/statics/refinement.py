@@ -103,7 +103,7 @@ class _Search:
     def __init__(self, trace, correct, bar, scene, tol, bound, degree, usual):
         self._trace, self._correct, self._bar = trace, correct, bar
         self._scene, self._tol, self._degree = scene, tol, degree
-        self._presses = any(action.presses for action in scene.actions)
+        self._presses = scene.has_walls
         self._rubs = any(action.finds_friction for action in scene.actions)
         self._usual, self._next = usual, None  # `_next`: the next mesh and its refinement factor, where it is known
         self.whole = self._few = self._which = None  # `_few`: sample points on the last mesh; `_which`: their indices

@@ -81,10 +81,10 @@ def edges_of_contact(model, state):
     at nodes. The state has the pressures of the nodes: their sum is off by the error of Lobatto's rule for a pressure
     that rises from the edge, q times its slope, and moves the edge by about q over the shorter of element and contact.
     """
-    if not any(action.presses for action in state.scene.actions):
+    if not state.scene.has_walls:
         return None
     rule, p, at, blocks, places = state.rule, state.degree, [], [], [np.empty(0) for _ in state.scene.rods]
-    of_nodes = np.split(model.rows_of_nodes, np.cumsum([len(state.s(rod)) for rod in state.scene.rods])[:-1])
+    of_nodes = _rows_of_rods(model, state)
     samples = np.unique(np.concatenate([rule.nodes[:-1] + t * np.diff(rule.nodes) for t in _SAMPLED] + [[1.0]]))
     nodes, gauss_points = np.searchsorted(samples, rule.nodes), gauss(p + 1)
     for i, contact in first_contacts_at(state):
@@ -130,7 +130,7 @@ def switched(model, here, there):
     """What the stiffness of walls at nodes lacks `there` since other nodes touch than at another `Equilibrium`, `here`;
     None where the same ones do."""
     changes, at = [], []
-    of_nodes = np.split(model.rows_of_nodes, np.cumsum([len(here.s(rod)) for rod in here.scene.rods])[:-1])
+    of_nodes = _rows_of_rods(model, here)
     for (i, contact), (_, moved) in zip(first_contacts_at(here), first_contacts_at(there), strict=True):
         x = here.s(here.scene.rods[i]) / here.scene.rods[i].length
         (before, _), (after, stiff) = contact(x), moved(x)
@@ -141,6 +141,11 @@ def switched(model, here, there):
     if not sum(map(len, at)):
         return None
     return of_blocks(np.concatenate(changes), np.concatenate(at), model.rows_of_nodes.max() + 1)
+
+
+def _rows_of_rods(model, state):
+    """[(nodes, 6) row numbers of the nodes of each rod]."""
+    return np.split(model.rows_of_nodes, np.cumsum([len(state.s(rod)) for rod in state.scene.rods])[:-1])
 
 
 def of_blocks(blocks, of_node, size):

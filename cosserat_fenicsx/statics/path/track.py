@@ -93,7 +93,7 @@ class Track:
         self.iterations, self.steps, self.failure, self.neutral = 0, 0, "", None
         self.origin, self.history = None, []
         actions = self.model.scene.actions
-        self._touches, self.touching = any(action.presses for action in actions), problem.touching
+        self._touches, self.touching = self.model.scene.has_walls, problem.touching
         longest = min((action.largest_step for action in actions if action.gaps is not None), default=math.inf)
         self._longest = longest / self.model.scales.length
 
