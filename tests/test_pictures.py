@@ -574,6 +574,7 @@ def test_flat_sections_are_seen_from_the_side():
 def test_a_film_swings_to_both_sides(tmp_path):
     """The frame in the middle is the mirror image of the first; the one at a quarter is the equilibrium."""
     from PIL import Image
+    from scipy import ndimage
 
     _, scene = column(eccentricity=0.0)
     pair = cf.modes(scene, 2, elements=4)  # of equal frequencies: the first is along x
@@ -594,9 +595,11 @@ def test_a_film_swings_to_both_sides(tmp_path):
     opposite = other_columns[other_rows == other_rows.min()].mean()
     assert abs(tip - centre) > 5 and tip + opposite == pytest.approx(2 * centre, abs=1.5)
     mirrored = np.zeros_like(first)
-    for beside in (-1, 0, 1):  # the centre is known to a pixel
-        mirrored[rows, np.clip(np.round(2 * centre - columns).astype(int) + beside, 0, 319)] = True
-    assert (mirrored & middle).sum() > 0.9 * middle.sum()
+    mirrored[rows, np.clip(np.round(2 * centre - columns).astype(int), 0, 319)] = True
+    # The centre is known to a pixel, and what smooths edges is another in each VTK. A rod is 3 to 4 pixels wide.
+    around = np.ones((3, 3))
+    assert (ndimage.binary_dilation(mirrored, around) & middle).sum() > 0.95 * middle.sum()
+    assert (mirrored & ndimage.binary_dilation(middle, around)).sum() > 0.95 * mirrored.sum()
 
 
 @pytest.mark.serial
