@@ -142,6 +142,21 @@ def test_whirl_of_a_shaft_between_bearings(tmp_path_all, truth):
     assert (tmp_path_all / "campbell.png").stat().st_size > 3000 and found.rates.tolist() == [0, spin]
 
 
+@pytest.mark.serial
+def test_the_unbalance_of_a_rotation_stiffens_the_twist(truth):
+    """A rod along the axis of rotation at the distance R from it, its mass at the arm a further out, twists at
+    w^2 = (GJ (pi/2L)^2 + m W^2 R a)/(J3 + m a^2). At the load factor 0 the state lacks the unbalance, which is said."""
+    R, a, W, GJ, J3 = 2.0, 0.1, 30.0, 1.0, 0.02
+    section = cf.Stiffness((1e9, 1e9), 1e9, (1e8, 1e8), GJ, mass=1.0, inertia=(0.01, 0.01, J3))
+    rod = cf.Rod(cf.Line((R, 0, 0), (R, 0, 1), d1=(1, 0, 0)), section, eccentricity=(a, 0.0))
+    scene = cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Centrifugal((0, 0, W))])
+    found = cf.modes(scene, 1, load_factor=1.0, elements=2)
+    exact = np.sqrt((GJ * (np.pi / 2) ** 2 + W**2 * R * a) / (J3 + a**2))
+    truth("twist of an eccentric rod in a rotation, rad/s", found.eigenvalues.imag, [exact], 1e-4)
+    with pytest.warns(cf.SceneWarning, match="the load factor multiplies the unbalance .* expected load_factor=1"):
+        assert cf.modes(scene, 1, elements=2).eigenvalues.imag[0] < 0.2 * exact
+
+
 def test_a_rotor_with_damping_inside_and_outside():
     """s^2 + c s + w1^2 tau (s - i W) + w1^2 = 0 in the inertial frame: stable below 30.13 rad/s, at 60 it grows."""
     W, J = 60.0, 1e-9

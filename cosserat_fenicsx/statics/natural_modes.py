@@ -13,7 +13,7 @@ from mpi4py import MPI
 from scipy.optimize import linear_sum_assignment
 
 from cosserat_fenicsx.algebra.pencil import Pencil, QuadraticPencil, on_every_rank
-from cosserat_fenicsx.checks import instance, number, refuse, tolerance, whole
+from cosserat_fenicsx.checks import instance, number, refuse, tolerance, warn, whole
 from cosserat_fenicsx.errors import NotConverged, SceneError
 from cosserat_fenicsx.interrupts import obey
 from cosserat_fenicsx.models.formulation import traits_of
@@ -83,7 +83,8 @@ def modes(
         scene: a `Scene`; every rod needs a mass and inertia. Without a load factor it may be free to move.
         count: number of modes, from the smallest square, or the smallest size of lambda, on.
         load_factor: eta of the state, a point of the path of load control from the unloaded reference. The reference
-            of a mechanism, such as a rod that hangs on a hinge, must be its equilibrium position but for strains.
+            of a mechanism, such as a rod that hangs on a hinge, must be its equilibrium position but for strains. It
+            multiplies the unbalance of eccentric rods in a `Centrifugal`, too: 1 for all of it.
         damped: whether to compute complex modes: None where something resists velocities, the scene rotates, or its
             loads have no potential. With False, what depends on velocities is left out and named in
             `Modes.left_out`, and where the loads have no potential the symmetric part of K is used.
@@ -122,6 +123,10 @@ def modes(
         check_magnitudes(scene, load_factor)
         check_tensions(scene, [load_factor])
     comm, slowed = communicator(comm), _slowed(scene)
+    eccentric = [rod.name for rod in scene.rods if rod.mass_centre]
+    if rotation is not None and eccentric and not load_factor and comm.rank == 0:
+        warn(f"modes: the load factor multiplies the unbalance of rod '{eccentric[0]}' in the rotation (Centrifugal), "
+             "which the state at 0 does not have: expected load_factor=1 for all of it")  # fmt: skip
     if damped is None and (near is not None or rotation is not None or slowed):
         damped = True
     following, last = _Following(), []
