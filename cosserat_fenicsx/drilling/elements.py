@@ -191,6 +191,8 @@ class AxialTorsional(StringModel):
             name_in_c = "pair_slope" if name == "damping" else "pair_lost"
             self._array(m, name_in_c, np.array([getattr(joint, name) for *_, joint in joints], dtype=float))
         self._signals += [joint.force for *_, joint in joints]
+        self._varying = [(p, joint.force) for p, (*_, joint) in enumerate(joints) if not joint.force.constant]
+        self._rotors = [(p, joint) for p, (*_, joint) in enumerate(joints) if joint.turns]
 
     def _set_hook(self, hook):
         top, elastic = self._m.top[0], math.isfinite(hook.stiffness)
@@ -322,15 +324,13 @@ class AxialTorsional(StringModel):
         if self._axial and "hook" not in self._samplers:
             parts[:, [1, 1 + len(self._signals)]] *= -1  # the hook's speed is positive upwards
         weights = self._weights(self.steps, steps)
-        varying = [(p, joint.force) for p, (*_, joint) in enumerate(self._chain.joints) if not joint.force.constant]
-        begin = [] if not varying else self._begin(parts)
-        for p, force in varying:  # of forces the means, as they oscillate
+        begin = [] if not self._varying else self._begin(parts)
+        for p, force in self._varying:  # of forces the means, as they oscillate
             for column in (1 + self._dofs + p, 1 + self._dofs + p + len(self._signals)):
                 parts[:, column] = _means(force, begin, parts)
-        changing = [(p, joint) for p, (*_, joint) in enumerate(self._chain.joints) if joint.turns]
         self._of_intervals = [
             (p, *self._put_curves(joint.tool, () if joint.force.constant else _means(joint.force.flow, begin, parts)))
-            for p, joint in changing
+            for p, joint in self._rotors
         ]
         for k, part in enumerate([parts] if self.end is None else parts[:, None]):
             for p, curves, _ in self._of_intervals:
@@ -367,9 +367,9 @@ class AxialTorsional(StringModel):
 
     def bit_state(self) -> np.ndarray:
         """(2, 2) place (m downwards, rad) and velocity of the bit at the end of the last step."""
-        found = np.full((2, 2), np.nan)
-        found[:, 2 - self._dofs :] = self._kept["x"][-1], self._kept["v"][-1]
-        return found
+        x, v = self._kept["x"][-1].tolist(), self._kept["v"][-1].tolist()
+        unknown = [np.nan] * (2 - self._dofs)
+        return np.array([unknown + x, unknown + v])
 
     @property
     def weight_on_bit(self) -> float:

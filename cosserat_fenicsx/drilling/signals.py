@@ -66,6 +66,8 @@ class ScalarSignal:
         if self.constant:
             return self._value
         given = call(self._value, t, self._where, f" at t = {t:g} s")
+        if type(given) is float and math.isfinite(given):  # what follows takes as long as the function
+            return given
         found = np.asarray(given).reshape(-1) if np.size(given) == 1 else np.array([np.nan])
         if found.dtype.kind not in "biuf" or not np.isfinite(found).all():
             refuse(self._where.split(".")[0], self._where.split(".")[1], given, f"a finite number ({self.unit}) at "
@@ -110,24 +112,24 @@ def intervals(signals, steps, dt):
     """Rows (length, signals at the begin, signals at the end, 1 where a step ends) of steps, cut at jumps. signals: a
     list of `ScalarSignal`. steps: (first, last + 1). dt: s."""
     first, last = steps
-    grid = np.arange(first, last + 1) * dt
-    jumps = {t for signal in signals for t in signal.jumps if grid[0] <= t < grid[-1]}
-    near = 1e-9 * dt
-    inner = sorted(t for t in jumps if np.abs(grid - t).min() > near)
-    times = np.sort(np.concatenate([grid, inner]))
-    ends = np.ones(len(times) - 1)
-    ends[np.searchsorted(times, inner) - 1] = 0.0
-    rows = np.empty((len(times) - 1, 2 + 2 * len(signals)))
-    rows[:, 0], rows[:, -1] = np.diff(times), ends
-    rows[ends == 1.0, 0] = np.where(np.isclose(rows[ends == 1.0, 0], dt, rtol=1e-9), dt, rows[ends == 1.0, 0])
+    times, n = np.arange(first, last + 1) * dt, len(signals)
+    jumps = {t for signal in signals for t in signal.jumps if times[0] <= t < times[-1]}
+    near, ends = 1e-9 * dt, np.ones(len(times) - 1)
+    if inner := sorted(t for t in jumps if np.abs(times - t).min() > near):
+        times = np.sort(np.concatenate([times, inner]))
+        ends = np.ones(len(times) - 1)
+        ends[np.searchsorted(times, inner) - 1] = 0.0
+    rows = np.empty((len(times) - 1, 2 + 2 * n))
+    lengths = times[1:] - times[:-1]
+    lengths[(ends == 1.0) & (np.abs(lengths - dt) <= 1e-8 + near)] = dt
+    rows[:, 0], rows[:, -1] = lengths, ends
     for i, signal in enumerate(signals):
         if signal.constant:
-            values = np.full(len(times), signal(0.0))
-            before = after = values
-        else:
-            before = np.array([signal(t) for t in times])
-            after = before.copy()
-            for j in np.flatnonzero([any(abs(t - x) <= near for x in jumps) for t in times]):
-                before[j], after[j] = signal(times[j] - 1e-6 * dt), signal(times[j] + 1e-6 * dt)
-        rows[:, 1 + i], rows[:, 1 + len(signals) + i] = after[:-1], before[1:]
+            rows[:, 1 + i] = rows[:, 1 + n + i] = signal(0.0)
+            continue
+        before = np.array([signal(t) for t in times])
+        after = before.copy()
+        for j in np.flatnonzero([any(abs(t - x) <= near for x in jumps) for t in times]) if jumps else ():
+            before[j], after[j] = signal(times[j] - 1e-6 * dt), signal(times[j] + 1e-6 * dt)
+        rows[:, 1 + i], rows[:, 1 + n + i] = after[:-1], before[1:]
     return rows

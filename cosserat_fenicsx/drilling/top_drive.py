@@ -466,7 +466,8 @@ class Autodriller(Part):
         low, high = self.limits[0], min(self.limits[1], self.rate or math.inf)
         if self.weight is None:
             return high, state
-        error = self.signal()(now.time) - now.weight
+        asked_for = self.signal()(now.time) if callable(self.weight) else self.weight  # at every sample
+        error = asked_for - now.weight
         more = self.Ki * self.sample * error
         asked = self.Kp * error + float(state[0]) + more
         stops = (asked > high and more > 0) or (asked < low and more < 0)
