@@ -21,7 +21,7 @@ from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.actions.walls import TubeAxis
 from cosserat_fenicsx.quantities import Units, length_unit_of, size_of
 from cosserat_fenicsx.parts import Length, Number, Part, at_least, between
-from cosserat_fenicsx.units import deg_per_30m, foot
+from cosserat_fenicsx.units import deg_per_100ft, deg_per_30m, foot
 from cosserat_fenicsx.well.survey import read_columns
 
 
@@ -338,7 +338,7 @@ def checked_survey(md, inc, azi, degrees, given="m"):
         expected = f"0 {given}: add the station (0, 0, azimuth) where the well starts vertically"
         refuse(who, "md[0]", float(told[0]), expected)
     if md[-1] > 1e6:
-        refuse(who, "md[-1]", float(md[-1]), "at most 1e+06 m")
+        refuse(who, "md[-1]", float(told[-1]), f"at most {1e6 / length:.4g} {given}")
     for i in np.flatnonzero(np.diff(md) < 1e-6) + 1:
         before = f"more than the station before, {told[i - 1]} {given}"
         refuse(who, f"md[{i}]", float(told[i]), f"{before} (ascending depths)")
@@ -417,18 +417,20 @@ def tortuosity(path: WellPath, amplitude: float | str, period: float | str, seed
     instance(given, "path", path, WellPath, "a WellPath")
     amplitude, period, seed = math.radians(given.amplitude), given.period, given.seed
     if period > path.length / 2:
-        refuse(given, "period", period, path.told(f"a length (m), at most half of the path's, {path.length / 2:g} m"))
+        most = path.told(f"{path.length / 2:g} m")
+        refuse(given, "period", path.told(f"{period:g} m"), f"a length of at most half of the path's, {most}")
     if path.length / period * _STATIONS > _MOST:
-        expected = f"at least {path.length * _STATIONS / _MOST:.3g} m, for {_MOST} stations at most"
-        refuse(given, "period", period, expected)
+        least = path.told(f"{path.length * _STATIONS / _MOST:.3g} m")
+        refuse(given, "period", path.told(f"{period:g} m"), f"at least {least}, for {_MOST} stations at most")
     turn = 2 * math.pi * amplitude / period
     if turn > _STEEP * deg_per_30m:
-        warn(f"tortuosity: amplitude = {given.amplitude:g} degrees and period = {period:g} m turn the hole by "
-             f"{turn / deg_per_30m:.3g} degrees per 30 m; drilled ones are crooked by a few: 300 feet are '300 ft' or "
-             "91.44")  # fmt: skip
+        rate, per = (deg_per_100ft, "100 ft") if path.unit == "ft" else (deg_per_30m, "30 m")
+        warn(f"tortuosity: amplitude = {given.amplitude:g} degrees and period = {path.told(f'{period:g} m')} turn the "
+             f"hole by {turn / rate:.3g} degrees per {per}; drilled ones are crooked by a few: 300 feet are '300 ft' "
+             "or 91.44")  # fmt: skip
     if period > _LONG:
-        warn(f"tortuosity: period = {period:g} m is hardly one of a drilled hole, which swerves within a few stands, "
-             f"at most {_LONG:g} m: {period:g} feet are '{period:g} ft' or {period * foot:g}")  # fmt: skip
+        warn(path.told(f"tortuosity: period = {period:g} m is hardly one of a drilled hole, which swerves within a few "
+             f"stands, at most {_LONG:g} m: {period:g} feet are '{period:g} ft' or {period * foot:g}"))  # fmt: skip
     md = np.linspace(0.0, path.length, math.ceil(path.length / period * _STATIONS) + 1)
     high, right = _deviations(md, path.length, amplitude, period, seed)
     tangent, across, aside = _frames(path, md)
