@@ -259,6 +259,25 @@ def test_a_rod_slides_to_rest():
     assert np.hypot(*moved[:2]) == pytest.approx(v**2 / (2 * mu * g), rel=1e-4)
 
 
+def test_friction_begins_where_a_motion_starts():
+    """From a path that turns a rod by 60 degrees and lays it down: it sticks there, and slides to rest as any other."""
+    mu, g, v = 0.3, 9.81, 2.0
+    section = cf.Stiffness((1e5, 1e5), 1e5, (50.0, 50.0), 50.0, mass=1.0, inertia=(1e-3, 1e-3, 2e-3))
+    rod = cf.Rod(cf.Line((0, 0, 0.4), (1, 0, 0.4)), section)
+    floor = cf.Plane((0, 0, 0), (0, 0, 1), friction=mu, contact_radius=0.0)
+    laid = cf.Prescribed(rod.start, displacement=(0.2, 0, -0.4), rotation=(0, 0, math.pi / 3))
+    loads = [floor, cf.Weight((0, 0, -g))]
+    start = cf.solve(cf.Scene([rod], [laid]), 1.0, elements=2)
+    still = cf.simulate(cf.Scene([rod], [], loads), 0.1, dt=5e-3, elements=2, degree=2, start=start)
+    assert np.abs(still.position(rod.at(0.5)) - still.position(rod.at(0.5))[0]).max() < 1e-6
+    moving = cf.Scene([rod], [], loads, velocities=[cf.InitialVelocity(rod, linear=(0.6 * v, 0.8 * v, 0))])
+    moved = cf.simulate(moving, 0.8, dt=5e-3, elements=2, degree=2, start=start).position(rod.at(0.5))
+    assert np.hypot(*(moved[-1] - moved[0])[:2]) == pytest.approx(v**2 / (2 * mu * g), rel=1e-4)
+    pulled = cf.solve(cf.Scene([rod], [laid], loads), 1.0, elements=2)
+    with pytest.raises(cf.SceneError, match="the path of a scene without them, and friction begins at zero"):
+        cf.simulate(moving, 0.1, dt=5e-3, elements=2, start=pulled)
+
+
 class TestWhatAResultLeavesOpen:
     rod = cf.Rod(cf.Line((0, 0, 0), (1, 0, 0)), cf.Stiffness((1e4, 1e4), 1e4, (1.0, 100.0), 1.0, mass=1.0,
                  inertia=(1e-3, 1e-3, 2e-3)), name="strut")  # fmt: skip

@@ -16,7 +16,7 @@ from cosserat_fenicsx.algebra.pool import PROBLEMS
 from cosserat_fenicsx.checks import File, instance, number, refuse, whole
 from cosserat_fenicsx.dynamics.pace import Adaptive, Fixed
 from cosserat_fenicsx.dynamics.schemes import SCHEMES
-from cosserat_fenicsx.dynamics.start import equilibrium, put_start, starts_in
+from cosserat_fenicsx.dynamics.start import equilibrium, point_of, put_start, starts_in
 from cosserat_fenicsx.dynamics.time_loop import TimeLoop, marks_of
 from cosserat_fenicsx.errors import NotConverged, SceneError, nearest
 from cosserat_fenicsx.models.base import Scales
@@ -82,8 +82,9 @@ def simulate(
         rho_inf: of "generalised-alpha": spectral radius at infinite frequency, from 0 to 1: the factor per step on
             vibrations much faster than the steps; 1 dissipates nothing (the trapezoidal rule). Default 0.8.
         save_every: s between saved states, steps end there exactly; None saves every step.
-        start: None for the reference, a `Path` for its last equilibrium, or (Path, k); rods must be the same objects. A
-            number is the load factor of an equilibrium of the scene just before t = 0.
+        start: None for the reference, a `Path` for its last equilibrium, or (Path, k); rods must be the same objects,
+            and friction of obstacles begins there, at zero. A number is the load factor of an equilibrium of the scene
+            just before t = 0.
         load_factor: multiplies all loads and prescribed motions, as in `solve`; None for `start` where that is a
             number, otherwise 1.
         elements: elements per rod.
@@ -120,10 +121,11 @@ def simulate(
                 f"Rod '{rod.name}': an infinite axial or shear stiffness: expected finite ones, for a motion"
             )
     marks = marks_of(scene, duration, save_every)
-    if start is not None and path_dependent(scene):
+    if start is not None and any(load.memory and not _may_start(load, start) for load in scene.actions):
         raise SceneError(
             "simulate.start: actions with a memory begin a motion with their initial one: expected None, and a motion "
-            "that applies the loads slowly"
+            "that applies the loads slowly; or, where these are obstacles with friction, the path of a scene without "
+            "them, and friction begins at zero"
         )
     refuse_stages("simulate", scene)
     _refuse_tendons(scene)
@@ -165,6 +167,13 @@ def simulate(
             history.keep_in(store)
         motion = TimeLoop(problem, stepper, pace, history, store)
         return motion.over(marks, save_every is None, progress)
+
+
+def _may_start(action, start):
+    """Whether an action with a memory may begin at a start: friction of obstacles, where it begins at zero."""
+    return (
+        action.finds_friction and not isinstance(start, numbers.Real) and not path_dependent(point_of(start)[0].scene)
+    )
 
 
 def _refuse_tendons(scene):

@@ -25,13 +25,15 @@ _OUT_OF_PLANE = 1e-10  # rounding of components out of a plane, over all
 
 def put_start(model, start):
     """Put (r, q) and the velocities of the scene at the time 0 into a loaded moving model, from None for the reference,
-    a Path for its last point, or (Path, k); returns warnings, a list of sentences. A SceneError for a start of another
-    scene's rods, or one that violates supports or joints, or overlaps an obstacle that its path does not have."""
+    a Path for its last point, or (Path, k), where friction of obstacles begins at zero; returns warnings, a list of
+    sentences. A SceneError for a start of another scene's rods, or one that violates supports or joints, or overlaps an
+    obstacle that its path does not have."""
     scene, layout = model.scene, model.layout
-    rq = _at_rest(model) if start is None else _of_path(model, *_point(start))
+    rq = _at_rest(model) if start is None else _of_path(model, *point_of(start))
     model.set_motion(model.unknowns_of(rq), np.zeros((sum(layout.counts), model.signature.points, 3)))
     if start is not None:
-        _check_overlap(scene, *_point(start))
+        _check_overlap(scene, *point_of(start))
+        model.actions.begin_friction()
     held = rq[model.tied_slots]
     if model.ties:
         c, _ = model.ties_at(0.0).evaluate(held, float(model.load_factor.value))
@@ -67,7 +69,7 @@ def starts_in(scene, plane, start):
             return False
     if start is None:
         return True
-    path, k = _point(start)
+    path, k = point_of(start)
     rods = [rod for rod in scene.rods if rod in path.scene.rods]
     moved = np.concatenate([path.motion(rod, np.linspace(0, 1, 33), [path._records[k]])[0] for rod in rods])
     return (
@@ -76,7 +78,8 @@ def starts_in(scene, plane, start):
     )
 
 
-def _point(start):
+def point_of(start):
+    """(Path, index of its point) of the argument `start`."""
     path, k = start if isinstance(start, tuple) and len(start) == 2 else (start, -1)
     instance("simulate", "start", path, Path, "a load factor, a Path, or (Path, index of its point)")
     if not len(path) or not -len(path) <= k < len(path):

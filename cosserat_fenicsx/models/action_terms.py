@@ -197,6 +197,12 @@ class ActionTerms:
         """Return to the friction of the last accepted state."""
         self.friction = [term.accepted for term in self.sticking]
 
+    def begin_friction(self):
+        """Count slip from the state, with friction that is zero there."""
+        for term in self.sticking:
+            term.commit()
+            term.held[:] = 0.0
+
     def commit(self):
         """Update the actions' memory to the state, which has been accepted."""
         for term in self.terms:
