@@ -185,7 +185,8 @@ typedef struct {
     double increment, rounding, loads; /* limits of the increment and of the residual: rounding + 1e-6 (1 + loads) */
     int period, contracts;          /* steps that are compared; whether quadratic convergence is expected */
     int most, iterations, verdict;
-    double steps[4];                /* sizes of the last ones, the latest first */
+    int keeps;                      /* whether the next step, on return the last one, is by the tangent before */
+    double norm, steps[4];          /* of the residual; sizes of the last steps, the latest first */
     double *b, *change;             /* (unknowns,) residual, and the step that is subtracted */
 } newton;
 

@@ -257,7 +257,7 @@ static void solve_lanes(const group *g, const int *in, int first, double *const 
         for (int i = 0; in[k] && !bad[k] && i < s->size; i++) x[k][i] = X[i][k];
 }
 
-/* Newton's directions: x with tangent * x = b at the states; who fails leaves. */
+/* Newton's directions: x with tangent * x = b at the states, or by the tangent before; who fails leaves. */
 void directions(const group *g, int *in, double *const *b, double *const *x)
 {
     int several, bad[LANES] = {0}, first = first_of(g, in, &several);
@@ -267,7 +267,7 @@ void directions(const group *g, int *in, double *const *b, double *const *x)
         problem *p = problem_of(g, k);
         if (!in[k]) continue;
         p->singular = 0;
-        if (alone || bad[k]) in[k] = !tangent(p) && !solve(p, b[k], x[k]);
+        if (alone || bad[k]) in[k] = (g->sweep[k]->newton->keeps || !tangent(p)) && !solve(p, b[k], x[k]);
     }
 }
 

@@ -11,6 +11,9 @@ enum { FAILED = 1 };
 /* Increments at a wall that no longer shrink, by rounding, are measured anew after some steps without them; one that is
    this many times larger than before may have stopped for another reason, such as an old tangent. */
 static const double FADES = 0.9, RISES = 10;
+/* A tangent serves a second step that is expected to be below the first of these shares of the limit of increments, and
+   has served if it is below the second. The residual alone does not tell: that of stretch may outweigh all others. */
+static const double SLIGHT = 1e-2, SERVED = 0.1;
 
 static int python_hook(void *self, int what, double *a, double *b);
 
@@ -329,10 +332,12 @@ int iterate(stepping *s)
 /* See `error_is_small`. Convergence is not taken for quadratic (`contracts`) on slender rods whose contact force is
    carried or unknown: rounding makes their tangent inexact for motions of low stiffness. Where n follows from the
    motion alone, Newton steps alternate between bending and the correction of the stretch that this causes; the larger
-   ones of successive pairs of steps (`period`) are compared then, because one small step does not imply convergence. */
+   ones of successive pairs of steps (`period`) are compared then, because one small step does not imply convergence. A
+   step by the tangent of the one before is judged by its size alone. */
 static int has_converged(const newton *n)
 {
     double before = 0, step = 0;
+    if (n->keeps) return n->steps[0] <= SERVED * n->increment;
     if (n->steps[0] <= n->increment) return 1;
     if (n->iterations < 2 * n->period) return 0;
     for (int i = 1; i <= n->period; i++) {
@@ -358,6 +363,8 @@ int judge_residual(newton *n, const double *b, const double *change)
     double norm = 0, step = 0;
     for (int i = 0; i < p->size; i++) norm += b[i] * b[i];
     if (root_of(p, norm, &norm)) return FAILED;
+    const double ratio = norm / n->norm; /* about that of the next step to the last one */
+    n->norm = norm;
     n->verdict = isfinite(norm) ? ITERATING : NOT_A_NUMBER;
     if (n->verdict != ITERATING || !change) return 0;
     for (int i = 0; i < n->nodes; i++)
@@ -370,6 +377,8 @@ int judge_residual(newton *n, const double *b, const double *change)
     if (!(step < 1e3)) n->verdict = GROWN;
     else if (balanced && has_converged(n)) n->verdict = CONVERGED;
     else if (n->iterations >= n->most) n->verdict = RAN_OUT;
+    n->keeps = n->verdict == ITERATING && !n->keeps && n->contracts && n->period == 1
+               && ratio * step <= SLIGHT * n->increment;
     return 0;
 }
 
@@ -377,13 +386,14 @@ int judge_residual(newton *n, const double *b, const double *change)
 void begin_newton(newton *n)
 {
     const problem *p = n->problem;
-    n->iterations = 0, n->verdict = ITERATING;
+    n->iterations = 0, n->verdict = ITERATING, n->keeps = 0;
     if (p->advance) memcpy(p->before, p->state, p->locals * sizeof *p->state);
 }
 
 /* Newton's method with full steps from the states of the sweeps that take part, whose unknowns are x; these, the
    states and the carried contact forces follow; who fails leaves. It takes the steps that SNES takes
-   (algebra/newton.py), without the time that SNES takes for its options. */
+   (algebra/newton.py), without the time that SNES takes for its options; one whose error is slight is by the tangent
+   of the step before, where sweeps are not in lock step. */
 void equilibrate(const group *g, int *in)
 {
     double *x[LANES], *b[LANES], *change[LANES];
@@ -402,6 +412,7 @@ void equilibrate(const group *g, int *in)
             if (!asked[k]) continue;
             in[k] = going[k] && !judge_residual(n, b[k], first ? 0 : change[k]);
             going[k] = in[k] && n->verdict == ITERATING;
+            n->keeps &= !g->together;
             if (in[k] && (n->verdict == CONVERGED || (going[k] && !first))) advance(n->problem);
             any |= asked[k] = going[k];
         }

@@ -94,6 +94,7 @@ class Newton(Pointers):
     def _tangent(self, snes, x, matrix, _):
         if self.c.iterations > 0:
             self.problem.advance()
+        self.c.keeps = 0  # paths of arc length ask for the tangent at the last step
         self.problem.factor()
 
     def _judge(self, snes, iterations, norms):
