@@ -116,13 +116,17 @@ typedef struct {
     float *compliance;              /* (positions, 4, 6, LANES) by each unit force of a node its own motion. Forces:
                                        along u and v, friction along the tube, and round it its moment alone; motions:
                                        see `motion_of`, and rotations about u and v */
-    float *right, *left;            /* (positions, 6, 6, LANES) by each motion of the node before or after it, which
-                                       forces beyond cause, that of a node */
-    double *responses;              /* (nodes, 3, 6, 6) by each unit force or moment of a node the motions of the one
-                                       before, of its own and of the next */
+    float *right, *left;            /* (positions, 6, 6, LANES) by each motion of the last node between two elements
+                                       before or after it, which forces beyond cause, that of a node */
+    float *preceding, *following;   /* (positions, inside, 4, 6, LANES) by each force of a node inside its element and
+                                       before or after it, the nearest first */
+    int inside;                     /* most nodes inside an element */
+    const int *inner;               /* (nodes,) whether they are */
+    double *responses;              /* (3, nodes, 2 inside + 3, 6, 6) by each unit force or moment of a node the motions
+                                       of its own and of those of its elements; see contact.c */
     double *motion, *forces, *late; /* (positions, 6, LANES) motions; (positions, 4, LANES) forces of these kinds, and
                                        of their changes what later sweeps take along */
-    double passing[2][6 * LANES];   /* (6, LANES) from lane to lane, to the right and to the left */
+    double *passing;                /* (2, 6 + 4 inside, LANES) from lane to lane, to the right and to the left */
     double *walled;                 /* (positions, 10, LANES) work space, see contact.c */
     double *moved;                  /* (nodes, 6) displacement and rotation in the step with the forces */
     double *force, *law;            /* (nodes, 6) force and moment; (nodes, 3) normal force, friction round and along */
@@ -384,7 +388,7 @@ int iterate(stepping *s);
 void begin_contact(contact *c, const int *slots, int count, const double *away, const double *tangent);
 void unit_forces(const contact *c, int first, int apart, int component, double *forces);
 void keep_responses(contact *c, int first, int apart, int component, const double *q, const double *changes);
-void find_transfers(contact *c);
+void find_transfers(contact *c, int apart);
 void find_motion(contact *c, const double *now);
 int settle(contact *c);
 int broken(const contact *c);

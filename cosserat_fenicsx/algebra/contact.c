@@ -1,13 +1,15 @@
 /* Contact of nodes with the wall of a tube, with Coulomb friction, where the motion responds linearly to the forces:
    block Gauss-Seidel over the nodes, each of which is solved with its exact law (wall_law.c, which comes before). Along
-   a rod a sweep knows the exact response: forces on one side of a node move the other side by this node's motion
-   alone. And, in the same way, contacts of rods with each other. */
+   a rod a sweep knows the exact response: forces on one side of a node between two elements move the other side by
+   this node's motion alone. */
 #include "chain.h"
 
 #include <math.h>
 #include <string.h>
 
-enum { MOTIONS = 6 };
+enum { MOTIONS = 6, PASSES = 3 };
+/* Arrays of responses: as they were found; without others; those before. */
+enum { RAW, CLEARED, BEFORE };
 /* Compliance times stiffness below which an iteration needs no help. */
 static const double LITTLE = 0.1;
 /* Of the moment along the tube where the surface is at the axis, dimensionless; least compliance of a node that is not
@@ -79,14 +81,22 @@ void unit_forces(const contact *c, int first, int apart, int component, double *
     }
 }
 
+/* The responses of node j to node i, at most an element apart, in one of their arrays: columns by unit forces. */
+static inline double *response(const contact *c, int kept, int i, int j)
+{
+    const size_t near = c->inside + 1, width = 2 * near + 1;
+    return c->responses + MOTIONS * MOTIONS * (width * ((size_t)kept * c->nodes + i) + j - i + near);
+}
+
 /* Keep the responses to these of every node and of the ones beside it: changes of the nodes' unknowns (nodes, 7) with
    quaternions q (nodes, 4). */
 void keep_responses(contact *c, int first, int apart, int component, const double *q, const double *changes)
 {
+    const int near = c->inside + 1;
     for (int i = first; i < c->nodes; i += apart)
-        for (int j = i > 0 ? i - 1 : i; j <= i + 1 && j < c->nodes; j++) {
+        for (int j = i > near ? i - near : 0; j <= i + near && j < c->nodes; j++) {
             const double *t = c->tangent + 3 * j, *u = c->across + 3 * j, *d = changes + 7 * j;
-            double *to = c->responses + MOTIONS * (MOTIONS * (3 * (size_t)i + j - i + 1) + component);
+            double *to = response(c, RAW, i, j) + MOTIONS * component;
             double v[3], round[3], turned[3];
             const double lever = axes_of(c, j, v, round);
             rotation_by(q + 4 * j, d + 3, turned);
@@ -114,31 +124,81 @@ static void invert(const double *G, const double *least, double *inverse)
     memcpy(inverse, A, sizeof A);
 }
 
-/* From these responses the compliance, and how the motion of a node moves the one beside it: what lies beyond is free,
-   so that it follows. */
-void find_transfers(contact *c)
+/* The numbers of node j in an array (positions, columns, 6, LANES) of transfers. */
+static inline float *passed_by(const contact *c, float *of, int columns, int j)
 {
-    enum { n = MOTIONS, BLOCK = n * n };
-    double least[n] = {0};
+    return of + (size_t)LANES * MOTIONS * columns * (j % c->positions) + j / c->positions;
+}
+
+/* From the responses of this number the compliance, and how the motion of the last node between two elements moves
+   those up to the next one: what lies beyond is free, so that it follows. Nodes inside elements move these also. */
+static void take_transfers(contact *c, int kept)
+{
+    enum { n = MOTIONS };
+    double least[n] = {0}, inverse[n * n];
     for (int i = 0; i < c->nodes; i++)
-        for (int k = 0; k < n; k++) least[k] = fmax(least[k], HELD * c->responses[BLOCK * (3 * i + 1) + (n + 1) * k]);
+        for (int k = 0; k < n; k++) least[k] = fmax(least[k], HELD * response(c, kept, i, i)[(n + 1) * k]);
     for (int i = 0; i < c->nodes; i++) {
-        const double *own = c->responses + (size_t)BLOCK * (3 * i + 1);
-        double inverse[BLOCK];
-        invert(own, least, inverse);
-        for (int side = -1; side <= 1; side++) {
-            const int j = i + side, lane = j / c->positions, at = j % c->positions;
-            if (j < 0 || j >= c->nodes) continue;
-            const double *G = own + side * BLOCK; /* columns one after the other, as all here */
-            float *to = (side < 0 ? c->left : side > 0 ? c->right : c->compliance) + lane;
-            to += (size_t)LANES * at * (side ? BLOCK : 4 * n);
-            for (int k = 0; k < (side ? n : 4); k++)
-                for (int r = 0; r < n; r++) {
-                    double sum = side ? 0 : G[n * k + r];
-                    for (int l = 0; l < n && side; l++) sum += G[n * l + r] * inverse[n * k + l];
-                    to[LANES * (n * k + r)] = sum;
+        const double *own = response(c, kept, i, i);
+        const int columns = c->inner[i] ? 4 : n;
+        float *to = passed_by(c, c->compliance, 4, i);
+        for (int k = 0; k < 4 * n; k++) to[LANES * k] = own[k];
+        if (!c->inner[i]) invert(own, least, inverse);
+        for (int side = -1; side <= 1; side += 2)
+            for (int j = i + side, b = 0; j >= 0 && j < c->nodes; j += side, b++) {
+                const double *G = response(c, kept, i, j); /* columns one after the other, as all here */
+                float *of = c->inner[i] ? (side < 0 ? c->following : c->preceding) : side < 0 ? c->left : c->right;
+                to = passed_by(c, of, c->inner[i] ? 4 * c->inside : n, j) + LANES * 4 * n * b * c->inner[i];
+                for (int k = 0; k < columns; k++)
+                    for (int r = 0; r < n; r++) {
+                        double sum = c->inner[i] ? G[n * k + r] : 0;
+                        for (int l = 0; l < n && !c->inner[i]; l++) sum += G[n * l + r] * inverse[n * k + l];
+                        to[LANES * (n * k + r)] = sum;
+                    }
+                if (!c->inner[j]) break;
+            }
+    }
+}
+
+/* The responses without what nodes that were loaded at the same time, `apart` from each other, do there: by the
+   transfers, from one of them to the next. */
+static void leave_out_others(contact *c, int apart)
+{
+    enum { n = MOTIONS };
+    const int near = c->inside + 1;
+    const size_t all = (size_t)c->nodes * (2 * near + 1) * n * n;
+    memcpy(c->responses + all * BEFORE, c->responses + all * CLEARED, all * sizeof *c->responses);
+    memcpy(c->responses + all * CLEARED, c->responses + all * RAW, all * sizeof *c->responses);
+    for (int side = -1; side <= 1; side += 2)
+        for (int first = 0; first < apart; first++) {
+            double d[n * n] = {0}, moved[n * n]; /* of the last node between two elements, by those behind */
+            int j = side > 0 ? 0 : c->nodes - 1, from = j;
+            for (int i = side > 0 ? first : first + (j - first) / apart * apart; i >= 0 && i < c->nodes;
+                 i += side * apart) {
+                for (; j >= 0 && j < c->nodes && (i - j) * side >= -near; j += side) {
+                    const float *T = passed_by(c, side < 0 ? c->left : c->right, n, j);
+                    memset(moved, 0, sizeof moved);
+                    for (int m = 0; m < n; m++)
+                        for (int k = 0; k < n; k++)
+                            for (int r = 0; r < n; r++) moved[n * m + r] += T[LANES * (n * k + r)] * d[n * m + k];
+                    double *G = response(c, CLEARED, i, j);
+                    for (int k = 0; k < n * n && (i - j) * side <= near; k++) G[k] -= moved[k];
+                    if (!c->inner[j]) memcpy(d, moved, sizeof d), from = j;
                 }
+                for (int k = 0; k < n * n && (from - i) * side >= 0; k++) d[k] += response(c, BEFORE, i, from)[k];
+            }
         }
+}
+
+/* The compliance and the transfers from the responses, for which nodes that were `apart` were loaded together. */
+void find_transfers(contact *c, int apart)
+{
+    const size_t all = (size_t)c->nodes * (2 * c->inside + 3) * MOTIONS * MOTIONS;
+    memcpy(c->responses + all * CLEARED, c->responses + all * RAW, all * sizeof *c->responses);
+    take_transfers(c, RAW);
+    for (int again = 0; again < PASSES && apart < c->nodes; again++) {
+        leave_out_others(c, apart);
+        take_transfers(c, CLEARED);
     }
 }
 
@@ -230,15 +290,17 @@ static inline int any_of(const vector *v, int count)
     return any(other);
 }
 
-/* One sweep over the nodes, from one end to the other: each moves as the one before does by all forces that have
-   changed on that side since a sweep came this way, in `passing` those beyond the lanes. Where nodes are to be `solved`
-   their own forces change; returns the size of these changes. What the other side does not know yet is in `late`. */
+/* One sweep over the nodes, from one end to the other: each moves as the last one between two elements does by all
+   forces that have changed on that side since a sweep came this way, and by the forces of nodes inside its element; in
+   `passing` those beyond the lanes. Where nodes are to be `solved` their own forces change; returns the size of these
+   changes. What the other side does not know yet is in `late`. */
 static double sweep_nodes(contact *c, int back, int solved)
 {
     const vector none = {0};
-    vector largest = none, d[MOTIONS];
-    double *passing = c->passing[back], size = 0;
-    for (int k = 0; k < MOTIONS; k++)
+    const int inside = c->inside, carried = MOTIONS + 4 * inside;
+    vector largest = none, d[carried], *recent = d + MOTIONS; /* of the nodes inside, the last one first */
+    double *passing = c->passing + (size_t)LANES * carried * back, size = 0;
+    for (int k = 0; k < carried; k++)
         for (int lane = 0; lane < LANES; lane++) {
             const int from = back ? lane + 1 : lane - 1;
             d[k][lane] = from >= 0 && from < c->lanes ? passing[LANES * k + from] : 0;
@@ -246,11 +308,14 @@ static double sweep_nodes(contact *c, int back, int solved)
     for (int step = 0; step < c->positions; step++) {
         const int i = back ? c->positions - 1 - step : step;
         const float *own = c->compliance + (size_t)LANES * 4 * MOTIONS * i;
+        const float *direct = (back ? c->following : c->preceding) + (size_t)LANES * 4 * MOTIONS * inside * i;
         double *motion = c->motion + LANES * MOTIONS * i, *late = c->late + LANES * 4 * i;
         vector passed[MOTIONS] = {none}, moved[MOTIONS], change[4] = {none};
         if (any_of(d, MOTIONS))
             add_by((back ? c->left : c->right) + (size_t)LANES * MOTIONS * MOTIONS * i, MOTIONS, d, passed);
-        for (int k = 0; k < MOTIONS; k++) d[k] = passed[k], moved[k] = load(motion + LANES * k) + passed[k];
+        for (int b = 0; b < inside; b++)
+            if (any_of(recent + 4 * b, 4)) add_by(direct + LANES * 4 * MOTIONS * b, 4, recent + 4 * b, passed);
+        for (int k = 0; k < MOTIONS; k++) moved[k] = load(motion + LANES * k) + passed[k];
         if (solved) largest = greater(largest, settle_nodes(c, i, moved, change));
         if (any_of(change, 4)) add_by(own, 4, change, moved);
         for (int k = 0; k < MOTIONS; k++) keep(moved[k], motion + LANES * k);
@@ -258,9 +323,14 @@ static double sweep_nodes(contact *c, int back, int solved)
             const vector known = change[k];
             change[k] += load(late + LANES * k), keep(known, late + LANES * k);
         }
-        if (any_of(change, 4)) add_by(own, 4, change, d);
+        vector within = none;
+        for (int lane = 0, j; lane < c->lanes && (j = node_of(c, i, lane)) >= 0; lane++) within[lane] = c->inner[j];
+        const mask inner = within != 0;
+        for (int k = 4 * inside; k-- > 0;) recent[k] = only(inner, k < 4 ? change[k] : recent[k - 4]);
+        if (any_of(change, 4)) add_by(own, 4, change, passed);
+        for (int k = 0; k < MOTIONS; k++) d[k] = choose(inner, d[k], passed[k]);
     }
-    for (int k = 0; k < MOTIONS; k++) keep(d[k], passing + LANES * k);
+    for (int k = 0; k < carried; k++) keep(d[k], passing + LANES * k);
     for (int k = 0; k < LANES; k++) size = fmax(size, largest[k]);
     return size;
 }
@@ -284,7 +354,7 @@ static void take_axes(contact *c)
         memcpy(c->forces + LANES * 4 * i, forces, sizeof forces);
     }
     memset(c->late, 0, (size_t)LANES * 4 * c->positions * sizeof *c->late);
-    for (int back = 0; back < 2; back++) memset(c->passing[back], 0, LANES * MOTIONS * sizeof **c->passing);
+    memset(c->passing, 0, (size_t)2 * LANES * (MOTIONS + 4 * c->inside) * sizeof *c->passing);
 }
 
 /* The motion and the forces of all nodes after they are settled. */
@@ -395,50 +465,4 @@ double lost(const contact *c, const double *before)
         sum += greater(damping * (p.R - p.R0) / 2, none) + greater(-(round + along) / 2, none);
     }
     return sum_of(sum);
-}
-
-/* ---- rods that touch each other ---------------------------------------------------------------------------------- */
-
-/* Solve contact i with the forces of all others; returns the size of the change of its motion by its own. */
-static double settle_pair(pairs *c, int i)
-{
-    const int parts = c->parts, all = c->count * parts;
-    const double *A = c->compliance + (size_t)i * parts * all + i * parts; /* A[k all + j]: j by a unit force k */
-    double *motion = c->motion + i * parts, *force = c->force + i * parts, change[3] = {0};
-    const double slope = c->slope[i];
-    const double gap = motion[0] - A[0] * force[0];
-    const double N = fmax((c->normal[i] - slope * (gap - c->gap[i])) / (1 + slope * A[0]), 0);
-    change[0] = N - force[0];
-    if (parts == 3) {
-        const double B[3] = {A[all + 1], (A[all + 2] + A[2 * all + 1]) / 2, A[2 * all + 2]};
-        const vector none = {0}, C[3] = {none + B[0], none + B[1], none + B[2]};
-        const vector b[2] = {none + motion[1] + A[1] * change[0] - B[0] * force[1] - B[1] * force[2],
-                             none + motion[2] + A[2] * change[0] - B[1] * force[1] - B[2] * force[2]};
-        vector T[2], multiplier = none + c->multiplier[i];
-        settle_friction(C, b, none + c->friction * N, none == 0, &multiplier, T);
-        c->multiplier[i] = multiplier[0], change[1] = T[0][0] - force[1], change[2] = T[1][0] - force[2];
-    }
-    double size = 0;
-    for (int k = 0; k < parts; k++) {
-        const double *column = c->compliance + ((size_t)i * parts + k) * all, by = change[k];
-        force[k] += by;
-        if (by == 0) continue;
-        for (int j = 0; j < all; j++) c->motion[j] += column[j] * by;
-        size = fmax(size, fabs(column[i * parts + k] * by));
-    }
-    return size;
-}
-
-/* Forces of all contacts with which their laws hold; the motion follows. Returns the number of sweeps. */
-int settle_pairs(pairs *c)
-{
-    double first = 0;
-    for (int sweep = 0; sweep < c->most; sweep++) {
-        double change = 0;
-        for (int i = 0; i < c->count; i++) change = fmax(change, settle_pair(c, sweep % 2 ? c->count - 1 - i : i));
-        if (!isfinite(change)) return c->most;
-        first = fmax(first, change);
-        if (change <= fmax(c->share * first, c->smallest)) return sweep + 1;
-    }
-    return c->most;
 }

@@ -196,7 +196,7 @@ static int find_compliance(problem *p, const double *x)
             if (solve(p, c->load, c->response) || at_nodes(p, c->response, 0, c->now)) return FAILED;
             keep_responses(c, first, apart, component, q, c->now);
         }
-    find_transfers(c);
+    find_transfers(c, apart);
     return 0;
 }
 

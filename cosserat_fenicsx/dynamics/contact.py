@@ -100,6 +100,7 @@ _MOST, _SHARE, _OF_NEIGHBOURS, _SMALLEST = 200, 1e-6, 1e-3, 1e-16
 # Numbers of positions and of nodes in C, see `contact`.
 _OF_POSITIONS = {"motion": 6, "forces": 4, "late": 4, "walled": 10}
 _TRANSFERS = {"compliance": 4, "right": 6, "left": 6}
+_INSIDE = "preceding", "following"  # by nodes inside an element
 _OF_NODES = "clearance", "stiffness", "friction", "damping", "arm", "multiplier"
 
 
@@ -120,6 +121,9 @@ class NodalContact(Pointers):
         self._origin = np.concatenate([np.tile(p.origin, (len(p.slots), 1)) for p in touched])[order]
         n, coupled = nodes.count, nodes.count - 1 if nodes.count <= _FEW else _NEIGHBOURS
         of, along = nodes.points, np.arange(n)  # nodes at the same point, as of two walls, count as one
+        inner = np.concatenate([place.inner for place in touched])[order]
+        ends = np.flatnonzero(np.diff(np.concatenate([[False], inner, [False]])))
+        inside = int((ends[1::2] - ends[::2]).max(initial=0))  # nodes in a row, each as often as there are walls
         reach = int((np.searchsorted(of, of + coupled, side="right") - 1 - along).max())
         self._numbers = {name: np.zeros(n) for name in _OF_NODES}
         units = {"stiffness": scales.force / scales.length, "damping": model.time / scales.length}
@@ -133,7 +137,8 @@ class NodalContact(Pointers):
         work = {name: np.zeros((positions, size, self._lib.LANES)) for name, size in _OF_POSITIONS.items()}
         # of half the numbers' accuracy: it guides iterations, and its reading takes most of their time
         self._transfers = {
-            name: np.zeros((positions, size, 6, self._lib.LANES), dtype=np.float32) for name, size in _TRANSFERS.items()
+            name: np.zeros((positions, size, 6, self._lib.LANES), dtype=np.float32)
+            for name, size in {**_TRANSFERS, **dict.fromkeys(_INSIDE, 4 * inside)}.items()
         }
         self._weaker = np.concatenate([np.full((len(p.slots), 2), p.weaker) for p in touched])[order]
         self._weaker[:, 1] *= model.time / scales.length
@@ -151,7 +156,10 @@ class NodalContact(Pointers):
         of_unknowns = {name: np.zeros(problem.numbering.size) for name in ("load", "response")}
         for name, array in self._transfers.items():
             setattr(contact, name, self._ffi.from_buffer("float[]", array))
-        arrays = {"fixed": nodes.fixed, "responses": np.zeros((n, 3, 6, 6)), **of_unknowns, **work}
+        contact.inside, contact.inner = inside, self.integers(inner)
+        work |= {"passing": np.zeros((2, 6 + 4 * inside, self._lib.LANES)),
+                 "responses": np.zeros((3, n, 2 * inside + 3, 6, 6))}  # fmt: skip
+        arrays = {"fixed": nodes.fixed, **of_unknowns, **work}
         for name, array in {**self._numbers, **self._vectors, **arrays}.items():
             setattr(contact, name, self.doubles(array))
         contact.known_for, contact.stale, contact.usual, contact.missing = np.nan, True, np.inf, 1.0
@@ -249,9 +257,11 @@ class NodalContact(Pointers):
 
 
 class _Place:
-    """The nodes that may touch one wall along one rod: numbers in the scene, arc lengths (m), stiffness (N/m)."""
+    """The nodes that may touch one wall along one rod: numbers in the scene, whether they are inside an element, arc
+    lengths (m), stiffness (N/m)."""
 
-    def __init__(self, wall, slots, s, lengths, origin):
+    def __init__(self, wall, slots, inner, s, lengths, origin):
+        self.inner = inner
         self.wall, self.slots, self.s, self.origin = wall, slots, s, origin
         self.stiffness, self.damping = wall.stiffness * lengths, np.full(len(s), wall.damping)
         self.weaker = wall.kinetic, wall.speed
@@ -277,7 +287,7 @@ def _places(model, walls):
                 beside = wall.beside(at)
                 lengths = np.where(beside < at, above, np.where(beside > at, below, lengths))
                 at = beside
-            found.append(_Place(wall, first[i] + here, at[here], lengths, scene.origin(rod)))
+            found.append(_Place(wall, first[i] + here, here % p > 0, at[here], lengths, scene.origin(rod)))
     return found
 
 
