@@ -2,8 +2,9 @@
 
 A thread that slides over what guides it has T' = -mu |t'| T on the way from its pulled end, with the unit direction t:
 the tension there times exp(-mu times the turning up to a place). The directions at the Gauss points of the elements
-are interpolated over an element and halves of its neighbours; |t'| of the polynomials is integrated in parts, since it
-has a kink where a curve in a plane bends back. At stations and kinks t may jump, by the angle between its two sides.
+are interpolated over an element and halves of its neighbours, if these are about as long; |t'| of the polynomials is
+integrated in parts, since it has a kink where a curve in a plane bends back. At stations and kinks t may jump, by the
+angle between its two sides.
 """
 
 import numpy as np
@@ -16,6 +17,13 @@ _POINTS, _WEIGHTS = (gauss(4).points + 1) / 2, gauss(4).weights / 2
 _SAMPLES, _ITERATIONS = np.linspace(0.0, 1.0, 9), 5
 # A lower bound of lengths, for divisions.
 _TINY = 1e-150
+# Least distance of points of other elements that an element's polynomial takes, over its length: less than that of
+# Gauss's points.
+_BESIDE = 0.1
+# Share of the largest |t'| of an element below which its least one makes a kink of the tension; the least change of the
+# tension along the element, over itself, that matters; and the distance from an end, over the element's length, to
+# which kinks count as there: they matter by its square.
+_KINK, _SLIGHT, _AT_END = 0.1, 1e-9, 1e-3
 
 
 class Turning:
@@ -34,11 +42,14 @@ class Turning:
         at = (breaks[:-1, None] + np.diff(breaks)[:, None] * places).ravel()
         self._near, self._coefficients = [], []
         for begin, end in zip(edges[:-1], edges[1:], strict=True):
-            size = min(2, end - begin) * points
             for k in range(begin, end):
-                first = np.clip(k * points - (size - points) // 2, begin * points, end * points - size)
-                near = np.arange(first, first + size)
-                x = (at[near] - breaks[k]) / (breaks[k + 1] - breaks[k])
+                own, h = np.arange(k * points, (k + 1) * points), breaks[k + 1] - breaks[k]
+                before = _apart(at, range(own[0], begin * points - 1, -1), points, h)
+                after = _apart(at, range(own[-1], end * points), points, h)
+                few = min(points // 2, len(before))
+                after = after[: points - few]
+                near = np.array([*before[: points - len(after)][::-1], *own, *after])
+                x, size = (at[near] - breaks[k]) / h, len(near)
                 middle, half = (x[0] + x[-1]) / 2, (x[-1] - x[0]) / 2 or 1.0
                 powers = np.linalg.inv(np.vander((x - middle) / half, increasing=True))
                 # of polynomials in x, from those in (x - middle)/half
@@ -89,6 +100,17 @@ class Turning:
 
         return up_to(size, 2 * np.arcsin(np.minimum(far / 2, 1.0))), change
 
+    def bends_back(self, t, friction):
+        """(..,) whether |t'| vanishes inside an element, so that T'' jumps there, of t as in `along`."""
+        c = self._polynomials(t)
+        k = c[..., 1:, :] * np.arange(1, c.shape[-2])[:, None]
+        place = _least(k)
+        x = np.concatenate([np.broadcast_to(_SAMPLES, (*place.shape, len(_SAMPLES))), place[..., None]], axis=-1)
+        size = np.linalg.norm(np.vander(x.ravel(), k.shape[-2], increasing=True).reshape(*x.shape, -1) @ k, axis=-1)
+        largest = size.max(axis=-1)
+        inside = np.abs(place - 0.5) < 0.5 - _AT_END
+        return (inside & (size[..., -1] < _KINK * largest) & (friction * largest > _SLIGHT)).any(axis=-1)
+
     def _steps(self, c):
         """(.., jumps, 3) changes of the direction at the jumps."""
         return c[..., self._jumps, 0, :] - c[..., self._jumps - 1, :, :].sum(axis=-2)
@@ -103,6 +125,19 @@ class Turning:
 
         share = np.exp(-friction * way(turned))
         return share, lambda dt: -friction * share * way(change(dt))
+
+
+def _apart(at, which, most, h):
+    """Up to `most` of the indices `which` of places `at`, each some share of h beyond the last one, from the first one:
+    directions of elements far shorter than h tell no slope over h."""
+    found, last = [], which[0]
+    for i in which:
+        if abs(at[i] - at[last]) > _BESIDE * h:
+            found.append(i)
+            last = i
+        if len(found) == most:
+            break
+    return found
 
 
 def _least(k):

@@ -76,6 +76,20 @@ def test_under_a_force(tendon, force, tip, other_end, length, truth, request):
 
 
 @pytest.mark.serial
+@pytest.mark.parametrize("force", [(0.12, 0, 0.05), (0.33, 0, 0)], ids=["one arc", "bends back"])
+def test_estimates(force):
+    """About the error to 30 times it, also of n and m, whose second derivatives jump where the tendon bends back."""
+    scene = arm(cf.Tendon(ROD, (-E, 0), 8.0, friction=0.5), cf.Force(ROD.end, force))
+    path, fine = cf.solve(scene, [1.0], tol=1e-6), cf.solve(scene, [1.0], elements=160)
+    stations = [ROD.at(x) for x in np.linspace(0.001, 0.299, 60)]
+    estimates = path.errors.position, path.errors.force, path.errors.moment
+    for query, estimate in zip(("displacement", "force", "moment"), estimates, strict=True):
+        of_path, exact = (np.array([getattr(x, query)(s)[-1] for s in stations]) for x in (path, fine))
+        error = np.linalg.norm(of_path - exact, axis=1).max() / np.linalg.norm(exact, axis=1).max()
+        assert 0.8 * error < estimate[-1] < 30 * error
+
+
+@pytest.mark.serial
 def test_at_guides():
     """Through rings of a rod that hardly bends, its tension falls with the angle of each kink (Euler's rope)."""
     stiff = cf.Rod(cf.Line((0, 0, 0), (0, 0, 1)), cf.Stiffness((1e9, 1e9), 1e9, (1e7, 1e7), 1e7), name="beam")

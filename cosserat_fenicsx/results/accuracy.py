@@ -17,6 +17,7 @@ from cosserat_fenicsx.results.compared import (
     halfway,
     transferred,
 )
+from cosserat_fenicsx.results.recovery import Threads
 from cosserat_fenicsx.results.rods import resting
 
 #: Largest number of points of a path that are all sample points.
@@ -68,6 +69,9 @@ def estimate_error(fine, coarse, before=None, *, smooth=True):
     Each quantity is judged by itself, relative to its own size, see `compared.sizes_of`: the four of the package, then
     further criteria (see `compared.Criterion`), which add rows to all (4, n) arrays.
 
+    Friction along a thread leaves the ends of elements no more accurate than the rest. Where it bends back inside an
+    element, n and m have second derivatives that jump, and no gain is assumed for them.
+
     Args:
         smooth: of scenes with walls: False where an edge of contact or of slip lies inside elements. No gain is assumed
             then, and the error is taken to be twice the difference, since two meshes may err in the same direction.
@@ -80,8 +84,11 @@ def estimate_error(fine, coarse, before=None, *, smooth=True):
     _, difference, at_ends, shared = _differences(fine, coarse)
     relative = shared / fine._reference.sizes
     part = np.where(relative < ASYMPTOTIC, 1 / SAFETY_BELOW, 1 / SAFETY)
+    slides = any(action.rough for action in fine.scene.actions)
     if before is None:
         ahead, far = difference > AHEAD * at_ends, difference > FAR_AHEAD * at_ends
+        if slides:
+            ahead |= relative < ASYMPTOTIC
         # n is constant where no loads act along rods, so that the ends cause all of its error
         far[FORCE] |= far[:FORCE].all(axis=0) & (difference[FORCE] <= OF_ENDS * at_ends[FORCE])
         sure = (far | (relative == 0))[: len(NAMES)].all(axis=0) & equal_elements(fine.layout)
@@ -95,6 +102,9 @@ def estimate_error(fine, coarse, before=None, *, smooth=True):
         gain = np.clip(part * (seen - 1), 1, part * 2.0 ** (p + 1))
     if fine.scene.has_walls:
         gain = np.maximum(gain / _NEARLY, 1.0) if smooth else np.full_like(gain, 1 / _ROUGH)
+    if slides and (bends := Threads(fine).bend_back()).any():
+        gain[:FORCE, bends] = np.maximum(gain[:FORCE, bends] / _NEARLY, 1.0)
+        gain[FORCE:, bends] = 1.0
     gain[relative == 0] = 2.0 ** (p + 1) / SAFETY_BELOW
     fine.set_errors(relative / gain)
     return relative, gain

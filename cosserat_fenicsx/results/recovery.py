@@ -233,11 +233,24 @@ class Threads:
         if not thread.rough:
             return np.ones((len(v), v.shape[1], v.shape[2] + 2))
         if id(thread) not in self._shares:
-            t = _along(thread, places, v, k)[1]
-            t = np.einsum("...ij,...j->...i", R, t / np.linalg.norm(t, axis=-1, keepdims=True))
-            turning = Turning(self._result.scene, thread.rod, places.breaks, self._result.rule.gauss)
+            turning, t = self._turning(thread, places, R, v, k)
             self._shares[id(thread)] = turning.left(t, thread.friction, thread.pulled == "start")[0]
         return self._shares[id(thread)]
+
+    def _turning(self, thread, places, R, v, k):
+        """The `Turning` of a thread, and its directions at the Gauss points (n, elements, points, 3), inertial."""
+        t = _along(thread, places, v, k)[1]
+        t = np.einsum("...ij,...j->...i", R, t / np.linalg.norm(t, axis=-1, keepdims=True))
+        return Turning(self._result.scene, thread.rod, places.breaks, self._result.rule.gauss), t
+
+    def bend_back(self):
+        """(n,) whether a thread with friction bends back inside an element, so that its tension has a kink there."""
+        found = np.zeros(len(self._records["load_factor"]), dtype=bool)
+        for thread in self._threads:
+            if thread.rough:
+                turning, t = self._turning(thread, *self._strained(thread))
+                found |= turning.bends_back(t, thread.friction)
+        return found
 
     def length(self, thread):
         """(n,) m."""

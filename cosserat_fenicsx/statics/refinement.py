@@ -103,7 +103,7 @@ class _Search:
     def __init__(self, trace, correct, bar, scene, tol, bound, degree, usual):
         self._trace, self._correct, self._bar = trace, correct, bar
         self._scene, self._tol, self._degree = scene, tol, degree
-        self._presses = scene.has_walls
+        self._presses = scene.has_walls or any(action.rough for action in scene.actions)
         self._rubs = any(action.finds_friction for action in scene.actions)
         self._usual, self._next = usual, None  # `_next`: the next mesh and its refinement factor, where it is known
         self.whole = self._few = self._which = None  # `_few`: sample points on the last mesh; `_which`: their indices
@@ -156,7 +156,7 @@ class _Search:
         self._layered = None
         if not resolved:
             self._layered = with_layers(self._scene, found.layout, layers) or with_turns(self._scene, found)
-        if self._layered is None and self._presses and self._moved < MOST_MOVES:
+        if self._layered is None and self._scene.has_walls and self._moved < MOST_MOVES:
             self._layered = with_edges(self._scene, found.layout, contact_edges(found))
             self._moved += self._layered is not None
         if found.rounding > self._tol:  # refinement would increase it
@@ -264,7 +264,7 @@ class _Search:
 
     def _saves(self, few, coarse):
         """Whether a mesh between those of two paths suffices and is cheaper for all points; it becomes the next one."""
-        if self._presses:  # only halvings keep element ends at the edges of contact
+        if self._presses:  # only halvings keep element ends at the edges of contact, and show what kinks cost
             return False
         factor = self._factor_for(coarse)
         others = len(self.whole) - len(few)
@@ -281,7 +281,7 @@ class _Search:
         if self._factor < 2:
             return carry_error(fine, coarse, self._factor, self._order, before)
         # edges of slip move through elements from state to state
-        smooth = not (self._rubs or self._presses and loose_edges(fine.layout, contact_edges(fine)))
+        smooth = not (self._rubs or self._scene.has_walls and loose_edges(fine.layout, contact_edges(fine)))
         apart, gain = estimate_error(fine, coarse, before, smooth=smooth)
         self._halved, self._order = (fine, coarse), order_of(gain, fine.degree)
         if np.divide(fine.layout.counts, coarse.layout.counts).max() <= 2:  # else the coarse mesh is not fine enough
