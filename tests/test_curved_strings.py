@@ -209,18 +209,18 @@ def test_friction_at_a_node_is_a_vector_against_its_slip():
 def test_resume_below_a_pipe_that_rubs_gives_identical_digits(tmp_path, monkeypatch):
     """With a bit that cuts, below two motors whose pumps start."""
     bit = cf.drilling.BitOnRock(CUTTING, weight=20e3, inertia=10.0)
-    flow = cf.signals.Table((0.0, 0.1), (0.0, 0.04))
+    flow = cf.signals.Table((0.0, 0.02), (0.0, 0.04))
     motor = cf.well.MudMotor(21.0, outer_diameter=0.1715, displacement=0.0268, leakage=1.4e-8, flow=flow)
     pipe = [part(x, 0.127, 0.10861, weight=250.0) for x in (42.0, 30.0, 126.0)]
     parts = (part(60.0, 0.1651, 0.05715, weight=1200.0), pipe[0], motor, pipe[1], motor, pipe[2])
     string = drilling(lambda t: min(40 * t, 4.0), bit=bit, parts=parts, mud=cf.well.Mud(1200.0))
     mixed = cf.drilling.mixed_scene(string, 200.0)
     start = mixed.rest(**MESH)
-    given = MESH | {"dt": 2e-3, "start": start, "save_every": 6e-3}
-    whole = cf.simulate(mixed.scene, 0.12, **given)
-    stop_at(monkeypatch, 40, 0.0)
+    given = MESH | {"dt": 1.5e-3, "start": start, "save_every": 6e-3}
+    whole = cf.simulate(mixed.scene, 0.03, **given)
+    stop_at(monkeypatch, 16 * 13, 0.0)  # the pipe allows steps of 0.1 ms
     with pytest.raises(Stopped):
-        cf.simulate(mixed.scene, 0.12, folder=tmp_path / "run", **given)
+        cf.simulate(mixed.scene, 0.03, folder=tmp_path / "run", **given)
     history = cf.resume(tmp_path / "run", mixed.scene)
     for name in ("times", "energy", "work", "dissipated"):
         assert np.array_equal(getattr(history, name), getattr(whole, name))

@@ -54,7 +54,7 @@ def test_stick_slip_of_the_bit_is_that_of_the_string():
     """The bit slips at 3.5 s, sticks at 8.1 s, and slips again at 9.8 s; its drag is not on the inertia of the bit."""
     string = drilling()
     mixed = cf.drilling.mixed_scene(string, 3000.0)
-    history = cf.simulate(mixed.scene, 10.5, dt=0.0075, **SMALL)
+    history = cf.simulate(mixed.scene, 10.5, dt=0.0046, **SMALL)  # longer ones would be halved
     whole = cf.drilling.simulate(string, 10.5, dt=5e-4, model="torsion")
     times, speed = mean_speeds(history, mixed.rod)
     off = np.abs(speed - np.interp(times, whole.times, whole.bit_speed))
@@ -69,13 +69,13 @@ def test_stick_slip_of_the_bit_is_that_of_the_string():
 def slips():
     """A `MixedScene` whose bit sticks and then slips, and its motion of 2 s."""
     mixed = cf.drilling.mixed_scene(drilling(LIGHT), 3000.0)
-    return mixed, cf.simulate(mixed.scene, 2.0, dt=0.01, **SMALL)
+    return mixed, cf.simulate(mixed.scene, 2.0, dt=4e-3, **SMALL)
 
 
 @pytest.mark.slow
 def test_other_schemes_agree(slips):
     mixed, history = slips
-    alpha = cf.simulate(mixed.scene, 2.0, dt=0.01, scheme="generalised-alpha", **SMALL)
+    alpha = cf.simulate(mixed.scene, 2.0, dt=4e-3, scheme="generalised-alpha", **SMALL)
     (_, one), (_, other) = (mean_speeds(x, mixed.rod) for x in (history, alpha))
     assert one.max() > 3.9
     np.testing.assert_allclose(other, one, atol=0.015)
@@ -155,20 +155,19 @@ def test_sampled_controls_above_a_rod(tmp_path, monkeypatch):
 
     ramp = cf.drilling.TopDrive(None, 100.0, cf.drilling.TorqueOverTime(cf.signals.Ramp(3e3, 0.0, 0.4), sample=0.02))
     pulled = replace(under(cf.drilling.Stiff(), 0.0), drive=ramp)
-    for scene in (under(HeldPI(), 100.0), under(HeldPI(True), 0.0), pulled):
+    for scene in (pulled, under(HeldPI(True), 0.0), under(HeldPI(), 100.0)):
         mixed = cf.drilling.mixed_scene(scene, 250.0)
-        found, whole = mixed.as_drilling(moved()), cf.drilling.simulate(scene, 0.64, dt=1e-4, progress=False)
+        history, whole = moved(), cf.drilling.simulate(scene, 0.64, dt=1e-4, progress=False)
+        found = mixed.as_drilling(history)
         for name in ("drive_speed", "surface_torque", "bit_speed"):
             true = np.interp(found.mean_times, whole.mean_times, getattr(whole, name))
             assert np.abs(getattr(found, name) - true).max() < 3e-3 * np.abs(true).max(), (name, scene.drive)
-    with pytest.raises(cf.SceneError, match="sample = 0.02: expected a sample .* steps of one dt divide"):
+    with pytest.raises(cf.SceneError, match="sample = 0.04: expected a sample .* steps of one dt divide"):
         moved(3e-3)
-    mixed = cf.drilling.mixed_scene(under(HeldPI(), 100.0), 250.0)
-    whole = moved()
     stop_at(monkeypatch, 150, 0.0)
     with pytest.raises(Stopped):
         moved(folder=tmp_path / "kept")
-    assert np.array_equal(cf.resume(tmp_path / "kept", mixed.scene).energy, whole.energy)
+    assert np.array_equal(cf.resume(tmp_path / "kept", mixed.scene).energy, history.energy)
 
 
 def test_an_autodriller_above_a_rod():
@@ -199,11 +198,11 @@ def test_a_torque_that_drops_at_once():
 
 
 def test_resume_gives_identical_digits(slips, tmp_path, monkeypatch):
-    """While the bit sticks, and while it slips: after steps of 2.5 ms."""
+    """While the bit sticks, and while it slips."""
     mixed, whole = slips
     stuck, slipping = np.interp([1.25, 1.7], *mean_speeds(whole, mixed.rod))
     assert abs(stuck) < 1e-9 and slipping > 0.1
-    for steps, run in ((500, partial(cf.simulate, duration=2.0, dt=0.01, **SMALL)), (180, cf.resume)):
+    for steps, run in ((312, partial(cf.simulate, duration=2.0, dt=4e-3, **SMALL)), (113, cf.resume)):
         stop_at(monkeypatch, steps, 0.0)
         with pytest.raises(Stopped):
             run(scene=mixed.scene, folder=tmp_path)

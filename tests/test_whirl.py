@@ -285,7 +285,7 @@ def test_a_collar_turns_from_forward_to_backward_whirl(capsys):
     import whirl
     from known_numbers import deviation
 
-    for check in whirl.main(out=None, duration=6.5, run_up=3.0):
+    for check in whirl.main(out=None, duration=6.1, run_up=3.0):
         assert deviation(check) <= check.allowed, check
     assert "backward whirl at -5" in capsys.readouterr().out
 
