@@ -37,7 +37,7 @@ from cosserat_fenicsx.pictures.drawing import (
     together,
 )
 from cosserat_fenicsx.pictures.signs import Deformed, Resting, signs_of, span_of, without_sign
-from cosserat_fenicsx.pictures.view import Labels, plain, view_of
+from cosserat_fenicsx.pictures.view import Labels, axes_of, plain, view_of
 from cosserat_fenicsx.quantities import Units
 from cosserat_fenicsx.ranks import communicator, on_first
 
@@ -54,6 +54,8 @@ _SMALLER = 0.7
 # Maximum number of rods that are named in the picture of a scene; maximum number of names in larger letters.
 _NAMED, _FEW = 40, 8
 _AT_REST = "#9db4cc"
+# Intervals on the longest axis, at most, around the first of shapes that are side by side.
+_TICKS_APART = 4
 
 
 def rods(path, file=None, points=None, magnify=1.0, color=None, side_by_side=None, units="SI"):
@@ -112,7 +114,7 @@ def _draw(path, points, magnify, color, side_by_side):
         shown = shown[-1:]
         bodies, factors = ({key: of[key] for key in of if key[0] == shown[0]} for of in (bodies, factors))
     span = span_of(path.scene, [Deformed(path, k, {}, magnify, 0.0) for k in shown], everywhere)
-    moved, apart = dict.fromkeys(shown, np.zeros(3)), _apart(path.scene, shown, bodies, span, side_by_side)
+    moved, apart = dict.fromkeys(shown, np.zeros(3)), _apart(path.scene, shown, bodies, everywhere, span, side_by_side)
     small = _small(path, shown, size, magnify)
     if apart:
         moved, (*_, up) = apart, view_of(span)
@@ -137,16 +139,21 @@ def _draw(path, points, magnify, color, side_by_side):
     title = _title(path, shown, magnify, small, apart, factors.values())
     _finish(plotter, pyvista, everywhere, symbols, lines, title,
             lambda labels: _label(labels, path, shown, bodies, span, apart, letters(plotter)),
-            4 if apart else 6)  # fmt: skip
+            _TICKS_APART if apart else 6)  # fmt: skip
     return plotter
 
 
-def _apart(scene, shown, bodies, span, wish):
-    """{k: vector (3,), m} by which shapes are moved apart; wish: bool, or None for where they are tangled."""
-    shapes, (_, right, above, _) = [[bodies[k, rod].line for rod in scene.rods] for k in shown], view_of(span)
+def _apart(scene, shown, bodies, everywhere, span, wish):
+    """{k: vector (3,), m} by which shapes are moved apart, the second one out of the axes around the first; everywhere:
+    points (n, 3), m, of all shapes; wish: bool, or None for where they are tangled."""
+    shapes, (_, right, above, up) = [[bodies[k, rod].line for rod in scene.rods] for k in shown], view_of(span)
     if wish is None:
         wish = all(load.tube() is None for load in scene.loads) and tangled(shapes, right, above)
-    return dict(zip(shown, shifts(shapes, right), strict=True)) if wish and len(shown) > 1 else {}
+    if not wish or len(shown) == 1:
+        return {}
+    axes = axes_of(around(shapes[0], everywhere, up), _TICKS_APART)
+    box = np.array([*itertools.product(*((axis.low, axis.high) for axis in axes))]) @ right
+    return dict(zip(shown, shifts(shapes, right, box), strict=True))
 
 
 def _outline(body, factor, span):
@@ -348,9 +355,11 @@ def _cross(a, b):
     return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
 
 
-def shifts(shapes, right):
-    """Vectors (3,), m, that bring shapes beside each other, from the left to the right; the first one stays."""
+def shifts(shapes, right, box):
+    """Vectors (3,), m, that bring shapes beside each other, from the left to the right; the first one stays, in a box
+    with the corners `box` (8,), m, along that way."""
     along = [np.concatenate(lines) @ right for lines in shapes]
+    along[0] = np.append(along[0], box)
     gap, edge, found = _GAP * max(map(np.ptp, along)), along[0].min(), []
     for ends in along:
         found.append((edge - ends.min()) * right)
