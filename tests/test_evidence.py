@@ -199,12 +199,12 @@ def of_the_suite(duration, quasi_static=False, gravity=(0, 0, 0), **rod):
     given = {
         "centerline": points, "radius": 0.02, "length": 1.0, "normal": (0, 0, 1), "loads": (), "start": end("clamped"),
         "end": end("free"), "start_motion": None, "end_motion": None,
-        "material": SimpleNamespace(youngs_modulus=1e6, shear_modulus=1e6 / 3, density=1000.0),
+        "material": SimpleNamespace(youngs_modulus=1e6, shear_modulus=1e6 / 3, density=1000.0), "friction": 0.0,
         "nodes": lambda n: np.linspace(points[0], points[-1], n + 1),
     } | rod  # fmt: skip
     return SimpleNamespace(
         rods=(SimpleNamespace(**given),), duration=duration, gravity=gravity, obstacles=(), quasi_static=quasi_static,
-        slowest_frequency=lambda: 1.0,
+        self_contact=False, slowest_frequency=lambda: 1.0,
     )  # fmt: skip
 
 
@@ -228,9 +228,26 @@ def test_scenarios_of_another_suite():
     driven = of_the_suite(0.2, True, end=SimpleNamespace(value="clamped"), end_motion=turn)
     _, _, (d1,) = suite.solve(driven, 4, 3)
     assert math.atan2(d1[-1, -1, 1], d1[-1, -1, 2]) == pytest.approx(-0.5 * 7 / 8, abs=0.05)
-    across = of_the_suite(1.0, centerline=np.array([(0, 0, 0), (0, 0, 0.5), (1.0, 0, 0)]))
-    with pytest.raises(NotImplementedError, match="a clamp at the start of a rod across the line between its ends"):
-        suite.solve(across, 4, 2)
+    across = np.array([(0, 0, 0), (0.5, 0, 0), (0.5, 0, 0.5)])
+    with pytest.raises(NotImplementedError, match="a clamp at the end of a rod across its line at rest"):
+        suite.solve(of_the_suite(1.0, centerline=across, end=SimpleNamespace(value="clamped")), 4, 2)
+
+
+@pytest.mark.once
+def test_contact_in_scenarios_of_another_suite():
+    """A rod on a slope below and above the friction that the larger coefficient holds; and how rods are bent."""
+    import cosseratbench_suite as suite
+
+    floor = SimpleNamespace(kind="plane", point=(0, 0, -0.02), normal=(0, 0, 1), friction=0.1)
+    for slope, moves in ((0.25, 0.0), (0.4, 0.1 * 9.81 * (0.2 / 2 - (1 - math.exp(-2 * 0.2)) / 4))):  # v' + 2 v = 0.981
+        given = of_the_suite(0.2, True, (9.81 * slope, 0, -9.81), start=SimpleNamespace(value="free"), friction=0.3)
+        given.obstacles = (floor,)
+        _, (nodes,), _ = suite.solve(given, 2, 21)
+        assert nodes[-1, 0, 0] == pytest.approx(moves, abs=3e-4) and abs(nodes[-1, :, 2]).max() < 2e-3
+    helix = np.stack([f(np.linspace(0, 9, 40)) for f in (np.cos, np.sin, lambda x: 0.2 * x)], axis=1)
+    first, turns = suite._turns(helix, np.array([(1.0, 0, 0), (1.0, 1.0, 0)]))
+    assert suite._bent(first, turns, 1.0) == pytest.approx(helix, abs=1e-12)
+    assert np.ptp(suite._bent(first, turns, 0.0)[:, [0, 2]], axis=0) == pytest.approx(0, abs=1e-12)
 
 
 @pytest.mark.once

@@ -7,10 +7,11 @@ Writes out/cosseratbench.md: this package beside the results of other solvers th
 scenarios (rods, ends, loads, durations) and judges where nodes are at equal time intervals. `Adapter` is its interface
 of a solver; `solve` reads a scenario by its attributes alone, so that it needs no part of the suite.
 
-Rods are straight when free of stress and stay on the line between their ends until they are moved to where they start.
-Equilibria are solved as such, in one frame; motions begin with all nodes held where the scenario has them. What can
-touch something is reported as unsupported by the suite, for want of `ROD_CONTACT`, `CYLINDER_CONTACT` or
-`PLANE_CONTACT` of this adapter, which does not translate contacts to `RodContact`, `Cylinder` and `Plane`.
+Rods are straight when free of stress and stay on a line until they are moved to where they start. Equilibria are solved
+as such, in one frame; motions begin with all nodes held where the scenario has them. Rods that can touch an obstacle or
+each other are in motion, with a scheme that dissipates what its steps do not resolve. Surfaces are elastic; both
+surfaces of a contact have the larger of their coefficients of friction. A `Cylinder` has no ends here: a rod that comes
+to those of the suite's is reported as unsupported.
 """
 
 import argparse
@@ -24,6 +25,7 @@ from pathlib import Path
 
 import numpy as np
 from harness import in_words, record, table, write
+from scipy.spatial.transform import Rotation
 
 import cosserat_fenicsx as cf
 
@@ -36,39 +38,86 @@ DEGREE = 2
 #: What its docs/findings.md tells of solvers and references that its kept results do not have.
 FINDINGS = """
 Its docs/findings.md adds: dismech has the pendulum's period to 1.4e-4 and its amplitude to 9e-6, and the catenary's sag
-to 1.8e-4; crossing, the error of the lift is 5e-4 by MuJoCo, 3e-3 by PyElastica and 2.6e-2 by dismech. The reference of
-the catenary has no bending stiffness, which lifts the sag by about 0.1 mm (4e-4 of it); that of the pendulum is linear,
+to 1.8e-4; crossing, the error of the lift is 5e-4 by MuJoCo, 3e-3 by PyElastica and 2.6e-2 by dismech; pile, after 173
+s and 18 s, rope of MuJoCo and PyElastica lies in coils of 10 and 16 cm, 1.5 diameters high, and dismech diverges.
+
+The lift of crossing is measured at node 26 of 51 elements, half an element beside the crossing: the reference curve
+itself has a lift_error of 5.4e-3 there, and leaves out shear, which the suite says is worth 1e-4 m. The slide
+of capstan contains what the rope stretches as friction sets in; it does not creep afterwards. The reference of the
+catenary has no bending stiffness, which lifts the sag by about 0.1 mm (4e-4 of it); that of the pendulum is linear,
 2e-5 too fast for this swing; the twist is measured to about 0.5 %. Smaller numbers beyond these say nothing."""
 # Time steps in a frame: of motions, and of states that a slow drive passes through.
 _STEPS, _SLOW_STEPS = 20, 4
+# Stiffness of rods' surfaces and of obstacles over that of two rods of the material that cross (Hertz); obstacles let
+# rods in by about 1 % of a radius, and no node jumps on them; damping of impacts of rods, s/m.
+_RODS, _WALLS, _IMPACT = 30.0, 0.1, 1.0
+# Turn of a rod, rad, in a stage in which it is brought to where it starts.
+_BEND = 0.4
+# Elements in one of the suite's, of rods that touch: these bend around each other in a few radii.
+_FINER = 2
 
 
 def solve(scenario, elements, frames):
     """Solve a scenario of the suite. scenario: with the attributes of the suite's `Scenario`. elements: of every rod.
     frames: how many. Returns Frames. Raises NotImplementedError: in words, what this adapter does not do."""
-    if scenario.obstacles:
-        raise NotImplementedError("obstacles")
     rods = [_rod(k, given, scenario) for k, given in enumerate(scenario.rods)]
+    contacts = _contacts(scenario, rods)
     driven = any(rod.start_motion or rod.end_motion for rod in scenario.rods)
-    alone = scenario.quasi_static and not driven
-    return (_settled if alone else _moved)(scenario, rods, elements, frames)
+    if scenario.quasi_static and not driven and not contacts:
+        return _settled(scenario, rods, elements, frames)
+    found = _moved(scenario, rods, contacts, elements, frames)
+    for cylinder in (given for given in scenario.obstacles if given.kind == "cylinder"):
+        for given, nodes in zip(scenario.rods, found.positions, strict=True):
+            away = nodes - np.asarray(cylinder.center)
+            along = away @ cylinder.unit_axis
+            across = np.linalg.norm(away - along[..., None] * cylinder.unit_axis, axis=2)
+            if np.any((across < cylinder.radius + 2 * given.radius) & (np.abs(along) > cylinder.length / 2)):
+                raise NotImplementedError("the ends of a cylinder")
+    return found
 
 
 def _rod(k, given, scenario):
-    """The rod at rest: straight, from its first point towards its last, with d1 along the scenario's normal."""
+    """The rod at rest: straight, with d1 along the scenario's normal, from its first point along a start that is
+    clamped, else towards its last point."""
     points = np.asarray(given.centerline, dtype=float)
-    along = (points[-1] - points[0]) / np.linalg.norm(points[-1] - points[0])
-    for name, segment in (("start", points[1] - points[0]), ("end", points[-1] - points[-2])):
-        if getattr(given, name).value == "clamped" and np.linalg.norm(np.cross(segment, along)) > 1e-3 * math.dist(
-            segment, (0, 0, 0)
-        ):
-            raise NotImplementedError(f"a clamp at the {name} of a rod across the line between its ends")
+    along = points[1] - points[0] if given.start.value == "clamped" else points[-1] - points[0]
+    along = along / np.linalg.norm(along)
+    segment = points[-1] - points[-2]
+    if given.end.value == "clamped" and np.linalg.norm(np.cross(segment, along)) > 1e-3 * np.linalg.norm(segment):
+        raise NotImplementedError("a clamp at the end of a rod across its line at rest")
     line = cf.Line(tuple(points[0]), tuple(points[0] + given.length * along), d1=tuple(given.normal))
     m = given.material
     material = cf.Material(m.youngs_modulus, m.youngs_modulus / (2 * m.shear_modulus) - 1, m.density)
     drag = 2 * scenario.slowest_frequency() if scenario.quasi_static else 0.0
     damping = cf.Damping(drag=drag) if drag else None
     return cf.Rod(line, cf.Circle(2 * given.radius), material, name=f"rod {k}", damping=damping)
+
+
+def _contacts(scenario, rods):
+    """Obstacles, one for each rod, and the contact of rods with each other and with themselves."""
+    loads, pairs = [], list(zip(scenario.rods, rods, strict=True))
+
+    def hertz(given):
+        m = given.material
+        return m.youngs_modulus / (4 * (1 - (m.youngs_modulus / (2 * m.shear_modulus) - 1) ** 2))
+
+    for obstacle in scenario.obstacles:
+        for given, rod in pairs:
+            surface = {"friction": max(obstacle.friction, given.friction), "rod": rod}
+            surface |= {"stiffness": _WALLS * hertz(given), "stick": _WALLS * hertz(given)}
+            if obstacle.kind == "plane":
+                loads.append(cf.Plane(tuple(obstacle.point), tuple(obstacle.normal), **surface))
+            elif obstacle.kind == "cylinder":
+                loads.append(cf.Cylinder(tuple(obstacle.center), tuple(obstacle.axis), obstacle.radius, **surface))
+            else:
+                raise NotImplementedError(f"an obstacle that is a {obstacle.kind}")
+    if len(rods) > 1 or scenario.self_contact:
+        rough = {given.friction for given in scenario.rods}
+        if len(rough) > 1:
+            raise NotImplementedError("rods of different friction that touch each other")
+        hard = _RODS * max(hertz(given) for given in scenario.rods)
+        loads.append(cf.RodContact(stiffness=hard, damping=_IMPACT, friction=rough.pop(), itself=scenario.self_contact))
+    return loads
 
 
 def _held(given, rod, name, to):
@@ -114,29 +163,86 @@ def _settled(scenario, rods, elements, frames):
     return Frames(np.linspace(0, scenario.duration, frames), positions, directors)
 
 
-def _moved(scenario, rods, elements, frames):
+def _moved(scenario, rods, contacts, elements, frames):
     """Rods in motion from where the scenario has them, at rest; in quasi-static ones with a drag."""
-    pins, supports = [], []
+    own = elements * (_FINER if any(load.rods_touch for load in contacts) else 1)
+    mesh = {"elements": own, "degree": DEGREE, "model": "spatial"}
+    supports = []
     for given, rod in zip(scenario.rods, rods, strict=True):
-        places = given.nodes(elements)
-        for name, k in (("start", 0), ("end", elements)):
-            pins += _held(given, rod, name, places[k])
+        for name, place in (("start", given.centerline[0]), ("end", given.centerline[-1])):
             motion = getattr(given, f"{name}_motion")
-            supports += _driven(rod, name, motion) if motion else _held(given, rod, name, places[k])
-        free = range(1, elements if given.end.value != "free" else elements + 1)
-        s = rod.length * np.arange(elements + 1) / elements
-        by = places - rod.curve.position(s)
-        pins += [cf.Prescribed(rod.at(s[k]) if k < elements else rod.end, displacement=tuple(by[k])) for k in free]
-    weight = [cf.Weight(tuple(scenario.gravity), permanent=True)] if any(scenario.gravity) else []
-    mesh = {"elements": elements, "degree": DEGREE, "model": "spatial"}
-    start = cf.solve(cf.Scene(rods, pins, weight), [1.0], **mesh)
+            supports += _driven(rod, name, motion) if motion else _held(given, rod, name, place)
+    # where rods may touch obstacles all nodes are held, so that none between others lies in one
+    held = {"elements": DEGREE * own, "degree": 1, "model": "spatial"} if contacts else mesh
+    start = cf.solve(_pinned(scenario, rods, contacts, held["elements"]), [1.0], **held)
     frame = scenario.duration / (frames - 1)
     dt = frame / (_SLOW_STEPS if scenario.quasi_static else _STEPS)
-    scene = cf.Scene(rods, supports, _loads(scenario, rods))
-    history = cf.simulate(scene, scenario.duration, dt=dt, save_every=frame, start=start, **mesh)
+    scene = cf.Scene(rods, supports, [*_loads(scenario, rods), *contacts])
+    scheme = {"scheme": "generalised-alpha", "rho_inf": 0.0} if scenario.quasi_static and contacts else {}
+    history = cf.simulate(scene, scenario.duration, dt=dt, save_every=frame, start=start, **mesh, **scheme)
     found = [list(zip(*(_sampled(history, k, rod, elements) for k in range(frames)), strict=True)) for rod in rods]
     positions, directors = ([np.array(x[i]) for x in found] for i in (0, 1))
     return Frames(np.linspace(0, scenario.duration, frames), positions, directors)
+
+
+def _pinned(scenario, rods, contacts, count):
+    """A scene that holds `count` + 1 equidistant points of every rod where the scenario has them, bent in stages."""
+    share, pairs, weight = np.arange(count + 1) / count, list(zip(scenario.rods, rods, strict=True)), scenario.gravity
+    now = [rod.curve.position(rod.length * share) for rod in rods]
+    places = [_outside(contacts, rod, rod.length * share, given.nodes(count)) for given, rod in pairs]
+    turns = [_turns(*both) for both in zip(places, now, strict=True)]
+    stages = max(1, *(math.ceil(np.linalg.norm(found[1], axis=1).sum() / _BEND) for found in turns))
+    supports = [[cf.Clamp(rod.start) if given.start.value == "clamped" else cf.Hinge(rod.start, tuple(given.normal))
+                 for given, rod in pairs]] + [[] for _ in range(stages - 1)]  # fmt: skip
+    for k, (given, rod) in enumerate(pairs):
+        ends_held = given.end.value == "clamped"
+        if ends_held and stages > 1:
+            raise NotImplementedError("a rod with a clamped end that starts bent")
+        supports[0] += _held(given, rod, "end", places[k][-1]) if ends_held else []
+        stations = [*(rod.at(rod.length * x) for x in share[1:-1]), *([] if ends_held else [rod.end])]
+        for stage, pins in enumerate(supports, 1):
+            before, now[k] = now[k], places[k] if stage == stages else _bent(*turns[k], stage / stages)
+            pins += [cf.Prescribed(x, displacement=tuple(by))
+                     for x, by in zip(stations, now[k][1:] - before[1:], strict=False)]  # fmt: skip
+    loads = [cf.Weight(tuple(weight), permanent=True)] if any(weight) else []
+    return cf.Scene(rods, supports[0], loads, stages=[cf.Stage(supports=pins) for pins in supports[1:]])
+
+
+def _outside(contacts, rod, s, points):
+    """Points (n, 3) of a rod at arc lengths s, moved out of obstacles: a polyline cuts round ones a little."""
+    for load in contacts:
+        if load.gaps is not None and load.acts_on(rod):
+            gap, normal = load.gaps(rod, s, points)
+            points = points + np.maximum(-gap, 0.0)[:, None] * normal
+    return points
+
+
+def _turns(nodes, line):
+    """((first node (3,), direction (3,) of a line of nodes, lengths (n,) of segments between nodes (n + 1, 3)),
+    rotation vectors (n, 3) from that direction to the first segment, and from each segment to the next one, in axes
+    that the segments carry without twist)."""
+    along = np.diff(nodes, axis=0)
+    lengths = np.linalg.norm(along, axis=1)
+    along = np.vstack([line[1] - line[0], along])
+    along /= np.linalg.norm(along, axis=1, keepdims=True)
+    axes = np.cross(along[:-1], along[1:])
+    sines = np.linalg.norm(axes, axis=1)
+    angles = np.arctan2(sines, np.sum(along[:-1] * along[1:], axis=1))
+    frame, turns = Rotation.identity(), []
+    for turn in axes * (angles / np.maximum(sines, np.finfo(float).tiny))[:, None]:
+        turns.append(frame.inv().apply(turn))
+        frame = Rotation.from_rotvec(turn) * frame
+    return (nodes[0], along[0], lengths), np.array(turns)
+
+
+def _bent(first, turns, share):
+    """The nodes (n + 1, 3) of what `_turns` has taken apart, bent by a share of its turns."""
+    place, along, lengths = first
+    frame, tangents = Rotation.identity(), []
+    for turn in turns:
+        frame = frame * Rotation.from_rotvec(share * turn)
+        tangents.append(frame.apply(along))
+    return place + np.vstack([np.zeros(3), np.cumsum(lengths[:, None] * tangents, axis=0)])
 
 
 def _driven(rod, name, motion):
@@ -195,14 +301,18 @@ def obtained(out):
 def adapter():
     """The solver that the suite runs; its modules must be on the path."""
     capability = importlib.import_module("cosseratbench.solver").Capability
+    diverged = importlib.import_module("cosseratbench.solver").Diverged
     trajectory = importlib.import_module("cosseratbench.trajectory").Trajectory
 
     class Adapter:
         name, backend_version = "cosserat_fenicsx", cf.__version__
-        capabilities = frozenset({capability.STRETCH, capability.SHEAR})
+        capabilities = frozenset(capability)
 
         def run(self, scenario, *, n_elements, n_frames):
-            found = solve(scenario, n_elements, n_frames)
+            try:
+                found = solve(scenario, n_elements, n_frames)
+            except cf.NotConverged as error:
+                raise diverged(str(error)) from error
             return trajectory(found.times, tuple(found.positions), tuple(found.directors))
 
     return Adapter()
