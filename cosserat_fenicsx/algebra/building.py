@@ -187,7 +187,7 @@ class Packed(_Kernel):
         self._key = next(iter(packed), None)
         self._w = packed[self._key] if packed else np.zeros((elements, 0))
         self._c = np.array(cpp.fem.pack_constants(self._form), dtype=float)
-        sources = [place for function in moving for place in self._places(function.x.array)]
+        sources = list(self._places([function.x.array for function in moving]))
         self._set(self._w, self._c, sources, [slot for constant in constants for slot in self._slots(constant.value)])
         if self._others:
             self.c.next = self._others.c
@@ -203,19 +203,20 @@ class Packed(_Kernel):
         """{key of the integral: coefficients (elements, n)}."""
         return {key: np.ascontiguousarray(w) for key, w in cpp.fem.pack_coefficients(self._form).items()}
 
-    def _places(self, numbers):
-        """Where a Function's values are packed, found by packing indices in place of values, twice."""
-        kept, index = numbers.copy(), np.arange(len(numbers), dtype=float)
-        numbers[:] = index
-        first = self._pack()
-        numbers[:] = index + 1
-        second = self._pack()
-        numbers[:] = kept
-        for key, array in first.items():
-            columns = np.flatnonzero((array != second[key]).any(axis=0))
-            for run in np.split(columns, np.flatnonzero(np.diff(columns) > 1) + 1):
-                if len(run):
-                    yield numbers, array[:, run], run[0]
+    def _places(self, arrays):
+        """Where the values of Functions are packed, found by packing indices in place of values."""
+        kept, first = [numbers.copy() for numbers in arrays], np.cumsum([0, *map(len, arrays)])
+        for numbers, begin in zip(arrays, first, strict=False):
+            numbers[:] = np.arange(begin, begin + len(numbers)) + _MARK
+        packed = self._pack().get(self._key, self._w)
+        for numbers, values in zip(arrays, kept, strict=True):
+            numbers[:] = values
+        columns = np.flatnonzero((packed != self._w).any(axis=0))
+        of = np.searchsorted(first, packed[:1, columns].ravel(), side="right") - 1
+        for run in np.split(np.arange(len(columns)), np.flatnonzero((np.diff(columns) > 1) | np.diff(of)) + 1):
+            if len(run):
+                k, at = of[run[0]], columns[run]
+                yield arrays[k], np.rint(packed[:, at] - _MARK) - first[k], at[0]
 
     def _slots(self, value):
         """The places of a Constant among the packed ones, found in the same way."""
