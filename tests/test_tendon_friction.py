@@ -90,6 +90,22 @@ def test_estimates(force):
 
 
 @pytest.mark.serial
+def test_along_a_tendon(tmp_path):
+    """The tension along it is a quantity of the path, a table, a file and a chart."""
+    loads = (beside(), cf.Tendon(ROD, HELIX, 1.0))
+    path = cf.solve(arm(*loads), [0.0, 1.0], elements=4)
+    state, along = path.tendon(loads[0]), path.to_dict()["rods"]["arm"]["tendon_tension"]
+    assert along.shape == (2, 17, 2) and along[..., 0][:, ::4] == pytest.approx(state.along)
+    assert along[1, :, 1] == pytest.approx(1.0)
+    table = state.to_dataframe(units={"force": "kN"})
+    assert table["tension along the tendon (kN) load factor 1"].to_numpy() == pytest.approx(state.along[-1] / 1e3)
+    figure = state.plot_quantity("along")
+    assert figure.axes[0].lines[1].get_ydata() == pytest.approx(state.along[-1])
+    state.write(tmp_path / "tendon.csv")
+    assert (tmp_path / "tendon_states.csv").read_text().startswith("state,tension (N),length (m),slack")
+
+
+@pytest.mark.serial
 def test_at_guides():
     """Through rings of a rod that hardly bends, its tension falls with the angle of each kink (Euler's rope)."""
     stiff = cf.Rod(cf.Line((0, 0, 0), (0, 0, 1)), cf.Stiffness((1e9, 1e9), 1e9, (1e7, 1e7), 1e7), name="beam")

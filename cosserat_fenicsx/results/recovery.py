@@ -2,15 +2,16 @@
 and threads along rods (`Action.is_thread`): what they carry, their tensions and lengths.
 """
 
+from dataclasses import dataclass
 from functools import lru_cache
-from typing import NamedTuple
 
 import numpy as np
 
 from cosserat_fenicsx.numerics import conjugate_product, directors, product_conjugate
-from cosserat_fenicsx.quantities import span_in_words
+from cosserat_fenicsx.quantities import Quantity, Units, span_in_words
 from cosserat_fenicsx.results.records import Records
 from cosserat_fenicsx.results.compared import all_cell_nodes, cell_nodes
+from cosserat_fenicsx.results.result import Result, by_name
 from cosserat_fenicsx.scene.action import without_stress
 from cosserat_fenicsx.scene.signals import at
 from cosserat_fenicsx.turning import Turning
@@ -135,27 +136,55 @@ _MOST, _SAME = 30, 1e-13
 _INSIDE = 1e-9
 
 
-class TendonState(NamedTuple):
+@dataclass(frozen=True, repr=False)
+class TendonState(Result):
     """A tendon in several states: its tension (n,), N, with friction that at its pulled end; its length along the rod
     (n,), m; s (elements + 1,), m, the arc lengths of the rod at the ends of its elements, and along (n, elements + 1)
-    the tension there, N, at a kink that just beyond it. `print` shows the first and the last state, and in how many it
-    is slack."""
+    the tension there, N, at a kink that just beyond it. places (n,): of the states, in words. `print` shows the first
+    and the last state, and in how many it is slack; tables, files and `plot_quantity("along")` the tension along it.
+    """
 
     tension: np.ndarray
     length: np.ndarray
     s: np.ndarray
     along: np.ndarray
+    places: tuple[str, ...] = ()
+
+    _rows_axis, _beside = "place", {"_states": "point"}  # noqa: RUF012
+    _quantities = by_name(
+        Quantity("s", unit="m", axes=("place",)),
+        Quantity("state", axes=("point",), getter=lambda found: np.array(found.places)),
+        Quantity("tension", unit="N"),
+        Quantity("length", unit="m"),
+        Quantity("slack"),
+    )
+
+    def __len__(self):
+        return len(self.tension)
+
+    @property
+    def quantities(self) -> dict[str, Quantity]:
+        """{name: `Quantity`}; the components of `along` are the states."""
+        along = Quantity("along", "tension along the tendon", "N", self.places, axes=("place",),
+                         getter=lambda found: found.along.T)  # fmt: skip
+        return super().quantities | by_name(along)
 
     @property
     def slack(self):
         """(n,) whether it has no tension."""
         return self.tension == 0
 
-    def __str__(self):
+    def _answer(self, units):
         slack = f", slack in {self.slack.sum()} of {len(self.slack)} states" if self.slack.any() else ""
         least = self.along[-1].min() if len(self.along) else 0.0
         slack = f", friction leaves {least:.4g} N in the last" * bool(least < self.tension[-1:].sum()) + slack
-        return f"tension {span_in_words(self.tension, 'N')}, length {span_in_words(self.length, 'm')}{slack}"
+        text = f"tension {span_in_words(self.tension, 'N')}, length {span_in_words(self.length, 'm')}{slack}"
+        return [units.sentence(text)]
+
+    def __str__(self):
+        return "\n".join(self._answer(Units()))
+
+    __repr__ = __str__
 
 
 class Threads:
@@ -236,6 +265,11 @@ class Threads:
             turning, t = self._turning(thread, places, R, v, k)
             self._shares[id(thread)] = turning.left(t, thread.friction, thread.pulled == "start")[0]
         return self._shares[id(thread)]
+
+    def left_at_nodes(self, thread):
+        """(n, nodes) the share of the tension that friction leaves at the nodes of the thread's rod."""
+        left = np.einsum("ij,nej->nei", self._result.rule.from_ends_and_gauss, self._left(thread))
+        return np.concatenate([left[:, :, :-1].reshape(len(left), -1), left[:, -1:, -1]], axis=1)
 
     def _turning(self, thread, places, R, v, k):
         """The `Turning` of a thread, and its directions at the Gauss points (n, elements, points, 3), inertial."""
@@ -334,3 +368,27 @@ def _inertial(R, a):
 def _skew(a):
     """(.., 3, 3) the matrices of the cross product by vectors (.., 3)."""
     return np.cross(a[..., None, :], np.eye(3)).swapaxes(-1, -2)
+
+
+def _tensions(result, rod):
+    """(n, nodes, parts) tensions of the threads along a rod, N, NaN beyond its own; None without any."""
+    threads, most = Threads(result), _most_threads(result.scene)
+    found = [x for x in result.scene.all_loads if x.is_thread and x.rod is rod]
+    found = [result._tension(x)[:, None] * threads.left_at_nodes(x) for x in found]
+    if not found:
+        return None
+    found += [np.full_like(found[0], np.nan)] * (most - len(found))
+    return np.stack(found, axis=-1) if most > 1 else found[0]
+
+
+def _most_threads(scene):
+    """The largest number of threads along one rod."""
+    return max((sum(x.is_thread and x.rod is rod for x in scene.all_loads) for rod in scene.rods), default=0)
+
+
+def tension_of(scene):
+    """The `Quantity` of the tensions along the rods, with a component for each thread along a rod in the order of the
+    loads, as a list; an empty one without threads."""
+    most = _most_threads(scene) if any(x.is_thread for x in scene.all_loads) else 0
+    parts = [str(k) for k in range(most)] if most > 1 else ""
+    return [Quantity("tendon_tension", "tension of tendons", "N", parts, axes=("point", "s"), getter=_tensions)][:most]

@@ -16,7 +16,7 @@ from cosserat_fenicsx.parts import per_scene
 from cosserat_fenicsx.results import screen
 from cosserat_fenicsx.results.compared import cells_of, located
 from cosserat_fenicsx.results.queries import Extremes, Reactions, Stresses, largest_in_words, reactions_in_words
-from cosserat_fenicsx.results.recovery import TendonState, Threads, at_nodes
+from cosserat_fenicsx.results.recovery import TendonState, Threads, at_nodes, tension_of
 from cosserat_fenicsx.results.result import (
     Result,
     _said,
@@ -114,6 +114,11 @@ class RodResult(Result, Extremes, Reactions, Stresses, States):
     _more_about: tuple[str, ...] = ()
     _of_stations: tuple[str, ...] = ("displacement", "quaternion", "force", "moment")
 
+    @property
+    def quantities(self) -> dict[str, Quantity]:
+        """{name: `Quantity`}, with the tensions of tendons along the rods."""
+        return super().quantities | by_name(*tension_of(self.scene))
+
     def station(self, station: StationOrName) -> Station:
         """The `Station` given as one or by its name.
 
@@ -167,7 +172,8 @@ class RodResult(Result, Extremes, Reactions, Stresses, States):
         if not any(load.is_thread and load == tendon for load in self.scene.all_loads):
             raise SceneError(f"tendon: {tendon!r} is no tendon of the scene: expected one of result.scene.loads")
         tension, (s, share) = self._tension(tendon), Threads(self).share(tendon)
-        return TendonState(tension, self.thread_length(tendon), s, tension[:, None] * share)
+        places = tuple(map(self.place_of, range(len(self))))
+        return TendonState(tension, self.thread_length(tendon), s, tension[:, None] * share, places)
 
     def thread_length(self, thread):
         """(n,) length along its rod, m, of a thread that need not be there."""
