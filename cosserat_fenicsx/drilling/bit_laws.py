@@ -75,9 +75,10 @@ class BitLaw(Part, family="bit law"):
         drills: whether the bit drills by its weight, so that its torque follows from the axial motion.
         lifts: why the law asks for axial motion, a few words; "" where it does not.
         repeats: (how many a revolution, of what), such as (3, "lobes"); None for a bit that is the same all around.
+        axial_stiffness: weight on bit per depth of cut, N/m; infinite of a bit that does not cut.
     """
 
-    needs_weight, drills, lifts, repeats = False, False, "", None
+    needs_weight, drills, lifts, repeats, axial_stiffness = False, False, "", None, math.inf
 
     def torque(self, speed: float, weight: float) -> float:
         """N m at a speed (rad/s) and weight on bit (N)."""

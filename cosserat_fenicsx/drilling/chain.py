@@ -28,12 +28,16 @@ class _Settings:
     elements: int = 250  # default number without a step
     fewest: int = 40  # elements for a given step
     most: int = 400
+    most_that_cut: int = 4000  # of a bit that cuts
     period: tuple[float, float] = (80.0, 10.0)  # default and fewest steps in a period of a tool
     disc: float = 0.1  # longest step over 1/omega of the stiffest disc
-    impact: float = 0.2  # default step over the time in which rock stops a bit
+    impact: float = 0.2  # default step over the time in which rock stops a bit, or a bit that cuts answers
     # Longest step, and passing time of a wave along the lowest element, over that time, for a largest weight on bit to
     # 1 %.
     resolved: float = 0.4
+    # The same of elements above a bit that cuts: in longer ones what it left a revolution ago feeds waves as short as
+    # an element, which do not leave the bit.
+    fed: float = 0.25
 
 
 _SET = _Settings()
@@ -113,7 +117,8 @@ def chain_of(scene, dt: float, elements: int | None, axial: bool) -> Chain:
     if scene.discs:
         return _chain_of_discs(scene.discs, axial, static_weight(scene) if axial else 0.0)
     if elements is None:
-        elements = min(max(_travel_time(scene) / dt, _SET.fewest), _SET.most)
+        most = _SET.most_that_cut if _cuts(scene) else _SET.most
+        elements = min(max(_travel_time(scene) / dt, _SET.fewest), most)
     return _chain_of_string(scene, dt, elements, axial)
 
 
@@ -227,17 +232,24 @@ def fewest_in_period(scene, dt) -> None:
         refuse("AxialTorsional", "dt", dt, f"at most {most:.3g} s: {_SET.period[1]:g} steps in a period of the tool")
 
 
+def _cuts(scene):
+    """Whether the bit of a string cuts: its weight follows a depth of cut."""
+    return scene.bit is not None and not scene.discs and scene.bit.law.axial_stiffness < math.inf
+
+
 def time_of_impact(scene) -> float:
-    """Time (s) in which the rock of a `Drilling` stops the bit: Z/k by the impedance Z (N s/m) of the lowest section,
-    or sqrt(m/k) by the mass m (kg) of the bit, the longer one; infinite without rock of a stiffness k (N/m)."""
+    """Time (s) in which the rock of a `Drilling` stops the bit, or a bit that cuts answers: Z/k by the impedance Z
+    (N s/m) of the lowest section, or sqrt(m/k) by the mass m (kg) of the bit, the longer one; infinite without rock of
+    a stiffness k (N/m), or weight on bit per depth of cut."""
     bit = scene.bit
-    if bit is None or math.isinf(bit.rock_stiffness):
+    k = math.inf if bit is None else bit.law.axial_stiffness if _cuts(scene) else bit.rock_stiffness
+    if math.isinf(k):
         return math.inf
     if scene.discs:
         mass, impedance = bit.mass + (scene.discs.masses or (math.inf,))[-1], 0.0
     else:
         mass, impedance = bit.mass, scene.segments[-1].axial_impedance
-    return max(math.sqrt(mass / bit.rock_stiffness), impedance / bit.rock_stiffness)
+    return max(math.sqrt(mass / k), impedance / k)
 
 
 def passing_time(scene, depths) -> float:
@@ -246,13 +258,19 @@ def passing_time(scene, depths) -> float:
 
 
 def unresolved(scene, depths, dt) -> str:
-    """A sentence where the steps (s) or the elements are too long for impacts, or ""."""
-    impact, passing = time_of_impact(scene), passing_time(scene, depths)
-    longest = _SET.resolved * impact
-    if max(dt, passing) <= longest:
+    """A sentence where the steps (s) or the elements are too long for impacts, or for a bit that cuts, or ""."""
+    impact, passing, cuts = time_of_impact(scene), passing_time(scene, depths), _cuts(scene)
+    longest, slowest = _SET.resolved * impact, (_SET.fed if cuts else _SET.resolved) * impact
+    if dt <= longest and passing <= slowest:
         return ""
-    most = longest * scene.segments[-1].axial_speed if passing > longest else 0.0
+    most = slowest * scene.segments[-1].axial_speed if passing > slowest else 0.0
     few = f", and elements of at most {most:.2g} m at the bit" if most else ""
+    if cuts:
+        return (
+            f"APPROXIMATE: steps of {dt:.2g} s, or elements that a wave passes in {passing:.2g} s, are too long for "
+            f"the bit, which answers within {impact:.2g} s: it may bounce where it does not in shorter ones; expected "
+            f"a dt of at most {longest:.2g} s{few}"
+        )
     return (
         f"APPROXIMATE: the rock stops the bit within {impact:.2g} s, which steps of {dt:.2g} s and elements that a "
         f"wave passes in {passing:.2g} s do not resolve: peaks of the weight on bit depend on them; expected a dt of "

@@ -53,9 +53,9 @@ class AxialTorsional(StringModel):
     Args:
         scene: a `Drilling`.
         dt: step, s; None for the time in which a wave of torsion passes an element, at most 0.01 s, and shorter where
-            a falling law needs it; of discs a part of their shortest period.
+            a falling law or a bit that cuts needs it; of discs a part of their shortest period.
         elements: about how many along the string, each component has one at least; None for as many as waves of torsion
-            pass in a step, within 40 to 400, or 250 without a step.
+            pass in a step, within 40 to 400 (4000 with a bit that cuts), or 250 without a step.
         axial: False for torsion alone.
         end: an `EndCondition` in place of the law's own, or None.
 
@@ -449,6 +449,8 @@ class AxialTorsional(StringModel):
             yield "starts hanging off bottom, without friction"
         if bit is not None and bit.weight is not None and not bit.law.drills:
             yield from _of_rock(scene, self.depths, self.dt)
+        elif bit is not None and bit.law.drills and not scene.discs and unresolved(scene, self.depths, self.dt):
+            yield unresolved(scene, self.depths, self.dt)
         if follows_the_bit(scene):
             yield "without a Hook its load stays the same: the string follows the bit that drills"
 
