@@ -37,6 +37,7 @@ exclude_patterns = ["templates", "paper"]
 default_role = "py:obj"  # `Path` in a docstring becomes a link
 napoleon_use_ivar = True
 autodoc_typehints = "none"
+autodoc_use_type_comments = False  # there are none, and to look for them takes a fifteenth of the time
 autosummary_imported_members = True
 myst_enable_extensions = ["dollarmath", "colon_fence"]
 myst_heading_anchors = 3
