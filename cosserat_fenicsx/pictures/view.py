@@ -104,6 +104,8 @@ class View:
 # the picture's edge.
 _LETTERS = {**dict.fromkeys(" .,:;'|!()[]-/Iijltfr", 0.34), **dict.fromkeys("mwMW@%", 0.95)}
 _LETTER, _CAPITAL, _LINE, _GAP, _EDGE = 0.56, 0.73, 1.15, 5, 4
+# Distance of numbers of two axes over the size of letters.
+_ASUNDER = 0.6
 # Distances (pixels) of a label from its point, and turns (deg) of its direction, in the order of preference; distance
 # from which on a thin line leads back.
 _DISTANCES, _LEADER = (16, 26, 42, 64, 92, 128, 180, 250, 340, 460), 40
@@ -177,13 +179,17 @@ class Labels:
         return True
 
     def evenly(self, texts, *, size, away):
-        """Labels [(text, point (3,), m)] of every n-th tick of an axis, as many as have room; away: as of `fix`."""
+        """Labels [(text, point (3,), m)] of every n-th tick of an axis, as many as have room, not so near to one of
+        another axis that both read as one, if two can be; away: as of `fix`."""
         boxes, best = [_box(text, self._view.pixels(point) + away, size) for text, point in texts], []
-        for n, first in ((n, first) for n in range(1, len(texts) + 1) for first in range(n)):
-            some = range(first, len(texts), n)
-            apart = not any(_overlap(boxes[i], boxes[j]) for i, j in itertools.pairwise(some))
-            kept = [i for i in some if self._free(boxes[i])] if apart else []
-            best = max(best, kept, key=len)  # the first of equal ones
+        for spare in (_ASUNDER * size, 0.0):
+            for n, first in ((n, first) for n in range(1, len(texts) + 1) for first in range(n)):
+                some = range(first, len(texts), n)
+                apart = not any(_overlap(boxes[i], boxes[j]) for i, j in itertools.pairwise(some))
+                kept = [i for i in some if self._free(boxes[i] + np.array((-spare, 0, spare, 0)))] if apart else []
+                best = max(best, kept, key=len)  # the first of equal ones
+            if len(best) > 1:
+                break
         for i in best:
             self._keep(*texts[i], boxes[i], size, "black")
 
