@@ -38,7 +38,7 @@ help:
 	@echo "make figure3 every curve of the paper's Figure 3, and what was found; writes out/ (about 4 minutes)"
 	@echo "make work-precision  speed against accuracy, beside Exudyn, OpenSeesPy, PyElastica, CalculiX, welleng and torque-drag (half an hour at most)"
 	@echo "make benchmarks  published problems, each solved, drawn and compared with its printed numbers; writes out/benchmarks.md (a few minutes)"
-	@echo "make cosseratbench  the scenarios of a public suite, cosseratbench, beside the results of other solvers (git gets it; half an hour, nearly all for a rope that piles up)"
+	@echo "make cosseratbench  the scenarios of a public suite, cosseratbench, beside the results of other solvers (git gets it; ten minutes, nearly all for a rope that piles up)"
 	@echo "make failures where methods fail: a map of methods against trials; writes out/ (at most a quarter of an hour)"
 	@echo "make rods-in-wells  the exact rod in three wells, 40 random ones, and beyond buckling: steps, processor time, errors (about 8 minutes)"
 	@echo "make truths  errors against closed forms and numbers of other programs, beside what was asked for (a few minutes)"
