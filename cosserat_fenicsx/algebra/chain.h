@@ -136,7 +136,8 @@ typedef struct {
     double *before, *now;           /* (nodes, 7) unknowns at the start and with the last motion */
     double *free, *last;            /* (nodes, 6) motion and forces before the last ones were found */
     double *load, *response;        /* (unknowns,) of this rank */
-    int stale, exact;               /* whether the compliance must be found again; whether all responses are exact */
+    int stale, exact, covers;       /* whether the compliance must be found again; whether all responses are exact;
+                                       whether there are no unknowns but those of the nodes */
     double usual, worse, least, rounding; /* error of the motion by the compliance, relative: the smallest one, at least
                                        `least`; this many times it, and the compliance is stale; smallest motions that
                                        are compared */

@@ -11,6 +11,8 @@ enum { FAILED = 1 };
 /* Increments at a wall that no longer shrink, by rounding, are measured anew after some steps without them; one that is
    this many times larger than before may have stopped for another reason, such as an old tangent. */
 static const double FADES = 0.9, RISES = 10;
+/* Steps by one tangent from one look at how exact the compliance is to the next. */
+enum { LOOKS = 8 };
 /* A tangent serves a second step that is expected to be below the first of these shares of the limit of increments, and
    has served if it is below the second. The residual alone does not tell: that of stretch may outweigh all others. */
 static const double SLIGHT = 1e-2, SERVED = 0.1;
@@ -246,8 +248,8 @@ static void respond_nearby(contact *c, double *change)
 }
 
 /* Find the forces with which the laws of contact hold after Newton's step, which is subtracted from x, and add the
-   response to their change. `first`: whether it is the first of a step. */
-static int meet(problem *p, const double *x, double *change, int first)
+   response to their change. `looks`: whether to judge the compliance. */
+static int meet(problem *p, const double *x, double *change, int looks)
 {
     contact *c = p->contact;
     const size_t size = 6 * c->nodes * sizeof *c->force;
@@ -256,7 +258,7 @@ static int meet(problem *p, const double *x, double *change, int first)
     memcpy(c->free, c->moved, size), memcpy(c->last, c->force, size), c->omitted = 0;
     settle(c);
     if (memcmp(c->last, c->force, size) == 0) return 0;
-    if (first || c->exact) return respond_exactly(p, change);
+    if (looks || c->exact) return respond_exactly(p, change);
     respond_nearby(c, change);
     return 0;
 }
@@ -312,7 +314,9 @@ int iterate(stepping *s)
             s->fresh = 0, s->spent = s->price, s->served = 0;
         }
         if (solve(p, s->b, s->change)) return FAILED;
-        if (!p->singular && p->contact && meet(p, s->x, s->change, s->iterations == 0)) return FAILED;
+        const contact *c = p->contact;
+        const int looks = c && s->iterations == 0 && (!c->covers || s->served % LOOKS == 0 || isinf(c->usual));
+        if (!p->singular && c && meet(p, s->x, s->change, looks)) return FAILED;
         if (!p->singular && hook(p, CONTACT, s->x, s->change)) return FAILED;
         if (p->singular) {
             s->verdict = SINGULAR;

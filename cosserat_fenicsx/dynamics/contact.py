@@ -29,6 +29,8 @@ class TouchingNodes:
         rows = np.zeros((self.count, 7), dtype=np.int64)
         rows[self._here] = numbering.rows[self._dofs]
         rows = self._sum(rows)
+        #: whether there are no other unknowns
+        self.covers = len(np.unique(rows[rows >= 0])) == numbering.total
         again = (rows[1:] == rows[:-1]).all(axis=1) & (rows[1:] >= 0).any(axis=1)
         #: (n,) number of the point that a node is: those that follow each other may be the same, as of two walls
         self.points = np.concatenate([[0], np.cumsum(~again)])
@@ -151,7 +153,7 @@ class NodalContact(Pointers):
         contact.nodes, contact.reach, contact.at_end = n, reach, at_end
         contact.most, contact.share, contact.smallest = _MOST, _SHARE if n <= _FEW else _OF_NEIGHBOURS, _SMALLEST
         contact.worse, contact.least, contact.rounding = _WORSE, _MISSED, _ROUNDING
-        contact.exact, contact.rows = n <= _FEW, self.integers(nodes.rows)
+        contact.exact, contact.covers, contact.rows = n <= _FEW, nodes.covers, self.integers(nodes.rows)
         contact.lanes, contact.positions = lanes, positions
         of_unknowns = {name: np.zeros(problem.numbering.size) for name in ("load", "response")}
         for name, array in self._transfers.items():
