@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from mpi4py import MPI
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.algebra import eigen
@@ -16,6 +17,18 @@ LINE = cf.Line((0, 0, 0), (1, 0, 0), d1=(0, 0, 1))
 def beta(modes, rod, L=1.0):
     """sqrt of omega over sqrt(EI/(rho A L^4)), EI about d_1."""
     return (modes.squares * rod.stiffness.mass * L**4 / rod.stiffness.bending[0]) ** 0.25
+
+
+def test_contact_on_ranks():
+    """About a heavy rod whose end lies on a plane, with an edge of contact inside an element: as on one rank."""
+    section = cf.Stiffness((1e4, 1e4), 2e4, (2.0, 2.0), 2.0, mass=1.0, inertia=(1e-3, 1e-3, 2e-3))
+    rod = cf.Rod(cf.Line((0, 0, 0), (2, 0, 0), d1=(0, 1, 0)), section)
+    floor = cf.Plane((0, 0, -0.1), (0, 0, 1), contact_radius=0.0, stiffness=1e4)
+    loads = [floor, cf.LineForce(rod, (0, 0, -15.0), permanent=True), cf.Force(rod.end, (-1.0, 0, 0))]
+    scene = cf.Scene([rod], [cf.Clamp(rod.start)], loads)
+    for find, numbers in ((cf.modes, "frequencies"), (cf.buckling, "load_factors")):
+        on_all, alone = (getattr(find(scene, 2, elements=8, comm=comm), numbers) for comm in (None, MPI.COMM_SELF))
+        np.testing.assert_allclose(on_all, alone, rtol=1e-7)
 
 
 @pytest.mark.parametrize("degree", [1, 2, 3])

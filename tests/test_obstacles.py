@@ -62,6 +62,10 @@ class TestNothingPassesUnseen:
         monkeypatch.setattr(cf.Cylinder, "breaks", lambda self, rod: ())
         with pytest.raises(cf.NotConverged, match="rod 'arm' passes into Cylinder by .* expected more elements there"):
             cf.solve(self.scene, 1.0, elements=2)
+        post = cf.Cylinder((0.556, 0, -0.073), (0, 1, 0), 0.02, contact_radius=0.0)
+        scene = cf.Scene([self.rod], [cf.Clamp(self.rod.start)], [post, cf.Force(self.rod.end, (0, 0, -0.6))])
+        with pytest.raises(cf.NotConverged, match="rod 'arm' passes into Cylinder"):
+            cf.buckling(scene, load_factor=1.0, elements=2)
 
     def test_on_a_mesh_that_is_chosen(self):
         path = cf.solve(self.scene, 1.0, tol=1e-2)

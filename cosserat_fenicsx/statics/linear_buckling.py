@@ -19,7 +19,7 @@ from cosserat_fenicsx.scene.scene import Scene, check_magnitudes, check_tensions
 from cosserat_fenicsx.statics.critical import Energies, critical_sensitivity
 from cosserat_fenicsx.statics.meshes import layers_of, until_two_meshes_agree
 from cosserat_fenicsx.statics.path.follower import standing
-from cosserat_fenicsx.statics.problem import check_arguments, solvers_of
+from cosserat_fenicsx.statics.problem import check_arguments, look_beside, solvers_of
 from cosserat_fenicsx.statics.small_motions import circulatory_part, edges_of_contact, static_bifurcations, switched
 from cosserat_fenicsx.statics.stability import add_to, shapes_of
 
@@ -156,6 +156,7 @@ def _critical(scene, layout, count, load_factor, tol, degree, comm):
         change, most = _extent(model, moved, rates[0], unit)
         moved(0.0)
         state = Equilibrium.of(model, load_factor)
+        look_beside(problem, load_factor)
         refuse_grazing(state, "buckling")
         if edges := edges_of_contact(model, state):
             stability.whole.lacking = edges.lacking

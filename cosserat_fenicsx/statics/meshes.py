@@ -24,6 +24,7 @@ from cosserat_fenicsx.results.accuracy import (
     unresolved,
 )
 from cosserat_fenicsx.results.compared import cells_of
+from cosserat_fenicsx.results.contacts import Passes
 from cosserat_fenicsx.scene.action import without_stress
 from cosserat_fenicsx.scene.curves import Line
 from cosserat_fenicsx.scene.signals import sample_times
@@ -428,8 +429,8 @@ def until_two_meshes_agree(owner, scene, on_mesh, tol, *, most, elements, degree
             bar.on(largest, best)
             try:
                 found = on_mesh(layout)
-            except NotConverged:
-                if elements or failed or largest >= most:
+            except NotConverged as problem:
+                if elements or largest >= most or (failed and not isinstance(problem, Passes)):
                     raise
                 failed, coarse, before, layout = True, None, None, layout.finer(scene, 2)
                 continue

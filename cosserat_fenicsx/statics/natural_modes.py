@@ -31,7 +31,13 @@ from cosserat_fenicsx.scene.stages import refuse_stages
 from cosserat_fenicsx.scene.statical import without_mechanism
 from cosserat_fenicsx.statics.meshes import layers_of, until_two_meshes_agree
 from cosserat_fenicsx.statics.path.follower import standing
-from cosserat_fenicsx.statics.problem import check_arguments, refuse_rod_contact, refuse_rough_threads, solvers_of
+from cosserat_fenicsx.statics.problem import (
+    check_arguments,
+    look_beside,
+    refuse_rod_contact,
+    refuse_rough_threads,
+    solvers_of,
+)
 from cosserat_fenicsx.statics.small_motions import (
     Bodies,
     beside_edges,
@@ -281,6 +287,7 @@ def _on_mesh(scene, layout, count, load_factor, degree, comm, damped, near, rota
         negative = stability.count() if loaded else 0
         K, rows, held = stiffness(problem)
         soft, state = softness(problem, K), Equilibrium.of(model, load_factor)
+        look_beside(problem, load_factor)
         refuse_grazing(state, "modes")
         edges = edges_of_contact(model, state)
         if edges:

@@ -19,6 +19,8 @@ from cosserat_fenicsx.models.signature import Signature
 from cosserat_fenicsx.ranks import communicator
 from cosserat_fenicsx.parts import per_scene
 from cosserat_fenicsx.results.compared import NAMES, criteria_of
+from cosserat_fenicsx.results.contacts import check_passes
+from cosserat_fenicsx.results.path import Path
 from cosserat_fenicsx.results.records import Record
 from cosserat_fenicsx.scene.action import describe
 from cosserat_fenicsx.scene.scene import Scene
@@ -432,6 +434,14 @@ def solvers_of(scene, layout, *, formulation="mixed", degree=4, points=None, com
         if problem.load(scene, layout):
             stability.load()
         yield solvers
+
+
+def look_beside(problem, load_factor):
+    """Refuse (`Passes`) a state in which a rod passes into an obstacle unseen between two nodes."""
+    if problem.model.scene.has_obstacles:
+        path = Path.of(problem.model)
+        path.append(record_of(problem, load_factor, 0, 0, 0))
+        check_passes(path)
 
 
 def record_of(problem, load_factor, negative_modes, iterations, steps, neutral=False):
