@@ -416,7 +416,6 @@ class _Errors:
     # A change by the mesh below this share of the change before is taken as small by chance: changes fall to a
     # twentieth (the median, from equal elements to others) or a seventh (later).
     falls: float = 1 / 32
-    series: float = 4.0  # safety factor of what is left of a geometric series of changes
 
 
 _ERRORS = _Errors()
@@ -450,10 +449,7 @@ class RodErrors:
             known = {name: x for name, x in before.changes.items() if np.isfinite(x)}
             changes |= {name: max(changes[name], _ERRORS.falls * x) for name, x in known.items()}
         self.changes = changes
-        of_mesh = {}
-        for name, change in changes.items():
-            left = _left(change, before.changes[name]) if before else change
-            of_mesh[name] = _OF_CHANGE[name] * left * scales[name]
+        of_mesh = {name: _OF_CHANGE[name] * changes[name] * scales[name] for name in NAMES}
         self.errors = {name: of_mesh[name] + self._by_stiffness[name] + rounding[name] for name in NAMES}
         self.error = max(self.errors[name] / scales[name] for name in counted)
         self.of_stiffness = max(self._by_stiffness[name] / scales[name] for name in counted)
@@ -488,11 +484,3 @@ def _changes(there, here, scales, counted):
     own = {name: abs(here[name] - there[name]) / scales[name] for name in NAMES}
     largest = max(own[name] for name in {*counted, "wall_force"})
     return {name: max(largest, change) for name, change in own.items()}
-
-
-def _left(change, before):
-    """The change that the error is estimated by, from a change and the one before: less than it where changes fall as
-    a geometric series, whose rest is small."""
-    if not change < before < np.inf:
-        return change
-    return max(min(1.0, _ERRORS.series * change / (before - change)) * change, _ERRORS.falls * before)

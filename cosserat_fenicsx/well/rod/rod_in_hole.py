@@ -34,9 +34,7 @@ class _Meshes:
     before: int = 4  # a requested number of elements over that of the mesh before
     per_piece: float = 1.5  # least number of elements of the first mesh over the pieces of the string
     fewest: float = 0.3  # bounds of the density of elements on a finer mesh, over equal ones
-    densest: float = 10.0
-    of_rings: float = 1 / 3  # share of a mesh's elements beside the rings, whose forces short elements decide
-    beside: float = 30.0  # length, m, in which the density of elements falls by e beside a ring
+    densest: float = 2.4
     by_wall: float = 1.25  # below this multiple of the wall-stiffness error, the mesh error is taken as resolved
     fine: int = 1024  # the first mesh that must have a solution: snakes and helices need more elements than others
 
@@ -181,15 +179,15 @@ class _Job(NamedTuple):
 def _finer(string, count, before, job):
     """The `InHole` on a mesh of `count` elements, from the `InHole` on the mesh before, or from the start in stages."""
     if before is not None:
-        layout = _divided(string, before.path.layout, _wanted(string, before), count)
+        layout = _divided(string, before.path.layout, _wanted(before), count)
         near = LAST_TWO if before.estimates.ratio <= _WALLS.regular else DECADES
         near = LAST if max(before.of_stiffness, UNSEEN) <= _WALLS.known * job.tol else near
         # the contact on the coarse mesh may be too far off, or the wall too stiff for this one
         for stages, factor in ((near, before.factor), (BACK, before.factor), (BACK, 1.0)):
             with contextlib.suppress(NotConverged):
                 return _on_mesh(string, layout, stages, factor, before, before, job)
-    pieces = Layout.of(string.scene, count if string.rings else 1)
-    layout = _divided(string, pieces, np.diff(pieces.breaks[0]) * (1 + _by_rings(string, pieces)), count)
+    pieces = Layout.of(string.scene, 1)
+    layout = _divided(string, pieces, np.diff(pieces.breaks[0]), count)
     found = []
     for way in _FROM_HELIX if job.helix else _STARTS:
         try:
@@ -208,25 +206,13 @@ def _finer(string, count, before, job):
     )
 
 
-def _wanted(string, answer):
+def _wanted(answer):
     """(elements,) density of elements on a finer mesh: larger where the pressure changes."""
     h, p = np.diff(answer.path.layout.breaks[0]), answer.element_pressures
     change = p.max(axis=1) - p.min(axis=1)
     change = np.maximum(change, np.maximum(np.append(change[1:], 0.0), np.append(0.0, change[:-1])))
     usual = np.median(p[p > 0]) if (p > 0).any() else 1.0
-    by_change = np.clip(np.sqrt(change / usual), _MESHES.fewest, _MESHES.densest)
-    return h * np.maximum(by_change, _by_rings(string, answer.path.layout))
-
-
-def _by_rings(string, layout):
-    """(elements,) density of elements beside the rings, over that far from them, which gives them their share; 0 far
-    from them."""
-    h, ends = np.diff(layout.breaks[0]), layout.breaks[0] * string.rod.length
-    rings = np.array([ring.station.s for ring in string.rings])
-    away = np.abs((ends[1:] + ends[:-1])[:, None] / 2 - rings).min(axis=1, initial=np.inf)
-    beside, share = np.exp(-away / _MESHES.beside), _MESHES.of_rings
-    whole = float(h @ beside)
-    return max(share / (1 - share) / whole - 1, 0.0) * beside if whole else beside
+    return h * np.clip(np.sqrt(change / usual), _MESHES.fewest, _MESHES.densest)
 
 
 def _divided(string, layout, wanted, count):
