@@ -21,9 +21,9 @@ _PROJECTED = 400
 # Tolerance where eigenvalues of the other sign may lie much nearer to zero: their rounding limits the accuracy.
 _COARSE = 1e-9
 # Fewest unknowns of a matrix whose factors are kept for later ones; the relative residual of a solution with factors of
-# an earlier matrix, also where Newton's method corrects what it leaves, and the iterations that cost less than new
-# factors.
-_KEPT, _REUSED, _CORRECTED, _MOST_REUSES = 2000, 1e-10, 1e-7, 12
+# an earlier matrix, also where Newton's method corrects what it leaves, and in a step by the tangent of the one before,
+# which is taken only where it hardly moves; and the iterations that cost less than new factors.
+_KEPT, _REUSED, _CORRECTED, _SLIGHT, _MOST_REUSES = 2000, 1e-10, 1e-7, 1e-2, 12
 # % extra memory for fill-in, too little of which fails without a message, where pivots are exchanged and where not; and
 # the smallest pivot of a matrix with a diagonal of ones that is positive definite beyond doubt.
 _EXCHANGE, _NO_EXCHANGE, _SURELY = 200, 20, 1e-9
@@ -385,6 +385,7 @@ class RepeatedFactors:
         """Take the matrix of these entries (entries,); False where it is found to be singular."""
         self._matrix.setValuesCSR(*self._pattern, values)
         self._matrix.assemble()
+        self._solved = False
         if self._old is not None:
             self._old = True
         self._taken = bool(self._near) and self._near.take(values)
@@ -407,10 +408,12 @@ class RepeatedFactors:
 
     def solve(self, b, corrected=False):
         """The solution (rows,) for a right-hand side; not a number where the matrix is singular after all. corrected:
-        whether Newton's method corrects what it leaves."""
+        whether Newton's method corrects what it leaves, once or by a second solution with this matrix."""
+        limit = (_SLIGHT if self._solved else _CORRECTED) if corrected else _REUSED
+        self._solved = True
 
         def found(ksp):
-            ksp.setTolerances(rtol=_CORRECTED if corrected else _REUSED)
+            ksp.setTolerances(rtol=limit)
             ksp.solve(self._b, self._x)
             return ksp.getConvergedReason() > 0
 
