@@ -303,6 +303,17 @@ class TestWhatAResultLeavesOpen:
             with pytest.warns(cf.SceneWarning, match="Plane has friction, and where rods cease to stick to it"):
                 linear(dataclasses.replace(pressed, loads=rough), 1, elements=4)
 
+    def test_on_a_plane_across_the_axes(self):
+        """Gaps that are rounding, where nothing has moved, let nothing pass."""
+        along, place = np.array([3.0, 5.0, 2.0]) / math.sqrt(38.0), np.array([0.13, 0.27, 0.41])
+        rod = cf.Rod(cf.Line(place, place + along), self.rod.section, name="strut")
+        floor = cf.Plane(place, np.cross(along, (0.1, 0.7, -0.4)), contact_radius=0.0)
+        scene = cf.Scene([rod], [cf.Clamp(rod.start)], [floor, cf.Force(rod.end, -along)])
+        with pytest.raises(cf.SceneError, match="'strut' touches, at s = .* Plane without pressing on it, and may"):
+            cf.modes(scene, 1, elements=3)
+        with pytest.warns(cf.SceneWarning, match="does not see that it may lift off"):
+            assert len(cf.solve(scene, [0.0, 1.0], elements=3)) == 2
+
     def test_a_post_beside_the_nodes(self):
         """A bent cantilever on a thin post: the force is across the rod, at 0.22 rad (shooting: 0.19849, 0.88747 N);
         that of a node beside the place has another direction by up to h/2R."""

@@ -20,6 +20,8 @@ _BETWEEN = 3
 _DEEPER = 2.0
 # Depth between two nodes, over the size of the obstacle (see `Action.gaps`), that is never allowed.
 _SHALLOW = 0.1
+# Depth between two nodes, over the rod's length, that is rounding.
+_ROUNDING = 1e-10
 # Gap over the rod's length up to which a rod that does not press touches: rounding.
 _GRAZES = 1e-13
 # Smallest share of an obstacle's pressure along rods that a sentence mentions.
@@ -301,7 +303,7 @@ def check_passes(path, share=1e-2, whole=None):
             between = x[:-1, None] + np.diff(x)[:, None] * np.arange(1, places + 1) / (places + 1)
             inside = -_gaps(path, obstacle, rod, between.ravel())[0].reshape(len(depth), *between.shape)
             beside = np.maximum(depth[:, 1:], depth[:, :-1])[..., None]
-            excess = inside - _DEEPER * beside - allowed[:, None, None]
+            excess = inside - _DEEPER * beside - np.maximum(allowed, _ROUNDING * rod.length)[:, None, None]
             if excess.size and excess.max() > 0:
                 k, *where = np.unravel_index(np.argmax(excess), excess.shape)
                 raise Passes(

@@ -2,6 +2,7 @@
 and threads along rods (`Action.is_thread`): what they carry, their tensions and lengths.
 """
 
+from collections import Counter
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -383,7 +384,7 @@ def _tensions(result, rod):
 
 def _most_threads(scene):
     """The largest number of threads along one rod."""
-    return max((sum(x.is_thread and x.rod is rod for x in scene.all_loads) for rod in scene.rods), default=0)
+    return max(Counter(id(x.rod) for x in scene.all_loads if x.is_thread).values(), default=0)
 
 
 def tension_of(scene):
