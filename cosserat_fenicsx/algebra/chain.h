@@ -121,7 +121,8 @@ typedef struct {
     float *preceding, *following;   /* (positions, inside, 4, 6, LANES) by each force of a node inside its element and
                                        before or after it, the nearest first */
     int inside;                     /* most nodes inside an element */
-    const int *inner;               /* (nodes,) whether they are */
+    const int *inner, *parted;      /* (nodes,) whether they are; whether the motion of one does not tell that of the
+                                       next, on another rod */
     double *responses;              /* (3, nodes, 2 inside + 3, 6, 6) by each unit force or moment of a node the motions
                                        of its own and of those of its elements; see contact.c */
     double *motion, *forces, *late; /* (positions, 6, LANES) motions; (positions, 4, LANES) forces of these kinds, and
@@ -389,7 +390,7 @@ int iterate(stepping *s);
 void begin_contact(contact *c, const int *slots, int count, const double *away, const double *tangent);
 void unit_forces(const contact *c, int first, int apart, int component, double *forces);
 void keep_responses(contact *c, int first, int apart, int component, const double *q, const double *changes);
-void find_transfers(contact *c, int apart);
+int find_transfers(contact *c, int apart);
 void find_motion(contact *c, const double *now);
 int settle(contact *c);
 int broken(const contact *c);

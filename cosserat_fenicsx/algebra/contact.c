@@ -10,6 +10,8 @@
 enum { MOTIONS = 6, PASSES = 3 };
 /* Arrays of responses: as they were found; without others; those before. */
 enum { RAW, CLEARED, BEFORE };
+/* Share of others in a node's own response from which they cannot be left out. */
+static const double OF_OTHERS = 0.5;
 /* Compliance times stiffness below which an iteration needs no help. */
 static const double LITTLE = 0.1;
 /* Of the moment along the tube where the surface is at the axis, dimensionless; least compliance of a node that is not
@@ -145,7 +147,7 @@ static void take_transfers(contact *c, int kept)
         for (int k = 0; k < 4 * n; k++) to[LANES * k] = own[k];
         if (!c->inner[i]) invert(own, least, inverse);
         for (int side = -1; side <= 1; side += 2)
-            for (int j = i + side, b = 0; j >= 0 && j < c->nodes; j += side, b++) {
+            for (int j = i + side, b = 0; j >= 0 && j < c->nodes && !c->parted[side > 0 ? j - 1 : j]; j += side, b++) {
                 const double *G = response(c, kept, i, j); /* columns one after the other, as all here */
                 float *of = c->inner[i] ? (side < 0 ? c->following : c->preceding) : side < 0 ? c->left : c->right;
                 to = passed_by(c, of, c->inner[i] ? 4 * c->inside : n, j) + LANES * 4 * n * b * c->inner[i];
@@ -190,16 +192,31 @@ static void leave_out_others(contact *c, int apart)
         }
 }
 
-/* The compliance and the transfers from the responses, for which nodes that were `apart` were loaded together. */
-void find_transfers(contact *c, int apart)
+/* Whether the own responses, before the others were left out, were largely those to others: without these a series
+   that need not converge would be left. */
+static int muddled(const contact *c)
+{
+    for (int i = 0; i < c->nodes; i++) {
+        const double *raw = response(c, RAW, i, i), *own = response(c, CLEARED, i, i);
+        for (int k = 0; k < MOTIONS * MOTIONS; k += MOTIONS + 1)
+            if (!(fabs(own[k] - raw[k]) <= OF_OTHERS * fabs(raw[k]))) return 1;
+    }
+    return 0;
+}
+
+/* The compliance and the transfers from the responses, for which nodes that were `apart` were loaded together. Returns
+   whether this was too near; the responses are taken as they are then. */
+int find_transfers(contact *c, int apart)
 {
     const size_t all = (size_t)c->nodes * (2 * c->inside + 3) * MOTIONS * MOTIONS;
     memcpy(c->responses + all * CLEARED, c->responses + all * RAW, all * sizeof *c->responses);
     take_transfers(c, RAW);
     for (int again = 0; again < PASSES && apart < c->nodes; again++) {
         leave_out_others(c, apart);
+        if (again == 0 && muddled(c)) return 1;
         take_transfers(c, CLEARED);
     }
+    return 0;
 }
 
 /* The motion of all nodes in the step from `before` to unknowns `now`: displacements and rotations, by the mean

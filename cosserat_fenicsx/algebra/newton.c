@@ -13,6 +13,8 @@ enum { FAILED = 1 };
 static const double FADES = 0.9, RISES = 10;
 /* Steps by one tangent from one look at how exact the compliance is to the next. */
 enum { LOOKS = 8 };
+/* How many times as far from each other nodes are loaded, at most, where they move each other. */
+enum { FARTHEST = 4 };
 /* A tangent serves a second step that is expected to be below the first of these shares of the limit of increments, and
    has served if it is below the second. The residual alone does not tell: that of stretch may outweigh all others. */
 static const double SLIGHT = 1e-2, SERVED = 0.1;
@@ -184,21 +186,23 @@ static int move_nodes(problem *p, const double *x, const double *change)
 static int find_compliance(problem *p, const double *x)
 {
     contact *c = p->contact;
-    const int apart = 2 * c->reach + 1 < c->nodes ? 2 * c->reach + 1 : c->nodes;
     double *q = c->free, *forces = c->last; /* work space, before they are found */
     c->known_for = c->h, c->usual = INFINITY, c->stale = 0;
     if (at_nodes(p, x, 0, c->now)) return FAILED;
     for (int i = 0; i < c->nodes; i++)
         for (int k = 0; k < 4; k++) q[4 * i + k] = c->now[7 * i + 3 + k] + c->fixed[7 * i + 3 + k];
-    for (int first = 0; first < apart; first++)
-        for (int component = 0; component < 6; component++) {
-            unit_forces(c, first, apart, component, forces);
-            memset(c->load, 0, p->size * sizeof *c->load);
-            add_forces(c, forces, 0, 1, c->load);
-            if (solve(p, c->load, c->response) || at_nodes(p, c->response, 0, c->now)) return FAILED;
-            keep_responses(c, first, apart, component, q, c->now);
-        }
-    find_transfers(c, apart);
+    for (int times = 1, near = 1; near && times <= FARTHEST; times *= 2) {
+        const int wanted = times * (2 * c->reach + 1), apart = wanted < c->nodes ? wanted : c->nodes;
+        for (int first = 0; first < apart; first++)
+            for (int component = 0; component < 6; component++) {
+                unit_forces(c, first, apart, component, forces);
+                memset(c->load, 0, p->size * sizeof *c->load);
+                add_forces(c, forces, 0, 1, c->load);
+                if (solve(p, c->load, c->response) || at_nodes(p, c->response, 0, c->now)) return FAILED;
+                keep_responses(c, first, apart, component, q, c->now);
+            }
+        near = find_transfers(c, apart);
+    }
     return 0;
 }
 

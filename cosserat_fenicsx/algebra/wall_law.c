@@ -143,7 +143,8 @@ static inline void settle_friction(const vector A[3], const vector b[2], vector 
                                    vector T[2])
 {
     const vector trace = A[0] + A[2], floor = 1e-14 * trace, none = {0};
-    vector shift = *multiplier, size = none;
+    /* not from what a step that failed has left */
+    vector shift = choose(absolute(*multiplier) < INFINITY, *multiplier, none), size = none;
     T[0] = T[1] = none;
     live &= (most > 0) & (trace > 0);
     for (int j = 0; j < MOST_LOCAL && any(live); j++) {

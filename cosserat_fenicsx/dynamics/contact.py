@@ -3,9 +3,12 @@
 Every Newton iteration has a tangent of the rods without contact, by whose inverse, the compliance, the nodes that may
 touch respond linearly to their forces. With it the laws of all nodes are solved exactly (algebra/contact.c) before the
 step is taken. So Newton's method sees smooth equations alone, whatever sticks, slips, touches or lifts off, and its
-tangent stays valid. Along a rod forces on one side of a node move the other side by this node's motion alone, so that
-one matrix from node to node passes all of it on; what rods pass to each other otherwise the next iteration corrects.
+tangent stays valid. Along a rod, and one that is joined to its end, forces on one side of a node move the other side by
+this node's motion alone, so that one matrix from node to node passes all of it on; what rods pass to each other
+otherwise the next iteration corrects.
 """
+
+from itertools import pairwise
 
 import numpy as np
 
@@ -158,7 +161,9 @@ class NodalContact(Pointers):
         of_unknowns = {name: np.zeros(problem.numbering.size) for name in ("load", "response")}
         for name, array in self._transfers.items():
             setattr(contact, name, self._ffi.from_buffer("float[]", array))
+        numbers = np.concatenate([np.full(len(place.slots), place.number) for place in touched])[order]
         contact.inside, contact.inner = inside, self.integers(inner)
+        contact.parted = self.integers(_parted(model.scene, numbers))
         work |= {"passing": np.zeros((2, 6 + 4 * inside, self._lib.LANES)),
                  "responses": np.zeros((3, n, 2 * inside + 3, 6, 6))}  # fmt: skip
         arrays = {"fixed": nodes.fixed, **of_unknowns, **work}
@@ -259,11 +264,11 @@ class NodalContact(Pointers):
 
 
 class _Place:
-    """The nodes that may touch one wall along one rod: numbers in the scene, whether they are inside an element, arc
-    lengths (m), stiffness (N/m)."""
+    """The nodes that may touch one wall along the rod of a number: numbers in the scene, whether they are inside an
+    element, arc lengths (m), stiffness (N/m)."""
 
-    def __init__(self, wall, slots, inner, s, lengths, origin):
-        self.inner = inner
+    def __init__(self, wall, number, slots, inner, s, lengths, origin):
+        self.number, self.inner = number, inner
         self.wall, self.slots, self.s, self.origin = wall, slots, s, origin
         self.stiffness, self.damping = wall.stiffness * lengths, np.full(len(s), wall.damping)
         self.weaker = wall.kinetic, wall.speed
@@ -289,8 +294,21 @@ def _places(model, walls):
                 beside = wall.beside(at)
                 lengths = np.where(beside < at, above, np.where(beside > at, below, lengths))
                 at = beside
-            found.append(_Place(wall, first[i] + here, here % p > 0, at[here], lengths, scene.origin(rod)))
+            found.append(_Place(wall, i, first[i] + here, here % p > 0, at[here], lengths, scene.origin(rod)))
     return found
+
+
+def _parted(scene, numbers):
+    """(n,) of nodes on rods of these numbers: whether the next one is on a rod whose start is not joined to this rod's
+    end, so that the motion of one does not tell that of the other."""
+    joined = {
+        (id(one.rod), id(other.rod))
+        for joint in scene.joints
+        for one, other in ((joint.first, joint.second), (joint.second, joint.first))
+        if one.s == one.rod.length and other.s == 0.0
+    }
+    rods = [id(scene.rods[i]) for i in numbers]
+    return np.array([a != b and (a, b) not in joined for a, b in pairwise(rods)] + [False])
 
 
 def _shares(breaks, nodes):
