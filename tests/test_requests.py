@@ -47,7 +47,8 @@ def test_long_eigenproblems_end_soon_after_a_signal(command, number, tmp_path):
     assert process.poll() is None, "it takes minutes"
     process.send_signal(number)
     out, err = process.communicate(timeout=15)
-    assert (process.returncode, out, err) == (130, "", "cosserat: interrupted\n")
+    # A line of progress comes first where the machine is busy.
+    assert (process.returncode, out, err.splitlines()[-1]) == (130, "", "cosserat: interrupted")
 
 
 @pytest.mark.serial
