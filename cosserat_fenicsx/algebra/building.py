@@ -211,12 +211,13 @@ class Packed(_Kernel):
         packed = self._pack().get(self._key, self._w)
         for numbers, values in zip(arrays, kept, strict=True):
             numbers[:] = values
-        columns = np.flatnonzero((packed != self._w).any(axis=0))
+        off = packed - _MARK
+        columns = np.flatnonzero((abs(off - np.rint(off)) < 1e-6).all(axis=0)) if len(packed) else np.empty(0, int)
         of = np.searchsorted(first, packed[:1, columns].ravel(), side="right") - 1
         for run in np.split(np.arange(len(columns)), np.flatnonzero((np.diff(columns) > 1) | np.diff(of)) + 1):
             if len(run):
                 k, at = of[run[0]], columns[run]
-                yield arrays[k], np.rint(packed[:, at] - _MARK) - first[k], at[0]
+                yield arrays[k], np.rint(off[:, at]) - first[k], at[0]
 
     def _slots(self, value):
         """The places of a Constant among the packed ones, found in the same way."""

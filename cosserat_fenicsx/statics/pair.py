@@ -498,7 +498,7 @@ class Loaded(Pointers):
             function.x.array[:] = kept
             found.append((name, Place(function.x.array, np.arange(len(which)), which)))
             for form in self._packed():
-                for _, of_elements, column in form._places(function.x.array):
+                for _, of_elements, column in form._places([function.x.array]):
                     rows = np.arange(form.elements)[:, None] * form._w.shape[1]
                     places = rows + column + np.arange(of_elements.shape[1])
                     of_array = which[of_elements.astype(int).ravel()]
