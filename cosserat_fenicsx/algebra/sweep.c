@@ -202,6 +202,7 @@ static void slopes(const group *g, int *in, double *const *x, double *const *out
             ahead[k][i] = (behind[k][i] - ahead[k][i]) * 0.5 / change[k];
     }
     residuals(g, in, x, behind);
+    EACH(k, g, in) g->sweep[k]->newton->keeps = 0; /* as an iteration that failed may have left it */
     directions(g, in, ahead, out);
     EACH(k, g, in) in[k] = !g->sweep[k]->newton->problem->singular;
 }
