@@ -175,6 +175,12 @@ def test_a_path_goes_on_from_another_one(held):
     assert ended.stage[-1] == 1 and 0.5 < ended.load_factors[-1] < 1
     with pytest.raises(cf.SceneError, match=r"start: expected a Path of this scene with fewer stages: dataclasses"):
         cf.solve(column([], [cf.Stage([cf.Force("rod.end", (1, 0, 0))])]), start=whole)
+    kept = dataclasses.replace(scene.stages[0], release=())
+    for other in ({"loads": [*scene.loads, cf.Force("rod.end", (1, 0, 0))]}, {"stages": [kept, *scene.stages[1:]]}):
+        with pytest.raises(cf.SceneError, match="start: expected a Path of this scene"):
+            cf.solve(dataclasses.replace(scene, **other), elements=8, start=path)
+    with pytest.raises(cf.SceneError, match="start: expected a Path of degree 4 with 5 Gauss points"):
+        cf.solve(scene, elements=8, gauss_points=5, start=path)
 
 
 @pytest.mark.serial

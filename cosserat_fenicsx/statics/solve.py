@@ -297,7 +297,7 @@ def solve(
         )
     legs = [followed(leg) for leg in scene.legs] if scene.stages else [followed(None)]
     _keep_in_space(legs)
-    known = _followed_before(scene, start, legs, degree)
+    known = _followed_before(scene, start, legs, degree, gauss_points or degree)
     oscillates = elements is None and gauss_points is not None and gauss_points > degree
     if oscillates:
         bound = [name for name in bound if name in _MOTION] or _MOTION
@@ -376,7 +376,7 @@ def _keep_in_space(legs):
             leg.choice = leg.choice.in_space("the stage before is followed in space, or in another plane")
 
 
-def _followed_before(scene, start, legs, degree):
+def _followed_before(scene, start, legs, degree, gauss_points):
     """{stage: its `Path`} of the path to continue."""
     for leg, following in itertools.pairwise(legs):
         if leg.leg.load_factors is None and leg.load_factors[-1] != 1:
@@ -390,11 +390,11 @@ def _followed_before(scene, start, legs, degree):
     parts = start.parts if start.scene.stages else {-1: start}
     stages = start.scene.stages
     same = all(
-        len(a) <= len(b) and all(x is y for x, y in zip(a, b, strict=False))
+        len(a) == len(b) and all(x is y or (isinstance(x, str) and x == y) for x, y in zip(a, b, strict=True))
         for a, b in (
             *((getattr(start.scene, name), getattr(scene, name)) for name in ("rods", "supports", "loads", "joints")),
             *((getattr(x, name), getattr(y, name)) for x, y in zip(stages, scene.stages, strict=False)
-              for name in ("loads", "supports")),
+              for name in ("loads", "supports", "release")),
         )
     )  # fmt: skip
     if not same or not parts.keys() <= {leg.leg and leg.leg.stage for leg in legs} or not len(start):
@@ -403,9 +403,12 @@ def _followed_before(scene, start, legs, degree):
             "dataclasses.replace(path.scene, stages=[*path.scene.stages, Stage(...)])"
         )
     ends = {leg.leg.stage: leg.load_factors[-1] for leg in legs}
-    if start.degree != degree or any(part.load_factors[-1] != ends[stage] for stage, part in parts.items()):
+    if (start.degree, len(start.rule.gauss)) != (degree, gauss_points) or any(
+        part.load_factors[-1] != ends[stage] for stage, part in parts.items()
+    ):
         raise SceneError(
-            f"start: expected a Path of degree {degree} that has come to the last load factor of its stages"
+            f"start: expected a Path of degree {degree} with {gauss_points} Gauss points per element that has come to "
+            "the last load factor of its stages"
         )
     return dict(parts)
 
