@@ -68,7 +68,8 @@ class Interrupted(KeyboardInterrupt):
     """
 
     def __init__(self, path, kept=""):
-        done = f"interrupted after {len(path)} {path.axis}{'' if len(path) == 1 else 's'}"
+        counted = getattr(path, "counted", path.axis)
+        done = f"interrupted after {len(path)} {counted}{'' if len(path) == 1 else 's'}"
         super().__init__(f"{done}, which the exception's `path` holds{kept}")
         self.path, self.words = path, done + kept
 

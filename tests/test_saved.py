@@ -388,7 +388,7 @@ def test_what_does_not_fit_is_refused(path, tmp_path_all):
 
 @pytest.mark.serial
 def test_indices_are_whole_numbers(path):
-    for wrong in ("x", 1.0, True):
+    for wrong in ("x", 1.0, True, np.array([0, 1])):
         for asked in (lambda k: path[k], lambda k: path.at_points([k]), lambda k: path.fields(k)):
             with pytest.raises(cf.SceneError, match="expected the index of a load factor, a whole number from -2 to 1"):
                 asked(wrong)

@@ -173,6 +173,9 @@ def test_a_path_goes_on_from_another_one(held):
     assert path.iterations[path.stage < 0].sum() == whole.iterations[whole.stage < 0].sum()
     ended = cf.solve(scene, elements=8, until=lambda p: p.stage[-1] == 1 and p.load_factors[-1] > 0.5)
     assert ended.stage[-1] == 1 and 0.5 < ended.load_factors[-1] < 1
+    again = cf.solve(scene, elements=8, start=ended)  # the stage that was not followed to its end anew
+    np.testing.assert_allclose(again.position("rod.end"), whole.position("rod.end"), rtol=0, atol=1e-9)
+    assert str(cf.Interrupted(ended)).startswith(f"interrupted after {len(ended)} load factors")
     with pytest.raises(cf.SceneError, match=r"start: expected a Path of this scene with fewer stages: dataclasses"):
         cf.solve(column([], [cf.Stage([cf.Force("rod.end", (1, 0, 0))])]), start=whole)
     kept = dataclasses.replace(scene.stages[0], release=())

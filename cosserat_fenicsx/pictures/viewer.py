@@ -199,7 +199,7 @@ def _seconds(result):
 
 def _notes(result, shown, factors):
     """Notes under the title: the states shown, the speed of the play, and what is not to scale."""
-    kind, whole = f"{result.axis}s", len(result)
+    kind, whole = f"{result.counted}s", len(result)
     notes = [f"{len(shown)} of {whole} {kind} shown, evenly chosen" if len(shown) < whole else f"{whole} {kind}"]
     notes[0] += ", straight lines between them"
     duration = float(result.along_axis[-1] - result.along_axis[0])

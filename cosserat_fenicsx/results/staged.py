@@ -29,7 +29,7 @@ class StagedPath(Path):
         parts: {stage: its whole `Path`}, each with the scene of that stage; place: (n,) indices into these.
     """
 
-    axis = "stage"
+    axis, counted = "stage", "load factor"
     _quantities, _over = _QUANTITIES, "through_stages"
 
     def __init__(self, scene, parts: Mapping[int, Path]):

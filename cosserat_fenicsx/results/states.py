@@ -29,6 +29,8 @@ class States(OnNodes):
     axis, more_fields = "", {}
     #: whether stability is judged by the number of negative modes
     counts_modes = True
+    #: what messages call one of the states
+    counted = property(lambda self: self.axis)
     #: cached properties, which are cleared when a state is added
     _computed = ("_records", "_motion")
 
@@ -128,8 +130,8 @@ class States(OnNodes):
 
     def _index(self, k, where):
         """The index k of a state, checked; `where` for messages."""
-        expected = f"expected the index of a {self.axis}, a whole number from {-len(self)} to {len(self) - 1}"
-        if isinstance(k, bool | np.bool_) or not hasattr(k, "__index__"):
+        expected = f"expected the index of a {self.counted}, a whole number from {-len(self)} to {len(self) - 1}"
+        if isinstance(k, bool | np.bool_) or not hasattr(k, "__index__") or np.ndim(k):
             raise SceneError(f"{where}: {expected}")
         if not -len(self) <= k < len(self):
             raise IndexError(f"{where}: {expected}")

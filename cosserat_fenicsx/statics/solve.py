@@ -94,8 +94,9 @@ class Legs:
                 if leg.leg is not None:
                     if failure.path is not None:
                         failure.path = self._joined({**self._so_far, leg.leg.stage: failure.path})
-                    if isinstance(failure, NotConverged):
-                        failure.args = (f"{leg.leg.words}: {failure}{_RELEASED if leg.leg.released else ''}",)
+                    if isinstance(failure, Interrupted):
+                        raise Interrupted(failure.path) from None
+                    failure.args = (f"{leg.leg.words}: {failure}{_RELEASED if leg.leg.released else ''}",)
                 raise
             except Promoted as found:
                 found.leg = k
@@ -238,7 +239,8 @@ def solve(
             a double bifurcation the first mode); None to stay on it, stable or not.
         until: called with the Path after every recorded point; the path ends where it returns True. Only with a tuple
             (a, b) of load factors.
-        start: a Path of the same scene with fewer stages, or none, to start from; it is not computed again.
+        start: a Path of the same scene with fewer stages, or none, to start from; its complete stages are not computed
+            again.
         progress: True, False, or None for a progress bar on long runs in a terminal.
         comm: MPI communicator; default all ranks. Every rank calls, every rank gets the same Path.
 
@@ -388,12 +390,11 @@ def _followed_before(scene, start, legs, degree, gauss_points):
         return {}
     instance("solve", "start", start, Path, "a Path")
     parts = start.parts if start.scene.stages else {-1: start}
-    stages = start.scene.stages
     same = all(
         len(a) == len(b) and all(x is y or (isinstance(x, str) and x == y) for x, y in zip(a, b, strict=True))
         for a, b in (
             *((getattr(start.scene, name), getattr(scene, name)) for name in ("rods", "supports", "loads", "joints")),
-            *((getattr(x, name), getattr(y, name)) for x, y in zip(stages, scene.stages, strict=False)
+            *((getattr(x, name), getattr(y, name)) for x, y in zip(start.scene.stages, scene.stages, strict=False)
               for name in ("loads", "supports", "release")),
         )
     )  # fmt: skip
@@ -403,14 +404,14 @@ def _followed_before(scene, start, legs, degree, gauss_points):
             "dataclasses.replace(path.scene, stages=[*path.scene.stages, Stage(...)])"
         )
     ends = {leg.leg.stage: leg.load_factors[-1] for leg in legs}
-    if (start.degree, len(start.rule.gauss)) != (degree, gauss_points) or any(
-        part.load_factors[-1] != ends[stage] for stage, part in parts.items()
-    ):
+    # what was interrupted is computed anew
+    whole = dict(itertools.takewhile(lambda part: part[1].load_factors[-1] == ends[part[0]], parts.items()))
+    if (start.degree, len(start.rule.gauss)) != (degree, gauss_points) or not whole:
         raise SceneError(
             f"start: expected a Path of degree {degree} with {gauss_points} Gauss points per element that has come to "
-            "the last load factor of its stages"
+            "the last load factor of a stage"
         )
-    return dict(parts)
+    return whole
 
 
 def _not_located(path):
