@@ -166,7 +166,10 @@ def test_saved_and_read(found, tmp_path):
 
 
 def test_empty_results_are_refused():
-    empty = cf.solve(column()[1], [0.5], elements=2).at_points([])
+    path = cf.solve(column()[1], [0.5], elements=2)
+    with pytest.raises(cf.SceneError, match="plot_quantity.'error'.: this result does not know it: expected one of "):
+        path.plot_quantity("error")
+    empty = path.at_points([])
     for method in ("to_dataframe", "to_xarray"):
         with pytest.raises(cf.SceneError, match=f"{method}: expected a result with at least one load factor"):
             getattr(empty, method)()

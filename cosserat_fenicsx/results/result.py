@@ -191,7 +191,8 @@ class Result:
             units: see `Result`. width: of the picture, pixels.
 
         Raises:
-            SceneError: an unknown name, or another kind of quantity; matplotlib is missing, or an unknown ending.
+            SceneError: an unknown name, another kind of quantity, or one that is NaN everywhere; matplotlib is missing,
+                or an unknown ending.
         """
         from cosserat_fenicsx.pictures.charts import draw_quantity
 
@@ -199,6 +200,9 @@ class Result:
         given = {key: values for key in known if (values := np.asarray(known[key].of(self))).dtype.kind in "fiub"}
         if name not in given:
             raise SceneError(f"plot_quantity({name!r}): expected one of {', '.join(given)}")
+        if _unknown(given[name]):
+            others = ", ".join(key for key, values in given.items() if not _unknown(values))
+            raise SceneError(f"plot_quantity({name!r}): this result does not know it: expected one of {others}")
         over = self._over if self._over in given else next(iter(given))
         shown = [(known[key], given[key]) for key in (over, name)]
         title = getattr(getattr(self, "scene", None), "title", "")
