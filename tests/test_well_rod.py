@@ -190,7 +190,8 @@ def test_a_rigid_wall_is_approached_as_closely_as_the_accuracy_needs(tmp_path_al
     last = rigid.contacts[-1]
     told_of_bit = [cell.strip() for cell in of_bit.split("│")]
     numbers = [float(x) for x in told_of_bit[3:5]]
-    assert numbers == pytest.approx([last.force / 1e3, last.error], rel=1e-5) and told_of_bit[5] == "high"
+    assert numbers == pytest.approx([last.force / 1e3, last.error], rel=5e-4)  # printed with four digits
+    assert told_of_bit[5] == "high"
     assert last.side == "high" and "not estimated" in told
     # of the bit, along the hole, to which the string is a little inclined
     assert rigid.tension[-1] == pytest.approx(0.25 * rigid.contacts[-1].force, rel=5e-3)
