@@ -18,7 +18,10 @@ export VTK_DEFAULT_OPENGL_WINDOW = vtkEGLRenderWindow
 # A numpy in the user's own site directory would hide the distribution's.
 export PYTHONNOUSERSITE = 1
 
-.PHONY: help setup packages demo animation motion heap gallery well string whirl recipes test docs tutorials tables figure3 work-precision benchmarks cosseratbench failures rods-in-wells folders tangles truths random random-wells random-strings imperfect mutants sanitizers release clean
+# Two workers, each a process without MPI.
+WORKERS = $(PYTHON) -m pytest -n 2 --dist worksteal
+
+.PHONY: help setup packages demo animation motion heap gallery well string whirl recipes test slow docs tutorials tables figure3 work-precision benchmarks cosseratbench failures rods-in-wells folders tangles truths random random-wells random-strings imperfect mutants sanitizers release clean
 
 help:
 	@echo "Times are those of two idle cores and an empty cache of compiled forms, after \`make setup\`; beside other work they are two to three times as long."
@@ -31,9 +34,10 @@ help:
 	@echo "make string  drill-strings in motion: stick-slip, waves, a map of stability, each with pictures and numbers that must come out; writes out/strings/ (a minute)"
 	@echo "make whirl   a collar in its hole from forward to backward whirl, and a map of whirl over speed and friction; writes out/whirl/ (three minutes)"
 	@echo "make recipes the recipes of docs/recipes_*.md, and whether they print what is shown; writes out/recipes/ (a minute and a half)"
-	@echo "make docs    the documentation as a site that needs no network; writes out/docs/index.html (a minute)"
+	@echo "make docs    the documentation as a site that needs no network; writes out/docs/index.html (a minute), and runs the programs of its pages (three minutes)"
 	@echo "make tutorials  run the notebooks of docs/tutorials/ and store what they print and draw (a minute)"
-	@echo "make test    all tests, the serial ones on two workers (a quarter of an hour)"
+	@echo "make test    the tests, but for those of \`make docs\` and \`make slow\`: on two workers, and on ranks (twelve minutes)"
+	@echo "make slow    tests that take more than two seconds each (three minutes)"
 	@echo "make tables  the tables of accuracy and cost in docs/, measured anew and put there"
 	@echo "make figure3 every curve of the paper's Figure 3, and what was found; writes out/ (about 4 minutes)"
 	@echo "make work-precision  speed against accuracy, beside Exudyn, OpenSeesPy, PyElastica, CalculiX, welleng and torque-drag (half an hour at most)"
@@ -82,18 +86,23 @@ whirl: setup
 recipes: setup
 	$(PYTHON) demos/recipes.py
 
-# Warnings are errors. What Sphinx keeps between two builds lies beside the pages.
+# Warnings are errors. What Sphinx keeps between two builds lies beside the pages. Then the programs of the pages run.
 docs: setup .venv/.docs
-	$(PYTHON) -m sphinx -q -W --keep-going -b html docs out/docs
+	$(PYTHON) -m sphinx -q -W --keep-going -j 2 -b html docs out/docs
+	$(WORKERS) -m pages
 
 tutorials: setup
 	$(PYTHON) demos/tutorials.py
 
+# Tests that are slow and that each release of Debian could fail: .ci/run makes them on Debian 13.
+slow: setup
+	$(WORKERS) -m "slow and not once"
+
 # Two workers that know nothing of each other, then two ranks, then four for what depends on how many there are.
 # pytest's cache directory is off in parallel: the ranks would write it all at once.
 test: setup
-	$(PYTHON) -m pytest -n 2 --dist worksteal
-	$(MPIRUN) -n 2 $(PYTHON) -m pytest -p no:cacheprovider --color=no -m "not serial and not ranks"
+	$(WORKERS) -m "not pages and (once or not slow)"
+	$(MPIRUN) -n 2 $(PYTHON) -m pytest -p no:cacheprovider --color=no -m "not serial and not ranks and not slow"
 	$(MPIRUN) -n 4 $(PYTHON) -m pytest -p no:cacheprovider --color=no -m ranks
 
 tables: setup

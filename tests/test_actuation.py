@@ -133,6 +133,7 @@ def test_derivatives_by_what_has_no_stress():
 MOVING = cf.Stiffness(shear=(GA, GA), axial=EA, bending=(2.0, 2.0), torsion=1.6, mass=0.5, inertia=(1e-4, 1e-4, 2e-4))
 
 
+@pytest.mark.slow
 def test_the_work_of_a_muscle_in_motion():
     """It is the change of the strain energy, so that the balance closes; and what is slow follows the equilibria."""
     arm = rod_of(1.0, MOVING)

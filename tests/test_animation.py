@@ -38,6 +38,7 @@ def test_between_saved_states_the_error_is_of_third_order():
     assert errors[0] < 3e-5 and errors[0] / errors[1] == pytest.approx(8, rel=0.1)
 
 
+@pytest.mark.slow
 def test_saved_too_seldom_is_straight_and_says_so(tmp_path):
     rod = cf.Rod(cf.Line((0, 0, 0), (1, 0, 0)), cf.Circle(0.02), cf.Material(200e9, density=7800.0))
     spin = cf.InitialVelocity(rod, angular=(0, 0, 2 * np.pi))
@@ -49,6 +50,7 @@ def test_saved_too_seldom_is_straight_and_says_so(tmp_path):
     history.animate(tmp_path / "spin.gif", **{**SMALL, "fps": 2})
 
 
+@pytest.mark.slow
 def test_gif_and_mp4(flight, tmp_path):
     from PIL import Image
 

@@ -149,6 +149,7 @@ def test_the_rod_in_a_hole_of_that_rate(case, criterion):
         assert rod.bit_side_force[0] == pytest.approx(0.0, abs=math.radians(0.02) / 30 * slope)
 
 
+@pytest.mark.slow
 def test_shear_and_a_drop_with_the_bend_turned_over():
     tube = {"outer_diameter": 0.1714, "inner_diameter": 0.0762}
     parts = [well.Bit(HOLE), well.Collar(0.8, **tube), well.Stabiliser(0.4, 0.2143, **tube)]

@@ -140,6 +140,7 @@ def test_rounding_of_slender_columns_is_small_and_told(held):
         assert off < 2e-9 and 0.8 * off <= found.error[0] < 2e-8, (slender, off, found.error)
 
 
+@pytest.mark.slow
 @pytest.mark.serial
 def test_rounding_of_a_slender_column_at_a_spring_or_under_load():
     """A spring at the top, which acts in full at the load factor 0: tan a = a - a^3/k with P = a^2, again without shear
@@ -398,6 +399,7 @@ def critical_below(force, guided):
     return 2 * np.count_nonzero(roots < x)
 
 
+@pytest.mark.slow
 @pytest.mark.serial
 @pytest.mark.parametrize("elements, degree", [(8, 4), (64, 2), (512, 1)])
 @pytest.mark.parametrize("model, guided", RUNGS)

@@ -168,6 +168,7 @@ def inextensible(axial=np.inf, shear=np.inf):
     return column(section=cf.Stiffness(shear=(shear, shear), axial=axial, bending=k.bending, torsion=k.torsion))
 
 
+@pytest.mark.slow
 @pytest.mark.serial
 @pytest.mark.parametrize("degree, elements, formulation", [(2, 8, "mixed"), (3, 8, "mixed"), (2, 8, "multiplier")])
 def test_same_error_at_every_slenderness(degree, elements, formulation):
@@ -428,6 +429,7 @@ def test_what_is_advised_helps(control):
     assert path.stable.all()
 
 
+@pytest.mark.slow
 @pytest.mark.serial
 def test_loads_beyond_ea_are_asked_about():
     _, scene = column()

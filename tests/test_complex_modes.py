@@ -102,6 +102,7 @@ def test_a_rotating_blade(EI, hub, rate, tau, exact, truth):
     assert found.stable
 
 
+@pytest.mark.slow
 def test_flutter_is_an_event_of_a_path(tmp_path_all, truth):
     """Beck's column; with a little Kelvin-Voigt damping at about half the load (Ziegler's paradox). The exact loads are
     20.0509536 and 10.9391220 without shear, whose effect is 1.2e-5 and 6e-6 here."""

@@ -42,6 +42,7 @@ def exponential(k, s):
     return np.eye(3) + t * axis + (1 - c) * axis @ axis, whole
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("model", "formulation"), [("determinate", "mixed"), ("spatial", "mixed"), ("spatial", "displacement")]
 )
@@ -185,6 +186,7 @@ def test_a_tapered_matrix_has_the_euler_load_of_its_principal_axes():
     assert [cf.euler_load(plain), cf.euler_load(turned)] == pytest.approx([expected] * 2, rel=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.serial
 def test_infinite_stiffness_beside_a_matrix():
     """Another rod of the scene may be rigid against stretch and shear; the contact force is an unknown then."""

@@ -206,6 +206,7 @@ def test_friction_at_a_node_is_a_vector_against_its_slip():
     assert math.hypot(F[0], G[0] / r) == pytest.approx(mu * math.sqrt(load**2 - (G[0] / r) ** 2), rel=1e-9)
 
 
+@pytest.mark.slow
 def test_resume_below_a_pipe_that_rubs_gives_identical_digits(tmp_path, monkeypatch):
     """With a bit that cuts, below two motors whose pumps start."""
     bit = cf.drilling.BitOnRock(CUTTING, weight=20e3, inertia=10.0)

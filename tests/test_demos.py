@@ -55,6 +55,7 @@ def test_animation_quick(tmp_path):
     assert path.load_factors[-1] == animation.FAR and path.error.max() < 1e-6
 
 
+@pytest.mark.slow
 def test_bare_dolfinx():
     """dolfinx and SNES by hand find what the package finds with the same elements."""
     import bare_dolfinx
@@ -100,6 +101,7 @@ def test_motion(tmp_path_all, capsys):
     COMM.barrier()
 
 
+@pytest.mark.slow
 @pytest.mark.serial
 def test_a_small_heap():
     import heap

@@ -115,6 +115,7 @@ def forgotten(monkeypatch):
     CRITERIA.update(criteria)
 
 
+@pytest.mark.pages
 @pytest.mark.usefixtures("forgotten")
 @pytest.mark.parametrize(("page", "program", "shown"), PROGRAMS, ids=[page for page, _, _ in PROGRAMS])
 def test_programs_run(page, program, shown, tmp_path, monkeypatch):
@@ -154,7 +155,7 @@ def test_scene_files_are_read(page, scene, tmp_path):
     assert cf.read(file).title
 
 
-@pytest.mark.slow
+@pytest.mark.pages
 @pytest.mark.parametrize("file", TUTORIALS, ids=lambda file: file.stem)
 def test_tutorials_print_what_they_show(file):
     """`demos/tutorials.py` puts in what they print and draw today."""

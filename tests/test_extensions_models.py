@@ -14,6 +14,7 @@ ROD = cf.Rod(cf.Line((0, 0, 0), (0, 0, 1.0)), SECTION, name="column")
 BENT = cf.Scene([ROD], [cf.Clamp(ROD.start)], [cf.Force(ROD.end, (3.0, 4.0, -15.0))])
 
 
+@pytest.mark.slow
 def test_a_formulation(tmp_path_all):
     """By its name and as a class; the penalty vanishes at the solution, which is that of the multiplier form."""
     options = {"elements": 4, "model": "spatial"}
@@ -84,6 +85,7 @@ def test_a_load():
 HARD = cf.Wall(ROD, (0, 0, 0), (0, 0, 1.0), clearance=1e-3, stiffness=1e3, law=Hardening(0.004))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("load", [pytest.param(AcrossRod(ROD, 2.0), marks=pytest.mark.serial), HARD])
 def test_stored_and_resumed(load, tmp_path_all):
     """A motion that is ended early and resumed is the one that was not, to the last digit."""
@@ -130,6 +132,7 @@ law = { type = "Hardening", doubling = "4 mm" }
 SAME = cf.Scene([ROD], [cf.Clamp(ROD.start)], [AcrossRod(ROD, 2.0), HARD])
 
 
+@pytest.mark.slow
 @pytest.mark.serial  # ranks would write the file while others read it
 def test_in_a_scene_file(tmp_path_all):
     """Load, law and formulation; a result is saved with its scene, and a motion resumed without a scene given."""

@@ -81,6 +81,7 @@ def test_other_schemes_agree(slips):
     np.testing.assert_allclose(other, one, atol=0.015)
 
 
+@pytest.mark.slow
 def test_the_rows_of_a_string_are_means_between_saved_states_and_of_order_2():
     """Angles of drive and bit by the step, also where steps are halved and where few states are saved."""
     drive = cf.drilling.TopDrive(
@@ -101,6 +102,7 @@ def test_the_rows_of_a_string_are_means_between_saved_states_and_of_order_2():
     assert taken == pytest.approx(history.dissipated[-1], rel=1e-3)
 
 
+@pytest.mark.slow
 def test_linear_controls_above_a_rod():
     """A PI control as a `LinearControl` is that one; others, some of them late, are those of the string; refusals."""
 
@@ -186,6 +188,7 @@ def test_an_autodriller_above_a_rod():
             assert off < 5e-3 * size, (name, off / size)
 
 
+@pytest.mark.slow
 def test_a_torque_that_drops_at_once():
     """Coulomb: nothing moves until the static torque is reached; then Z om = 2 M_in - T_d."""
     law = cf.drilling.Stribeck(2000.0, 1000.0)
@@ -197,6 +200,7 @@ def test_a_torque_that_drops_at_once():
     assert starts[0] == pytest.approx(starts[1], abs=0.01) and turned[0] == pytest.approx(turned[1], rel=5e-3)
 
 
+@pytest.mark.slow
 def test_resume_gives_identical_digits(slips, tmp_path, monkeypatch):
     """While the bit sticks, and while it slips."""
     mixed, whole = slips
@@ -363,6 +367,7 @@ def test_parts_of_several_impedances_scatter_as_they_should():
 # -- with a rod ------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scheme", ["momentum", "energy", "generalised-alpha"])
 def test_the_answer_to_a_torque_at_the_bit_is_that_of_the_whole_string(scheme):
     """Of order 2 in time, in every scheme."""
@@ -402,6 +407,7 @@ def test_a_matched_drive_reflects_nothing():
     np.testing.assert_allclose(speed, other, atol=1e-9 * np.abs(other).max())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("drag", [0.0, 0.2])
 def test_a_controlled_drive_turns_the_rod_as_it_turns_the_string(drag):
     """Against the waves of the whole string, whose speeds are means over two of its steps."""
@@ -426,6 +432,7 @@ def test_energy_balance_with_all_that_the_pipe_does(scheme, allowed):
     assert imbalance(motion(scene, 3.0, 0.005, scheme=scheme)) < allowed
 
 
+@pytest.mark.slow
 def test_from_hanging_at_rest_the_hook_lifts_it():
     """By as much as the hook moved, one travel time before, on the mean."""
     weight = 200.0 * STEEL.density * math.pi / 4 * (0.1651**2 - 0.05715**2) * 9.80665

@@ -49,6 +49,7 @@ def test_a_free_rod_has_six_motions_for_nothing():
     assert beta(modes, rod)[6] == pytest.approx(4.7300407, rel=2e-2) and modes.squares[7] > modes.squares[6]
 
 
+@pytest.mark.slow
 @pytest.mark.serial
 @pytest.mark.parametrize("EI", [1e-4, 1e-7])
 def test_no_copy_of_a_low_frequency_is_missing(EI):

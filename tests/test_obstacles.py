@@ -67,6 +67,7 @@ class TestNothingPassesUnseen:
         with pytest.raises(cf.NotConverged, match="rod 'arm' passes into Cylinder"):
             cf.buckling(scene, load_factor=1.0, elements=2)
 
+    @pytest.mark.slow
     def test_on_a_mesh_that_is_chosen(self):
         path = cf.solve(self.scene, 1.0, tol=1e-2)
         touch = path.contacts(self.post)
@@ -314,6 +315,7 @@ class TestWhatAResultLeavesOpen:
         with pytest.warns(cf.SceneWarning, match="does not see that it may lift off"):
             assert len(cf.solve(scene, [0.0, 1.0], elements=3)) == 2
 
+    @pytest.mark.slow
     def test_a_post_beside_the_nodes(self):
         """A bent cantilever on a thin post: the force is across the rod, at 0.22 rad (shooting: 0.19849, 0.88747 N);
         that of a node beside the place has another direction by up to h/2R."""

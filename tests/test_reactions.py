@@ -103,6 +103,7 @@ def tree():
     return a, b, loads, [cf.Joint(a.end, b.start)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("formulation", ["mixed", "displacement", "multiplier", "infinite stiffness"])
 def test_balance_in_space(formulation):
     rigid = formulation == "infinite stiffness"
@@ -219,6 +220,7 @@ def test_rate_of_momentum(scheme, model):
     assert off_rate(history, FORCE if scheme == "energy" else BOTH) < 1e-9
 
 
+@pytest.mark.slow
 @pytest.mark.serial
 @pytest.mark.parametrize("model", ["planar", "spatial"])
 def test_rate_of_momentum_by_generalised_alpha(model):

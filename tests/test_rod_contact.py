@@ -31,6 +31,7 @@ def crossing(lowered=0.15, **contact):
     return cf.Scene([lower, upper], [cf.Clamp(lower.start), cf.Clamp(lower.end), *ends], [touch])
 
 
+@pytest.mark.slow
 def test_crossing_rods(tmp_path, truth):
     """13.689149090107861 N of solve_bvp; they hold each other by the same force in tables, files and fields."""
     scene, force = crossing(), 13.689149090107861
@@ -51,6 +52,7 @@ def test_crossing_rods(tmp_path, truth):
     assert again.contacts(again.scene.loads[0]).force == pytest.approx(found.force, rel=1e-12)
 
 
+@pytest.mark.slow
 def test_a_ring_is_pulled_until_it_touches_itself(truth):
     """By shooting: F = 6 N presses it onto itself by 0.12063607907258804 N, in one point."""
     R, EI, radius, n = 1 / (2 * math.pi), 1e-3, 0.03, 32
@@ -118,6 +120,7 @@ def closest(path, radius):
     return smallest / (2 * radius)
 
 
+@pytest.mark.slow
 def test_no_rod_passes_through_another(tangle):
     """Two to five rods at random angles, whose ends are moved through each other by many diameters, some with friction:
     each path ends with rods that hold each other, or with the contact by name; none is crossed."""
@@ -149,6 +152,7 @@ def test_no_rod_passes_through_another(tangle):
             assert apart[i, j] > 2.5e-3 or p[i, 2] > q[j, 2]
 
 
+@pytest.mark.slow
 def test_friction_holds_and_slips(tmp_path, truth):
     """A rod on another one is pulled to and fro against a spring k: it sticks with the compliance of the lower rod in
     bending, shear and, since friction has an arm, twist, and slips at the friction mu N, N known from the balance."""

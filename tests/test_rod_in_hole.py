@@ -163,6 +163,7 @@ def test_slender_strings_are_solved():
     assert soft == pytest.approx(stiffer, rel=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.serial
 def test_drilling_with_weight_on_a_centred_bit():
     """The soft string's hook load and torque are 661 189 N and 9548 N m; the clearance takes 3.4 % of the torque."""
@@ -313,6 +314,7 @@ SOFT_PIPE = cf.well.Component(None, STIFF, 241.13, 0.0635, name="pipe")
 MUD = cf.well.Mud(1200.0)
 
 
+@pytest.mark.slow
 @pytest.mark.serial
 @pytest.mark.parametrize(
     "operation", [cf.well.RotaryDrilling(80e3, 5e3), cf.well.Sliding(50e3), cf.well.TripOut()], ids=str

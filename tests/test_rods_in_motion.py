@@ -129,6 +129,7 @@ def on_rails(loads=(), **velocity):
     return cf.Scene([*rails, rod], held, [touch, weight, *loads], velocities=[cf.InitialVelocity(rod, **velocity)])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("speed", "spin"), [(0.6, 0.0), (0.0, -60.0)], ids=["slides", "spins"])
 def test_a_rod_that_slides_or_spins_begins_to_roll(speed, spin):
     """Angular momentum about the surface that it rolls on stays: v = (2 v0 - r w0)/3; in sliding the speed changes by
@@ -149,6 +150,7 @@ def test_a_rod_that_slides_or_spins_begins_to_roll(speed, spin):
     assert history.dissipated[-1] == pytest.approx(lost, rel=0.02)
 
 
+@pytest.mark.slow
 def test_a_rod_sticks_below_the_friction_cone_and_slides_above():
     """Pulled along its axis by a force that grows to twice friction: it does not creep before, and then moves as
     c (t - t1)^3/6 with the rate c of the force over the mass, which begins to pull when its share is mu."""
@@ -162,6 +164,7 @@ def test_a_rod_sticks_below_the_friction_cone_and_slides_above():
     assert x[-1] - x[holds][-1] == pytest.approx(rate * 0.1**3 / 6, rel=0.01)
 
 
+@pytest.mark.slow
 def test_a_rod_slides_to_rest(truth):
     """v^2/(2 mu g) along its axis, of motions in the truths with other numbers."""
     scene = on_rails(linear=(0.5, 0, 0))

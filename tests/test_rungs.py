@@ -334,6 +334,7 @@ def test_moments_are_of_order_2p_at_element_ends(degree, meshes):
     assert np.log2(errors[0] / errors[1]) == pytest.approx(2 * degree, abs=0.2)
 
 
+@pytest.mark.slow
 @pytest.mark.serial
 @pytest.mark.parametrize("name", ["moved", "hinge", "follower", "eccentric", "a hinge between"])
 def test_the_tangent_of_reactions_and_live_loads_is_their_derivative(name):
@@ -425,6 +426,7 @@ def test_meshes_are_refined_from_coarser_ones():
     assert sum(path.elements) <= 2 * sum(mixed.elements)
 
 
+@pytest.mark.slow
 @pytest.mark.serial
 def test_infinite_and_very_large_stiffnesses_make_the_force_an_unknown():
     k = column()[0].stiffness

@@ -383,6 +383,7 @@ def test_rigid_spins_are_exact():
     assert np.abs(history.balance).max() < 1e-9 and history.dissipated[-1] < 1e-12
 
 
+@pytest.mark.slow
 def test_flight_in_space():
     """Within 5e-3 m of the references of tests/test_motion.py, and at tol 1e-3 within 1e-3 of the rod's length."""
     rod, scene = flying_in_space()

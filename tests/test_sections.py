@@ -288,6 +288,7 @@ def test_a_stored_motion_knows_its_matrix():
     assert "Scene.rods[0].section" in difference(one, other, "motion")
 
 
+@pytest.mark.slow
 def test_the_first_mesh_sees_axes_that_turn_along_the_rod():
     """The same first mesh as for a rod whose directors rotate instead, with constant principal stiffnesses."""
     rate = 40 * np.pi

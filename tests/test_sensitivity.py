@@ -140,6 +140,7 @@ def test_stations_and_supports_of_the_scene_that_was_given():
     assert np.array_equal(again.position(rod.end), path.position(rod.end))  # the solvers are as they were
 
 
+@pytest.mark.slow
 def test_uncertainty_adds_up():
     _, scene = column()
     path = cf.solve(scene, [0.3, 0.9], elements=4)

@@ -10,7 +10,7 @@ from pathlib import Path
 import chromium
 import pytest
 
-pytestmark = [pytest.mark.serial, pytest.mark.once, pytest.mark.slow]
+pytestmark = [pytest.mark.serial, pytest.mark.once, pytest.mark.pages]
 ROOT = Path(__file__).parent.parent
 DOCS = ROOT / "docs"
 PAGES = (

@@ -77,6 +77,7 @@ SOFT = [{"depth": depth, "friction": mu, "model": "soft"} for depth in (900.0, 2
 EXACT = {"depth": [620.0, 650.0], "friction": [0.2], "model": ["rod"]}
 
 
+@pytest.mark.slow
 @pytest.mark.ranks
 @pytest.mark.parametrize(("task", "cases"), [
     (tip, COLUMNS), (hook_load, SOFT), pytest.param(hook_load, EXACT, marks=pytest.mark.slow),

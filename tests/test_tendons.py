@@ -86,6 +86,7 @@ def test_its_work_in_motion():
     assert history.tendon(pulled).tension[-1] == pytest.approx(T)
 
 
+@pytest.mark.slow
 def test_the_tensions_that_bring_the_tip_to_a_point():
     """The derivatives by the tensions are those of differences, and lead to given tensions within four steps."""
     tensions, names = np.array([1.0, 1.0]), ["loads[0].tension", "loads[1].tension"]
@@ -143,6 +144,7 @@ def test_what_is_refused(make, says):
     assert says in str(found.value)
 
 
+@pytest.mark.slow
 def test_in_stages():
     """Tightened one after the other in one place, then one is released: the end is that of the other alone."""
     one, other = TWO[0], cf.Tendon(ROD, TWO[0].offset, 2.0)

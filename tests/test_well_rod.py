@@ -169,6 +169,7 @@ def test_of_several_equilibria_the_stable_one_is_taken(monkeypatch):
         assert before[0].negative_modes == taken
 
 
+@pytest.mark.slow
 @pytest.mark.serial
 def test_a_rigid_wall_is_approached_as_closely_as_the_accuracy_needs(tmp_path_all):
     """Beside a stabiliser with little clearance a wall of 1e8 N/m^2 is too soft for a hook load to 1e-4."""
@@ -378,6 +379,7 @@ def test_whole_wells(name, operation, load):
     assert not any("MORE" in line for line in found.why)  # the soft string's estimate covers the difference
 
 
+@pytest.mark.slow
 @pytest.mark.serial
 def test_a_string_in_a_vertical_hole_is_a_helix_and_not_straight():
     path = cf.well.WellPath.from_survey([0, 310], [0, 0], [0, 0])
@@ -430,6 +432,7 @@ def test_an_unknown_number_of_negative_modes_is_not_enough(out):
         assert not out.enough
 
 
+@pytest.mark.slow
 @pytest.mark.serial
 def test_a_string_that_stays_straight_where_there_is_a_helix_is_not_enough():
     """In a vertical hole with friction: what the helix rubs is the error of the model."""

@@ -251,6 +251,7 @@ VOLVE = DEMOS / "wells" / "volve_f12.toml"
 RODS = DEMOS / "eccentric_cantilever.toml"
 
 
+@pytest.mark.slow
 def test_the_demos_give_their_numbers(capsys):
     import wells
     from known_numbers import deviation

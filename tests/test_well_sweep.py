@@ -93,6 +93,7 @@ def test_a_depth_without_an_answer_is_a_row_that_says_so(monkeypatch, tmp_path):
     assert "and not solved: the contact alternates" in str(either)
 
 
+@pytest.mark.slow
 def test_a_sweep_by_the_rod_is_stopped_and_goes_on(monkeypatch, tmp_path):
     """The signal comes while C asks for the wall's data in a Newton step, as most of them do."""
     given = HOLE, STRING, cf.well.TripOut(), [800.0, 1200.0, 1600.0]
@@ -525,6 +526,7 @@ def test_tension_beyond_what_a_pipe_carries_is_told():
         assert ("BEYOND WHAT ANY PIPE CARRIES" in str(answer)) == told
 
 
+@pytest.mark.slow
 def test_a_random_well():
     """`make random-wells` compares 100 of them; here the rod's answer in one."""
     drawn = random_wells.draw(2)
@@ -620,6 +622,7 @@ def test_the_snake_begins_at_its_load_and_has_its_amplitude():
         assert pressure.max() == pytest.approx(1.858649, rel=3e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["helix", "helix at 400 kN"])
 def test_the_helix_of_a_thrust(name):
     """A weightless rod with finite EA and GA in a frictionless cylinder: a Cosserat helix in the middle."""
@@ -640,6 +643,7 @@ def test_the_helix_of_a_thrust(name):
     assert shortening == pytest.approx(case["shortening"], rel=3e-5)  # the wall gives way
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("inclination", "operation"), [(45, cf.well.Static(250e3)), (60, cf.well.Sliding(240e3))])
 def test_a_string_in_a_plane_hole_leaves_the_plane_where_it_would_buckle(inclination, operation):
     """Straight, and beyond the load of a snake: in the plane Newton's method keeps the symmetry."""
