@@ -97,7 +97,8 @@ test_what_a_scheme_cannot_do_is_said = refuses({
                      "steps back in time: expected rods without damping"),
     "no rho": (lambda: cf.simulate(FREE_ROD, 1, dt=0.1, rho_inf=0.8),
                "simulate.rho_inf = 0.8: expected None, since scheme = 'momentum' has no such parameter"),
-    "a name": (lambda: cf.simulate(FREE_ROD, 1, dt=0.1, scheme="generalized-alpha"), "did you mean 'generalised-alpha'?"),
+    "a name": (lambda: cf.simulate(FREE_ROD, 1, dt=0.1, scheme="generalized-alpha"),
+               "did you mean 'generalised-alpha'?"),
     **{f"rho {rho}": (lambda rho=rho: cf.simulate(FREE_ROD, 1, dt=0.1, scheme=SCHEME, rho_inf=rho), words)
        for rho, words in ((1.2, "simulate.rho_inf = 1.2: expected a number from 0 to 1"),
                           (-0.1, "simulate.rho_inf = -0.1"), ("1", "simulate.rho_inf = '1'"))},

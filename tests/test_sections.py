@@ -133,7 +133,8 @@ REFUSED_ALSO = {
                "side = 'middle': expected 'left' or 'right'"),
     **{f"profile {name}": (lambda name=name: cf.Profile(name), words) for name, words in (
         ("IPE 210", "Profile.name = 'IPE 210': did you mean IPE 180 or IPE 200 or IPE 220?"),
-        ("INP 200", "expected IPE, HEA, HEB or HEM with its size"), ("HE", "expected IPE, HEA, HEB or HEM with its size"),
+        ("INP 200", "expected IPE, HEA, HEB or HEM with its size"),
+        ("HE", "expected IPE, HEA, HEB or HEM with its size"),
         (200, "Profile.name = 200: expected a name such as 'IPE 200'"))},
     **{f"outline {i}": (lambda given=given: cf.Stiffness((1, 1), 1, (1, 1), 1, outline=given),
                         f"Stiffness.outline = {given}: expected three or more corners") for i, given in enumerate(
@@ -468,8 +469,8 @@ def test_a_cantilever_of_pieces_and_of_a_section_without_shape():
     """M c/I of a beam under a force at its end, on either side of a step; none where the shape is not known."""
     P, b, h = 2.0, 0.04, 0.06
     thick, thin = cf.Rectangle(b, 2 * h), cf.Rectangle(b, h)
-    rod = cf.Rod(cf.Line((0, 0, 0), (3, 0, 0), d1=(0, 1, 0)), [(1.0, thick), (2.0, thin.stiffness(STEEL_QUARTER)), (3.0, thin)],
-                 STEEL_QUARTER, name="beam")  # fmt: skip
+    sections = [(1.0, thick), (2.0, thin.stiffness(STEEL_QUARTER)), (3.0, thin)]
+    rod = cf.Rod(cf.Line((0, 0, 0), (3, 0, 0), d1=(0, 1, 0)), sections, STEEL_QUARTER, name="beam")
     path = cf.solve(cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Force(rod.end, (0, 0, -P))]), [1.0], elements=6)
     for s, height in ((0.0, 2 * h), (1.0, 2 * h), (2.5, h)):
         stress = path.stress(rod.at(s))

@@ -29,8 +29,8 @@ def at_angle(radius):
     ("loads", "tip", "lengths", "reaction"),
     [
         ([HELIX], (3.62541620686e-05, 0.0290382844773, 0.296974818222), [0.300199905207], np.zeros(6)),
-        ([cf.Tendon(ROD, at_angle(0.01), T), FORCE], (0.0259697064642, 0.0185265807549, 0.297088762302), [0.300319388743],
-         (0.05, -0.03, -0.1, 0.00706000479356, 0.0174514087615, -0.00170542023167)),
+        ([cf.Tendon(ROD, at_angle(0.01), T), FORCE], (0.0259697064642, 0.0185265807549, 0.297088762302),
+         [0.300319388743], (0.05, -0.03, -0.1, 0.00706000479356, 0.0174514087615, -0.00170542023167)),
         ([*TWO, cf.LineForce(ROD, (0, 0, -0.3))], (0.0904653029162, 0.0452326510359, 0.275696550185),
          [0.293431662397, 0.29653453624], (0, 0, -0.09, -0.0013882631192, 0.00277652625594, 0)),
     ],
@@ -47,7 +47,7 @@ def test_it_bends_and_twists(loads, tip, lengths, reaction, how, truth, request)
 
 
 def test_beside_the_axis_of_a_straight_rod():
-    """An arc of the curvature e T/EI, shorter by T/EA; the rod is pressed by -T d3, and its plane is that of (d1, d3)."""
+    """An arc of the curvature e T/EI, shorter by T/EA; the rod is pressed by -T d3, and its plane is (d1, d3)."""
     straight = cf.Tendon(ROD, (0.01, 0), T)
     path = cf.solve(arm(straight), [0.5, 1.0], tol=1e-7)
     assert path.model == "planar" and (path.negative_modes == 0).all() and path.conservative
