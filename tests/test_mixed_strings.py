@@ -81,7 +81,6 @@ def test_other_schemes_agree(slips):
     np.testing.assert_allclose(other, one, atol=0.015)
 
 
-@pytest.mark.slow
 def test_the_rows_of_a_string_are_means_between_saved_states_and_of_order_2():
     """Angles of drive and bit by the step, also where steps are halved and where few states are saved."""
     drive = cf.drilling.TopDrive(
@@ -102,7 +101,6 @@ def test_the_rows_of_a_string_are_means_between_saved_states_and_of_order_2():
     assert taken == pytest.approx(history.dissipated[-1], rel=1e-3)
 
 
-@pytest.mark.slow
 def test_linear_controls_above_a_rod():
     """A PI control as a `LinearControl` is that one; others, some of them late, are those of the string; refusals."""
 
@@ -188,7 +186,6 @@ def test_an_autodriller_above_a_rod():
             assert off < 5e-3 * size, (name, off / size)
 
 
-@pytest.mark.slow
 def test_a_torque_that_drops_at_once():
     """Coulomb: nothing moves until the static torque is reached; then Z om = 2 M_in - T_d."""
     law = cf.drilling.Stribeck(2000.0, 1000.0)
