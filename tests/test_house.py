@@ -56,7 +56,7 @@ ROOMS = {
     "statics": {"scene", "models", "algebra", "results"},
     "dynamics": {"scene", "models", "algebra", "results", "storage", "statics"},
     "studies": {"results", "storage"},
-    "well": {"actions", "scene", "models", "statics", "results", "storage", "pictures"},
+    "well": {"algebra", "actions", "scene", "models", "statics", "results", "storage", "pictures"},
     "drilling": {"actions", "well", "scene", "results", "storage", "pictures", "algebra", "dynamics"},
     "files": {"drilling", "well", "scene", "statics", "dynamics", "storage"},
     "cli": {"files", "drilling", "well", "scene", "models", "statics", "dynamics", "results", "storage", "pictures"},

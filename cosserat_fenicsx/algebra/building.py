@@ -39,7 +39,7 @@ _FLAGS = ("-O3", "-fno-math-errno", "-ffp-contract=fast", "-fno-wrapv", "-fopenm
 @functools.cache
 def module(*sources):
     """cffi's (ffi, lib) of C files (default: this folder's) and the header of the first one, which must only declare;
-    lines with # are for C alone.
+    lines with # are for C alone. Of a file without a header the functions that are declared `extern`.
 
     C finds the number of arguments of FFCx's kernels as KERNEL_ARGUMENTS. Processes that come at the same time wait for
     the one that compiles; a file that is damaged or belongs to another system is made again. Raises InstallationError:
@@ -81,6 +81,7 @@ def _task(sources):
     flags = [*_FLAGS, *instructions(), f"-DKERNEL_ARGUMENTS={compat.KERNEL_ARGUMENTS}"]
     flags += code_cache.more_flags()
     header = sources[0].with_suffix(".h")
+    header = header if header.exists() else sources[0]
     contents = [file.read_bytes() for file in (*sources, header)]
     key = hashlib.sha256(repr((contents, flags, code_cache.SUFFIX, cffi.__version__)).encode())
     return f"cosserat_{sources[0].stem}_{key.hexdigest()[:20]}", sources, header, flags
@@ -89,9 +90,11 @@ def _task(sources):
 def _build(name, folder, sources, header, flags):
     from cffi import recompiler  # rarely needed, and slow to import
 
-    declarations = header.read_text(encoding="utf-8").splitlines()
+    declarations = header.read_text(encoding="utf-8")
+    if header in sources:
+        declarations = "\n".join(re.findall(r"^extern [^;{]*;", declarations, re.MULTILINE))
     builder = cffi.FFI()
-    builder.cdef("\n".join(line for line in declarations if not line.startswith("#")))
+    builder.cdef("\n".join(line for line in declarations.splitlines() if not line.startswith("#")))
     glue, made = folder.absolute() / "module.c", folder.absolute() / (name + code_cache.SUFFIX)
     code = "".join(f'#include "{source.absolute()}"\n' for source in sources)
     recompiler.make_c_source(builder, name, code, str(glue))

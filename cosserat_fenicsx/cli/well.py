@@ -9,7 +9,7 @@ from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.quantities import Units
 from cosserat_fenicsx.ranks import on_first, world
 from cosserat_fenicsx.storage.store import discard
-from cosserat_fenicsx.well.buckled import LockUp
+from cosserat_fenicsx.well.criteria import LockUp
 from cosserat_fenicsx.well.scenefile import TorqueAndDragSettings
 from cosserat_fenicsx.well.tables import of_operations
 

@@ -2,9 +2,9 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
-from functools import cached_property
+from functools import cached_property, partial
 from types import MappingProxyType
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -84,6 +84,15 @@ _QUANTITIES = by_name(
 )  # fmt: skip
 
 
+class Judged(NamedTuple):
+    """What is said of the model of an answer: see `TorqueAndDrag`; decided: the sentences on why the rod follows."""
+
+    why: tuple[str, ...]
+    model_error: float
+    left_out: tuple[float, float]
+    decided: tuple[str, ...] = ()
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class TorqueAndDrag(Differentiated, ChartedBetween):
     """Loads of a string in its hole, from `torque_and_drag`. SI units; depths are measured depths.
@@ -96,18 +105,14 @@ class TorqueAndDrag(Differentiated, ChartedBetween):
 
     Attributes:
         model: what was solved: "soft", "buckled" or "rod".
-        why: sentences on what decided for the model, and what it leaves out.
         differences: {model: (N, N m)}: hook load and surface torque less those of the other models that were solved.
         error: estimated error of hook load and surface torque as solutions of the model's equations, over the largest
             tension and torque along the string (over 1 % of that tension times the contact radius where this is more).
-        model_error: estimate, also relative, of how far those of the rod in contact may be, which is stiff and has
-            a clearance: the error of the model, not of its solution. NaN: not estimated, of the rod itself.
-        left_out: the same of hook load (N) and of surface torque (N m), not relative.
         enough: whether both are within `tol`, as far as they are estimated, of hook load and surface torque alone;
             False warns that the model does not suffice for the accuracy asked for.
         torque_convention: "coulomb" or "johancsik", see `torque_and_drag`.
         laid, pieces: the string in its place, and cut where anything jumps; solved: what was found on it. by_rod: the
-            function that solves the rod in contact from an answer of a flexible string.
+            function that solves the rod in contact from an answer of a flexible string. judge: that gives `judged`.
     """
 
     words = property(lambda self: f"{self.model} string", doc="What was solved, for titles.")
@@ -128,15 +133,39 @@ class TorqueAndDrag(Differentiated, ChartedBetween):
     model: str
     tol: float
     torque_convention: str
-    why: tuple[str, ...]
     error: float
-    model_error: float
-    left_out: tuple[float, float]
     differences: dict[str, tuple[float, float]]
     laid: Any
     pieces: Any
     solved: Any
     by_rod: Any
+    judge: Any
+
+    @cached_property
+    def judged(self) -> "Judged":
+        """`why`, `model_error` and `left_out`, found when they are asked for."""
+        return self.judge()
+
+    def adding(self, sentence: str) -> "TorqueAndDrag":
+        """The same with one more sentence in `why`."""
+        return replace(self, judge=partial(self.judged._replace, why=(*self.why, sentence)))
+
+    @property
+    def why(self) -> tuple[str, ...]:
+        """Sentences on what decided for the model, and what it leaves out."""
+        return self.judged.why
+
+    @property
+    def model_error(self) -> float:
+        """Estimate, relative as `error`, of how far hook load and surface torque of the rod in contact may be, which is
+        stiff and has a clearance: the error of the model, not of its solution. NaN: not estimated, of the rod itself.
+        """
+        return self.judged.model_error
+
+    @property
+    def left_out(self) -> tuple[float, float]:
+        """`model_error` of hook load (N) and of surface torque (N m), not relative."""
+        return self.judged.left_out
 
     @property
     def quantities(self):

@@ -13,6 +13,7 @@ import numpy as np
 
 from cosserat_fenicsx.checks import instance, number, warn
 from cosserat_fenicsx.errors import SceneError
+from cosserat_fenicsx.parts import per_scene
 from cosserat_fenicsx.units import inch
 from cosserat_fenicsx.well.components import DrillString, weight_in_mud
 from cosserat_fenicsx.well.hole import Borehole, Mud
@@ -172,13 +173,23 @@ def checked_depth(owner, hole, string, operation, mud, depth, such="TripOut()"):
 def pieces_of(hole, string, operation, mud, depth):
     """The `Pieces` of a string whose lower end is at a measured depth (m), and its components in their places. Raises
     SceneError: a string that does not fit the hole: too long, too short, too wide, or a hole that ends above it."""
+    pieces, laid, floats = _in_place(hole, string, mud, depth)
+    if mud is not None:
+        mud.doubt_depths(hole.length, depth)
+    for sentence in floats:
+        warn(sentence)
+    slip = np.array([operation.direction(place.component.contact_radius) for place in laid])[pieces.component]
+    return pieces._replace(axial=slip[:, 0], around=slip[:, 1]), laid
+
+
+@per_scene
+def _in_place(hole, string, mud, depth):
+    """What `pieces_of` returns, as far as it does not depend on the operation; and sentences on what floats."""
     if not 0 < depth <= hole.length * (1 + 1e-12):
         told = f"torque_and_drag: depth = {depth:.10g} m: expected a measured depth in the hole, which ends at "
         told += f"{hole.length:.10g} m (survey {hole.path.length:.10g} m, sections {hole.sections[-1].to:.10g} m)"
         raise SceneError(hole.path.told(told))
     laid = string.laid(depth, hole.path.told)
-    if mud is not None:
-        mud.doubt_depths(hole.length, depth)
     ends = [place.top for place in laid]
     interfaces = [] if mud is None else mud.interfaces
     cuts = np.concatenate([hole.path.md, ends, [section.to for section in hole.sections], interfaces, [depth]])
@@ -188,20 +199,19 @@ def pieces_of(hole, string, operation, mud, depth):
     top, bottom = cuts[:-1], cuts[1:]
     middle = (top + bottom) / 2
     component = np.searchsorted(-np.array(ends), -middle)
-    weight = np.empty_like(middle)
+    weight, floats = np.empty_like(middle), []
     for i, place in enumerate(laid):
         here = component == i
         weight[here] = weight_in_mud(place.component, mud, middle[here])
         if (weight[here] < 0).any():
-            warn(f"{place.component.name} floats: it weighs {weight[here].min():g} N/m in mud")
+            floats.append(f"{place.component.name} floats: it weighs {weight[here].min():g} N/m in mud")
     radii = np.array([place.component.contact_radius for place in laid])
-    slip = np.array([operation.direction(radius) for radius in radii])
     _check_widths(hole, laid)
     section = np.searchsorted(hole.path.md, middle) - 1
     return Pieces(
         top, bottom, component, weight, hole.at(middle, "friction"), radii[component],
-        hole.at(middle, "diameter") / 2, *slip[component].T, *_downward(hole.path, section, bottom),
-    ), laid  # fmt: skip
+        hole.at(middle, "diameter") / 2, None, None, *_downward(hole.path, section, bottom),
+    ), laid, floats  # fmt: skip
 
 
 def _downward(path, section, bottom):

@@ -12,7 +12,7 @@ from cosserat_fenicsx.progress import StageProgress
 from cosserat_fenicsx.quantities import Quantity
 from cosserat_fenicsx.ranks import world
 from cosserat_fenicsx.results.result import Result, by_name
-from cosserat_fenicsx.well.buckled import LockUp, buckled_string
+from cosserat_fenicsx.well.criteria import LockUp, buckled_string
 from cosserat_fenicsx.well.pieces import sections_of
 from cosserat_fenicsx.well.softstring import chain_of, soft_string
 from cosserat_fenicsx.well.strength import MODES, UNKNOWN

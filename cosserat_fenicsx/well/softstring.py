@@ -10,17 +10,16 @@ The first N is Coulomb's law: friction across the hole holds a part of q, N^2 + 
 the wall. The second is the field's convention: C. A. Johancsik, D. B. Friesen & R. Dawson, J. Petr. Technol. 36 (1984)
 987, doi:10.2118/11380-PA.
 
-Method: T = T_bottom + w (height) + P is exact but for the friction P, P' = c mu N(P). On pieces without jumps, all of
-them at once, Newton's method on the function P: the linear equation of each iteration is solved by its integrating
-factor, the integrals by Gauss's points. Pieces are cut where N has a kink, which is where q vanishes and turns round,
-and halved, until the friction on pieces and on their halves agrees to the tolerance.
+Method: T = T_bottom + w (height) + P is exact but for the friction P, P' = c mu N(P). On pieces without jumps, from the
+lower end up, P follows from collocation at Gauss's points, in C. Pieces are cut where N has a kink, which is where q
+vanishes and turns round, and halved, until the friction on pieces and on their halves agrees to the tolerance.
 
 Derivatives of tension and torque by weight, friction and the loads on the lower end follow from the equations
 linearised at the solution: with V = T k + w (n cos ku + t sin ku) and N = sqrt(V^2 + (w b)^2), for the change dP
 
     dP' = d k V/N dP + N dd + d (V (k dT_0 + dV_w) + w b^2 dw)/N,
 
-dT_0 and dV_w the explicit parts. It is linear and is solved as one iteration of Newton's method is, on the same pieces.
+dT_0 and dV_w the explicit parts. It is linear and is solved by its integrating factor on the same pieces.
 Where N has a kink pieces are cut, and N is continuous there, so that the place of a cut has no part in it.
 
 `Differentiated`: the derivatives of an answer by friction, weights, mud and loads on the bit, and its uncertainty.
@@ -29,6 +28,7 @@ Where N has a kink pieces are cut, and N is continuous there, so that the place 
 import math
 from collections import namedtuple
 from collections.abc import Iterable, Mapping
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -36,14 +36,18 @@ from numpy.polynomial.legendre import legval, legvander
 from scipy.linalg.blas import dtbsv
 from scipy.optimize import brentq
 
+from cosserat_fenicsx.algebra.building import module
+from cosserat_fenicsx.checks import finite_array, refuse
 from cosserat_fenicsx.errors import NotConverged, SceneError, nearest
 from cosserat_fenicsx.numerics import gauss
 from cosserat_fenicsx.results.queries import Sensitivity, Uncertainty
+from cosserat_fenicsx.statics.cases import Cases
 from cosserat_fenicsx.well.pieces import down_along
+from cosserat_fenicsx.well.tools import MudMotor
 
 
 _POINTS = 8  # Gauss points a piece
-_ITERATIONS, _ROUNDS = 60, 60
+_ROUNDS = 60
 _SHORTEST = 1e-9  # m, of pieces that are still cut
 _EPS = np.finfo(float).eps
 
@@ -103,6 +107,10 @@ AT = np.concatenate([[0.0], _X, [1.0]])
 UP_TO = np.concatenate([np.zeros((1, _POINTS)), POINTS_TO, WEIGHTS[None]])
 UP_TO = np.concatenate([np.zeros((_POINTS + 2, 1)), UP_TO, np.zeros((_POINTS + 2, 1))], axis=1)
 _HALVES = legvander(np.concatenate([_X - 1, _X]), _POINTS - 1) @ _RULE.series
+_SOURCE = Path(__file__).with_name("softstring.c")
+# What C reads: the places, and by columns the integrals up to the points, the weights, the values at the points of the
+# halves, and the last two coefficients of Legendre's series.
+_TABLES = np.concatenate([x.ravel() for x in (AT, POINTS_TO.T, WEIGHTS, _HALVES.T, _RULE.series[-2:])])
 
 
 def chain_of(pieces, coulomb=True):
@@ -130,133 +138,57 @@ def soft_string(chain, tension, torque, tol):
     Raises:
         NotConverged: the tolerance was not reached.
     """
-    friction = None
     for _ in range(_ROUNDS):
-        coarse = _Friction(chain, tension)
-        coarse.solve(friction)
-        halves = _cut(chain, np.full((len(chain.length), 1), 0.5))
-        fine = _Friction(halves, tension)
-        fine.solve(coarse.on_halves())
-        defects = np.abs(coarse.forces - fine.forces.reshape(-1, 2).sum(axis=1))
-        defects = 2 * (defects + (fine.unseen() + fine.unresolved()).reshape(-1, 2).sum(axis=1))
-        scale = np.abs(fine.tension).max() + np.abs(fine.heights).sum() * 1e-3
-        # friction above multiplies a change from below, at most by this factor
-        grown = np.exp(np.cumsum((np.abs(chain.drag) * chain.curvature * chain.length)[::-1])[::-1])
-        pulls, turns = np.abs(chain.drag) * defects * grown, chain.turn * defects
-        moments = torque + np.concatenate([[0.0], np.cumsum(halves.turn * fine.forces)])
-        largest = np.abs(moments).max()
-        if pulls.sum() <= tol * scale and turns.sum() <= tol * largest:
-            rounding = _EPS * len(fine.forces)
-            errors = pulls.sum() + rounding * scale, turns.sum() + rounding * largest
-            return fine.solved(torque, *errors)
+        rows, size = np.array(chain[:-1]), 2 * len(chain.length)
+        pieces, halves, sums = np.empty((size // 2, 12)), np.empty((4 + 3 * len(AT)) * size), np.empty(6)
+        ffi, lib = module(_SOURCE)
+        arrays = (ffi.from_buffer("double[]", x) for x in (rows, _TABLES))
+        found = (ffi.from_buffer("double[]", x) for x in (pieces, halves, sums))
+        if lib.soft_string(size // 2, *arrays, tension, torque, *found):
+            raise NotConverged("torque_and_drag: the friction of the soft string did not converge")
+        (pulls, turns), (pull, turn, scale, largest) = pieces.T[:2], sums[:4].tolist()
+        if pull <= tol * scale and turn <= tol * largest:
+            parts, along = halves[: 4 * size].reshape(4, size), halves[4 * size :].reshape(3, size, len(AT))
+            rows = np.repeat(rows, 2, axis=1)
+            rows[[0, 3, 4]] = parts[:3]
+            rounding = _EPS * size
+            return Solved(Chain(*rows, np.repeat(chain.origin, 2)), AT, *along, parts[3], pull + rounding * scale,
+                          turn + rounding * largest, np.zeros(size, dtype=bool))  # fmt: skip
         share = np.maximum(pulls / scale, turns / max(largest, _EPS * scale))
         split = (share > tol / (2 * len(share))) & (chain.length > _SHORTEST)
         if not split.any():
             break
-        chain = _cut(chain, coarse.places(split))
-        friction = None
+        chain = _cut(chain, _places(chain, pieces[:, 2:], split))
     raise NotConverged("torque_and_drag: the soft string did not reach its tolerance: expected a larger tol")
 
 
-class _Friction:
-    """The friction P on the pieces of a chain."""
+def _many(pieces, coulomb, weight, friction, tension, torque):
+    """The sums (cases, 6) of softstring.c of strings on the same `Pieces`, which differ in weight and friction (cases,
+    pieces), and in tension and torque (cases,)."""
+    found, (ffi, lib) = np.empty((len(tension), 6)), module(_SOURCE)
+    rows, work = np.array(chain_of(pieces, coulomb)[:-1]), np.empty(21 * len(pieces.top))
+    slip = np.array([pieces.axial, pieces.around, pieces.radius])[:, ::-1]
+    of_cases = (weight[:, ::-1], friction[:, ::-1], tension, torque, work, found)
+    arrays = [ffi.from_buffer("double[]", np.ascontiguousarray(x)) for x in (rows, _TABLES, slip, *of_cases)]
+    lib.soft_strings(*found.shape[:1], len(pieces.top), *arrays[:3], coulomb, *arrays[3:])
+    return found
 
-    def __init__(self, chain, tension):
-        self.chain = chain
-        rows = chain.columns
-        u = rows.length * AT
-        self._across, heights = rows.weight * rows.down(u)[1], rows.weight * rows.height(u)
-        self.heights = heights[:, -1]
-        below = np.concatenate([[tension], tension + np.cumsum(self.heights)])
-        self._below, self._pull = below, below[:-1, None] + heights
-        self._b2 = (chain.weight * chain.b)[:, None] ** 2
-        self._k, self._drag, self._length = rows.curvature, rows.drag, chain.length
 
-    def solve(self, start=None):
-        """Newton's method; `start`: P at the points."""
-        across, pull, b2 = self._across[:, 1:-1], self._pull[:, 1:-1], self._b2
-        k, drag, length = self._k, self._drag, self._length
-        P = np.zeros_like(pull) if start is None else start
-        scale, before = np.abs(self._below).max() + np.abs(self.heights).sum(), np.inf
-        self.starts = np.zeros(len(length) + 1)
-        if drag.any():
-            for _ in range(_ITERATIONS):
-                V = k * (pull + P) + across
-                N = np.sqrt(V * V + b2)
-                slope = drag * k * np.divide(V, N, out=np.zeros_like(V), where=N > 0)
-                self.starts, new = _integrated(slope, drag * N - slope * P, length)
-                change = np.abs(new - P).max()
-                P = new
-                scale = max(scale, np.abs(self.starts).max())
-                if change <= 4 * _EPS * scale or (change <= 1e-10 * scale and change >= before / 4):
-                    break
-                before = change
-            else:
-                raise NotConverged("torque_and_drag: the friction of the soft string did not converge")
-        self._P = P
-        self.points = k * (pull + P) + across
-        self.forces = (np.sqrt(self.points**2 + b2) @ WEIGHTS) * length
-        self.starts = chained(np.ones_like(length), self._drag[:, 0] * self.forces)
-        self.tension = self._below + self.starts
-
-    def solved(self, torque, error, torque_error):
-        """The `Solved` of this chain; `torque` at the lower end."""
-        chain, climb = self.chain, self.chain.climb[:, None]
-        friction = np.concatenate([self.starts[:-1, None], self._P, self.starts[1:, None]], axis=1)
-        tension = self._pull + friction
-        load = np.sqrt((self._k * tension + self._across) ** 2 + self._b2)
-        turned = chain.turn[:, None] * chain.length[:, None] * (load @ UP_TO.T)
-        below = torque + np.concatenate([[0.0], np.cumsum(turned[:-1, -1])])
-        return Solved(chain, AT, tension, below[:, None] + turned, load / climb, self.forces / chain.climb,
-                      error, torque_error, np.zeros(len(below), dtype=bool))  # fmt: skip
-
-    def unresolved(self):
-        """Errors of forces (N) by the decay of the load's Legendre coefficients, squared by Gauss's rule."""
-        load = np.sqrt(self.points**2 + self._b2)
-        cut_off = (load @ _RULE.series[-2:].T) ** 2
-        return cut_off.sum(axis=1) * self._length / np.maximum(load.max(axis=1), np.finfo(float).tiny)
-
-    def unseen(self):
-        """Errors of forces (N) by sharp turns of the load between two points, which comparisons may miss."""
-        below, above = self._end_loads()
-        load = np.concatenate([below[:, None], self.points, above[:, None]], axis=1)
-        steps, widths = np.abs(np.diff(load, axis=1)), np.diff(AT) * self._length[:, None]
-        sharp = np.sqrt(self._b2) < steps
-        if not sharp.any():
-            return np.zeros(len(below))
-        # inside: a part of the triangle over the step; beside an end: the triangle that has the wrong sign, twice, and
-        # the contribution of the load along the binormal
-        error = np.where(sharp & (load[:, 1:] * load[:, :-1] < 0), steps * widths / 4, 0.0)
-        for i, end in ((0, below), (-1, above)):
-            near = sharp[:, i] & (np.abs(end) < steps[:, i])
-            turned = np.where(end * self.points[:, i] < 0, end**2, 0.0)
-            error[:, i] = np.where(
-                near, 2 * (turned + self._b2[:, 0]) * widths[:, i] / np.where(near, steps[:, i], 1.0), 0.0
-            )
-        return error.sum(axis=1)
-
-    def _end_loads(self):
-        """V at the lower and at the upper ends of pieces."""
-        return [self._k[:, 0] * T + self._across[:, i] for T, i in ((self.tension[:-1], 0), (self.tension[1:], -1))]
-
-    def on_halves(self):
-        """P at the points of the halves of all pieces, by interpolation."""
-        return (self._P @ _HALVES.T).reshape(-1, _POINTS)
-
-    def places(self, split):
-        """Where pieces are cut, as shares of their lengths (NaN: not): in the middle, and round a sharp turn of q."""
-        cuts = np.full((len(split), 7), np.nan)
-        cuts[split, 0] = 0.5
-        below, above = self._end_loads()
-        for i in np.flatnonzero(split & (below * above < 0)):
-            zero = _zero(below[i], self.points[i], above[i])
-            width = 2 * np.sqrt(self._b2[i, 0]) / abs(above[i] - below[i])
-            cuts[i] = [zero, *(zero + side * width * far for far in (1, 5, 25) for side in (-1, 1))]
-            if width < 1e-7:
-                cuts[i, 1:] = np.nan
-        cuts[~((cuts > 1e-12) & (cuts < 1 - 1e-12))] = np.nan
-        cuts[split & np.isnan(cuts).all(axis=1), 0] = 0.5
-        return cuts
+def _places(chain, loads, split):
+    """Where pieces are cut, as shares of their lengths (NaN: not): in the middle, and round a sharp turn of q; loads:
+    (n, 10) V at the places of all pieces."""
+    cuts = np.full((len(split), 7), np.nan)
+    cuts[split, 0] = 0.5
+    below, above, least = loads[:, 0], loads[:, -1], np.abs(chain.weight * chain.b)
+    for i in np.flatnonzero(split & (below * above < 0)):
+        zero = _zero(loads[i])
+        width = 2 * least[i] / abs(above[i] - below[i])
+        cuts[i] = [zero, *(zero + side * width * far for far in (1, 5, 25) for side in (-1, 1))]
+        if width < 1e-7:
+            cuts[i, 1:] = np.nan
+    cuts[~((cuts > 1e-12) & (cuts < 1 - 1e-12))] = np.nan
+    cuts[split & np.isnan(cuts).all(axis=1), 0] = 0.5
+    return cuts
 
 
 def _integrated(slope, source, length):
@@ -274,11 +206,10 @@ def chained(gain, added):
     return dtbsv(1, below, np.append(0.0, added), lower=1, diag=1)
 
 
-def _zero(below, inside, above):
-    """Where a load changes its sign on a piece, as a share of it, from its values at the ends and at the points."""
-    signs = np.sign(np.concatenate([[below], inside, [above]]))
-    j = int(np.flatnonzero(np.diff(signs))[0])
-    series = _RULE.series @ inside
+def _zero(loads):
+    """Where a load changes its sign on a piece, as a share of it, from its values at the places AT."""
+    j = int(np.flatnonzero(np.diff(np.sign(loads)))[0])
+    series = _RULE.series @ loads[1:-1]
     values = legval(2 * AT[j : j + 2] - 1, series)
     if values[0] * values[1] >= 0:
         return AT[j + int(abs(values[1]) < abs(values[0]))]
@@ -363,27 +294,71 @@ class Differentiated:
             )
         if query not in _QUERIES:
             raise SceneError(f"query = {query!r}: {nearest(query, _QUERIES)}")
-        names = [parameters] if isinstance(parameters, str) else list(parameters)
-        known = self._parameters()
-        for name in names:
-            if name in ("mud.density", "mud.inside") and isinstance(self.mud and self.mud.density, tuple):
-                raise SceneError(
-                    f"parameter {name!r} of a string: it is rows of depth and density, which have no one derivative: "
-                    "expected one density, Mud(density), or the difference of the answers of two Mud([...])"
-                )
-            if name not in known:
-                plain = ", ".join(x for x in known if "[" not in x)
-                raise SceneError(
-                    f"parameter {name!r} of a string: known: {plain}, hole.sections[i].friction with i from 0 to "
-                    f"{len(self.hole.sections) - 1}, string.components[i].weight with i from 0 to {len(self.laid) - 1}"
-                )
-        found = {name: known[name] for name in names}
+        found = self._known(parameters)
         rates = {name: self._rate(change, query) for name, (change, _, _) in found.items()}
         zero = {name: np.zeros_like(rate) for name, rate in rates.items()}
         return Sensitivity(
             np.asarray(getattr(self, query)), rates, zero, {name: value for name, (_, value, _) in found.items()},
             {name: unit for name, (_, _, unit) in found.items()}, query, _QUERIES[query],
         )  # fmt: skip
+
+    def batch(self, over: Iterable[str], values: np.ndarray) -> Cases:
+        """Hook load and surface torque of the soft string for many values of its numbers, solved in C one after
+        another: each as of `torque_and_drag` with these numbers and the same `tol`.
+
+        Args:
+            over: names as of `sensitivity`; "friction" and "weight" are those of the whole hole and string, but for
+                sections and components that are named too.
+            values: (cases, names) of them, in SI units.
+
+        Returns:
+            Cases: its values are (cases, 2) hook load (N) and surface torque (N m), with the estimated errors of the
+            solution; those of the model are `model_error` of single answers. `by_solve`: pieces were cut.
+
+        Raises:
+            SceneError: unknown names, values of another shape or out of range, or an answer of another model.
+        """
+        if self.model != "soft":
+            raise SceneError(
+                f"batch: model = {self.model!r}: expected the answer of torque_and_drag(..., model='soft')"
+            )
+        known, pieces, coulomb = self._known(over), self.pieces, self.torque_convention == "coulomb"
+        values = finite_array("batch", "values", values, "(cases, names) finite numbers")
+        if values.ndim != 2 or values.shape[1] != len(known):
+            refuse("batch", "values", values, f"rows of {len(known)} numbers: {', '.join(known)}")
+        weight, friction = (np.tile(x, (len(values), 1)) for x in (pieces.weight, pieces.friction))
+        tension, torque = (np.full(len(values), x) for x in (-self.operation.weight, self.operation.torque))
+        given = dict(zip(known, values.T, strict=True))
+        for name in sorted(known, key=lambda x: ("mud" not in x, "[" in x)):  # what is for a part of the string last
+            change, value, each = known[name][0], known[name][1], given[name]
+            least = 0.0 if name.endswith("friction") or "mud" in name else -np.inf
+            most = 5.0 if name.endswith("friction") else np.inf
+            if each.min(initial=0.0) < least or each.max(initial=0.0) > most:
+                refuse("batch", name, each, f"numbers from {least:g} to {most:g}")
+            if name.startswith("operation"):
+                tension, torque = (-each, torque) if name == "operation.weight" else (tension, each)
+            elif "mud" in name:
+                weight += np.outer(each - value, change.weight)
+            else:
+                weight += (each[:, None] - weight) * change.weight
+                friction += (each[:, None] - friction) * change.friction
+        for motor in self.string.components if "operation.torque" in known and len(values) else ():
+            if isinstance(motor, MudMotor):
+                motor.running(type(self.operation).__name__, float(torque.max()))
+        found = _many(pieces, coulomb, weight, friction, tension, torque)
+        sizes, rounding = np.abs(found[:, 2:4]), 2 * _EPS * len(pieces.top)
+        cut, failures = ~(found[:, :2] <= self.tol * sizes).all(axis=1), {}
+        loads, errors = found[:, 4:].copy(), found[:, :2] + rounding * sizes
+        for i in np.flatnonzero(cut).tolist():
+            chain = chain_of(pieces._replace(weight=weight[i], friction=friction[i]), coulomb)
+            try:
+                one = soft_string(chain, tension[i], torque[i], self.tol)
+            except NotConverged as problem:
+                loads[i] = errors[i] = np.nan
+                failures[i] = str(problem)
+            else:
+                loads[i], errors[i] = (one.tension[-1, -1], one.torque[-1, -1]), (one.error, one.torque_error)
+        return Cases(loads, errors, cut, failures)
 
     def uncertainty(
         self,
@@ -407,6 +382,24 @@ class Differentiated:
         if query in ("tension", "torque"):
             return self._down(tension if query == "tension" else torque)
         return np.asarray((tension if query == "hook_load" else torque)[-1, -1])
+
+    def _known(self, parameters):
+        """{name: (`Change`, value, unit)} of parameters by their names."""
+        known = self._parameters()
+        names = [parameters] if isinstance(parameters, str) else list(parameters)
+        for name in names:
+            if name in ("mud.density", "mud.inside") and isinstance(self.mud and self.mud.density, tuple):
+                raise SceneError(
+                    f"parameter {name!r} of a string: it is rows of depth and density, which have no one derivative: "
+                    "expected one density, Mud(density), or the difference of the answers of two Mud([...])"
+                )
+            if name not in known:
+                plain = ", ".join(x for x in known if "[" not in x)
+                raise SceneError(
+                    f"parameter {name!r} of a string: known: {plain}, hole.sections[i].friction with i from 0 to "
+                    f"{len(self.hole.sections) - 1}, string.components[i].weight with i from 0 to {len(self.laid) - 1}"
+                )
+        return {name: known[name] for name in names}
 
     def _parameters(self):
         """{name: (`Change`, value, unit)} of all parameters."""

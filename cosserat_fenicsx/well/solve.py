@@ -22,7 +22,8 @@ again with a helix wherever there may be one. A helix is pressed on the wall by 
 by its load as well, as is usually reckoned. These are sums of sizes: differences of opposite signs do not cancel.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -33,8 +34,8 @@ from cosserat_fenicsx.progress import Plan
 from cosserat_fenicsx.ranks import world
 from cosserat_fenicsx.units import rpm
 from cosserat_fenicsx.well import criteria
-from cosserat_fenicsx.well.answer import TorqueAndDrag, scales_of, share
-from cosserat_fenicsx.well.buckled import LockUp, buckled_string, earliest_helix, growth
+from cosserat_fenicsx.well.answer import Judged, TorqueAndDrag, scales_of, share
+from cosserat_fenicsx.well.criteria import LockUp, buckled_string, earliest_helix, growth
 from cosserat_fenicsx.well.components import DrillString
 from cosserat_fenicsx.well.hole import Borehole, Mud
 from cosserat_fenicsx.well.operations import Operation
@@ -295,11 +296,12 @@ def torque_and_drag(
     tol = check_settings(model, tol, torque_convention)
     pieces, laid = pieces_of(hole, string, operation, mud, depth)
     given = hole, string, operation, mud, depth
-    flexible, why = _flexible(given, model, tol, torque_convention, pieces, laid)
+    flexible = _flexible(given, model, tol, torque_convention, pieces, laid)
     if model in (SOFT, BUCKLED) or (model == AUTO and flexible.enough):
         return flexible
     if model == AUTO and flexible.model == BUCKLED:
-        return replace(flexible, why=(*flexible.why, _NO_ROD))
+        return flexible.adding(_NO_ROD)
+    why = flexible.judged.decided
     told = "" if model == ROD else f"{why[-1].rpartition(': ')[0] or why[-1]}: "
     try:
         with Plan(f"torque_and_drag, {operation.name}: {told}{_HOW_LONG} {longest(tol):.0f}", progress, world()):
@@ -310,7 +312,7 @@ def torque_and_drag(
                 problem.args = ("; ".join([str(problem), *_instead(flexible, why)]),)
             raise
         failed = f"the exact rod in contact was tried, and not solved: {problem}"
-        return replace(flexible, why=(*flexible.why, failed))
+        return flexible.adding(failed)
 
 
 def _instead(flexible, why):
@@ -336,48 +338,52 @@ def check_settings(model=AUTO, tol=1e-4, torque_convention=CONVENTIONS[0]):
 
 
 def _flexible(given, model, tol, torque_convention, pieces, laid):
-    """The `TorqueAndDrag` of the soft, or buckled, string; and sentences on why it is not the answer."""
-    path, operation = given[0].path, given[2]
-    sections = sections_of([place.component for place in laid])
-    rings = rings_of(laid, given[0])
+    """The `TorqueAndDrag` of the soft, or buckled, string."""
+    operation, told = given[2], [*_on_motor(given[1], given[2])]
     soft = soft_string(chain_of(pieces, torque_convention == "coulomb"), -operation.weight, operation.torque, tol)
-    buckled, locked = None, []
+    buckled = None
     if model != SOFT:
         try:
-            buckled = buckled_string(soft, pieces, sections, tol)
+            buckled = buckled_string(soft, pieces, sections_of([place.component for place in laid]), tol)
         except LockUp as stuck:
             if model != ROD:
                 raise
-            locked.append(f"{_LOCKS_UP}: {stuck}")
+            told.insert(0, f"{_LOCKS_UP}: {stuck}")
     solved, used = buckled or soft, BUCKLED if buckled or model == BUCKLED else SOFT
-    left_out, scales = model_errors(path, pieces, soft, solved, sections, rings), scales_of(solved, pieces)
-    error = max(map(share, (solved.error, solved.torque_error), scales))
+    error = max(map(share, (solved.error, solved.torque_error), scales_of(solved, pieces)))
+    ends = [(x.tension[-1, -1], x.torque[-1, -1]) for x in (solved, soft)]
+    differences = {SOFT: tuple(float(a - b) for a, b in zip(*ends, strict=True))} if buckled else {}
+    judge = partial(_judged, given, model, used, tol - error, tol, pieces, laid, soft, solved, told)
+    return TorqueAndDrag(*given, used, tol, torque_convention, error, differences, laid, pieces, solved, rod_in_contact,
+                         judge)  # fmt: skip
+
+
+def _judged(given, model, used, left, tol, pieces, laid, soft, solved, told):
+    """The `Judged` of a flexible string; left: of the tolerance, for the model; told: more sentences."""
+    sections = sections_of([place.component for place in laid])
+    left_out = model_errors(given[0].path, pieces, soft, solved, sections, rings_of(laid, given[0]))
+    scales = scales_of(solved, pieces)
     shares = {what: share(parts.total, scale) for what, parts, scale in zip(_QUANTITIES, left_out, scales, strict=True)}
     why = [f"model = '{model}' as asked"] if model != AUTO else []
-    why += [*_on_buckling(model, soft, solved, sections), *_on_what_is_left_out(used, left_out, shares), *locked]
+    why += [*_on_buckling(model, soft, solved, sections), *_on_what_is_left_out(used, left_out, shares)]
     EA = sections.EA[pieces.component[solved.chain.origin]][:, None]
     strain = float(np.nan_to_num(np.abs(solved.tension) / EA).max())
     if strain > 0.01:
         why.append(f"BEYOND WHAT ANY PIPE CARRIES: the tension strains it by {100 * strain:.3g} %")
-    beyond = [what for what, part in shares.items() if part > tol - error]
-    why += _on_motor(given[1], operation)
+    beyond = [what for what, part in shares.items() if part > left]
+    why += told
     whole = [*why, *(f"NOT ENOUGH for tol = {tol:g} in the {what}" for what in beyond)]
     if model == AUTO and beyond:
         exceeding = " and the ".join(beyond)
         why.append(f"the {used} string's error in the {exceeding} exceeds tol = {tol:g}: solving the rod in contact")
-    ends = [(x.tension[-1, -1], x.torque[-1, -1]) for x in (solved, soft)]
-    differences = {SOFT: tuple(float(a - b) for a, b in zip(*ends, strict=True))} if buckled else {}
-    answer = TorqueAndDrag(*given, used, tol, torque_convention, tuple(whole), error, max(shares.values()),
-                           tuple(parts.total for parts in left_out), differences, laid, pieces, solved,
-                           rod_in_contact)  # fmt: skip
-    if bent := given[1].bent:
-        unknown = (
-            f"THE BEND of {bent} IS NOT IN IT: a string on the axis of the hole has none, and what it "
-            "adds to the wall's forces is not estimated; model='rod' has it"
-        )
-        answer = replace(answer, why=(*answer.why, unknown), model_error=np.inf, left_out=(np.inf, np.inf))
-        why.append(f"{bent} is bent: solving the rod in contact, which has the bend")
-    return answer, why
+    if not (bent := given[1].bent):
+        return Judged(tuple(whole), max(shares.values()), tuple(parts.total for parts in left_out), tuple(why))
+    whole.append(
+        f"THE BEND of {bent} IS NOT IN IT: a string on the axis of the hole has none, and what it "
+        "adds to the wall's forces is not estimated; model='rod' has it"
+    )
+    why.append(f"{bent} is bent: solving the rod in contact, which has the bend")
+    return Judged(tuple(whole), np.inf, (np.inf, np.inf), tuple(why))
 
 
 def _on_motor(string, operation):

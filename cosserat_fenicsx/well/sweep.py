@@ -22,7 +22,7 @@ from cosserat_fenicsx.results.result import Charted, by_name
 from cosserat_fenicsx.storage.mark import NotMarked, mark_of
 from cosserat_fenicsx.storage.store import Kind, Nowhere, Store
 from cosserat_fenicsx.well import tables
-from cosserat_fenicsx.well.buckled import LockUp
+from cosserat_fenicsx.well.criteria import LockUp
 from cosserat_fenicsx.well.components import DrillString
 from cosserat_fenicsx.well.hole import Borehole, Mud
 from cosserat_fenicsx.well.operations import Operation
@@ -295,6 +295,7 @@ def _answer(hole, string, operation, depth, settings):
     """The numbers of `KEPT`, and a note or ""."""
     try:
         answer = torque_and_drag(hole, string, operation, depth=depth, progress=False, **settings)
+        left_out = answer.model_error, *answer.left_out
     except LockUp as locked:
         return tuple(locked.md if name == "locked" else np.nan for name in KEPT), f"locks up at md = {locked.md:.5g} m"
     except NotConverged as failed:
@@ -308,5 +309,5 @@ def _answer(hole, string, operation, depth, settings):
         why = [line for line in answer.why if line.startswith("NOT ENOUGH")]
         why += [] if answer.model == ROD else answer.why[-1:]  # why it is not the rod
         notes += [answer.words, *why]
-    numbers = (answer.hook_load, answer.surface_torque, answer.error, answer.model_error, *answer.left_out, np.nan)
+    numbers = (answer.hook_load, answer.surface_torque, answer.error, *left_out, np.nan)
     return (*numbers, float(_MODELS.index(answer.model))), "; ".join(notes)

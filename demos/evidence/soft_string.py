@@ -8,13 +8,14 @@ Writes to out/: soft_string.md (the table), soft_string.png (the chart).
 Hook loads of pulling out and running in a uniform string, bit free, coefficient of friction 0.25, in well P (turn and
 horizontal) and in Volve 15/9-F-12. Peers get the exact survey at stations that are closer and closer; this package gets
 the stations as they are and a tolerance. Times are processor times of one warm answer, the median of 25, on one thread.
+And of a string of three components in a well of 200 stations: a call after the first, and a case of a batch.
 """
 
 import statistics
 from pathlib import Path
 
 import numpy as np
-from harness import command, drawn, in_words, repeated, table, write
+from harness import HEADS, command, drawn, in_words, judged, repeated, table, write
 from peers.environments import Missing
 from peers.process import Peer
 
@@ -31,6 +32,7 @@ PEERS = "welleng", "torque-drag"
 WEIGHT, RADIUS, FRICTION = 241.13, 0.0635, 0.25
 TOLS, SPACINGS = (1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12), (100.0, 30.0, 10.0, 3.0, 1.0)
 SAMPLES, LIMIT = 25, 60.0  # samples of each row; time limit of a request to a peer, s
+CALL, CASE, CASES = 0.4, 0.1, 1000  # asked at most, ms: a call, a case of a batch of so many
 
 
 def ours(path, tol):
@@ -44,6 +46,26 @@ def ours(path, tol):
 
     loads, seconds = repeated(both, SAMPLES)
     return loads, seconds / 2
+
+
+def stations():
+    """Rows of a table: ms of a call and of a case in a batch, of a drill-string in a well of 200 stations."""
+    md, rng = np.linspace(0.0, 4000.0, 200), np.random.default_rng(3)
+    inc = np.abs(np.interp(md, [0.0, 400.0, 1600.0], [0.0, 0.0, 60.0]) + np.append(0.0, rng.normal(0.0, 0.3, 199)))
+    path = cf.well.WellPath.from_survey(md, inc, 40.0 + 20.0 * np.sin(md / 700.0))
+    hole = cf.well.Borehole(path, [cf.well.HoleSection(2500.0, 0.2224, 0.2), cf.well.HoleSection(4000.0, 0.2159, 0.3)])
+    parts = [cf.well.Bit(0.2159), cf.well.Collar(90.0, "NC46-65"), cf.well.DrillPipe(size="5 in 19.50 lb/ft")]
+    asked = hole, cf.well.DrillString(parts), cf.well.RotaryDrilling(60e3, 5e3)
+    over = ["hole.sections[0].friction", "hole.sections[1].friction", "operation.weight", "mud.density"]
+    values = np.array([0.2, 0.3, 60e3, 1200.0]) * rng.uniform(0.8, 1.2, (CASES, len(over)))
+
+    def call():
+        return cf.well.torque_and_drag(*asked, mud=cf.well.Mud(1200.0), model="soft")
+
+    call().batch(over, values)  # compiles
+    one, many = repeated(call, SAMPLES)[1], repeated(lambda: call().batch(over, values), 5)[1]
+    return [("ms a call, 200 stations", judged(1e3 * one, CALL, ".2f")),
+            (f"ms a case of {CASES} in a batch", judged(1e3 * many / CASES, CASE, ".3f"))]  # fmt: skip
 
 
 def theirs(peer, path, spacing):
@@ -98,7 +120,8 @@ def lines(rows, silent):
     heads = " | ".join(f"`{name}`: relative error | ms" for name in TRUTH)
     told = [(program, setting, *(found[name] for name in TRUTH)) for (program, setting), found in cells.items()]
     missing = (f"Not measured: {line}." for line in silent)
-    return [*table(f"program | setting | {heads}", told), "", *missing, in_words()]
+    asked = table(f"asked | found | {HEADS}", stations())
+    return [*table(f"program | setting | {heads}", told), "", *asked, "", *missing, in_words()]
 
 
 def chart(rows):

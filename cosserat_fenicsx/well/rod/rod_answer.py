@@ -8,7 +8,7 @@ Their bodies, and all other components, touch with their contact radius along th
 import contextlib
 import math
 from dataclasses import dataclass, fields
-from functools import cached_property
+from functools import cached_property, partial
 from operator import attrgetter
 from typing import ClassVar
 
@@ -17,7 +17,7 @@ import numpy as np
 from cosserat_fenicsx.checks import refuse
 from cosserat_fenicsx.errors import NotConverged, SceneError
 from cosserat_fenicsx.well import criteria
-from cosserat_fenicsx.well.answer import TorqueAndDrag, scales_of, share
+from cosserat_fenicsx.well.answer import Judged, TorqueAndDrag, scales_of, share
 from cosserat_fenicsx.well.components import in_columns
 from cosserat_fenicsx.well.contacts import VERTICAL, WallContact, name_of_side
 from cosserat_fenicsx.well.pieces import bend_of, rings_of
@@ -63,8 +63,7 @@ class RodInContact(TorqueAndDrag):
         differences = {name: (here[0] - hook, here[1] - torque) for name, (hook, torque) in there.items()}
         given |= {"model": "rod", "error": solved.error, "differences": differences, "solved": solved}
         why = (*decided, *_found(flexible, solved, differences))
-        model_error, left_out = _of_buckling(flexible, solved, differences)
-        return cls(**{**given, "model_error": model_error, "left_out": left_out, "why": why})
+        return cls(**{**given, "judge": partial(Judged, why, *_of_buckling(flexible, solved, differences))})
 
     @property
     def enough(self):
