@@ -6,6 +6,7 @@ from math import inf, pi, sqrt
 import cosserat_fenicsx as cf
 import numpy as np
 import pytest
+from cosserat_fenicsx.cli.explain import explain
 
 P = 1.2 * pi**2 / 4
 # EI = L = 1, inextensible: by a shooting method of its own, (x, z) of the tip, and the side force at which it snaps
@@ -193,6 +194,11 @@ def test_stages_in_a_scene_file(held, tmp_path_all):
     assert 'release = ["stages[0].supports[0]"]' in text and 'load_factors = "0.0:1.0"' in text
     path = cf.read(tmp_path_all / "scene.toml").run(elements=8)
     np.testing.assert_array_equal(path.position("rod.end"), cf.solve(held.scene, elements=8).position("rod.end"))
+    told = explain(held.scene, (0.0, 1.0), {})
+    assert (
+        "Stage hold: holds Pin at rod@0.5; releases Force at rod.end." in told and "Stage 1: applies Force at" in told
+    )
+    assert "Then stages[0] ('hold'): load factor 0 to 1 in steps the solver chooses; model: spatial: " in told
 
 
 PUSH, SIDE = cf.Force("rod.end", (1, 0, 0)), cf.Force("rod@0.7", (0, 1, 0))

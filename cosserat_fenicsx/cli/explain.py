@@ -74,12 +74,20 @@ def explain(scene, load_factors, settings):
             f"Mesh: elements of degree {degree}, from {first} per rod ({unknowns} unknowns) refined until two meshes "
             f"agree to tol = {tol:g} in {', '.join(map(words_of, bound))}."
         )
-    if isinstance(load_factors, tuple):
-        lines.append(f"Path: load factor {load_factors[0]:g} to {load_factors[1]:g} in steps the solver chooses.")
-    else:
-        listed = ", ".join(f"{x:g}" for x in np.atleast_1d(load_factors))
-        lines.append(f"Path: load factors {listed}, reached exactly, with steps between where needed.")
+    lines.append(f"Path: {_path(load_factors)}.")
+    for leg in scene.legs if scene.stages else []:
+        if leg.stage >= 0:
+            part = choose(scene.of_leg(leg), model=settings.get("model", "auto"), formulation=formulation, degree=degree,
+                          follows=follows)  # fmt: skip
+            lines.append(f"Then {leg.words}: {_path(leg.load_factors)}; model: {part.model}: {'; '.join(part.why)}.")
     return "\n".join(lines)
+
+
+def _path(load_factors):
+    if isinstance(load_factors, tuple):
+        return f"load factor {load_factors[0]:g} to {load_factors[1]:g} in steps the solver chooses"
+    listed = ", ".join(f"{x:g}" for x in np.atleast_1d(load_factors))
+    return f"load factors {listed}, reached exactly, with steps between where needed"
 
 
 def of_the_scene(scene):

@@ -282,7 +282,8 @@ def _name_of(item):
 
 
 def actions_in_words(scene):
-    """Sentences that list the actions and prescribed motions of a scene, by whether the load factor multiplies them."""
+    """Sentences that list the actions and prescribed motions of a scene, by whether the load factor multiplies them, and
+    what its stages change."""
     groups = (
         ("Loads, times the load factor", [x for x in scene.loads if x.scaled]),
         ("Prescribed motions, times the load factor", [x for x in scene.supports if x.moves]),
@@ -290,6 +291,13 @@ def actions_in_words(scene):
         ("Not multiplied by the load factor", [x for x in scene.loads if not x.scaled and not x.permanent]),
     )
     lines = [f"{title}: {some_of(map(describe, items))}." for title, items in groups if items]
+    legs = scene.legs if scene.stages else []
+    named = {x.place: x.item for leg in legs for x in (*leg.standing, *leg.ramped, *leg.supports)}
+    for leg in legs[-len(scene.stages) :]:
+        stage = scene.stages[leg.stage]
+        groups = ("applies", stage.loads), ("holds", stage.supports), ("releases", [named[x] for x in stage.release])
+        changes = [f"{verb} {some_of(map(describe, items))}" for verb, items in groups if items]
+        lines.append(f"Stage {leg.name or leg.stage}: {'; '.join(changes)}.")
     return "\n".join(lines) or "Loads: none."
 
 
