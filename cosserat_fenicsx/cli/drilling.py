@@ -1,6 +1,7 @@
 """Drill-strings in motion on the command line: `cosserat run`, `cosserat explain` and `cosserat resume`."""
 
 import math
+import shlex
 import sys
 from argparse import Namespace
 from dataclasses import replace
@@ -53,8 +54,8 @@ def _check_folder(folder, scene):
     if folder and holds(folder) == KIND.what:
         store = Store(folder, KIND).open()
         store.scene(scene, store.head["duration"])  # refused with what differs
-        raise SceneError(f"--folder {folder}: it holds this motion already: `cosserat resume {folder}` continues it; "
-                         "or expected another name")  # fmt: skip
+        raise SceneError(f"--folder {folder}: it holds this motion already: `cosserat resume {shlex.quote(folder)}` "
+                         "continues it; or expected another name")  # fmt: skip
 
 
 def deliver_motion(computed, options, tables=None):

@@ -41,7 +41,8 @@ def explain(scene, load_factors, settings):
     check_arguments(scene, tol, elements, bound)
     check_magnitudes(scene, np.abs(load_factors).max())
     follows = settings.get("branch") is not None or settings.get("control") == "arc"
-    choice = choose(scene, model=settings.get("model", "auto"), formulation=formulation, degree=degree, follows=follows)
+    wanted = {"model": settings.get("model", "auto"), "formulation": formulation, "degree": degree, "follows": follows}
+    choice = choose(scene, **wanted)
     many = isinstance(load_factors, tuple) or np.size(load_factors) > FEW
     if elements or follows:
         layout = Layout.of(scene, elements) if elements else first_layout(scene, degree)
@@ -77,8 +78,7 @@ def explain(scene, load_factors, settings):
     lines.append(f"Path: {_path(load_factors)}.")
     for leg in scene.legs if scene.stages else []:
         if leg.stage >= 0:
-            part = choose(scene.of_leg(leg), model=settings.get("model", "auto"), formulation=formulation, degree=degree,
-                          follows=follows)  # fmt: skip
+            part = choose(scene.of_leg(leg), **wanted)
             lines.append(f"Then {leg.words}: {_path(leg.load_factors)}; model: {part.model}: {'; '.join(part.why)}.")
     return "\n".join(lines)
 

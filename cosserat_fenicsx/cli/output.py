@@ -2,6 +2,7 @@
 else is printed, by one MPI rank alone, exit codes, and how all ranks end when one raises."""
 
 import os
+import shlex
 import sys
 import tempfile
 import warnings
@@ -96,7 +97,7 @@ def deliver(computed, options, names, files_of, tables=None, *, moving=False, ob
         reached = f" (t = {result.times[-1]:.6g} s)" if isinstance(trouble, Interrupted) and moving and result else ""
         say(f"cosserat: {getattr(trouble, 'words', trouble)}{reached}")
         if getattr(options, "folder", None) and not isinstance(trouble, NotConverged | SceneError):
-            say(f"cosserat: `cosserat resume {options.folder}` continues from there")
+            say(f"cosserat: `cosserat resume {shlex.quote(options.folder)}` continues from there")
         elif moving and code == INTERRUPTED:
             say("cosserat: a motion that is run with --folder DIR can be continued by `cosserat resume DIR`")
     return code

@@ -115,7 +115,7 @@ _ROUNDING = 1e-9
 _TURN, _FASTER, _OF_BLADES = 1.0, 3.0, 0.25
 KIND = Kind(
     what="motion of a drill-string", home="drilling.motion", call="drilling.simulate",
-    again="cosserat_fenicsx.resume('{place}'), or `cosserat resume {place}`, continues it",
+    again="cosserat_fenicsx.resume({place!r}), or `cosserat resume {quoted}`, continues it",
     differs="the scene is not the one of the motion", tables=("series", "profiles"), starts=True, rounding=1e-9,
     scene=Drilling,
 )  # fmt: skip

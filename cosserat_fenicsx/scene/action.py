@@ -282,8 +282,8 @@ def _name_of(item):
 
 
 def actions_in_words(scene):
-    """Sentences that list the actions and prescribed motions of a scene, by whether the load factor multiplies them, and
-    what its stages change."""
+    """Sentences that list the actions and prescribed motions of a scene, by whether the load factor multiplies them,
+    and what its stages change."""
     groups = (
         ("Loads, times the load factor", [x for x in scene.loads if x.scaled]),
         ("Prescribed motions, times the load factor", [x for x in scene.supports if x.moves]),

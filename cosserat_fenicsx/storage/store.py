@@ -14,6 +14,7 @@ import fcntl
 import importlib
 import json
 import os
+import shlex
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -51,7 +52,8 @@ class Kind:
         home: the module, below the package, whose functions `go_on(store, scene, duration, progress)` and
             `read(store, scene)` continue and read it, and whose `KIND` this is.
         call: the function whose argument `folder` names the folder.
-        again: how to resume it, a text with {place}. differs: the beginning of messages on another computation.
+        again: how to resume it, a text with {place}, and {quoted} for a shell. differs: the beginning of messages on
+            another computation.
         tables: the names of its tables.
         each_rank: whether every rank has rows and a memory of its own.
         starts: whether there is a checkpoint of the start, before which nothing is stored.
@@ -220,7 +222,7 @@ class Store(Nowhere):
     @property
     def again(self):
         """How to resume the computation, in words."""
-        return self.kind.again.format(place=str(self.place))
+        return self.kind.again.format(place=str(self.place), quoted=shlex.quote(str(self.place)))
 
     @property
     def kept(self):

@@ -14,7 +14,7 @@ _OF_INSTANT = {"time": "<f8", "load_factor": "<f8", "steps": "<i8", "iterations"
 _ARRAYS = ("rq", "rates", "gauss_fields", "reactions", "tie_forces", "clamp_forces", "wall_forces", "far_ends")
 KIND = Kind(
     what="motion", home="dynamics.simulate", call="simulate", differs="the scene is not the one of the motion",
-    again="cosserat_fenicsx.resume('{place}'), or `cosserat resume {place}`, continues it", tables=("instants",),
+    again="cosserat_fenicsx.resume({place!r}), or `cosserat resume {quoted}`, continues it", tables=("instants",),
     each_rank=True, starts=True, rounding=1e-9, scene=Scene,
 )  # fmt: skip
 
