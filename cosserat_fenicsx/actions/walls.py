@@ -174,22 +174,28 @@ class _Confined(Pressing):
     def refreshed(self, rod, s, r):
         near = self.path.nearest(r, s + self.begins)
         clearance, arm, friction = self.sizes(s, near.md)
-        stage, kp = self.stage, np.full(len(s), self.stiffness)
-        stage.last = r
-        slip = stage.friction * value_at(self.slip, s)
+        stage, slip, kp = self.stage, self._slips(s), np.full(len(s), self.stiffness)
+        anchor = near.position if stage.anchor is None else stage.anchor
+        self._see(r)
         return (
             action.vector(near.position, "m from origin"),
             action.vector(near.tangent, "1"),
             action.vector(near.curvature, "1/m"),
             action.scalar(clearance, "m"),
-            action.scalar(min(stage.wall, stage.most) * kp, self.unit),
+            action.scalar(np.minimum(stage.wall, stage.most) * kp, self.unit),
             action.scalar(stage.spring * kp, self.unit),
-            action.vector(near.position if stage.anchor is None else stage.anchor, "m from origin"),
-            action.scalar(slip[:, 0] * friction, "1"),
-            action.scalar(slip[:, 1] * friction, "1"),
+            action.vector(anchor, "m from origin"),
+            action.scalar(stage.friction * friction * slip[:, 0], "1"),
+            action.scalar(stage.friction * friction * slip[:, 1], "1"),
             action.scalar(arm, "m"),
             *self._law_data(),
         )
+
+    def _slips(self, s):
+        return value_at(self.slip, s)
+
+    def _see(self, r):
+        self.stage.last = r
 
 
 @dataclass(frozen=True)
@@ -338,6 +344,40 @@ class TubeRing(_Confined, PointAction):
 
     def sizes(self, s, md):
         return tuple(np.full(len(s), x) for x in (self.clearance, self.contact_radius, self.friction))
+
+    @property
+    def together(self):
+        """See `Action`."""
+        return None if self.law else (_Rings, id(self.path))
+
+
+class _Rings(_Confined):
+    """`TubeRing`s of one path as one wall, with a point of each."""
+
+    unit = TubeRing.unit
+
+    def __init__(self, rings):
+        self._rings, self.path = rings, rings[0].path
+        self.stiffness, self.begins = (np.array([getattr(x, name) for x in rings]) for name in ("stiffness", "begins"))
+        self._all_slips = np.concatenate([value_at(ring.slip, [ring.station.s]) for ring in rings])
+        self._sizes = np.concatenate([ring.sizes([ring.station.s], None) for ring in rings], axis=1)
+
+    @property
+    def stage(self):
+        stages = [ring.stage for ring in self._rings]
+        numbers = (np.array([getattr(x, name) for x in stages]) for name in ("wall", "most", "spring", "friction"))
+        anchors = [stage.anchor for stage in stages if stage.anchor is not None]
+        return Stage(*numbers, anchor=np.concatenate(anchors) if anchors else None)
+
+    def sizes(self, s, md):
+        return self._sizes
+
+    def _slips(self, s):
+        return self._all_slips
+
+    def _see(self, r):
+        for k, ring in enumerate(self._rings):
+            ring.stage.last = r[k : k + 1]
 
 
 #: A tube near points of a rod: measured depth (n,), m; point of the axis (n, 3), m, inertial; unit tangent (n, 3);

@@ -306,15 +306,16 @@ class Term:
         self.weight.x.array[:] = weight
         # tensions that are found are not data
         self.moves = not self.kind.finds_tension and any(signals_of(action) for action, _, _ in members)
-        for k, function in enumerate((*self.data, *self.memory)):
-            # data of one member also where none acts, so that no virtual work divides by zero there
-            action, rod = self._where[0][:2]
-            datum = (*at(action, 0.0).data(rod, np.zeros(1)), *action.memory)[k]
+        # data of one member also where none acts, so that no virtual work divides by zero there
+        action, rod = self._where[0][:2]
+        data = (*at(action, 0.0).data(rod, np.zeros(1)), *action.memory)
+        for function, datum in zip((*self.data, *self.memory), data, strict=True):
             function.x.array.reshape(-1, datum.size)[:] = self._scaled(datum, rod)
         self._values = None
         self._delayed = {}
         self.put(0.0)
         self._values = None  # the first step then counts as a change, which is checked
+        self._refreshing = [*self._joined()] if self._where[0][0].refreshed else []
         for k, function in enumerate(self.memory):
             for action, rod, rows, *_ in self._where:
                 function.x.array.reshape(-1, action.memory[k].size)[rows] = self._scaled(action.memory[k], rod)
@@ -329,6 +330,25 @@ class Term:
                 here = in_turn[bounds[i] : bounds[i + 1]]
                 frames = model.axes @ rod.curve.frame(s[here].ravel())
                 self._frame.x.array.reshape(-1, 9)[numbers[here].ravel()] = frames.reshape(-1, 9)
+
+    def _joined(self):
+        """What `refresh` does, for each action or for several at stations together: (`Action.refreshed`, rod, rows, arc
+        lengths, nodes and their shares (n, k), of whose positions a point's is the sum)."""
+        model, several = self._model, {}
+        shares = model.rule.basis(self._dof_places)[:, model.node_order]
+        places = np.arange(shares.shape[1])[None].repeat(len(shares), axis=0)
+        if np.isclose(shares.max(axis=1), 1.0).all():  # at nodes
+            places, shares = shares.argmax(axis=1)[:, None], np.ones((len(shares), 1))
+        for k, (action, rod, *where, _) in enumerate(self._where):
+            if len(where[0]):
+                several.setdefault((id(rod), action.together or k), []).append((action, rod, *where))
+        for members in several.values():
+            actions, (rod, *_), *where = zip(*members, strict=True)
+            action = actions[0].together[0](actions) if len(actions) > 1 else actions[0]
+            rows, s, (cells, points) = (np.concatenate(parts, axis=-1) for parts in where)
+            nodes = np.take_along_axis(model.cell_nodes[cells], places[points], axis=1)
+            whole = np.array_equal(rows, np.arange(len(self._arrays[0])))
+            yield action.refreshed, rod, slice(None) if whole else rows, s, nodes, shares[points]
 
     def follow(self, delayed):
         self._delayed = {id(action): delayed[id(action)] for action, *_ in self._where if id(action) in delayed}
@@ -375,7 +395,7 @@ class Term:
     def _take(self, data, rod, rows):
         adds = self.kind.place == "law"
         for array, datum in zip(self._arrays, data, strict=True):
-            array[rows] = self._scaled(datum, rod) + (array[rows] if adds else 0.0)
+            array[rows] = self._scaled(datum, rod) + array[rows] if adds else self._scaled(datum, rod)
 
     def _scaled(self, datum, rod):
         """The value of a `Datum`, dimensionless, vectors along the model's axes."""
@@ -383,7 +403,7 @@ class Term:
         if datum.unit == "m from origin":
             value = value - model.scene.origin(rod)
         value = value / model.scales.of_unit(datum.unit, self._time)
-        return value @ model.axes.T if datum.size == 3 else value
+        return value @ model.axes.T if datum.size == 3 and model.signature.flat else value
 
     def _interpolated(self, nodal):
         """(local elements, points per element, k) interpolated from nodal values (local nodes, k)."""
@@ -398,11 +418,10 @@ class Term:
         if self.sliding:
             return
         model = self._model
-        r = self._interpolated(model.positions())
-        for action, rod, rows, s, here, _ in self._where:
-            if len(rows):
-                place = r[here] * model.scales.length + model.scene.origin(rod)
-                self._take(action.refreshed(rod, s, place), rod, rows)
+        r = model.positions()
+        for refreshed, rod, rows, s, nodes, shares in self._refreshing:
+            place = np.einsum("nk,nki->ni", shares, r[nodes]) * model.scales.length + model.scene.origin(rod)
+            self._take(refreshed(rod, s, place), rod, rows)
 
     def commit(self):
         """Store the memory evaluated at the state."""

@@ -218,6 +218,9 @@ class Action(Part, family="load or action", homes=("cosserat_fenicsx.scene.loads
     #: (rod, s (n,), r (n, 3)) -> the `Datum`s of `data` for a rod whose points are at r (m, inertial). It is evaluated
     #: in every Newton iteration; its derivative by r is not in the tangent.
     refreshed = None
+    #: None; or, of an action at a station, a class and what tells apart those that it cannot join: its object of
+    #: several actions at stations of one rod has a `refreshed` for a point of each.
+    together = None
     #: Whether its `added_mass` along a rod is smaller than that across.
     lateral = False
     #: Whether it stands for the inertia of a motion, so that motions and natural modes refuse it.

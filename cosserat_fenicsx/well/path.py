@@ -203,7 +203,8 @@ class WellPath(TubeAxis):
             for a in range(0, len(rows), many):
                 found[a : a + many] = self._on_the_whole(rows[a : a + many])
         else:
-            found = self._walked(rows, np.broadcast_to(np.asarray(near, dtype=float), points.shape[:-1]).ravel())
+            i, x = self._walked(rows, np.broadcast_to(np.asarray(near, dtype=float), points.shape[:-1]).ravel())
+            found = self.sections.start[i] + x
         return found.reshape(points.shape[:-1])
 
     def nearest(self, points: Numbers | None, near: Numbers) -> "Nearest":
@@ -218,14 +219,12 @@ class WellPath(TubeAxis):
             of the end, and no curvature.
         """
         at = np.clip(near, 0.0, self.length)
+        i, x = self._place(at) if points is None else self._walked(points, at)
+        md = self.sections.start[i] + x
+        position, tangent, curvature = self._at(i, x)
         if points is None:
-            beyond, md = near - at, at
-        else:
-            md, beyond = np.nan_to_num(self._walked(points, at)), None  # a solver that diverges sees it by its points
-        position, tangent, curvature = self._at(*self._place(md))
-        if beyond is not None:
-            position += beyond[:, None] * tangent
-        curvature[(md <= 0.0) | (md >= self.length)] = 0.0
+            position += (near - at)[:, None] * tangent
+        curvature[(md <= 0.0) | (i == len(self.sections.start) - 1) & (x >= self.sections.length[-1])] = 0.0
         return Nearest(md, position, tangent, curvature)
 
     def _at(self, i, x):
@@ -246,19 +245,18 @@ class WellPath(TubeAxis):
         return s.start[best] + x[np.arange(len(points)), best]
 
     def _walked(self, points, near):
-        """Section by section in one direction, so that it ends; neighbours share the plane across their station."""
+        """`_place` of the closest points: section by section in one direction, so that it ends; neighbours share the
+        plane across their station."""
         s = self.sections
         i, _ = self._place(near)
-        x = self._projected(points, i)
-        way = np.where(x < 0, -1, np.where(x > s.length[i], 1, 0))
+        x, length = self._projected(points, i), s.length[i]
+        way = (x > length) * 1 - (x < 0)
         while True:
-            moving = np.flatnonzero(
-                (way < 0) & (x < 0) & (i > 0) | (way > 0) & (x > s.length[i]) & (i < len(s.start) - 1)
-            )
+            moving = np.flatnonzero((way < 0) & (x < 0) & (i > 0) | (way > 0) & (x > length) & (i < len(s.start) - 1))
             if not len(moving):
-                return s.start[i] + np.clip(x, 0.0, s.length[i])
+                return i, np.minimum(np.maximum(x, 0.0), length)
             i[moving] += way[moving]
-            x[moving] = self._projected(points[moving], i[moving])
+            x[moving], length[moving] = self._projected(points[moving], i[moving]), s.length[i[moving]]
 
     def _projected(self, points, i):
         """Arc length from the starts of sections i to the closest points on their circles, nearest to their middles."""
@@ -309,8 +307,10 @@ def _curvatures(inc, azi, length):
 
 def _arc(sections, i, x):
     """cos(kx), x sinc(kx), x^2/2 sinc(kx/2)^2 at x from the starts of sections i; sinc without pi."""
-    angle = sections.bend[i] * x
-    return np.cos(angle), x * np.sinc(angle / np.pi), x**2 / 2 * np.sinc(angle / (2 * np.pi)) ** 2
+    half = sections.bend[i] * x / 2
+    sine = np.sin(half)
+    chord = x * np.divide(sine, half, out=np.ones_like(half), where=half != 0)
+    return 1 - 2 * sine**2, chord * np.cos(half), chord**2 / 2
 
 
 _FULL = math.radians(360)
