@@ -199,8 +199,8 @@ typedef struct {
 /* Newton's method of a time step, see `Iteration` in dynamics/stepper.py. */
 typedef struct {
     problem *problem;
-    int motions;                    /* nodal unknowns of this rank */
-    double root;                    /* of their number on all ranks */
+    int motions, turning;           /* nodal unknowns of this rank; nodes with quaternions */
+    double root;                    /* of the number of nodal unknowns on all ranks */
     double increment, smallest, rounding, rate, price, diverged;
     int most;
     double *x, *start, *b, *change; /* (unknowns,) each; x from the guess to the solution, start: before the step */

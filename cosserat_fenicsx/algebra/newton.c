@@ -303,11 +303,21 @@ static void judge_increment(stepping *s, double step, double before)
     }
 }
 
+/* Scale the quaternions of a guess to |q| = 1: what they differ from it by moves the rotations by an old tangent. */
+static void normalise(double *x, int turning)
+{
+    for (double *q = x + 3; turning > 0; turning--, q += 7) {
+        const double size = sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
+        for (int k = 0; k < 4 && size > 0; k++) q[k] /= size;
+    }
+}
+
 /* Newton's method from the guess x; the state follows. */
 int iterate(stepping *s)
 {
     problem *p = s->problem;
     double step = 0, before;
+    normalise(s->x, s->turning);
     if (motion_in(s, s->x, s->start, &s->enough)) return FAILED;
     s->enough = fmax(fmax(s->smallest, s->increment * s->enough), s->of_noise * s->noise);
     s->iterations = 0, s->verdict = ITERATING;

@@ -319,7 +319,8 @@ class StepProblem(Equations):
         vectors = {"x": self.x, "b": self.b, "change": self._increment}
         for name, vector in vectors.items():
             setattr(found, name, self.doubles(vector.array))
-        if self.numbering.block == 7 and not self.ties:
+        found.turning = self.numbering.nodes * (self.numbering.block == 7)
+        if found.turning and not self.ties:
             self.c.now, self._turned = found.x, np.zeros(7 * self.numbering.nodes)
             self.c.turned, self.c.turns = self.doubles(self._turned), self.numbering.nodes
         return found
