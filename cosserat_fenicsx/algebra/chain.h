@@ -137,8 +137,7 @@ typedef struct {
     double *before, *now;           /* (nodes, 7) unknowns at the start and with the last motion */
     double *free, *last;            /* (nodes, 6) motion and forces before the last ones were found */
     double *load, *response;        /* (unknowns,) of this rank */
-    int stale, exact, covers;       /* whether the compliance must be found again; whether all responses are exact;
-                                       whether there are no unknowns but those of the nodes */
+    int stale, exact;               /* whether the compliance must be found again; whether all responses are exact */
     double usual, worse, least, rounding; /* error of the motion by the compliance, relative: the smallest one, at least
                                        `least`; this many times it, and the compliance is stale; smallest motions that
                                        are compared */
@@ -392,6 +391,7 @@ void unit_forces(const contact *c, int first, int apart, int component, double *
 void keep_responses(contact *c, int first, int apart, int component, const double *q, const double *changes);
 int find_transfers(contact *c, int apart);
 void find_motion(contact *c, const double *now);
+void aim(contact *c);
 int settle(contact *c);
 int broken(const contact *c);
 void slips(const contact *c, double *size);

@@ -374,6 +374,34 @@ static void take_axes(contact *c)
     memset(c->passing, 0, (size_t)2 * LANES * (MOTIONS + 4 * c->inside) * sizeof *c->passing);
 }
 
+/* The forces and moments of the nodes at position i by their law, where they are. */
+static void put_forces(contact *c, int i, const walled *w, const place *p)
+{
+    const vector inward = -w->law[0] * p->share;
+    const vector in_u = inward * p->e[0] - w->law[1] * p->e[1], in_v = inward * p->e[1] + w->law[1] * p->e[0];
+    for (int lane = 0, j; lane < c->lanes && (j = node_of(c, i, lane)) >= 0; lane++) {
+        const double *t = c->tangent + 3 * j, *u = c->across + 3 * j, arm = c->arm[j];
+        const double round = w->law[1][lane], along = w->law[2][lane];
+        double *force = c->force + 6 * j, v[3];
+        cross3(t, u, v);
+        for (int k = 0; k < 3; k++) {
+            force[k] = in_u[lane] * u[k] + in_v[lane] * v[k] + along * t[k] + 0.0; /* never -0 */
+            force[3 + k] = arm * (round * t[k] + along * (p->e[1][lane] * u[k] - p->e[0][lane] * v[k])) + 0.0;
+        }
+    }
+}
+
+/* Turn the last forces of all nodes to where the given motion takes these. */
+void aim(contact *c)
+{
+    for (int i = 0; i < c->positions; i++) {
+        vector motion[4];
+        const walled w = walled_at(c, i);
+        const place p = motion_of(c, i, &w, motion);
+        put_forces(c, i, &w, &p);
+    }
+}
+
 /* The motion and the forces of all nodes after they are settled. */
 static void leave_axes(contact *c)
 {
@@ -388,20 +416,17 @@ static void leave_axes(contact *c)
         }
         for (int k = 0; k < 2; k++) turned[k] = load(c->motion + LANES * (MOTIONS * i + 4 + k));
         const place p = place_of(c, w.start, motion);
-        const vector tilt = before.e[0] * turned[1] - before.e[1] * turned[0], inward = -w.law[0] * p.share;
-        const vector in_u = inward * p.e[0] - w.law[1] * p.e[1], in_v = inward * p.e[1] + w.law[1] * p.e[0];
+        const vector tilt = before.e[0] * turned[1] - before.e[1] * turned[0];
+        put_forces(c, i, &w, &p);
         for (int lane = 0, j; lane < c->lanes && (j = node_of(c, i, lane)) >= 0; lane++) {
             const double *t = c->tangent + 3 * j, *u = c->across + 3 * j, arm = c->arm[j];
             const double spin = change[3][lane] / (arm > 0 ? arm : LEAST_LEVER);
-            const double round = w.law[1][lane], along = w.law[2][lane];
             const double slid = change[2][lane] + arm * tilt[lane]; /* of the displacement alone */
-            double *moved = c->moved + 6 * j, *force = c->force + 6 * j, v[3];
+            double *moved = c->moved + 6 * j, v[3];
             cross3(t, u, v);
             for (int k = 0; k < 3; k++) {
                 moved[k] += change[0][lane] * u[k] + change[1][lane] * v[k] + slid * t[k];
                 moved[3 + k] += turned[0][lane] * u[k] + turned[1][lane] * v[k] + spin * t[k];
-                force[k] = in_u[lane] * u[k] + in_v[lane] * v[k] + along * t[k] + 0.0; /* never -0 */
-                force[3 + k] = arm * (round * t[k] + along * (p.e[1][lane] * u[k] - p.e[0][lane] * v[k])) + 0.0;
                 c->law[3 * j + k] = w.law[k][lane];
             }
             c->multiplier[j] = w.multiplier[lane];

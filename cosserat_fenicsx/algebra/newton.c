@@ -11,8 +11,6 @@ enum { FAILED = 1 };
 /* Increments at a wall that no longer shrink, by rounding, are measured anew after some steps without them; one that is
    this many times larger than before may have stopped for another reason, such as an old tangent. */
 static const double FADES = 0.9, RISES = 10;
-/* Steps by one tangent from one look at how exact the compliance is to the next. */
-enum { LOOKS = 8 };
 /* How many times as far from each other nodes are loaded, at most, where they move each other. */
 enum { FARTHEST = 4 };
 /* A tangent serves a second step that is expected to be below the first of these shares of the limit of increments, and
@@ -252,8 +250,9 @@ static void respond_nearby(contact *c, double *change)
 }
 
 /* Find the forces with which the laws of contact hold after Newton's step, which is subtracted from x, and add the
-   response to their change. `looks`: whether to judge the compliance. */
-static int meet(problem *p, const double *x, double *change, int looks)
+   response to their change: the exact one to the first change in a step, which is the largest and judges the compliance.
+   */
+static int meet(problem *p, const double *x, double *change, int first)
 {
     contact *c = p->contact;
     const size_t size = 6 * c->nodes * sizeof *c->force;
@@ -262,7 +261,7 @@ static int meet(problem *p, const double *x, double *change, int looks)
     memcpy(c->free, c->moved, size), memcpy(c->last, c->force, size), c->omitted = 0;
     settle(c);
     if (memcmp(c->last, c->force, size) == 0) return 0;
-    if (looks || c->exact) return respond_exactly(p, change);
+    if (first || c->exact) return respond_exactly(p, change);
     respond_nearby(c, change);
     return 0;
 }
@@ -321,6 +320,10 @@ int iterate(stepping *s)
     if (motion_in(s, s->x, s->start, &s->enough)) return FAILED;
     s->enough = fmax(fmax(s->smallest, s->increment * s->enough), s->of_noise * s->noise);
     s->iterations = 0, s->verdict = ITERATING;
+    if (p->contact) {
+        if (move_nodes(p, s->x, 0)) return FAILED;
+        aim(p->contact);
+    }
     while (s->verdict == ITERATING) {
         if (residual(p, s->x, s->b)) return FAILED;
         if (s->fresh) {
@@ -329,8 +332,7 @@ int iterate(stepping *s)
         }
         if (solve(p, s->b, s->change)) return FAILED;
         const contact *c = p->contact;
-        const int looks = c && s->iterations == 0 && (!c->covers || s->served % LOOKS == 0 || isinf(c->usual));
-        if (!p->singular && c && meet(p, s->x, s->change, looks)) return FAILED;
+        if (!p->singular && c && meet(p, s->x, s->change, s->iterations == 0)) return FAILED;
         if (!p->singular && hook(p, CONTACT, s->x, s->change)) return FAILED;
         if (p->singular) {
             s->verdict = SINGULAR;

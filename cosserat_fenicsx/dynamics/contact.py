@@ -32,8 +32,6 @@ class TouchingNodes:
         rows = np.zeros((self.count, 7), dtype=np.int64)
         rows[self._here] = numbering.rows[self._dofs]
         rows = self._sum(rows)
-        #: whether there are no other unknowns
-        self.covers = len(np.unique(rows[rows >= 0])) == numbering.total
         again = (rows[1:] == rows[:-1]).all(axis=1) & (rows[1:] >= 0).any(axis=1)
         #: (n,) number of the point that a node is: those that follow each other may be the same, as of two walls
         self.points = np.concatenate([[0], np.cumsum(~again)])
@@ -101,7 +99,7 @@ _FEW, _NEIGHBOURS = 16, 10
 _WORSE, _MISSED, _ROUNDING = 10.0, 1e-3, 1e-9
 # Sweeps over the nodes: largest number, and changes of the motion that end them, over the first one (of few nodes, and
 # of many, which the next iteration corrects) and dimensionless.
-_MOST, _SHARE, _OF_NEIGHBOURS, _SMALLEST = 200, 1e-6, 1e-3, 1e-16
+_MOST, _SHARE, _OF_NEIGHBOURS, _SMALLEST = 200, 1e-6, 1e-4, 1e-16
 # Numbers of positions and of nodes in C, see `contact`.
 _OF_POSITIONS = {"motion": 6, "forces": 4, "late": 4, "walled": 10}
 _TRANSFERS = {"compliance": 4, "right": 6, "left": 6}
@@ -156,7 +154,7 @@ class NodalContact(Pointers):
         contact.nodes, contact.reach, contact.at_end = n, reach, at_end
         contact.most, contact.share, contact.smallest = _MOST, _SHARE if n <= _FEW else _OF_NEIGHBOURS, _SMALLEST
         contact.worse, contact.least, contact.rounding = _WORSE, _MISSED, _ROUNDING
-        contact.exact, contact.covers, contact.rows = n <= _FEW, nodes.covers, self.integers(nodes.rows)
+        contact.exact, contact.rows = n <= _FEW, self.integers(nodes.rows)
         contact.lanes, contact.positions = lanes, positions
         of_unknowns = {name: np.zeros(problem.numbering.size) for name in ("load", "response")}
         for name, array in self._transfers.items():
