@@ -390,7 +390,7 @@ void begin_contact(contact *c, const int *slots, int count, const double *away, 
 void unit_forces(const contact *c, int first, int apart, int component, double *forces);
 void keep_responses(contact *c, int first, int apart, int component, const double *q, const double *changes);
 int find_transfers(contact *c, int apart);
-void find_motion(contact *c, const double *now);
+void find_motion(int nodes, int width, const double *before, const double *now, double *moved);
 void aim(contact *c);
 int settle(contact *c);
 int broken(const contact *c);

@@ -219,17 +219,15 @@ int find_transfers(contact *c, int apart)
     return 0;
 }
 
-/* The motion of all nodes in the step from `before` to unknowns `now`: displacements and rotations, by the mean
-   rotation; with them the work of a force and a moment in a step is exact. */
-void find_motion(contact *c, const double *now)
+/* The motion of nodes from unknowns `before` to `now` (nodes, 7): displacements and, at the end of each of these
+   (nodes, width), rotations, by the mean rotation; with them the work of a force and a moment in a step is exact. */
+void find_motion(int nodes, int width, const double *before, const double *now, double *moved)
 {
-    const double *before = c->before;
-    double *moved = c->moved;
-    for (int i = 0; i < c->nodes; i++, before += 7, now += 7, moved += 6) {
+    for (int i = 0; i < nodes; i++, before += 7, now += 7, moved += width) {
         double q[4], d[4];
-        for (int k = 0; k < 3; k++) moved[k] = now[k] - before[k];
+        for (int k = 0; k < width - 3; k++) moved[k] = k < 3 ? now[k] - before[k] : 0;
         for (int k = 0; k < 4; k++) q[k] = (before[3 + k] + now[3 + k]) / 2, d[k] = now[3 + k] - before[3 + k];
-        rotation_by(q, d, moved + 3);
+        rotation_by(q, d, moved + width - 3);
     }
 }
 

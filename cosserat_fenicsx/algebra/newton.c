@@ -176,7 +176,7 @@ static int move_nodes(problem *p, const double *x, const double *change)
     contact *c = p->contact;
     if (at_nodes(p, x, change, c->now)) return FAILED;
     for (int i = 0; i < 7 * c->nodes; i++) c->now[i] += c->fixed[i];
-    find_motion(c, c->now);
+    find_motion(c->nodes, 6, c->before, c->now, c->moved);
     return 0;
 }
 
@@ -250,8 +250,7 @@ static void respond_nearby(contact *c, double *change)
 }
 
 /* Find the forces with which the laws of contact hold after Newton's step, which is subtracted from x, and add the
-   response to their change: the exact one to the first change in a step, which is the largest and judges the compliance.
-   */
+   response to their change: the exact one to the first change in a step, which judges the compliance. */
 static int meet(problem *p, const double *x, double *change, int first)
 {
     contact *c = p->contact;

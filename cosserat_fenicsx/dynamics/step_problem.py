@@ -334,7 +334,7 @@ class StepProblem(Equations):
         ranks; data of the actions in the law are then those at the end of the step."""
         model, load_factor, done = self.model, self.load_factor, 0.0
         if self._live or self._loads.norm() > 0:
-            self.numbering.from_local(model.passed(), self._vector)
+            self.numbering.from_local(self._passed(), self._vector)
             done = self._loads.dot(self._vector)
         if self._live:
             self._refresh(0.5)
@@ -344,6 +344,15 @@ class StepProblem(Equations):
             done += model.comm.allreduce(self.ties.work(load_factor))
         done += self._of_law + self._work_of_law(self._middle, self._until)
         return done - sum(part.books()[0] for part in self.touching)
+
+    def _passed(self):
+        """(local degrees of freedom,) the step from `start` to the state in the components of the test functions, so
+        that its product with a load vector is work: displacements, and small rotations."""
+        found = self._state - self._start
+        if self.numbering.block == 7:
+            arrays = (self._ffi.from_buffer("double[]", array) for array in (self._start, self._state, found))
+            self._lib.find_motion(len(found) // 7, 7, *arrays)
+        return found
 
     def multipliers_at(self, t):
         """`multipliers`, then the tensions of tendons of given length at the state, of the time t (s)."""

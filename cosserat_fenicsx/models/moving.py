@@ -316,11 +316,6 @@ class Moving(Damped):
         """(elements, p + 1, inertia_size) from Jrho about d_1, d_2, d_3 (.., 3) and the frames at rest (.., 3, 3)."""
         raise NotImplementedError
 
-    def passed(self):
-        """(local degrees of freedom,) the step from `start` to `state` in the components of the test functions, so that
-        its product with a load vector is work: displacements, and small rotations."""
-        raise NotImplementedError
-
     def set_velocity(self, linear, angular):
         """Set velocities and angular velocities (N, 3) of all nodes, dimensionless, inertial, scene's order."""
         raise NotImplementedError
@@ -386,6 +381,9 @@ class Moving(Damped):
         return both[:3], both[3:]
 
 
+_OF_Q = np.repeat([0.0, 1.0], [3, 4])
+
+
 class MovingSpatial(Moving, SpatialModel):
     """The spatial model with inertia."""
 
@@ -394,17 +392,10 @@ class MovingSpatial(Moving, SpatialModel):
     def _section_inertia(self, J, frames):
         return six_of(np.einsum("...ij,...j,...kj->...ik", frames, J, frames))
 
-    def passed(self):
-        now, before = (array.reshape(-1, 7) for array in self._arrays[:2])  # node by node
-        work = now - before
-        work[:, 4:] = turned_by(work[:, 3:], (now[:, 3:] + before[:, 3:]) / 2)
-        work[:, 3] = 0.0
-        return work.ravel()
-
     def turned_over(self):
         """See `Moving`; a q of the other sign also satisfies |q| = 1."""
-        products = self._arrays[0] * self._arrays[1]  # node by node
-        here = bool((sum(products[3 + k :: 7] for k in range(4)) <= 0).any())
+        products = (self._arrays[0] * self._arrays[1]).reshape(-1, 7) @ _OF_Q  # node by node
+        here = bool((products <= 0).any())
         return self.comm.allreduce(here, op=MPI.LOR) if self.comm.size > 1 else here
 
     def set_velocity(self, linear, angular):
@@ -464,10 +455,6 @@ class MovingPlanar(Moving, PlanarModel):
     def _section_inertia(self, J, frames):
         along = np.einsum("...ik,i->...k", frames, self.axes[2])
         return np.einsum("...k,...k->...", along**2, J)[..., None]
-
-    def passed(self):
-        now, before, _ = self._arrays
-        return now - before
 
     def set_velocity(self, linear, angular):
         e1, e2, normal = self.axes

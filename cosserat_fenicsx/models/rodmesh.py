@@ -351,7 +351,11 @@ class Numbering:
         self.free = np.flatnonzero(self.rows >= 0)
         self.of_free = self.rows[self.free]
         mine = (self.of_free >= self.first) & (self.of_free < self.first + self.size)
-        self._mine, self._of_mine = self.free[mine], self.of_free[mine] - self.first
+        #: of this rank's unknowns, those of constraint equations left out, a local degree of freedom of each
+        self._from = np.zeros(
+            self.size if self.first + self.size < self.total else self.first_multiplier - self.first, int
+        )
+        self._from[self.of_free[mine] - self.first] = self.free[mine]
         self._serial = self.comm.size == 1
         self._shared = shared
         if not self._serial:
@@ -376,9 +380,9 @@ class Numbering:
 
     def from_local(self, numbers, x):
         """Copy local degrees of freedom to a solver's vector; multipliers become zero."""
-        array = x.array_w
-        array[:] = 0.0
-        array[self._of_mine] = numbers[self._mine]
+        array, count = x.array_w, len(self._from)
+        np.take(numbers, self._from, out=array[:count], mode="clip")
+        array[count:] = 0.0
 
     def add_up(self, numbers, b):
         """Sum local contributions, of all ranks and joined nodes, into a solver's vector."""
