@@ -45,9 +45,9 @@ def exponents(scene, stations, duration, dt, count, *, after=0.0, every=1, **set
         stations: that are watched, `every` so many steps from the time `after` on, s. count: of exponents.
         settings: of `simulate`.
     """
-    history = cf.simulate(scene, duration, dt=dt, **settings)
-    first = round(after / dt)
-    samples = np.array([history.displacement(station)[first::every, 1] for station in stations])
+    history = cf.simulate(scene, duration, dt=dt, save_every=every * dt, **settings)
+    first = round(after / (every * dt))
+    samples = np.array([history.displacement(station)[first:, 1] for station in stations])
     rows = samples.shape[1] // 2
     window = np.lib.stride_tricks.sliding_window_view
     hankel = np.concatenate([window(channel, samples.shape[1] - rows + 1) for channel in samples], axis=1)

@@ -484,4 +484,10 @@ def box_up_to(steady, top):
     # damping of Kelvin and Voigt has all but a few modes decay by its own rate
     slowest = max((x.damping for x in steady.guide.parts if x.length), default=0.0)
     left = max(-_DECAY / steady.guide.travel, -_OWN_RATE / slowest if slowest else -math.inf)
-    return lambda f: Box(left, f.fastest, 0.0, top)
+
+    def box(f):
+        # one of few, so that contours are those of other cases
+        right, step = f.fastest, f.spacing / 2
+        return Box(left, step * 1.4 ** math.ceil(math.log(right / step, 1.4)), 0.0, top)
+
+    return box

@@ -12,7 +12,9 @@ which are entire functions of s, but for s = -1/tau. States are scaled by positi
 such that nothing overflows however large s L is.
 """
 
+import math
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import groupby
 from operator import itemgetter
 
@@ -25,6 +27,8 @@ from cosserat_fenicsx.drilling.top_drive import Hook
 
 #: |g L|^2 below which sinh(g L)/g and its derivative are computed by series, truncated at 1e-16.
 _SMALL = 1e-2
+#: Points on one side of a contour at which a `Guide` keeps what it found, and how many such sides.
+_LONG, _KEPT = 40, 64
 
 
 @dataclass(frozen=True)
@@ -223,6 +227,11 @@ class Guide:
     top_inertia: float = 0.0
     fed: float = 0.0
 
+    @cached_property
+    def _ends(self):
+        """The states of `bottom` at some s, by their bytes."""
+        return {}
+
     @property
     def travel(self):
         """Time of a wave from the top to the bit, s."""
@@ -258,7 +267,13 @@ class Guide:
 
     def bit(self, s):
         """w at the bit, the action on it B = (Z + J s) w, and their derivatives: (w, B, dw, dB)."""
-        end = self.bottom(s)
+        # every case of a map walks along the same contour
+        if len(s) < _LONG:
+            end = self.bottom(s)
+        elif (end := self._ends.get(key := s.tobytes())) is None:
+            if len(self._ends) == _KEPT:
+                self._ends.clear()
+            end = self._ends[key] = self.bottom(s)
         return end.w, self.inertia * s * end.w - end.P, end.dw, self.inertia * (s * end.dw + end.w) - end.dP
 
     def impedance_at_bit(self, s):
@@ -266,7 +281,7 @@ class Guide:
         end = self.bottom(np.asarray(s, dtype=complex))
         return -end.P / end.w
 
-    @property
+    @cached_property
     def drive(self):
         """The largest rate at which drive or friction that falls with the slip feeds motions, 1/s; 0 for none."""
         return max(self.fed, *(-part.drag for part in self.parts if part.length), 0.0)
@@ -283,15 +298,21 @@ class Guide:
         if isinstance(self.parts[-1], Parted):
             y, c = replace(self, parts=self.parts[:-1]).least(x), self.parts[-1].damping
             return c * y / (c + y)
-        lowest, travel, drag = self.parts[-1], 0.0, 0.0
+        impedance, travel, drag = self._lowest
+        fed, lost = x - self.drive, x + drag / 2
+        theta = math.sqrt(fed / lost) * math.tanh(2 * travel * math.sqrt(fed * lost))
+        return impedance * theta / (1 + math.sqrt(max(1 - theta**2, 0.0)))
+
+    @cached_property
+    def _lowest(self):
+        """Impedance, travel time and largest drag of the uniform part at the lower end, see `least`."""
+        lowest, travel, drag = self.impedance, 0.0, 0.0
         for part in reversed(self.parts):
-            if not part.length or not np.isclose(part.impedance, lowest.impedance, rtol=1e-9):
+            if not part.length or not math.isclose(part.impedance, lowest, rel_tol=1e-9):
                 break
             travel, drag = travel + part.travel, max(drag, part.drag)
-        travel -= self.fed > 0 and self.parts[0].travel / 2  # spent on what the drive feeds
-        fed, lost = x - self.drive, x + drag / 2
-        theta = np.sqrt(fed / lost) * np.tanh(2 * travel * np.sqrt(fed * lost))
-        return float(lowest.impedance * theta / (1 + np.sqrt(max(1 - theta**2, 0.0))))
+        # less what is spent on what the drive feeds
+        return lowest, float(travel - (self.fed > 0 and self.parts[0].travel / 2)), drag
 
 
 def _held(s):
@@ -308,12 +329,13 @@ def _drive_top(drive, impedance):
     check_late(drive.control, gains.linear, impedance, impedance is None)
     if gains.rigid:
         return _held
-    rest, *answers = map(np.poly1d, polynomials_of(gains))
+    given = [np.atleast_1d(p) for p in polynomials_of(gains)]
+    slopes = [np.polyder(p) for p in given]
 
     def top(s):
-        hold, q, dq = np.exp(-late * s), rest(s), rest.deriv()(s)
-        e, M = (p(s) * hold for p in answers)
-        de, dM = ((p.deriv()(s) - late * p(s)) * hold for p in answers)
+        hold = np.exp(-late * s) if late else 1.0
+        (q, e, M), (dq, de, dM) = ([np.polyval(p, s) for p in of] for of in (given, slopes))
+        e, M, de, dM = e * hold, M * hold, (de - late * e) * hold, (dM - late * M) * hold
         if gains.linear and gains.linear.of_speed:
             return M, q + e, dM, dq + de
         return q - M, -(inertia * s * q + e), dq - dM, -(inertia * (q + s * dq) + de)
