@@ -480,7 +480,9 @@ class CuttingEnd(EndCondition):
         if turning <= 0:
             cut = max(weight - self._flats, 0.0) / law.axial_stiffness
         self.rock = RockSurface(law.blades, float(place[1]), float(place[0]), slope, cut)
-        self._before = np.array(motion, dtype=float)  # velocities at the start of the last step
+        # Mean velocities of the last step and of the one before. Velocities at the ends of steps alternate where a
+        # short lowest element vibrates faster than steps resolve, and so would the rock, and the depth of cut.
+        self._mean = self._before = np.array(motion, dtype=float)
         self._bears = (
             self._flats if rate > 0 else min(weight, self._flats)
         )  # force of the wear flats during the last step
@@ -492,9 +494,8 @@ class CuttingEnd(EndCondition):
         return self.law.axial_stiffness * cut + flats, self.law.torsional_stiffness * cut + self._rubbing * flats
 
     def begin(self, model, h: float) -> EndForce:
-        self._at, velocity = model.bit_state()
-        w = velocity + (velocity - self._before) / 2
-        self._before = velocity
+        self._at, _ = model.bit_state()
+        w = 2 * self._mean - self._before
         rock, _ = self.rock.under(self._at[1] + h / 2 * w[1])
         self._gap = self._at[0] - rock
         cut = self._gap + h / 2 * w[0]
@@ -507,8 +508,10 @@ class CuttingEnd(EndCondition):
         return EndForce(force, tangent, torque, self._flats / 2)
 
     def commit(self, model, h: float) -> None:
-        (u, angle), (v, turning) = model.bit_state()
+        (u, angle), _ = model.bit_state()
         moved, turned = u - self._at[0], angle - self._at[1]
+        self._before, self._mean = self._mean, np.array([moved, turned]) / h
+        v, turning = (3 * self._mean - self._before) / 2  # at the end of the step
         borne = model.weight_on_bit - self.law.axial_stiffness * max(self._gap + moved / 2, 0.0)
         self._bears = min(max(borne, 0.0), self._flats)
         if turned > 0:
@@ -517,11 +520,11 @@ class CuttingEnd(EndCondition):
             self.rock.pass_over(float(angle), float(u), float(slope))
 
     def memory(self) -> dict:
-        return {"rock": self.rock.memory(), "before": self._before.copy(), "bears": self._bears}
+        return {"rock": self.rock.memory(), "means": np.array([self._mean, self._before]), "bears": self._bears}
 
     def recall(self, memory: dict) -> None:
         self.rock.recall(memory["rock"])
-        self._before, self._bears = memory["before"].copy(), float(memory["bears"])
+        (self._mean, self._before), self._bears = memory["means"].copy(), float(memory["bears"])
 
 
 class LobedEnd(EndCondition):

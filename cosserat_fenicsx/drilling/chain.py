@@ -239,8 +239,9 @@ def _cuts(scene):
 
 def time_of_impact(scene) -> float:
     """Time (s) in which the rock of a `Drilling` stops the bit, or a bit that cuts answers: Z/k by the impedance Z
-    (N s/m) of the lowest section, or sqrt(m/k) by the mass m (kg) of the bit, the longer one; infinite without rock of
-    a stiffness k (N/m), or weight on bit per depth of cut."""
+    (N s/m) of the lowest section, above a bit that cuts also of what is above shorter ones than elements may be, or
+    sqrt(m/k) by the mass m (kg) of the bit, the longer one; infinite without rock of a stiffness k (N/m), or weight on
+    bit per depth of cut."""
     bit = scene.bit
     k = math.inf if bit is None else bit.law.axial_stiffness if _cuts(scene) else bit.rock_stiffness
     if math.isinf(k):
@@ -248,19 +249,30 @@ def time_of_impact(scene) -> float:
     if scene.discs:
         mass, impedance = bit.mass + (scene.discs.masses or (math.inf,))[-1], 0.0
     else:
-        mass, impedance = bit.mass, scene.segments[-1].axial_impedance
+        mass, impedance, passed = bit.mass, math.inf, 0.0
+        for part in reversed(scene.segments if _cuts(scene) else scene.segments[-1:]):
+            if passed > _SET.fed * impedance / k:
+                break
+            impedance, passed = min(impedance, part.axial_impedance), passed + part.length / part.axial_speed
     return max(math.sqrt(mass / k), impedance / k)
 
 
-def passing_time(scene, depths) -> float:
-    """Time (s) that an axial wave takes along the lowest element of a string whose nodes have these depths (m)."""
-    return 0.0 if scene.discs else float(depths[-1] - depths[-2]) / scene.segments[-1].axial_speed
+def passing_time(scene, depths, within: float = 0.0) -> float:
+    """Longest time (s) that an axial wave takes along an element of a string whose nodes have these depths (m), of
+    those that it meets within a time (s) from the bit: by default along the lowest one."""
+    if scene.discs:
+        return 0.0
+    ends = np.cumsum([x.length for x in scene.segments])
+    of = np.minimum(np.searchsorted(ends, (depths[:-1] + depths[1:]) / 2), len(ends) - 1)
+    times = (np.diff(depths) / np.array([x.axial_speed for x in scene.segments])[of])[::-1]
+    return float(times[np.cumsum(times) - times <= within].max())
 
 
 def unresolved(scene, depths, dt) -> str:
     """A sentence where the steps (s) or the elements are too long for impacts, or for a bit that cuts, or ""."""
-    impact, passing, cuts = time_of_impact(scene), passing_time(scene, depths), _cuts(scene)
+    impact, cuts = time_of_impact(scene), _cuts(scene)
     longest, slowest = _SET.resolved * impact, (_SET.fed if cuts else _SET.resolved) * impact
+    passing = passing_time(scene, depths, slowest if cuts else 0.0)
     if dt <= longest and passing <= slowest:
         return ""
     most = slowest * scene.segments[-1].axial_speed if passing > slowest else 0.0
