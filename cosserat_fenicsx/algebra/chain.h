@@ -128,7 +128,7 @@ typedef struct {
     double *motion, *forces, *late; /* (positions, 6, LANES) motions; (positions, 4, LANES) forces of these kinds, and
                                        of their changes what later sweeps take along */
     double *passing;                /* (2, 6 + 4 inside, LANES) from lane to lane, to the right and to the left */
-    double *walled;                 /* (positions, 10, LANES) work space, see contact.c */
+    double *walled, *axes;          /* (positions, 11, LANES), (positions, 10, LANES) work space, see wall_law.c */
     double *moved;                  /* (nodes, 6) displacement and rotation in the step with the forces */
     double *force, *law;            /* (nodes, 6) force and moment; (nodes, 3) normal force, friction round and along */
     double *multiplier;             /* (nodes,) of friction at its bound, the last ones */
@@ -387,6 +387,7 @@ int judge_residual(newton *n, const double *b, const double *change);
 int iterate(stepping *s);
 
 void begin_contact(contact *c, const int *slots, int count, const double *away, const double *tangent);
+void pack_contact(contact *c);
 void unit_forces(const contact *c, int first, int apart, int component, double *forces);
 void keep_responses(contact *c, int first, int apart, int component, const double *q, const double *changes);
 int find_transfers(contact *c, int apart);

@@ -46,6 +46,30 @@ void begin_contact(contact *c, const int *slots, int count, const double *away, 
     }
 }
 
+/* Take what stays in a step to where nodes are solved together. */
+void pack_contact(contact *c)
+{
+    for (int i = 0; i < c->positions; i++) {
+        walled w = {0};
+        axes a = {0};
+        for (int lane = 0, j; lane < c->lanes && (j = node_of(c, i, lane)) >= 0; lane++) {
+            const double *t = c->tangent + 3 * j, *u = c->across + 3 * j;
+            double v[3];
+            cross3(t, u, v);
+            for (int k = 0; k < 3; k++) {
+                a.t[k][lane] = t[k], a.u[k][lane] = u[k], a.v[k][lane] = v[k];
+                w.law[k][lane] = c->law[3 * j + k];
+            }
+            a.arm[lane] = c->arm[j], w.start[0][lane] = c->start[2 * j], w.start[1][lane] = c->start[2 * j + 1];
+            w.clearance[lane] = c->clearance[j], w.stiffness[lane] = c->stiffness[j];
+            w.friction[lane] = c->friction[j], w.damping[lane] = c->damping[j];
+            w.multiplier[lane] = c->multiplier[j], w.inner[lane] = c->inner[j];
+        }
+        memcpy(c->walled + (size_t)LANES * WALLED * i, &w, sizeof w);
+        memcpy(c->axes + (size_t)LANES * AXES * i, &a, sizeof a);
+    }
+}
+
 /* The rotation for a change d of the quaternion q. */
 static void rotation_by(const double *q, const double *d, double *turned)
 {
@@ -236,8 +260,7 @@ void slips(const contact *c, double *size)
 {
     for (int i = 0; i < c->positions; i++) {
         vector motion[4];
-        const walled w = walled_at(c, i);
-        const place p = motion_of(c, i, &w, motion);
+        const place p = motion_of(c, i, motion);
         const vector slip = slip_round(&p, motion);
         for (int lane = 0, j; lane < c->lanes && (j = node_of(c, i, lane)) >= 0; lane++)
             size[j] = hypot(slip[lane], motion[2][lane]);
@@ -262,11 +285,10 @@ static inline void foretell_turning(vector W[4][4], const place *p, vector N, ve
    the change of their motion by the change of their own. */
 static vector settle_nodes(contact *c, int i, const vector *motion, vector *change)
 {
-    double *w = c->walled + (size_t)LANES * WALLED * i, *forces = c->forces + LANES * 4 * i;
-    walled here;
+    double *forces = c->forces + LANES * 4 * i;
+    walled here = walled_at(c, i);
     const vector none = {0};
     vector W[4][4], by[3][4], slip[4], moving[4], T[2] = {none, none}, size = none;
-    memcpy(&here, w, sizeof here);
     const place p = place_of(c, here.start, motion);
     const mask idle = (p.R0 <= here.clearance) & (p.R <= here.clearance) & (here.law[0] == 0) & (here.law[1] == 0)
                       & (here.law[2] == 0);
@@ -292,7 +314,7 @@ static vector settle_nodes(contact *c, int i, const vector *motion, vector *chan
         change[k] = only(~idle, N * inward[k] + T[0] * round[k] + T[1] * along[k] - load(forces + LANES * k));
     foretell_turning(W, &p, here.law[0], change);
     for (int k = 0; k < 4; k++) keep(load(forces + LANES * k) + change[k], forces + LANES * k);
-    memcpy(w, &here, sizeof here);
+    memcpy(c->walled + (size_t)LANES * WALLED * i, &here, sizeof here);
     respond(W, change, moving);
     for (int k = 0; k < 4; k++) size = greater(size, absolute(moving[k]));
     return size;
@@ -338,9 +360,7 @@ static double sweep_nodes(contact *c, int back, int solved)
             const vector known = change[k];
             change[k] += load(late + LANES * k), keep(known, late + LANES * k);
         }
-        vector within = none;
-        for (int lane = 0, j; lane < c->lanes && (j = node_of(c, i, lane)) >= 0; lane++) within[lane] = c->inner[j];
-        const mask inner = within != 0;
+        const mask inner = walled_at(c, i).inner != 0;
         for (int k = 4 * inside; k-- > 0;) recent[k] = only(inner, k < 4 ? change[k] : recent[k - 4]);
         if (any_of(change, 4)) add_by(own, 4, change, passed);
         for (int k = 0; k < MOTIONS; k++) d[k] = choose(inner, d[k], passed[k]);
@@ -354,17 +374,11 @@ static double sweep_nodes(contact *c, int back, int solved)
 static void take_axes(contact *c)
 {
     for (int i = 0; i < c->positions; i++) {
+        const axes a = axes_at(c, i);
         const walled w = walled_at(c, i);
-        vector motion[MOTIONS] = {0}, forces[4] = {0}; /* of rotations about u and v only the change is asked for */
-        motion_of(c, i, &w, motion);
-        forces[2] = w.law[2], forces[3] = w.law[1];
-        for (int lane = 0, j; lane < c->lanes && (j = node_of(c, i, lane)) >= 0; lane++) {
-            const double *u = c->across + 3 * j, *force = c->force + 6 * j;
-            double v[3];
-            cross3(c->tangent + 3 * j, u, v);
-            forces[0][lane] = dot3(u, force), forces[1][lane] = dot3(v, force);
-        }
-        memcpy(c->walled + (size_t)LANES * WALLED * i, &w, sizeof w);
+        vector motion[MOTIONS] = {0}, force[3]; /* of rotations about u and v only the change is asked for */
+        motion_of(c, i, motion), gather(c, c->force, 6, i, 0, force);
+        const vector forces[4] = {dot3v(a.u, force), dot3v(a.v, force), w.law[2], w.law[1]};
         memcpy(c->motion + LANES * MOTIONS * i, motion, sizeof motion);
         memcpy(c->forces + LANES * 4 * i, forces, sizeof forces);
     }
@@ -373,20 +387,19 @@ static void take_axes(contact *c)
 }
 
 /* The forces and moments of the nodes at position i by their law, where they are. */
-static void put_forces(contact *c, int i, const walled *w, const place *p)
+static void put_forces(contact *c, int i, const place *p)
 {
-    const vector inward = -w->law[0] * p->share;
-    const vector in_u = inward * p->e[0] - w->law[1] * p->e[1], in_v = inward * p->e[1] + w->law[1] * p->e[0];
-    for (int lane = 0, j; lane < c->lanes && (j = node_of(c, i, lane)) >= 0; lane++) {
-        const double *t = c->tangent + 3 * j, *u = c->across + 3 * j, arm = c->arm[j];
-        const double round = w->law[1][lane], along = w->law[2][lane];
-        double *force = c->force + 6 * j, v[3];
-        cross3(t, u, v);
-        for (int k = 0; k < 3; k++) {
-            force[k] = in_u[lane] * u[k] + in_v[lane] * v[k] + along * t[k] + 0.0; /* never -0 */
-            force[3 + k] = arm * (round * t[k] + along * (p->e[1][lane] * u[k] - p->e[0][lane] * v[k])) + 0.0;
-        }
+    const axes a = axes_at(c, i);
+    const walled w = walled_at(c, i);
+    const vector *law = w.law, inward = -law[0] * p->share;
+    const vector in_u = inward * p->e[0] - law[1] * p->e[1], in_v = inward * p->e[1] + law[1] * p->e[0];
+    vector force[6];
+    for (int k = 0; k < 3; k++) {
+        force[k] = in_u * a.u[k] + in_v * a.v[k] + law[2] * a.t[k] + 0.0; /* never -0 */
+        force[3 + k] = a.arm * (law[1] * a.t[k] + law[2] * (p->e[1] * a.u[k] - p->e[0] * a.v[k])) + 0.0;
     }
+    for (int lane = 0, j; lane < c->lanes && (j = node_of(c, i, lane)) >= 0; lane++)
+        for (int k = 0; k < 6; k++) c->force[6 * j + k] = force[k][lane];
 }
 
 /* Turn the last forces of all nodes to where the given motion takes these. */
@@ -394,9 +407,8 @@ void aim(contact *c)
 {
     for (int i = 0; i < c->positions; i++) {
         vector motion[4];
-        const walled w = walled_at(c, i);
-        const place p = motion_of(c, i, &w, motion);
-        put_forces(c, i, &w, &p);
+        const place p = motion_of(c, i, motion);
+        put_forces(c, i, &p);
     }
 }
 
@@ -404,29 +416,24 @@ void aim(contact *c)
 static void leave_axes(contact *c)
 {
     for (int i = 0; i < c->positions; i++) {
-        walled w;
-        vector change[4], motion[4], turned[2];
-        memcpy(&w, c->walled + (size_t)LANES * WALLED * i, sizeof w);
-        const place before = motion_of(c, i, &w, change);
-        for (int k = 0; k < 4; k++) {
-            motion[k] = load(c->motion + LANES * (MOTIONS * i + k));
-            change[k] = motion[k] - change[k];
-        }
-        for (int k = 0; k < 2; k++) turned[k] = load(c->motion + LANES * (MOTIONS * i + 4 + k));
-        const place p = place_of(c, w.start, motion);
+        const walled w = walled_at(c, i);
+        const axes a = axes_at(c, i);
+        vector change[4], motion[MOTIONS], more[6];
+        const place before = motion_of(c, i, change);
+        memcpy(motion, c->motion + LANES * MOTIONS * i, sizeof motion);
+        for (int k = 0; k < 4; k++) change[k] = motion[k] - change[k];
+        const vector *turned = motion + 4, spin = change[3] / choose(a.arm > 0, a.arm, LEAST_LEVER + 0 * a.arm);
         const vector tilt = before.e[0] * turned[1] - before.e[1] * turned[0];
-        put_forces(c, i, &w, &p);
+        const vector slid = change[2] + a.arm * tilt; /* of the displacement alone */
+        for (int k = 0; k < 3; k++) {
+            more[k] = change[0] * a.u[k] + change[1] * a.v[k] + slid * a.t[k];
+            more[3 + k] = turned[0] * a.u[k] + turned[1] * a.v[k] + spin * a.t[k];
+        }
+        const place p = place_of(c, w.start, motion);
+        put_forces(c, i, &p);
         for (int lane = 0, j; lane < c->lanes && (j = node_of(c, i, lane)) >= 0; lane++) {
-            const double *t = c->tangent + 3 * j, *u = c->across + 3 * j, arm = c->arm[j];
-            const double spin = change[3][lane] / (arm > 0 ? arm : LEAST_LEVER);
-            const double slid = change[2][lane] + arm * tilt[lane]; /* of the displacement alone */
-            double *moved = c->moved + 6 * j, v[3];
-            cross3(t, u, v);
-            for (int k = 0; k < 3; k++) {
-                moved[k] += change[0][lane] * u[k] + change[1][lane] * v[k] + slid * t[k];
-                moved[3 + k] += turned[0][lane] * u[k] + turned[1][lane] * v[k] + spin * t[k];
-                c->law[3 * j + k] = w.law[k][lane];
-            }
+            for (int k = 0; k < 6; k++) c->moved[6 * j + k] += more[k][lane];
+            for (int k = 0; k < 3; k++) c->law[3 * j + k] = w.law[k][lane];
             c->multiplier[j] = w.multiplier[lane];
         }
     }
@@ -454,7 +461,7 @@ int broken(const contact *c)
     for (int i = 0; i < c->positions; i++) {
         vector slope, motion[4];
         const walled w = walled_at(c, i);
-        const place p = motion_of(c, i, &w, motion);
+        const place p = motion_of(c, i, motion);
         const vector off = absolute(normal_force(c, &w, p.R0, p.R, &slope) - w.law[0]);
         if (any(~(off <= 1e-6 * w.law[0] + 1e-10 * w.stiffness))) return 1;
         const vector turned = p.x[0] * w.start[0] + p.x[1] * w.start[1];
@@ -478,7 +485,7 @@ double gained(const contact *c)
     for (int i = 0; i < c->positions; i++) {
         vector motion[4];
         const walled w = walled_at(c, i);
-        const place p = motion_of(c, i, &w, motion);
+        const place p = motion_of(c, i, motion);
         const vector deep = greater(p.R - w.clearance, none), before = greater(p.R0 - w.clearance, none);
         end += w.stiffness * deep * deep / 2, start += w.stiffness * before * before / 2;
     }
@@ -493,11 +500,10 @@ double lost(const contact *c, const double *before)
     vector sum = {0};
     const vector none = {0};
     for (int i = 0; i < c->positions; i++) {
-        vector motion[4], start[3] = {0};
+        vector motion[4], start[3];
         const walled w = walled_at(c, i);
-        const place p = motion_of(c, i, &w, motion);
-        for (int lane = 0, j; lane < c->lanes && (j = node_of(c, i, lane)) >= 0; lane++)
-            for (int k = 0; k < 3; k++) start[k][lane] = before[3 * j + k];
+        const place p = motion_of(c, i, motion);
+        gather(c, before, 3, i, 0, start);
         const vector k = w.stiffness, p0 = greater(p.R0 - w.clearance, none);
         const vector at_end = w.law[0] - k * greater(p.R - w.clearance, none);
         const vector damping = at_end + choose((p0 > 0) & (start[0] == 0), at_end, start[0] - k * p0);

@@ -3,6 +3,7 @@
 #include "chain.h"
 
 #include <math.h>
+#include <string.h>
 
 enum { MOST_LOCAL = 60 };
 
@@ -63,11 +64,32 @@ static inline vector absolute(vector a)
 }
 
 /* The law of a wall for nodes: from the tube's axis to the rod at the start, by u and v; sizes; the last forces
-   (normal, friction round and along) and multiplier. */
+   (normal, friction round and along) and multiplier; whether they are inside an element. Zero in lanes without a
+   node. */
 typedef struct {
-    vector start[2], clearance, stiffness, friction, damping, law[3], multiplier;
+    vector start[2], clearance, stiffness, friction, damping, law[3], multiplier, inner;
 } walled;
-enum { WALLED = sizeof(walled) / sizeof(vector) };
+
+/* Axes of nodes along and across their tubes, and their arms. */
+typedef struct {
+    vector t[3], u[3], v[3], arm;
+} axes;
+
+enum { WALLED = sizeof(walled) / sizeof(vector), AXES = sizeof(axes) / sizeof(vector) };
+
+static inline walled walled_at(const contact *c, int i)
+{
+    walled w;
+    memcpy(&w, c->walled + (size_t)LANES * WALLED * i, sizeof w);
+    return w;
+}
+
+static inline axes axes_at(const contact *c, int i)
+{
+    axes a;
+    memcpy(&a, c->axes + (size_t)LANES * AXES * i, sizeof a);
+    return a;
+}
 
 /* Node of a lane at a position, or -1. */
 static inline int node_of(const contact *c, int i, int lane)
@@ -76,16 +98,22 @@ static inline int node_of(const contact *c, int i, int lane)
     return lane < c->lanes && node < c->nodes ? node : -1;
 }
 
-static walled walled_at(const contact *c, int i)
+/* Three numbers, from the k-th on, of the nodes at position i of an array (nodes, width); of others in lanes without a
+   node. */
+static inline void gather(const contact *c, const double *of, int width, int i, int k, vector *to)
 {
-    walled w = {0};
-    for (int lane = 0, j; lane < c->lanes && (j = node_of(c, i, lane)) >= 0; lane++) {
-        for (int k = 0; k < 2; k++) w.start[k][lane] = c->start[2 * j + k];
-        w.clearance[lane] = c->clearance[j], w.stiffness[lane] = c->stiffness[j];
-        w.friction[lane] = c->friction[j], w.damping[lane] = c->damping[j], w.multiplier[lane] = c->multiplier[j];
-        for (int k = 0; k < 3; k++) w.law[k][lane] = c->law[3 * j + k];
+    int at[LANES];
+    for (int lane = 0; lane < LANES; lane++) {
+        const int j = node_of(c, i, lane);
+        at[lane] = width * (j < 0 ? 0 : j) + k;
     }
-    return w;
+    for (int l = 0; l < 3; l++)
+        for (int lane = 0; lane < LANES; lane++) to[l][lane] = of[at[lane] + l];
+}
+
+static inline vector dot3v(const vector *a, const vector *b)
+{
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
 /* The normal force of a node, and its derivative by the distance R from the axis at the end of the step; R0: at its
@@ -197,20 +225,15 @@ static inline place place_of(const contact *c, const vector *x0, const vector *m
 
 /* Where the nodes at position i are after their motion `moved` (6,), and this motion (4,): along u and v, the slip
    along the tube, and what the rotation about the tube adds to the slip round it. */
-static place motion_of(const contact *c, int i, const walled *w, vector *motion)
+static inline place motion_of(const contact *c, int i, vector *motion)
 {
-    vector tilt[2] = {0};
-    for (int k = 0; k < 4; k++) motion[k] = tilt[0];
-    for (int lane = 0, j; lane < c->lanes && (j = node_of(c, i, lane)) >= 0; lane++) {
-        const double *t = c->tangent + 3 * j, *u = c->across + 3 * j, *moved = c->moved + 6 * j, arm = c->arm[j];
-        double v[3];
-        cross3(t, u, v);
-        motion[0][lane] = dot3(u, moved), motion[1][lane] = dot3(v, moved), motion[2][lane] = dot3(t, moved);
-        motion[3][lane] = arm * dot3(t, moved + 3);
-        tilt[0][lane] = arm * dot3(u, moved + 3), tilt[1][lane] = arm * dot3(v, moved + 3);
-    }
-    const place p = place_of(c, w->start, motion);
-    motion[2] += p.e[1] * tilt[0] - p.e[0] * tilt[1];
+    const axes a = axes_at(c, i);
+    const walled w = walled_at(c, i);
+    vector moved[3], turned[3];
+    gather(c, c->moved, 6, i, 0, moved), gather(c, c->moved, 6, i, 3, turned);
+    motion[0] = dot3v(a.u, moved), motion[1] = dot3v(a.v, moved), motion[3] = a.arm * dot3v(a.t, turned);
+    const place p = place_of(c, w.start, motion);
+    motion[2] = dot3v(a.t, moved) + a.arm * (p.e[1] * dot3v(a.u, turned) - p.e[0] * dot3v(a.v, turned));
     return p;
 }
 

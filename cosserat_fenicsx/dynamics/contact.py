@@ -101,7 +101,7 @@ _WORSE, _MISSED, _ROUNDING = 10.0, 1e-3, 1e-9
 # of many, which the next iteration corrects) and dimensionless.
 _MOST, _SHARE, _OF_NEIGHBOURS, _SMALLEST = 200, 1e-6, 1e-4, 1e-16
 # Numbers of positions and of nodes in C, see `contact`.
-_OF_POSITIONS = {"motion": 6, "forces": 4, "late": 4, "walled": 10}
+_OF_POSITIONS = {"motion": 6, "forces": 4, "late": 4, "walled": 11, "axes": 10}
 _TRANSFERS = {"compliance": 4, "right": 6, "left": 6}
 _INSIDE = "preceding", "following"  # by nodes inside an element
 _OF_NODES = "clearance", "stiffness", "friction", "damping", "arm", "multiplier"
@@ -186,8 +186,10 @@ class NodalContact(Pointers):
             numbers["clearance"][at], numbers["arm"][at] = tube.clearance / scales.length, tube.arm / scales.length
             numbers["friction"][at] = tube.friction
         self.c.h = h
+        self._lib.pack_contact(self.c)
         if self._weakens:
             self._weaken(h, now)
+            self._lib.pack_contact(self.c)
         if not abs(h - self.c.known_for) <= 1e-9 * h:
             self.c.stale = True
         self._begun[:], self._law_begun[:] = vectors["force"], vectors["law"]
