@@ -302,12 +302,16 @@ static inline void fetch(const double *from, const double *end)
     for (; from < end; from += 8) __builtin_prefetch(from);
 }
 
-/* z -= column * by from `first` to `end`, both multiples of BESIDE; returns the column that follows. */
-static inline const double *subtract_column(double *restrict z, const double *restrict column, double by, int first,
-                                            int end)
+/* z -= column * by, of `many` vectors z and numbers by, from `first` to `end`, both multiples of BESIDE; returns the
+   column that follows. */
+static inline const double *subtract_column(double *restrict z, const double *restrict column, const double *by,
+                                            int first, int end, const int many)
 {
+    double value[AT_ONCE];
+    for (int r = 0; r < many; r++) value[r] = by[r];
     for (int i = first; i < end; i += BESIDE, column += BESIDE)
-        for (int j = 0; j < BESIDE; j++) z[i + j] -= column[j] * by;
+        for (int j = 0; j < BESIDE; j++)
+            for (int r = 0; r < many; r++) z[many * (i + j) + r] -= column[j] * value[r];
     return column;
 }
 
@@ -361,10 +365,11 @@ void count(chain *s, kernel *k)
     }
 }
 
-/* Forward substitution of b (this rank's unknowns); what the interface gets is added to it. */
-void forward(chain *s, const double *b, double *interface)
+/* Forward substitution of b (this rank's unknowns, many); what the interface gets is added to it. found: (elements,
+   wide, many) for `backward_of`; carry, y: (room, many) work space. */
+static inline void forward_of(const chain *s, const double *b, double *interface, double *found, double *carry,
+                              double *y, const int many)
 {
-    double *carry = s->carry, *y = s->work;
     int d = 0, carried = 0;
     for (int t = 0; t < s->elements; t++) {
         const size_t at = (size_t)t * s->room;
@@ -372,45 +377,71 @@ void forward(chain *s, const double *b, double *interface)
         const int n = s->done[2 * t], k = s->done[2 * t + 1], m = d + shape[0] + shape[1];
         const int *start = s->start + t;
         const double *l = s->factor + (size_t)*start * BESIDE, *next = l + BESIDE * (start[1] - *start);
-        double *z = s->forward + (size_t)t * s->wide;
+        double *z = found + (size_t)t * s->wide * many;
         if (t + 1 < s->elements) fetch(next, next + s->wide * k);
-        for (int i = 0; i < n; i++) y[i] = i >= d && i < m ? b[rows[i - d]] : 0;
-        for (int i = 0; i < carried; i++) y[carried_to(i, d + shape[0], shape)] += carry[i];
-        for (int i = 0; i < n; i++) z[i] = y[row[i]];
-        for (int j = 0; j < k; j++) l = subtract_column(z, l, z[j], round_down(j + 1), round_up(n));
+        for (int i = 0; i < n; i++)
+            for (int r = 0; r < many; r++) y[many * i + r] = i >= d && i < m ? b[many * rows[i - d] + r] : 0;
+        for (int i = 0; i < carried; i++)
+            for (int r = 0; r < many; r++) y[many * carried_to(i, d + shape[0], shape) + r] += carry[many * i + r];
+        for (int i = 0; i < n; i++)
+            for (int r = 0; r < many; r++) z[many * i + r] = y[many * row[i] + r];
+        for (int j = 0; j < k; j++) l = subtract_column(z, l, z + many * j, round_down(j + 1), round_up(n), many);
         d = m - k, carried = n - k;
         if (s->ends[t] == -1) {
-            memcpy(carry, z + k, carried * sizeof *carry);
+            memcpy(carry, z + many * k, many * carried * sizeof *carry);
             continue;
         }
-        for (int i = k; i < n; i++) interface[i < k + d ? s->ends[t] + i - k : column[i] - s->size] += z[i];
+        for (int i = k; i < n; i++)
+            for (int r = 0; r < many; r++)
+                interface[many * (i < k + d ? s->ends[t] + i - k : column[i] - s->size) + r] += z[many * i + r];
         d = carried = 0;
     }
 }
 
-/* Backward substitution: x from the solution on the interface, after `forward`. */
-void backward(chain *s, const double *interface, double *x)
+/* Backward substitution: x from the solution on the interface, after `forward_of`. */
+static inline void backward_of(const chain *s, const double *interface, double *x, double *found, const int many)
 {
     for (int t = s->elements - 1; t >= 0; t--) {
         const size_t at = (size_t)t * s->room;
         const int *shape = s->shape + 4 * t, *column = s->column + at;
         const int n = s->done[2 * t], k = s->done[2 * t + 1], m = n - shape[2] - shape[3];
         const double *u = s->factor + (size_t)s->start[t] * BESIDE, *inverse = s->inverse + at;
-        double *z = s->forward + (size_t)t * s->wide;
+        double *z = found + (size_t)t * s->wide * many;
         for (int j = 0; j < k; j++) u += round_up(n) - round_down(j + 1);
         if (t > 0) {
             const double *next = u - BESIDE * (s->start[t] - s->start[t - 1]);
             fetch(next, next + n * k);
         }
-        for (int i = k; i < n; i++) {
-            if (i < m && s->ends[t] >= 0) x[column[i]] = interface[s->ends[t] + i - k];
-            z[i] = column[i] < s->size ? x[column[i]] : interface[column[i] - s->size];
-        }
+        for (int i = k; i < n; i++)
+            for (int r = 0; r < many; r++) {
+                if (i < m && s->ends[t] >= 0) x[many * column[i] + r] = interface[many * (s->ends[t] + i - k) + r];
+                z[many * i + r] = column[i] < s->size ? x[many * column[i] + r]
+                                                      : interface[many * (column[i] - s->size) + r];
+            }
         for (int j = n - 1; j >= 0; j--) {
-            if (j < k) x[column[j]] = z[j] *= inverse[j];
-            u = subtract_column(z, u, z[j], 0, round_up(j < k ? j : k));
+            for (int r = 0; r < many && j < k; r++) x[many * column[j] + r] = z[many * j + r] *= inverse[j];
+            u = subtract_column(z, u, z + many * j, 0, round_up(j < k ? j : k), many);
         }
     }
+}
+
+void forward(chain *s, const double *b, double *interface)
+{
+    forward_of(s, b, interface, s->forward, s->carry, s->work, 1);
+}
+
+void backward(chain *s, const double *interface, double *x)
+{
+    backward_of(s, interface, x, s->forward, 1);
+}
+
+/* x (unknowns, AT_ONCE) of as many right-hand sides b, without an interface: the factors, whose reading takes most of
+   the time, are read once. work: ((elements, wide) and 2 room, AT_ONCE). */
+void substitute(const chain *s, const double *b, double *x, double *work)
+{
+    double *carry = work + (size_t)AT_ONCE * s->elements * s->wide, *y = carry + AT_ONCE * s->room;
+    forward_of(s, b, 0, work, carry, y, AT_ONCE);
+    backward_of(s, 0, x, work, AT_ONCE);
 }
 
 /* ---- a sparse system ------------------------------------------------------------------------------------------ */

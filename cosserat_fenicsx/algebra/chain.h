@@ -4,7 +4,7 @@
 #ifndef CHAIN_H
 #define CHAIN_H
 
-enum { LANES = 4 }; /* problems that are solved at once */
+enum { LANES = 4, AT_ONCE = 6 }; /* problems that are solved at once; right-hand sides of one */
 
 /* Values of a Function that change, and the first column of an element's packed coefficients that takes them. */
 typedef struct {
@@ -137,6 +137,7 @@ typedef struct {
     double *before, *now;           /* (nodes, 7) unknowns at the start and with the last motion */
     double *free, *last;            /* (nodes, 6) motion and forces before the last ones were found */
     double *load, *response;        /* (unknowns,) of this rank */
+    double *loads, *responded, *substituted; /* (unknowns, AT_ONCE) twice, and work space for `substitute`; or 0 */
     int stale, exact;               /* whether the compliance must be found again; whether all responses are exact */
     double usual, worse, least, rounding; /* error of the motion by the compliance, relative: the smallest one, at least
                                        `least`; this many times it, and the compliance is stale; smallest motions that
@@ -353,6 +354,7 @@ int eliminate(chain *s, kernel *k, const double *matrices);
 void count(chain *s, kernel *k);
 void forward(chain *s, const double *b, double *interface);
 void backward(chain *s, const double *interface, double *x);
+void substitute(const chain *s, const double *b, double *x, double *work);
 int factor_dense(double *F, int n, int *row, int *column, double zero, double *scale, double *work);
 void spread(int count, const int *sizes, const int *where, int *rows, int *columns);
 int number_entries(int size, int count, const int *rows, const int *columns, int *starts, int *distinct, int *entry,

@@ -180,6 +180,30 @@ static int move_nodes(problem *p, const double *x, const double *change)
     return 0;
 }
 
+/* Keep the responses to the unit forces of nodes from `first` on that are `apart`; see `find_compliance`. */
+static int respond_to_units(problem *p, int first, int apart, double *forces, const double *q)
+{
+    contact *c = p->contact;
+    const int together = c->loads && !p->singular;
+    for (int component = 0; component < AT_ONCE; component++) {
+        unit_forces(c, first, apart, component, forces);
+        memset(c->load, 0, p->size * sizeof *c->load);
+        add_forces(c, forces, 0, 1, c->load);
+        for (int i = 0; together && i < p->size; i++) c->loads[AT_ONCE * i + component] = c->load[i];
+        if (together) continue;
+        if (solve(p, c->load, c->response) || at_nodes(p, c->response, 0, c->now)) return FAILED;
+        keep_responses(c, first, apart, component, q, c->now);
+    }
+    if (together) substitute(p->chain, c->loads, c->responded, c->substituted);
+    for (int component = 0; together && component < AT_ONCE; component++) {
+        for (int i = 0; i < p->size; i++) c->response[i] = c->responded[AT_ONCE * i + component];
+        turn_on(p, c->response);
+        if (at_nodes(p, c->response, 0, c->now)) return FAILED;
+        keep_responses(c, first, apart, component, q, c->now);
+    }
+    return 0;
+}
+
 /* Find the compliance by the current tangent, at the unknowns x. */
 static int find_compliance(problem *p, const double *x)
 {
@@ -192,13 +216,7 @@ static int find_compliance(problem *p, const double *x)
     for (int times = 1, near = 1; near && times <= FARTHEST; times *= 2) {
         const int wanted = times * (2 * c->reach + 1), apart = wanted < c->nodes ? wanted : c->nodes;
         for (int first = 0; first < apart; first++)
-            for (int component = 0; component < 6; component++) {
-                unit_forces(c, first, apart, component, forces);
-                memset(c->load, 0, p->size * sizeof *c->load);
-                add_forces(c, forces, 0, 1, c->load);
-                if (solve(p, c->load, c->response) || at_nodes(p, c->response, 0, c->now)) return FAILED;
-                keep_responses(c, first, apart, component, q, c->now);
-            }
+            if (respond_to_units(p, first, apart, forces, q)) return FAILED;
         near = find_transfers(c, apart);
     }
     return 0;

@@ -137,7 +137,7 @@ class NodalContact(Pointers):
         self._vectors = {name: np.zeros((n, size)) for name, size in sizes.items()}
         lanes = self._lib.LANES if n >= self._lib.LANES * (reach + 1) else 1  # their nodes must not move each other
         positions = -(-n // lanes)
-        work = {name: np.zeros((positions, size, self._lib.LANES)) for name, size in _OF_POSITIONS.items()}
+        arrays = {name: np.zeros((positions, size, self._lib.LANES)) for name, size in _OF_POSITIONS.items()}
         # of half the numbers' accuracy: it guides iterations, and its reading takes most of their time
         self._transfers = {
             name: np.zeros((positions, size, 6, self._lib.LANES), dtype=np.float32)
@@ -156,15 +156,19 @@ class NodalContact(Pointers):
         contact.worse, contact.least, contact.rounding = _WORSE, _MISSED, _ROUNDING
         contact.exact, contact.rows = n <= _FEW, self.integers(nodes.rows)
         contact.lanes, contact.positions = lanes, positions
-        of_unknowns = {name: np.zeros(problem.numbering.size) for name in ("load", "response")}
+        chain, many, size = problem.c.chain, self._lib.AT_ONCE, problem.numbering.size
+        counts = {"load": size, "response": size}
+        if not problem.c.interfaces:
+            work = chain.elements * chain.wide + 2 * chain.room
+            counts |= {"loads": many * size, "responded": many * size, "substituted": many * work}
         for name, array in self._transfers.items():
             setattr(contact, name, self._ffi.from_buffer("float[]", array))
         numbers = np.concatenate([np.full(len(place.slots), place.number) for place in touched])[order]
         contact.inside, contact.inner = inside, self.integers(inner)
         contact.parted = self.integers(_parted(model.scene, numbers))
-        work |= {"passing": np.zeros((2, 6 + 4 * inside, self._lib.LANES)),
-                 "responses": np.zeros((3, n, 2 * inside + 3, 6, 6))}  # fmt: skip
-        arrays = {"fixed": nodes.fixed, **of_unknowns, **work}
+        arrays |= {"passing": np.zeros((2, 6 + 4 * inside, self._lib.LANES)),
+                   "responses": np.zeros((3, n, 2 * inside + 3, 6, 6))}  # fmt: skip
+        arrays |= {"fixed": nodes.fixed, **{name: np.zeros(count) for name, count in counts.items()}}
         for name, array in {**self._numbers, **self._vectors, **arrays}.items():
             setattr(contact, name, self.doubles(array))
         contact.known_for, contact.stale, contact.usual, contact.missing = np.nan, True, np.inf, 1.0
