@@ -150,8 +150,9 @@ class PipeAbove(PointAction):
     acting = None
 
     def data(self, rod, s):
-        springs, forces, damping = self._springs, (-self.tension, 0.0), (0.0, 0.0)
-        if self.acting is not None:
+        if self.acting is None:
+            springs, forces, damping = self._springs, (-self.tension, 0.0), (0.0, 0.0)
+        else:
             springs, (forces, damping) = (0.0, 0.0), self.acting
         values = zip((*forces, *damping, *springs), ("N", "N m", "N s/m", "N m s/rad", "N/m", "N m/rad"), strict=True)
         return (vector(self.down(), "1"), *(scalar(value, unit) for value, unit in values))

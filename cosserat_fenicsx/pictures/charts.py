@@ -85,6 +85,7 @@ def _write(figure, file, dpi=None):
     known = figure.canvas.get_supported_filetypes()
     if file.suffix.removeprefix(".") not in known:
         raise SceneError(f"{file}: expected a name that ends in .{', .'.join(sorted(known))}")
+    figure.set_layout_engine("none")  # all is where `arrange` has put it
     picture = io.BytesIO()  # complete in memory first: a full disk leads matplotlib to other exceptions than OSError
     figure.savefig(picture, format=file.suffix[1:], dpi=dpi or figure.dpi)
     with replaced(file) as fresh:
@@ -267,6 +268,7 @@ def arrange(figure):
         changed += [_fit_panel(panel) for panel in figure.axes if panel.get_visible()]
         if not any(changed):
             return
+    figure.draw_without_rendering()
 
 
 def _fit_panel(panel):
