@@ -142,24 +142,35 @@ class TermKind(namedtuple("TermKind", "work place sizes memory scaled evolve ref
         return self.thread and self.refreshed
 
 
-def place_actions(scene, layout):
-    """Terms of the actions: [(`TermKind`, [(action, rod index, vertex or None)])]. Actions of one kind share a term if
-    they act at different places, or in the law, where their data add up."""
-    terms, taken = [], []
+@per_scene
+def _acting(scene):
+    """[(action, its `TermKind`, index of its rod or, of one along rods, indices)] of actions with a virtual work."""
+    found = []
     for action in scene.actions:
         work = work_of(action)
         if work is None and not action.in_law:
             continue
         if action.station is not None:
-            places, place = [layout.vertex(scene, action.station)], "point"
+            rods, place = scene.number(action.station.rod), "point"
         else:
-            places = [(scene.number(rod), None) for rod in scene.rods_of(action)]
+            rods = [scene.number(rod) for rod in scene.rods_of(action)]
             place = "law" if action.in_law else "node" if action.at_nodes else "line"
-        data = at(action, 0.0).data(scene.rods[places[0][0]], np.zeros(1))
+        data = at(action, 0.0).data(scene.rods[rods if place == "point" else rods[0]], np.zeros(1))
         scaled = "load" if action.scaled else "permanent" if action.permanent else "full"
         sizes, memory = (tuple(datum.size for datum in data) for data in (data, action.memory))
         refreshed, dead = action.refreshed is not None or action.rough, traits_of(action, scene.rods).dead
         kind = TermKind(work, place, sizes, memory, scaled, action.evolve, refreshed, dead, action.is_thread)
+        found.append((action, kind, rods))
+    return found
+
+
+def place_actions(scene, layout):
+    """Terms of the actions: [(`TermKind`, [(action, rod index, vertex or None)])]. Actions of one kind share a term if
+    they act at different places, or in the law, where their data add up."""
+    terms, taken = [], []
+    for action, kind, rods in _acting(scene):
+        at_station = kind.place == "point"
+        places = [layout.vertex(scene, action.station)] if at_station else [(rod, None) for rod in rods]
         for (known, members), there in zip(terms, taken, strict=True):
             if known == kind and (kind.place == "law" or there.isdisjoint(places)):
                 break

@@ -15,6 +15,8 @@ from cosserat_fenicsx.well.contacts import ROUGH, high_side, side_in_space
 from cosserat_fenicsx.well.rod.resultants import along_elements, apart_mostly, contacts_along, with_errors
 from cosserat_fenicsx.well.rod.string_scene import is_round
 
+#: Of negative modes on a path before they are counted.
+UNKNOWN = -1
 # Fields with an error estimate.
 _ALONG = ("side_force", "bending_moment")
 
@@ -60,9 +62,14 @@ class InHole:
 
     def __init__(self, string, path, factor=1.0):
         self.string, self.path, self.scene, self.factor = string, path, path.scene, factor
-        self.steps, self.negative_modes = int(path.iterations[0]), int(path.negative_modes[0])
+        self.steps, self.negative_modes = int(path.iterations[0]), None
         self.estimates, self.errors, self.error, self.of_stiffness = None, {}, np.inf, np.inf
         self._mesh_before = None
+
+    def take_modes(self, count):
+        """Take the number of negative modes, which is None on meshes that finer ones follow."""
+        self.negative_modes = count
+        self.path._all["negative_modes"][:] = self.path._records[0].negative_modes = count
 
     def estimate(self, values, before):
         """Set the errors. values: {factor: {name: value}} in walls of several stiffnesses on this mesh, see

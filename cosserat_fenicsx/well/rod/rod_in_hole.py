@@ -19,7 +19,7 @@ from cosserat_fenicsx.results.path import Path
 from cosserat_fenicsx.statics.problem import record_of, solvers_of
 from cosserat_fenicsx.statics.settling import BACK, DECADES, LAST, LAST_TWO, settle, stages_from
 from cosserat_fenicsx.statics.small_motions import conservative_along
-from cosserat_fenicsx.well.rod.in_hole import NAMES, UNSEEN, InHole
+from cosserat_fenicsx.well.rod.in_hole import NAMES, UNKNOWN, UNSEEN, InHole
 from cosserat_fenicsx.well.rod.string_scene import in_helix, on_axis, string_in
 
 
@@ -99,7 +99,8 @@ def solve_in_hole(path, lengths, stiffness, weight, contact_radius, *, wall_stif
     tol = tolerance("solve_in_hole", tol)
     comm, counts = communicator(comm), _counts(elements, len(Layout.of(string.scene, 1).breaks[0]) - 1)
     with Progress([float(len(stages_from(string.spring)))], progress, comm, "stage") as bar:
-        job = _Job(degree, bool(helix), tol, _WALLS.stiffest if wall_stiffness is None else 1.0, bar, work, comm)
+        stiffest = _WALLS.stiffest if wall_stiffness is None else 1.0
+        job = _Job(degree, bool(helix), tol, counts[-1], stiffest, bar, work, comm)
         answer = None
         for count in counts:
             try:
@@ -110,9 +111,12 @@ def solve_in_hole(path, lengths, stiffness, weight, contact_radius, *, wall_stif
                 if answer is not None or count >= min(_MESHES.fine, counts[-1]):
                     raise
                 continue  # too few elements for its turns, or for a snake
-            # finer meshes do not reduce the effect of the wall's softness
-            if elements is None and answer.error <= max(tol, _MESHES.by_wall * answer.of_stiffness):
+            if elements is None and job.accepts(answer):
                 break
+        if answer.negative_modes is None:
+            with solvers_of(string.scene, answer.path.layout, degree=degree, comm=comm) as (problem, _, stability):
+                problem.set_load_factor(1.0)
+                _count_modes(string, problem, stability, answer)
     string.leave(answer.factor)
     if elements is None and answer.error > tol:
         raise NotAccurate(answer, tol, work.words)
@@ -165,15 +169,21 @@ def _counts(elements, pieces):
 
 
 class _Job(NamedTuple):
-    """Settings that all meshes share: degree, start, tolerance, stiffest wall over the first, progress, work, ranks."""
+    """Settings that all meshes share: degree, start, tolerance, elements of the last one, stiffest wall over the first,
+    progress, work, ranks."""
 
     degree: int
     helix: bool
     tol: float
+    most: int
     stiffest: float
     bar: Progress
     work: Work
     comm: MPI.Comm
+
+    def accepts(self, answer):
+        """Whether an `InHole` is accurate enough: finer meshes do not reduce the effect of the wall's softness."""
+        return answer.error <= max(self.tol, _MESHES.by_wall * answer.of_stiffness)
 
 
 def _finer(string, count, before, job):
@@ -238,22 +248,25 @@ def _on_mesh(string, layout, stages, factor, start, before, job):
         _begin(problem, string, layout, start, job.helix)
         job.bar.start(f"rod in its hole, {problem.model.unknowns} unknowns")
         steps, values, answer = 0, {}, None
-        while True:
+        while answer is None or not (answer.of_stiffness <= _WALLS.too_soft * job.tol or factor >= job.stiffest):
+            if answer is not None:
+                stages, factor = LAST, 10.0 * factor
             try:
-                *softer, found = _in_walls(string, problem, stability, stages, factor, steps, job)
+                *softer, found = _in_walls(string, problem, stages, factor, steps, job)
             except NotConverged:
                 if answer is None:
                     raise
-                return answer  # in the wall before
+                break  # the answer is in the wall before
             answer, steps = found, found.steps
             values |= {each.factor: {name: getattr(each, name) for name in NAMES} for each in (*softer, answer)}
             answer.estimate(values, before)
-            if answer.of_stiffness <= _WALLS.too_soft * job.tol or factor >= job.stiffest:
-                return answer
-            stages, factor = LAST, 10.0 * factor
+        # a mesh that others follow needs no number of modes
+        if before is None or job.accepts(answer) or len(layout.breaks[0]) > job.most:
+            _count_modes(string, problem, stability, answer)
+        return answer
 
 
-def _in_walls(string, problem, stability, stages, factor, steps, job):
+def _in_walls(string, problem, stages, factor, steps, job):
     """[`InHole`] of the precise stages, in walls of stiffnesses times a factor, after `steps` Newton steps here."""
     model, records = problem.model, {}
     decades = [k for k, stage in enumerate(stages[:-1]) if stage in DECADES]
@@ -268,7 +281,7 @@ def _in_walls(string, problem, stability, stages, factor, steps, job):
     scaled = [(factor * wall, factor * spring, viscous) for wall, spring, viscous in stages]
     hold, spend = _WALLS.hold if job.helix else 0.0, partial(job.work.spend, len(model.layout.breaks[0]) - 1)
     steps += _settled(string, problem, scaled, factor, careful, on_stage, hold, spend)
-    records[factor] = record_of(problem, 1.0, _negative_modes(string, problem, stability), steps, steps)
+    records[factor] = record_of(problem, 1.0, UNKNOWN, steps, steps)
     answers = []
     for stiffness, record in records.items():
         path = Path.of(model, [f"{string.words}; {model.signature.formulation.words}"], conservative_along)
@@ -331,6 +344,13 @@ def _negative_modes(string, problem, stability):
         for stage in string.stages:
             stage.friction = 1.0
         problem.model.actions.refresh()
+
+
+def _count_modes(string, problem, stability, answer):
+    """Find the number of negative modes of an `InHole` by a problem on its mesh."""
+    _begin(problem, string, answer.path.layout, answer, False)
+    string.leave(answer.factor)
+    answer.take_modes(_negative_modes(string, problem, stability))
 
 
 def _begin(problem, string, layout, before, helix):
