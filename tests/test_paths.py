@@ -94,6 +94,8 @@ def test_load_control_alone_says_what_it_met():
     _, scene, load = torsion_pendulum()
     with pytest.raises(cf.NotConverged, match="There may be a limit point.*control='auto'") as refusal:
         cf.solve(scene, (0.0, 20.0), elements=4, control="load")
+    with pytest.raises(cf.NotConverged, match="There may be a limit point.*model='spatial'"):
+        cf.solve(shallow_arch()[-1], (0.0, 40.0), elements=8, model="planar")
     reached = refusal.value.path.load_factors[-1]
     assert pendulum_limits(load)[0] * 0.999 < reached < pendulum_limits(load)[0]
     with pytest.raises(cf.NotConverged, match="3 steps of arc length did not reach it"):

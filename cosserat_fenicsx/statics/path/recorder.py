@@ -267,8 +267,9 @@ class Tracing:
             where = "Friction has not settled on the way back: try one step, steps=StepControl(adaptive=False), or"
         elif here and rubs(scene):
             where = "Friction may not hold more; otherwise try"
-        elif here and self._options["control"] == "load":
-            where = "There may be a limit point, which load control cannot pass (control='auto' can); otherwise try"
+        elif here and (self._options["control"] == "load" or self.path.model != "spatial"):
+            can = "control='auto'" if self._options["control"] == "load" else "model='spatial'"
+            where = f"There may be a limit point, which load control cannot pass ({can} can); otherwise try"
         elif self.path.events:
             where = f"{lost_at(self.path)}; to go on beyond it try"
         softer = ", a softer wall" if any(action.at_nodes for action in scene.actions) else ""
