@@ -128,7 +128,12 @@ if _VERSION < (0, 8):
 
     def create_interval_mesh(comm, cells, x):
         """A mesh of intervals on a line from `cells (n, 2)` and `x (m, 1)`, given on rank 0 alone."""
-        return dolfinx_mesh.create_mesh(comm, cells, x, interval_domain())
+        one = {"partitioner": _of_one_rank} if comm.size == 1 else {}
+        return dolfinx_mesh.create_mesh(comm, cells, x, interval_domain(), **one)
+
+    def _of_one_rank(comm, ranks, dimension, cells, ghosts):
+        """Where cells belong, without the search that dolfinx makes on one rank too."""
+        return cpp.graph.AdjacencyList_int32(np.zeros((cells.num_nodes, 1), dtype=np.int32))
 
     def create_solid_mesh(comm, cells, x):
         """A mesh of second-order hexahedra from `cells (n, 27)`, in basix' order of nodes, and `x (m, 3)`."""

@@ -151,7 +151,8 @@ class Elimination(Pointers):
         self._lib.spread(len(at), sizes, where, *(self._ffi.from_buffer("int[]", part) for part in here))
         comm = numbering.comm
         everywhere = comm.allgather(here) if comm.size > 1 else [here]
-        self.places, self._counts = np.concatenate(everywhere, axis=1), [part.shape[1] for part in everywhere]
+        self.places = np.concatenate(everywhere, axis=1) if comm.size > 1 else here
+        self._counts = [part.shape[1] for part in everywhere]
 
     def all_condensed(self):
         """(entries,) the condensed matrices of all ranks, at `places`."""
@@ -213,7 +214,8 @@ class Interface:
         self._here = (rows >= 0) & (columns >= 0)
         self._everywhere = bool(self._here.all())
         self._solver = _Dense(self._size) if self._size <= _DENSE else _Sparse(self._size)
-        self._entry = self._solver.entries(rows[self._here], columns[self._here])
+        own = slice(None) if self._everywhere else self._here  # a view where it serves: these are long
+        self._entry = self._solver.entries(rows[own], columns[own])
         self.dense = None
         if self._size <= _DENSE and elimination.numbering.comm.size == 1:
             every = np.full(len(rows), -1)
@@ -222,7 +224,8 @@ class Interface:
 
     def _values(self, of_nodes, *others):
         """The entries of all ranks' condensed matrices and of the constraint equations' derivatives."""
-        values = np.concatenate([self._elimination.all_condensed(), *(part.ravel() for part in (of_nodes, *others))])
+        parts = [x for x in (self._elimination.all_condensed(), *map(np.ravel, (of_nodes, *others))) if len(x)]
+        values = parts[0] if len(parts) == 1 else np.concatenate(parts) if parts else np.empty(0)
         if not self._everywhere:
             values = values[self._here[: len(values)]]
         return np.bincount(self._entry[: len(values)], values, minlength=self._solver.room)
