@@ -52,6 +52,17 @@ def _round(away, radius):
     return size - radius, away / size
 
 
+def shifted(shape, normal, change):
+    """The displacement of a surface that moves in itself by a vector, such as a belt, where its normal is given."""
+    return change
+
+
+def turned(shape, normal, change):
+    """The same of a cylinder that rotates about its axis by an angle, outside."""
+    _, axis, radius = shape
+    return change * radius * ufl.cross(axis, normal)
+
+
 # -- virtual work ------------------------------------------------------------------------------------------------------
 
 
@@ -78,7 +89,7 @@ def obstacle_work(point, test, surface, shape, arm, stiffness, *law, pressure=li
     return pressed(gap - arm, stiffness, *law, pressure=pressure) * ufl.dot(normal, test.phi_r)
 
 
-def friction_force(point, surface, shape, arm, stiffness, friction, stick, moved, turned, held):
+def friction_force(point, surface, shape, arm, stiffness, friction, stick, moved, turned, held, carried=None):
     """The normal, the pressure and the friction force of an obstacle, per length of the rod, with Coulomb's law.
 
     The surface sticks elastically: the force changes by -stick times the slip since the last accepted state, and is
@@ -92,11 +103,15 @@ def friction_force(point, surface, shape, arm, stiffness, friction, stick, moved
         see `obstacle_work`; friction: the coefficient; stick: force per area.
         moved, turned, held: of the last accepted state: the displacement; the normal there, turned back by the rotation
             from the reference, minus the normal at rest; the friction force.
+        carried: of a surface that moves in itself: a function such as `shifted`, and its motion since that state.
     """
     gap, normal = surface(point.r, *shape)
     gap_before, before = surface(point.rest + moved, *shape)
     touched = surface(point.rest, *shape)[1] + turned
     slip = point.u - moved - arm * (point.R * touched - before)
+    if carried is not None:
+        motion, change = carried
+        slip = slip - motion(shape, normal, change)
     trial = held - stick * slip
     trial = trial - ufl.dot(trial, normal) * normal
     pressure = pressed(gap - arm, stiffness)
@@ -108,14 +123,14 @@ def friction_force(point, surface, shape, arm, stiffness, friction, stick, moved
     return normal, pressure, ufl.conditional(touches, share, 0) * trial
 
 
-def rough_work(point, test, surface, shape, arm, stiffness, *data):
+def rough_work(point, test, surface, shape, arm, *data, **carried):
     """Virtual work of an obstacle with friction, see `friction_force`."""
-    return at_surface(test, *friction_force(point, surface, shape, arm, stiffness, *data), arm)
+    return at_surface(test, *friction_force(point, surface, shape, arm, *data, **carried), arm)
 
 
-def remembered(point, surface, shape, arm, stiffness, *data):
+def remembered(point, surface, shape, *data, **carried):
     """What `friction_force` remembers of an accepted state: `moved`, `turned`, `held`."""
-    normal, _, force = friction_force(point, surface, shape, arm, stiffness, *data)
+    normal, _, force = friction_force(point, surface, shape, *data, **carried)
     return [point.u, ufl.transpose(point.R) * normal - surface(point.rest, *shape)[1], force]
 
 

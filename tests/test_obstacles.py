@@ -279,8 +279,54 @@ def test_friction_begins_where_a_motion_starts():
     moved = cf.simulate(moving, 0.8, dt=5e-3, elements=2, degree=2, start=start).position(rod.at(0.5))
     assert np.hypot(*(moved[-1] - moved[0])[:2]) == pytest.approx(v**2 / (2 * mu * g), rel=1e-4)
     pulled = cf.solve(cf.Scene([rod], [laid], loads), 1.0, elements=2)
-    with pytest.raises(cf.SceneError, match="the path of a scene without them, and friction begins at zero"):
+    with pytest.raises(cf.SceneError, match="in which they have none, or that is without them, and friction"):
         cf.simulate(moving, 0.1, dt=5e-3, elements=2, start=pulled)
+
+
+STEADY = cf.Stiffness((1e7, 1e7), 1e7, (1e4, 1e4), 1e4, mass=10.0, inertia=(2.5e-4, 2.5e-4, 5e-4))
+
+
+def carried(rod, surface, *springs, pushed):
+    """A motion of a rod on a moving surface, from where the surface without friction holds it against a force."""
+    loads = [cf.LineForce(rod, (0, 0, -pushed / rod.length)), *springs]
+    still = cf.Scene([rod], [], [surface.smooth, *loads, cf.Spring(rod.at(0.1), 1.0, 1.0)])
+    start = cf.solve(still, 1.0, elements=1, degree=2)
+    return cf.simulate(cf.Scene([rod], [], [surface, *loads]), 0.4, dt=1e-3, elements=1, degree=2, start=start)
+
+
+def test_a_block_on_a_belt(truth):
+    """On a spring it is carried along, sticks, slips where mu m g = k x, and swings with the amplitude V sqrt(m/k)."""
+    m, k, mu, V, a = 2.0, 200.0, 0.4, 0.3, 0.01
+    rod = cf.Rod(cf.Line((0, 0, a), (0.2, 0, a)), STEADY)
+    belt = cf.Plane((0, 0, 0), (0, 0, 1), friction=mu, stick=1e8, contact_radius=a, velocity=(V, 0, 0))
+    history = carried(rod, belt, cf.Spring(rod.at(0.1), k, direction=(1, 0, 0)), pushed=9.81 * m)
+    x, v = history.displacement(rod.at(0.1))[:, 0], history.velocity(rod.at(0.1))[:, 0]
+    sticks = np.flatnonzero(v > 0.999 * V)[0]
+    assert history.times[sticks] == pytest.approx(0.08703056520629002, abs=1.1e-3)
+    assert v.max() < 1.01 * V and np.abs(history.balance).max() < 1e-9 * history.kinetic.max()
+    truth("block on a belt, largest way, m", x.max(), 0.03924 + 0.03, 1e-3)
+    with pytest.raises(cf.SceneError, match="expected a surface without velocity or spin, or a motion"):
+        cf.solve(cf.Scene([rod], [cf.Clamp(rod.start)], [belt]), 1.0)
+
+
+def test_a_roller_is_driven_by_the_drum_around_it():
+    """Its spin grows by mu N a/J up to that of rolling."""
+    mu, a, R, spin, pushed = 0.2, 0.01, 0.1, 5.0, 19.62
+    rod = cf.Rod(cf.Line((0, -0.1, a - R), (0, 0.1, a - R)), STEADY)
+    drum = cf.Cylinder((0, 0, 0), (0, 1, 0), R, mu, True, 1e7, 1e7, contact_radius=a, spin=spin)
+    held = [cf.Spring(end, 1e6, direction=(1, 0, 0)) for end in (rod.start, rod.end)]
+    history = carried(rod, drum, *held, pushed=pushed)
+    w, rate = history.angular_velocity(rod.at(0.1))[:, 1], mu * pushed * a / (5e-4 * rod.length)
+    assert np.polyfit(history.times[:60], w[:60], 1)[0] == pytest.approx(rate, rel=1e-4)
+    assert w[history.times > 1.05 * R * spin / a / rate] == pytest.approx(R * spin / a, rel=0.01)
+    assert np.abs(history.balance).max() < 1e-6 * history.kinetic.max()
+
+
+def test_what_moving_surfaces_need():
+    for given, words in (({"velocity": (1, 0, 0)}, "0 without friction"),
+                         ({"velocity": (1, 0, 1), "friction": 0.1}, "a velocity in the plane")):  # fmt: skip
+        with pytest.raises(cf.SceneError, match=words):
+            cf.Plane((0, 0, 0), (0, 0, 1), **given)
 
 
 class TestWhatAResultLeavesOpen:

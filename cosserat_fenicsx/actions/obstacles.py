@@ -4,7 +4,7 @@ Each is a gap function (forms/contact.py) with its data; pressure, friction, ref
 follow from it.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from functools import cache
 from typing import Annotated
 
@@ -14,10 +14,11 @@ from cosserat_fenicsx.actions.walls import ContactLaw, Pressing, across, held_ac
 from cosserat_fenicsx.checks import Numbers, refuse
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.forms import contact
-from cosserat_fenicsx.parts import Friction, Length, Several, UnitVector, WallStiffness, at_least
+from cosserat_fenicsx.parts import AngularVelocity, Friction, Length, Several, UnitVector, WallStiffness, at_least
 from cosserat_fenicsx.scene import action
 from cosserat_fenicsx.scene.action import LineAction
 from cosserat_fenicsx.scene.rod import Rod, RodOrName
+from cosserat_fenicsx.scene.signals import Signal, at
 
 # Stiffness of the surface against slip over that against penetration: a stiffer one makes sticking parts of a rod
 # alternate in the short boundary layers that a stiff surface has.
@@ -32,25 +33,50 @@ _Point = Annotated[Numbers, Several("length")]
 
 
 @cache
-def _work_of(surface, size, rough, pressure):
-    """The virtual work of an obstacle with a gap function of `size` data, with friction or with a law of pressure."""
+def _work_of(surface, size, rough, pressure, motion):
+    """The virtual work of an obstacle with a gap function of `size` data, with friction or with a law of pressure;
+    motion: of a surface that moves in itself, see `contact.shifted`, or None."""
 
     def work(point, test, *data):
         shape, rest = data[:size], data[size:]
         if rough:
-            return contact.rough_work(point, test, surface, shape, *rest)
+            rest, _, carried = _carried(rest, motion)
+            return contact.rough_work(point, test, surface, shape, *rest, **carried)
         return contact.obstacle_work(point, test, surface, shape, *rest, pressure=pressure)
 
-    work.__qualname__ = f"{surface.__name__}, {'rough' if rough else pressure.__qualname__}"  # orders the terms
+    law = "rough" if rough else pressure.__qualname__
+    work.__qualname__ = f"{surface.__name__}, {law}{', moving' if motion else ''}"  # orders the terms
     return work
 
 
 @cache
-def _evolution_of(surface, size):
+def _evolution_of(surface, size, motion):
     def evolve(point, *data):
-        return contact.remembered(point, surface, data[:size], *data[size:])
+        rest, now, carried = _carried(data[size:], motion)
+        *known, force = contact.remembered(point, surface, data[:size], *rest, **carried)
+        return [*known, *now, force]
 
     return evolve
+
+
+def _carried(data, motion):
+    """Data of friction without those of a moving surface; a list of how far it is; and its motion since then."""
+    if motion is None:
+        return data, [], {}
+    arm, stiffness, friction, now, stick, moved, turned, before, held = data
+    return (arm, stiffness, friction, stick, moved, turned, held), [now], {"carried": (motion, now - before)}
+
+
+@dataclass(frozen=True)
+class _Uniform:
+    """A motion of a surface: its speed times the time, a tuple."""
+
+    speed: tuple
+
+    jumps, straight = (), True
+
+    def __call__(self, t):
+        return tuple(t * x for x in self.speed)
 
 
 class Obstacle(Pressing, LineAction):
@@ -60,9 +86,10 @@ class Obstacle(Pressing, LineAction):
         surface: the gap function; `shape` its data; `beside` the same in numbers.
         contact_radius: of the rods' surfaces, m; None where it is that of their round sections.
         friction: the coefficient.
+        motion, carried: of a surface that moves in itself: see `contact.shifted`, and how far, a function of time.
     """
 
-    scaled, at_nodes, presses, surface = False, True, True, None
+    scaled, at_nodes, presses, surface, motion, carried = False, True, True, None, None, None
 
     #: See `Action.gaps`.
     largest_step = np.inf
@@ -73,8 +100,24 @@ class Obstacle(Pressing, LineAction):
     def validate(self):
         if self.law is not None and self.friction:
             refuse(self, "friction", self.friction, "0 with a law of pressure")
+        self._check_motion()
         if isinstance(self.rod, Rod):
             self.check_rod(self.rod)
+
+    @property
+    def smooth(self):
+        """The same obstacle without friction, at rest."""
+        without = {"friction": 0.0, "stick": None, "velocity": None, "spin": 0.0}
+        return replace(self, **{field.name: without[field.name] for field in fields(self) if field.name in without})
+
+    def _check_motion(self):
+        """Set `carried` of a surface that moves in itself."""
+
+    def _moves(self, field, unit, speed):
+        if not self.friction:
+            refuse(self, field, getattr(self, field), "0 without friction, by which alone a moving surface acts")
+        motion = _Uniform(tuple(map(float, speed)))
+        object.__setattr__(self, "carried", Signal(type(self).__name__, field, unit, motion, (), len(motion.speed)))
 
     def shape(self):
         """The data of the gap function, a tuple of `Datum`."""
@@ -127,7 +170,12 @@ class Obstacle(Pressing, LineAction):
         sizes = action.scalar(self.radius_of(rod, s), "m"), action.scalar(self.stiffness, "N/m^2")
         if not self.friction:
             return *self.shape(), *sizes, *self._law_data()
-        return *self.shape(), *sizes, action.scalar(self.friction, "1"), action.scalar(self.sticks, "N/m^2")
+        far = () if self.carried is None else (self._far(self.carried),)
+        return *self.shape(), *sizes, action.scalar(self.friction, "1"), *far, action.scalar(self.sticks, "N/m^2")
+
+    def _far(self, moved):
+        """The `Datum` of how far the surface has moved."""
+        return action.vector(moved, "m") if len(moved) == 3 else action.scalar(moved[0], "1")
 
     @property
     def sticks(self):
@@ -137,7 +185,11 @@ class Obstacle(Pressing, LineAction):
     @property
     def memory(self):
         """See `Action`: of friction."""
-        return tuple(action.vector(np.zeros(3), unit) for unit in ("m", "1", "N/m")) if self.friction else ()
+        if not self.friction:
+            return ()
+        moved, turned, held = (action.vector(np.zeros(3), unit) for unit in ("m", "1", "N/m"))
+        far = () if self.carried is None else (self._far(np.zeros_like(at(self, 0.0).carried)),)
+        return moved, turned, *far, held
 
     @property
     def finds_friction(self):
@@ -147,13 +199,17 @@ class Obstacle(Pressing, LineAction):
     @property
     def evolve(self):
         """See `Action`."""
-        return _evolution_of(self.surface, len(self.shape())) if self.friction else None
+        return _evolution_of(self.surface, len(self.shape()), self._motion) if self.friction else None
+
+    @property
+    def _motion(self):
+        return None if self.carried is None else self.motion
 
     @property
     def work(self):
         """See `Action`."""
         pressure = contact.linear if self.law is None else type(self.law).pressure
-        return _work_of(self.surface, len(self.shape()), bool(self.friction), pressure)
+        return _work_of(self.surface, len(self.shape()), bool(self.friction), pressure, self._motion)
 
     def holds(self, scene):
         """See `Action`: rods that lie on it, as long as they do."""
@@ -194,9 +250,11 @@ class Plane(Obstacle):
         rod: the rod that it acts on; None for all rods of the scene.
         contact_radius: of the rods' surfaces, m; None for that of their sections, which are `Circle` or `Tube`.
         law: None, or a `ContactLaw` in place of the pressure in proportion to the penetration, without friction.
+        velocity: of a belt, in the plane, m/s, inertial: in motions, from their start on.
 
     Raises:
-        SceneError: no normal, numbers outside their range, no contact radius known, or a rod that overlaps it at rest.
+        SceneError: no normal, numbers outside their range, no contact radius known, a rod that overlaps it at rest, or
+            a velocity out of the plane or without friction.
     """
 
     point: _Point
@@ -207,8 +265,15 @@ class Plane(Obstacle):
     rod: RodOrName | None = None
     contact_radius: Annotated[Length, at_least(0)] | None = None
     law: ContactLaw | None = None
+    velocity: Annotated[Numbers, Several("speed")] | None = None
 
-    surface = staticmethod(contact.plane)
+    surface, motion = staticmethod(contact.plane), staticmethod(contact.shifted)
+
+    def _check_motion(self):
+        if self.velocity is not None and any(self.velocity):
+            if abs(np.dot(self.velocity, self.normal)) > _NOTHING * np.linalg.norm(self.velocity):
+                refuse(self, "velocity", self.velocity, "a velocity in the plane, perpendicular to its normal")
+            self._moves("velocity", "m", self.velocity)
 
     def shape(self):
         return action.vector(self.point, "m from origin"), action.vector(self.normal, "1")
@@ -314,10 +379,11 @@ class Cylinder(_Cylindrical):
         friction: coefficient of friction.
         inside: whether rods are inside.
         stiffness, stick, rod, contact_radius, law: see `Plane`.
+        spin: of a drum about its axis, rad/s, right-handed about `direction`: in motions, from their start on.
 
     Raises:
-        SceneError: no direction, numbers outside their range, no contact radius known, or a rod that overlaps it at
-            rest.
+        SceneError: no direction, numbers outside their range, no contact radius known, a rod that overlaps it at rest,
+            or a spin without friction.
     """
 
     point: _Point
@@ -330,8 +396,15 @@ class Cylinder(_Cylindrical):
     rod: RodOrName | None = None
     contact_radius: Annotated[Length, at_least(0)] | None = None
     law: ContactLaw | None = None
+    spin: AngularVelocity = 0.0
 
     _unit_of_axis = "axis"
+
+    def _check_motion(self):
+        if self.spin:
+            self._moves("spin", "rad", (-self.spin if self.inside else self.spin,))
+
+    motion = staticmethod(contact.turned)
 
     @property
     def surface(self):

@@ -251,6 +251,9 @@ def _in_time(item):
     parts = []
     for field, signal in signals_of(item).items():
         given = signal.function
+        if item.station is None and getattr(item, "carried", None) is signal:
+            parts.append(f"its surface moves, {signal.field} = {getattr(item, signal.field)} {signal.unit}/s")
+            continue
         name = type(given).__name__ if type(given).__module__.endswith("signals") else "a function of time"
         marks = ", ".join(f"{t:g}" for t in signal.jumps if t >= 0)
         parts.append(f"{field} by {name}" + (f", steps end at t = {marks} s" if marks else ""))

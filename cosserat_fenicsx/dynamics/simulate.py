@@ -124,8 +124,8 @@ def simulate(
     if start is not None and any(load.memory and not _may_start(load, start) for load in scene.actions):
         raise SceneError(
             "simulate.start: actions with a memory begin a motion with their initial one: expected None, and a motion "
-            "that applies the loads slowly; or, where these are obstacles with friction, the path of a scene without "
-            "them, and friction begins at zero"
+            "that applies the loads slowly; or, where these are obstacles with friction, the path of a scene in which "
+            "they have none, or that is without them, and friction begins at zero"
         )
     refuse_stages("simulate", scene)
     _refuse_tendons(scene)

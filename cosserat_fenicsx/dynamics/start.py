@@ -89,8 +89,9 @@ def point_of(start):
 
 def _check_overlap(scene, path, k):
     """Refuse a start inside of an obstacle whose forces are not part of that equilibrium: it would be shot out."""
+    known = [obstacle.smooth for obstacle in path.scene.actions if obstacle.gaps is not None]
     for obstacle in scene.actions:
-        if obstacle.gaps is None or obstacle in path.scene.actions:
+        if obstacle.gaps is None or obstacle.smooth in known:
             continue
         for rod in scene.rods_of(obstacle):
             x = path.layout.node_s(path.rule.nodes)[path.scene.rods.index(rod)]

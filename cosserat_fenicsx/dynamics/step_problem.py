@@ -201,6 +201,7 @@ class StepProblem(Equations):
         of_contact = NODES * (model.comm.size > 1) * bool(walls)
         self.c.hooks = self._hooks | (CONTACT | RESIDUAL) * bool(self._laws) | of_contact
         self._law_moves = any(term.moves and term.kind.place == "law" for term in model.actions.terms)
+        self._carries = any(term.moves and term.memory for term in model.actions.terms)
         self._begun = False  # the reactions of another scene are no initial guess
         self.begin()
 
@@ -372,7 +373,11 @@ class StepProblem(Equations):
     def accept(self):
         """Accept the step; after its energies are recorded."""
         self.model.accept(self.h)
+        if self._carries:
+            self._take_loads(self._until)
         self.model.actions.commit()
+        if self._carries:
+            self._take_loads(self.loaded_at)
         for part in self.touching:
             part.accept()
 

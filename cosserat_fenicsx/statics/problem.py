@@ -62,10 +62,13 @@ def check_static(scene):
             "motion"
         )
     for item in scene.moving:
+        still = "a vector, a function of the arc length as Along(function)"
+        if item in scene.actions and item.gaps is not None:
+            still = "a surface without velocity or spin"
         raise SceneError(
-            f"Scene: the {type(item).__name__} depends on time, which a static analysis excludes: expected a vector, "
-            "a function of the arc length as Along(function), or a motion: cf.simulate(scene, duration) in Python, a "
-            "duration under [simulate] in a scene file, --duration on the command line"
+            f"Scene: the {type(item).__name__} depends on time, which a static analysis excludes: expected {still}, "
+            "or a motion: cf.simulate(scene, duration) in Python, a duration under [simulate] in a scene file, "
+            "--duration on the command line"
         )
     for action in scene.actions:
         if action.touches:
