@@ -13,7 +13,7 @@ from conftest import refuses
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.actions.fluids import AddedMass, LinearDrag
 from cosserat_fenicsx.forms import contact
-from cosserat_fenicsx.models.formulation import traits_of
+from cosserat_fenicsx.models.formulation import found_traits, traits_of
 from cosserat_fenicsx.scene import action
 
 EI, RHO = 1.0, 1.0
@@ -635,6 +635,9 @@ def test_what_ufl_tells():
         cf.Wall(BEAM, (0, 0, 0), (1, 0, 0), 0.1): (False, False, False, True),
         cf.PointMass(station, 1.0): (True, True, False, True),
     }
+    for load in (cf.Plane((0, 0, 0), (0, 0, 1), 0.1, velocity=(1, 0, 0)), cf.Sphere((0, 0, 0), 0.1),
+                 cf.Cylinder((0, 0, 0), (0, 1, 0), 0.1)):  # fmt: skip
+        assert traits_of(load, [BEAM]) == found_traits(load, [BEAM])
     for load, expected in told.items():
         traits = traits_of(load, [BEAM])
         assert (traits.dead, traits.known_force, traits.rates, traits.flat) == expected, load
