@@ -540,3 +540,11 @@ def test_a_moment_that_a_support_takes_buckles_nothing():
     found = cf.buckling(frame.scene([cf.Moment(frame.at(4), (1e3, 0, 0))], supports), 2)
     assert len(found) == 0 and np.isinf(found.bound) and found.conservative
     assert "no rod bears the loads" in str(found) and "inf" not in str(found)
+
+
+@pytest.mark.serial
+def test_a_planar_model_says_what_it_counts_out_of_its_plane():
+    rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, 1)), cf.Stiffness((1e6, 1e6), 1e6, (1.0, 100.0), 1.0), name="strip")
+    scene = cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Force(rod.end, (0.1, 0, -5.0))])
+    path = cf.solve(scene, [0.2, 1.0], model="planar", elements=4)
+    assert path.negative_modes.tolist() == [0, 1] and "Unstable out of its plane from the load factor" in str(path)

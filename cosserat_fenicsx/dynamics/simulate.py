@@ -153,7 +153,7 @@ def simulate(
     with solvers_of(scene_over, layout, degree, scheme, load_factor, comm, model) as (problem, stepper):
         stepper.rho_inf = rho_inf
         cautions += pace.watch(scene, duration, load_factor, stepper.impulse_error)
-        cautions += put_start(problem.model, start)
+        cautions += [*put_start(problem.model, start), *_braked(scene)]
         problem.begin()
         stepper.begin()
         history = (History if folder is None else StoredHistory).of(problem.model, scheme, [why, *cautions])
@@ -167,6 +167,17 @@ def simulate(
             history.keep_in(store)
         motion = TimeLoop(problem, stepper, pace, history, store)
         return motion.over(marks, save_every is None, progress)
+
+
+def _braked(scene):
+    """A sentence on drag of rods that nothing holds, which a damping ratio brings: [] where there is none."""
+    drag = max((rod.damping.drag for rod in scene.rods if rod.damping is not None), default=0.0)
+    if not drag or scene.supports:
+        return []
+    return [
+        f"the drag of Damping ({drag:.4g} 1/s) brakes vibrations and, since no support holds the rods, their motion as "
+        f"a whole too: a fall ends at g/drag = {9.81 / drag:.3g} m/s; Damping(time=...) alone leaves it as it is"
+    ]
 
 
 def _may_start(action, start):

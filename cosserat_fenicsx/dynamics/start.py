@@ -52,7 +52,8 @@ def put_start(model, start):
         if np.abs(rates).max() > _ZERO_VELOCITY:
             cautions = [
                 "a prescribed motion starts with a speed while the rods are at rest: contact forces then oscillate "
-                "without decay; a RunUp starts without speed, and the scheme 'generalised-alpha' damps the oscillation"
+                "without decay, and those of the first steps grow with shorter elements; a RunUp starts without speed, "
+                "and the scheme 'generalised-alpha' damps the oscillation"
             ]
     model.set_velocity(rates[:, :3], rates[:, 3:])
     return cautions

@@ -129,7 +129,11 @@ class Buckling(Shapes):
         told = f"Critical load factors {in_words(self.load_factors)}, {largest_error(self.error)}"
         yield f"{title}{told if len(self) else self.none[0].upper() + self.none[1:]}."
         if self.conservative and math.isfinite(self.bound):
-            yield f"The loads have a potential: there is no static bifurcation below {self.bound:.7g} (bound)."
+            yield (
+                f"The loads have a potential: there is no static bifurcation below {self.bound:.7g} (bound) of the "
+                "state extrapolated linearly. A structure that bends much may reach a limit load below it, which "
+                "`solve` finds."
+            )
         if self.caution:
             yield self.caution
 

@@ -32,6 +32,8 @@ from cosserat_fenicsx.scene.rod import RodOrName
 
 # Most events that `print` names.
 _EVENTS = 6
+#: The begin of the sentence of `why` on negative modes out of the plane.
+SIDEWAYS = "Unstable out of its plane"
 _KINDS = {"limit": "Limit point", "bifurcation": "Bifurcation", "flutter": "Flutter"}
 # The state of a point by the sign of its number of negative modes.
 _STATES = {0: "stable", 1: "unstable", -1: "critical"}
@@ -184,25 +186,33 @@ class Path(RodResult):
             f"{_STATES[np.sign(self.negative_modes[-1])]}, "
             f"{station} is displaced by {self._moved_in_words(station, units)} and turned by {turned:.6g} rad."
         )
+        yield from self._sideways
         for doubt in self.scene.doubts:
             yield f"First check: {doubt}"
         yield from errors_in_words(self)
         yield from contacts_in_words(self)
-        events = self._events_in_words()
-        yield from events[:_EVENTS]
-        if len(events) > _EVENTS:
-            yield f"... and {len(events) - _EVENTS} more by `details()`"
+        told, others = self._events_in_words()
+        yield from told
+        if others:
+            yield f"... and {len(others)} more by `details()`"
         if not self.left and any(event.kind == "bifurcation" for event in self.events):
             yield (
                 "The path stays on its branch there; --branch 1 or -1 (branch= in Python) leaves it at the first "
                 "bifurcation."
             )
 
+    @property
+    def _sideways(self):
+        return [sentence for sentence in self.why if sentence.startswith(SIDEWAYS)]
+
     def _events_in_words(self):
-        return [
+        """Those that `print` names, limit points before others, and the other ones, each along the path."""
+        words = [
             f"{_KINDS[event.kind]} at the load factor {event.load_factor:.7g}{self._of_stage(event.stage)}"
             for event in self.events
         ]
+        order = sorted(range(len(words)), key=lambda k: (self.events[k].kind == "bifurcation", k))
+        return [[words[k] for k in sorted(part)] for part in (order[:_EVENTS], order[_EVENTS:])]
 
     def _of_stage(self, stage):
         """The name of a stage after one of its load factors, in sentences."""
@@ -218,10 +228,11 @@ class Path(RodResult):
 
     @property
     def _reasons(self):
-        return [sentence for sentence in self.why if sentence not in self.scene.doubts]  # which are in the answer
+        told = [*self.scene.doubts, *self._sideways]  # in the answer
+        return [sentence for sentence in self.why if sentence not in told]
 
     def _more(self, units):
-        yield from self._events_in_words()[_EVENTS:]
+        yield from self._events_in_words()[1]
         yield from super()._more(units)
 
     def _table(self, units, rows, station=None):
