@@ -239,7 +239,7 @@ def test_in_a_scene_file(tmp_path):
     """All of them are known to a process that has read nothing else."""
     file = Path(__file__).parent.parent / "demos" / "strings" / "autodriller.toml"
     text = file.read_text(encoding="utf-8")
-    assert cf.read(file).scene.hook.autodriller == Autodriller(1e5, 2e-8, 2e-9)
+    assert cf.read(file).scene.hook.autodriller == Autodriller(1e5, 2e-8, 2e-9, sample=0.05)
     for law, expected in (
         ('{ type = "Rational", peak = "6 kN m", speed = "2 rad/s" }', Rational(6e3, 2.0)),
         ('{ type = "TableLaw", speeds = [0.0, 2.0], torques = ["6 kN m", "4 kN m"] }', TableLaw((0, 2), (6e3, 4e3))),

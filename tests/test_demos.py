@@ -9,6 +9,7 @@ from conftest import COMM
 from known_numbers import deviation
 
 import cosserat_fenicsx as cf
+from cosserat_fenicsx.cli.main import main
 
 DEMOS = Path(__file__).parent.parent / "demos"
 
@@ -109,3 +110,57 @@ def test_a_small_heap():
     history, checks = heap.six_rods()
     assert all(deviation(check) <= check.allowed for check in checks), checks
     assert np.diff(history.dissipated).min() >= 0
+
+
+STRINGS = sorted((DEMOS / "strings").glob("*.toml"))
+
+
+@pytest.mark.serial
+@pytest.mark.once
+@pytest.mark.pages
+def test_the_demos_of_strings_give_their_numbers(capsys):
+    import strings
+
+    names = {demo.__name__ for demo in strings.STRINGS} | {"stability_map"}
+    assert names == {file.stem for file in STRINGS}
+    for check in strings.main(out=None):
+        assert deviation(check) <= check.allowed, check
+    assert "Drill-strings in motion" in capsys.readouterr().out
+
+
+@pytest.mark.serial
+@pytest.mark.once
+@pytest.mark.pages
+def test_a_coarse_map_agrees_with_the_linear_theory(capsys):
+    import strings_map
+
+    assert all(deviation(check) == 0 for check in strings_map.main(quick=True))
+    told = capsys.readouterr().out
+    assert "25 simulations of 120 s on 1 rank(s)" in told and "the bit oscillates in 12, a mode grows in 4" in told
+
+
+@pytest.mark.serial
+@pytest.mark.once
+def test_the_command_line_explains_strings(capsys):
+    for file in STRINGS:
+        assert main(["explain", str(file)]) == 0
+    told = capsys.readouterr().out
+    for words in (
+        "String, drill pipe: 3000 m, 261.97 N/m in air, impedance 296.38 N m s/rad in torsion",
+        "Model: axial and torsional: the hook moves.",
+        "Motion: 36234 steps of 0.003312 s, 305 places along the string.",
+        "Drive: 40 rpm, PI(Kp 38000 N m s/rad, Ki 100000 N m/rad), inertia 2900 kg m^2.",
+        "Bit: none, the lower end is free.",
+        "Asked for: stability at 20 speeds and 20 weights on bit.",
+    ):
+        assert words in told, words
+
+
+@pytest.mark.serial
+@pytest.mark.once
+@pytest.mark.pages
+def test_the_command_line_maps_the_stability(tmp_path, capsys):
+    pytest.importorskip("matplotlib")
+    assert main(["run", str(DEMOS / "strings" / "stability_map.toml"), "--duration", "5", "-o", str(tmp_path)]) == 0
+    assert "20 speeds from 40 to 192 rpm" in capsys.readouterr().out
+    assert {"stability.csv", "stability.png", "drilling.csv", "map.png"} <= {file.name for file in tmp_path.iterdir()}

@@ -7,7 +7,7 @@ import pytest
 from clamped_rod import START, Problem
 from scipy.integrate import solve_bvp
 
-pytestmark = [pytest.mark.serial, pytest.mark.once, pytest.mark.slow]
+pytestmark = [pytest.mark.serial, pytest.mark.once, pytest.mark.pages]
 DEMOS = Path(__file__).parent.parent / "demos"
 
 

@@ -1,9 +1,8 @@
-"""Rods below a pipe, the pipe as a condition at their end, bits that come down on rock, and the demos."""
+"""Rods below a pipe, the pipe as a condition at their end, and bits that come down on rock."""
 
 import math
 from dataclasses import dataclass, replace
 from functools import partial
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,7 +12,6 @@ from scipy.integrate import solve_ivp, trapezoid
 from torsion_scenes import COLLARS, LAW, PIPE, part
 
 import cosserat_fenicsx as cf
-from cosserat_fenicsx.cli.main import main
 from cosserat_fenicsx.drilling.elements import AxialTorsional
 from cosserat_fenicsx.drilling.pipe_above import DelayLines, TopEnd
 
@@ -81,6 +79,7 @@ def test_other_schemes_agree(slips):
     np.testing.assert_allclose(other, one, atol=0.015)
 
 
+@pytest.mark.slow
 def test_the_rows_of_a_string_are_means_between_saved_states_and_of_order_2():
     """Angles of drive and bit by the step, also where steps are halved and where few states are saved."""
     drive = cf.drilling.TopDrive(
@@ -101,6 +100,7 @@ def test_the_rows_of_a_string_are_means_between_saved_states_and_of_order_2():
     assert taken == pytest.approx(history.dissipated[-1], rel=1e-3)
 
 
+@pytest.mark.slow
 def test_linear_controls_above_a_rod():
     """A PI control as a `LinearControl` is that one; others, some of them late, are those of the string; refusals."""
 
@@ -147,6 +147,7 @@ class HeldPI(cf.drilling.SampledControl):
         return now.asked - now.torque / 800 - 0.01 * now.angle, state
 
 
+@pytest.mark.slow
 def test_sampled_controls_above_a_rod(tmp_path, monkeypatch):
     """Torques and speeds of a control in Python are those of the string, and after an interruption the same digits."""
 
@@ -170,6 +171,7 @@ def test_sampled_controls_above_a_rod(tmp_path, monkeypatch):
     assert np.array_equal(cf.resume(tmp_path / "kept", mixed.scene).energy, history.energy)
 
 
+@pytest.mark.slow
 def test_an_autodriller_above_a_rod():
     """The weight on a bit that drills rises as on the string by elements."""
     driller = cf.drilling.Autodriller(weight=1e4, Kp=2e-7, Ki=2e-7, limits=(0, 0.02))
@@ -186,6 +188,7 @@ def test_an_autodriller_above_a_rod():
             assert off < 5e-3 * size, (name, off / size)
 
 
+@pytest.mark.slow
 def test_a_torque_that_drops_at_once():
     """Coulomb: nothing moves until the static torque is reached; then Z om = 2 M_in - T_d."""
     law = cf.drilling.Stribeck(2000.0, 1000.0)
@@ -647,54 +650,3 @@ def test_the_weight_of_a_hook_that_is_lowered_is_that_of_springs_in_a_row(stiffn
     assert history.weight_on_bit[-1] - 6e4 == pytest.approx(0.01 / give, rel=1e-6)
     turning = bouncing(stiffness, height=1e-12, start="steady", drag=cf.drilling.ViscousDrag(0.3, 0.3))
     assert np.ptp(cf.drilling.simulate(turning, 1.0, dt=5e-3).weight_on_bit) < 1.0
-
-
-DEMOS = Path(__file__).parent.parent / "demos"
-FILES = sorted((DEMOS / "strings").glob("*.toml"))
-
-
-@pytest.mark.once
-def test_the_demos_give_their_numbers(capsys):
-    import strings
-    from known_numbers import deviation
-
-    names = {demo.__name__ for demo in strings.STRINGS} | {"stability_map"}
-    assert names == {file.stem for file in FILES}
-    for check in strings.main(out=None):
-        assert deviation(check) <= check.allowed, check
-    assert "Drill-strings in motion" in capsys.readouterr().out
-
-
-@pytest.mark.once
-def test_a_coarse_map_agrees_with_the_linear_theory(capsys):
-    import strings_map
-    from known_numbers import deviation
-
-    assert all(deviation(check) == 0 for check in strings_map.main(quick=True))
-    told = capsys.readouterr().out
-    assert "25 simulations of 120 s on 1 rank(s)" in told and "the bit oscillates in 12, a mode grows in 4" in told
-
-
-@pytest.mark.once
-def test_the_command_line_explains_them(capsys):
-    for file in FILES:
-        assert main(["explain", str(file)]) == 0
-    told = capsys.readouterr().out
-    for words in (
-        "String, drill pipe: 3000 m, 261.97 N/m in air, impedance 296.38 N m s/rad in torsion",
-        "Model: axial and torsional: the hook moves.",
-        "Motion: 36234 steps of 0.003312 s, 305 places along the string.",
-        "Drive: 40 rpm, PI(Kp 38000 N m s/rad, Ki 100000 N m/rad), inertia 2900 kg m^2.",
-        "Bit: none, the lower end is free.",
-        "Asked for: stability at 20 speeds and 20 weights on bit.",
-    ):
-        assert words in told, words
-
-
-@pytest.mark.once
-@pytest.mark.slow
-def test_the_command_line_maps_the_stability(tmp_path, capsys):
-    pytest.importorskip("matplotlib")
-    assert main(["run", str(DEMOS / "strings" / "stability_map.toml"), "--duration", "5", "-o", str(tmp_path)]) == 0
-    assert "20 speeds from 40 to 192 rpm" in capsys.readouterr().out
-    assert {"stability.csv", "stability.png", "drilling.csv", "map.png"} <= {file.name for file in tmp_path.iterdir()}
