@@ -305,7 +305,9 @@ def calibrate_friction(
 
     @lru_cache(maxsize=1)
     def answers_of(friction):
-        with_friction = hole.with_friction(np.maximum(friction, 0.0))
+        with warnings.catch_warnings():  # of values that are tried
+            warnings.simplefilter("ignore", SceneWarning)
+            with_friction = hole.with_friction(np.maximum(friction, 0.0))
         answers = {id(m): torque_and_drag(with_friction, string, m.operation, depth=m.depth, **settings)
                    for m in measurements}  # fmt: skip
         return [answers[id(x.at)] for x in readings]
