@@ -33,6 +33,8 @@ _WIDTH, _HEIGHTS, _TITLE, _LINE = 640, (560, 680), 90, 38
 _STEEPEST = 1.0
 # Largest displacement in a picture, over the structure's size, that could not be seen; least share of it that moves.
 _SEEN, _MOVES = 0.02, 0.2
+# Share of a mode's displacement normal to a plane from which on a plane structure is seen from a corner.
+_LEAVES = 0.1
 # Displacement of a rod over its length and its rotation, below which it only twists.
 _IN_PLACE = 0.01
 # Memory for frames of a film, which are drawn once, bytes.
@@ -152,7 +154,8 @@ def _panels(found, shown, amplitude):
     down = math.ceil(len(shown) / across)
     drawn = [Drawn(found, k, amplitude) for k in shown]
     everywhere = np.concatenate([shape.everywhere() for shape in drawn])
-    panel = _height(everywhere)
+    span = _span(found, shown, everywhere)
+    panel = _height(everywhere, span)
     width = across * _WIDTH
     head = _head(found, width)
     top = max(_TITLE, _LINE * (head.count("\n") + 1))
@@ -171,7 +174,7 @@ def _panels(found, shown, amplitude):
         text = f"{_filled(f'k = {k}: {found.label(k)}{_most_at(found, k, shape)}', _WIDTH)}\n"
         text += _below(shape, bodies, seen, _WIDTH)
         plotter.add_text(text, position="upper_edge", color="black", font_size=11)
-        frame(plotter, seen, panel=True)
+        frame(plotter, seen, panel=True, span=span)
     return plotter
 
 
@@ -181,9 +184,18 @@ def _most_at(found, k, shape):
     return f", most at {found.farthest(k)[0]}" if shown else ""
 
 
-def _height(everywhere):
-    """The height of a panel that suits a drawing of points (n, 3), pixels."""
-    _, right, above, _ = view_of(np.ptp(everywhere, axis=0))
+def _span(found, modes, everywhere):
+    """(3,) the extents that decide on the view of points (n, 3), m: the largest one for all axes where the points
+    lie in a plane that one of the modes leaves."""
+    span, moved = np.ptp(everywhere, axis=0), np.abs(found.shapes[list(modes)][..., :3])
+    normal = np.abs(view_of(span)[0])
+    leaves = (moved @ normal).max(axis=1) > _LEAVES * np.linalg.norm(moved, axis=2).max(axis=1)
+    return np.full(3, span.max()) if normal.max() == 1.0 and leaves.any() else span
+
+
+def _height(everywhere, span):
+    """The height of a panel that suits a drawing of points (n, 3), pixels; span: see `_span`."""
+    _, right, above, _ = view_of(span)
     across, high = np.ptp(everywhere @ right), np.ptp(everywhere @ above)
     return int(np.clip(_WIDTH * high / max(across, 1e-9 * high), *_HEIGHTS))
 
@@ -239,7 +251,7 @@ class _Stage:
         below = _below(self._shape, bodies, self._everywhere, size[0])
         text = f"{_head(found, size[0])}\nk = {k}: {found.label(k)}{_most_at(found, k, self._shape)}\n{below}"
         self._plotter.add_text(text, position="upper_edge", color="black", font_size=10)
-        frame(self._plotter, self._everywhere, panel=True)
+        frame(self._plotter, self._everywhere, panel=True, span=_span(found, [k], self._everywhere))
         self.at = lru_cache(maxsize=max(1, _MEMORY // (3 * size[0] * size[1])))(self._draw)
 
     def _draw(self, share):
