@@ -242,3 +242,16 @@ def test_bends_that_are_refused(given, words):
     with pytest.raises(cf.SceneError) as refused:
         well.Collar(**{"length": 7.5, "size": "NC46-65", **given})
     assert words in str(refused.value)
+
+
+def test_rates_of_a_long_pendulum_change_smoothly_with_the_weight_on_bit():
+    """Nodes that begin and cease to touch in turn ended half of these without a rate, and one with a wrong one."""
+    hole = well.Borehole(well.WellPath.from_survey([0, 900], [45, 45], [0, 0]), well.HoleSection(900, "8.5 in", 0.25))
+    collar = {"outer_diameter": "6.75 in", "inner_diameter": "2.8125 in"}
+    string = well.DrillString([
+        well.Bit("8.5 in"), well.Collar(18.288, **collar), well.Stabiliser(1.524, "8.46875 in", "6.75 in", "2.8125 in"),
+        well.Collar(60.96, **collar), well.DrillPipe(outer_diameter=0.127, inner_diameter=0.0762),
+    ])  # fmt: skip
+    weights = np.arange(22, 39, 4) * cf.units.kip
+    rates = [well.build_rate(hole, string, well.Sliding(x), mud=well.Mud(1198.0)).rate[:3] for x in weights]
+    assert (np.abs(np.diff(rates, 2, axis=0)) < 0.25 * np.abs(np.diff(rates, axis=0)[1:])).all()

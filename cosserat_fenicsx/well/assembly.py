@@ -13,6 +13,7 @@ with shear (J. S. Przemieniecki, Theory of Matrix Structural Analysis, 1968, sec
 `build_rate`: the rate at which it builds inclination, by the criteria in use; they differ, and all are reported.
 """
 
+import itertools
 import math
 from dataclasses import dataclass
 from functools import cached_property
@@ -35,7 +36,7 @@ from cosserat_fenicsx.well.pieces import bend_of, checked_depth, pieces_of, ring
 _LIES = 3.0
 # Largest element, m; changes of the set of touching nodes at most; bracket of the place where the string lies down, in
 # elements; accuracy of that place, m.
-_ELEMENT, _CHANGES, _AROUND, _PLACE = 0.25, 50, 3.0, 1e-7
+_ELEMENT, _CHANGES, _AROUND, _PLACE = 0.25, 400, 3.0, 1e-7
 # Places closer than this, m, are one.
 _APART = 1e-6
 # Walls that become stiffer, each by a factor; Newton steps in each at most.
@@ -176,7 +177,10 @@ def _solved(beam, curvature, end, lies, free_from=math.inf, known=None):
     reached = np.where((s < free_from) | (s == end), clearance, np.inf)
     ends = np.array([-1, lies or (1 if load[-2] > 0 else -1)])
     for sides in _begun(bands, load, s, ends, reached, known, beam.weight.max() * _ELEMENT):
+        known_sides, repeats = set(), False
         for _ in range(_CHANGES):
+            repeats = repeats or sides.tobytes() in known_sides
+            known_sides.add(sides.tobytes())
             x, force = _with_contacts(bands, load, sides, clearance)
             offset, across = x[::2], force[::2]
             pulled = sides * across > 0  # a wall does not pull
@@ -185,6 +189,9 @@ def _solved(beam, curvature, end, lies, free_from=math.inf, known=None):
             if not pulled.any() and not beyond.any():
                 moment = float(force[-1] - beam.EI[beam.of_part(s[-1:])[0]] * curvature)
                 return Held(s, offset, x[1::2], sides, np.where(sides, across, 0.0), moment)
+            if repeats:  # one node at a time, the first one: no set of nodes then comes again (Murty 1974)
+                wrong = np.flatnonzero(pulled | (beyond != 0))[1:]
+                pulled[wrong], beyond[wrong] = False, 0.0
             sides = np.where(pulled, 0, np.where(sides, sides, beyond)).astype(int)
     raise NotConverged(
         f"no contacts of the assembly were found that fit in a hole of curvature {curvature:.3g} rad/m: expected less "
@@ -363,10 +370,12 @@ class BuildRate(Charted):
         return float(self.rate[CRITERIA.index(criterion)])
 
     def _answer(self, units):
-        force, tilt = self._told("bit_side_force", units, form=".5g"), math.degrees(self.bit_tilt)
+        force = self._told("bit_side_force", units, abs(self.bit_side_force), form=".5g")
+        pressed, tilted = ("low" if x < 0 else "high" for x in (self.bit_side_force, self.bit_tilt))
         yield (
-            f"In a straight hole the bit presses with {force} to the high side, and its axis is {tilt:.4g} deg off the "
-            f"hole's, > 0 to the high side. Rates of build by criteria, which differ; law: anisotropy "
+            f"In a straight hole the bit presses with {force} to the {pressed} side, and its axis is "
+            f"{math.degrees(abs(self.bit_tilt)):.4g} deg off the hole's to the {tilted} side. "
+            "Rates of build by criteria, which differ; law: anisotropy "
             f"{self.anisotropy:g}."
         )
         yield from self.why
@@ -432,15 +441,21 @@ def build_rate(
     }
     rates, why = [], []
     for name, measure in measures.items():
-        values = measure(side_force, tilt)
-        changes = np.flatnonzero(values[:-1] * values[1:] <= 0)
-        found = [brentq(lambda k, measure=measure: measure(*at(k)), *_LOOKED_FOR[[i, i + 1]], xtol=1e-9)
-                 for i in changes]  # fmt: skip
+        values, found, hidden = measure(side_force, tilt), [], []
+        for i, j in itertools.pairwise(np.flatnonzero(~np.isnan(values))):
+            if values[i] * values[j] <= 0:
+                try:
+                    found.append(brentq(_known(lambda k, measure=measure: measure(*at(k))), *_LOOKED_FOR[[i, j]],
+                                        xtol=1e-9))  # fmt: skip
+                except NotConverged:
+                    hidden.append(f"between {_told(_LOOKED_FOR[i])} and {_told(_LOOKED_FOR[j])}")
         rates.append(min(found, key=abs, default=math.nan))
-        if not found:
+        if hidden:
+            why.append(f"{name}: it changes its sign {' and '.join(hidden)}, where no equilibrium was found")
+        elif not found:
             why.append(f"{name}: it does not vanish in any hole between {_told(_LOOKED_FOR[0])} and "
                        f"{_told(_LOOKED_FOR[-1])}")  # fmt: skip
-        elif len(found) > 1:
+        if len(found) > 1:
             why.append(f"{name}: it vanishes in several holes: {', '.join(map(_told, found))}")
     unknown = _LOOKED_FOR[np.isnan(side_force)]
     if len(unknown):
@@ -456,6 +471,17 @@ def build_rate(
         )
     return BuildRate(np.array([*rates, three]), tuple(why), anisotropy, straight.side_force, straight.tilt,
                      tuple(straight.contacts), _LOOKED_FOR, side_force, tilt, beam)  # fmt: skip
+
+
+def _known(function):
+    """The function, which raises NotConverged where its value is NaN."""
+
+    def value(k):
+        if math.isnan(found := function(k)):
+            raise NotConverged("no equilibrium was found")
+        return found
+
+    return value
 
 
 def _told(curvature):
