@@ -21,11 +21,10 @@ from pathlib import Path
 
 import cffi
 import numpy as np
-from dolfinx import cpp
 
-from cosserat_fenicsx import code_cache, compat
+from cosserat_fenicsx import code_cache, compat  # before dolfinx, whose import it guards
 from cosserat_fenicsx.code_cache import instructions
-from cosserat_fenicsx.compat import compiling
+from cosserat_fenicsx.compat import compiling, cpp
 from cosserat_fenicsx.errors import InstallationError
 
 SOURCES = tuple(
