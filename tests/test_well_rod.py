@@ -460,3 +460,18 @@ def test_the_view_from_the_side(out, tmp_path_all):
     assert (tmp_path_all / "side.png").stat().st_size > 10_000
     with pytest.raises(cf.SceneError, match="plot_from_side.length = -1.0"):
         out.plot_from_side(length=-1.0)
+
+
+@pytest.mark.serial
+@pytest.mark.slow
+def test_a_kinked_well_at_a_small_tolerance():
+    """Newton's method that ends one step early leaves 0.5 N of the wall's force, and no mesh is enough."""
+    md, inc = [0, 500, 530, 900, 930, 1500, 1530, 1560, 2000], [0, 0, 6, 6, 2, 2, 14, 4, 4]
+    path = cf.well.WellPath.from_survey(md, inc, [0] * 6 + [90, 200, 200])
+    sections = [cf.well.HoleSection(1200, 0.2224, 0.25), cf.well.HoleSection(path.length, 0.2159, 0.2)]
+    string = cf.well.DrillString(
+        [cf.well.Bit(0.2159), cf.well.Collar(90, "NC46-65"), cf.well.DrillPipe(None, "5 19.50")]
+    )
+    given = {"mud": cf.well.Mud(1300.0), "model": "rod", "tol": 1e-5}
+    answer = cf.well.torque_and_drag(cf.well.Borehole(path, sections), string, cf.well.TripIn(), **given)
+    assert answer.hook_load == pytest.approx(544531.0176, rel=1e-8) and answer.error < 1e-5

@@ -30,6 +30,7 @@ from cosserat_fenicsx.results import saved
 from cosserat_fenicsx.results.history import History
 from cosserat_fenicsx.results.path import Path
 from cosserat_fenicsx.scene.action import describe, path_dependent
+from cosserat_fenicsx.scene.loads import Weight
 from cosserat_fenicsx.scene.scene import Scene, check_magnitudes, check_tensions
 from cosserat_fenicsx.scene.stages import refuse_stages
 from cosserat_fenicsx.statics.meshes import turning_in_law
@@ -170,13 +171,14 @@ def simulate(
 
 
 def _braked(scene):
-    """A sentence on drag of rods that nothing holds, which a damping ratio brings: [] where there is none."""
+    """A sentence on drag, which a damping ratio brings, in a scene with a weight and without supports: a list."""
     drag = max((rod.damping.drag for rod in scene.rods if rod.damping is not None), default=0.0)
-    if not drag or scene.supports:
+    pull = max((float(np.linalg.norm(load.gravity)) for load in scene.loads if isinstance(load, Weight)), default=0.0)
+    if not drag or not pull or scene.supports:
         return []
     return [
-        f"the drag of Damping ({drag:.4g} 1/s) brakes vibrations and, since no support holds the rods, their motion as "
-        f"a whole too: a fall ends at g/drag = {9.81 / drag:.3g} m/s; Damping(time=...) alone leaves it as it is"
+        f"the drag of Damping ({drag:.4g} 1/s) brakes vibrations and falls: a free one would end at g/drag = "
+        f"{pull / drag:.3g} m/s; Damping(time=...) alone leaves it as it is"
     ]
 
 

@@ -36,7 +36,6 @@ _MOST = 60  # Newton steps of a stage
 # Newton's method counts as alternating between two contacts where steps do not shrink by this factor this number of
 # times in a row; these shares of steps are then taken.
 _SLOW, _STALLED, _SHARES = 0.6, 2, (0.5, 0.35, 0.7)
-_FAST = 0.1  # a step that is shorter than the one before by this factor or more foretells the next one
 _BALANCED = 1e-6  # residual force of a node at equilibrium, over the norm of the loads
 
 
@@ -101,10 +100,10 @@ def _solve_stage(newton, enough, name, walls, hold):
 
 
 def converge(newton, enough, before=None):
-    """Take Newton steps, and shares of them where the contact alternates between two states, until the next full one
-    would be at most `enough`, in the model's unit of length; before: called before every step. Returns why it failed,
-    "" where it converged."""
-    moved, stalled, foretells = math.inf, 0, False
+    """Take Newton steps, and shares of them where the contact alternates between two states; enough: size of a full
+    step that ends it, in the model's unit of length; before: called before every step. Returns why it failed, "" where
+    it converged."""
+    moved, stalled = math.inf, 0
     for _ in range(_MOST):
         obey()
         if before:
@@ -113,9 +112,7 @@ def converge(newton, enough, before=None):
         step = newton.step(share)
         if step is None:
             return "the tangent is singular"
-        shorter = step.moved / moved if foretells and step.moved <= _FAST * moved else 1.0
-        foretells = step.share == 1.0
-        if foretells and shorter * step.moved <= enough:
+        if step.share == 1.0 and step.moved <= enough:
             return ""
         stalled = stalled + 1 if step.moved > _SLOW * moved else 0
         moved = step.moved

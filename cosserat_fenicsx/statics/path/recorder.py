@@ -126,8 +126,9 @@ class Tracing:
         if point.negative_modes and self.stability.sideways and not self._sideways:
             self._sideways = True
             self.path.why.append(
-                f"{SIDEWAYS} from the load factor {point.load_factor:.4g} on, which the planar model counts and does "
-                "not follow: a structure that is braced across its plane needs supports there, such as Rollers."
+                f"{SIDEWAYS} at the load factor {point.load_factor:.4g}, the first one where this was seen after "
+                f"{self._stable_at:.4g}: the planar model counts it and does not follow it. A structure that is braced "
+                "across its plane needs supports there, such as Rollers."
             )
         self._stable_at = point.load_factor
 
