@@ -37,7 +37,7 @@ help:
 	@echo "make docs    the documentation as a site that needs no network; writes out/docs/index.html (a minute), and runs the programs of its pages (three minutes)"
 	@echo "make tutorials  run the notebooks of docs/tutorials/ and store what they print and draw (a minute)"
 	@echo "make test    the tests, but for those of \`make docs\` and \`make slow\`: on two workers, and on ranks (a quarter of an hour)"
-	@echo "make slow    tests that take more than two seconds each (three minutes)"
+	@echo "make slow    tests that take more than two seconds each (five minutes)"
 	@echo "make tables  the tables of accuracy and cost in docs/, measured anew and put there"
 	@echo "make figure3 every curve of the paper's Figure 3, and what was found; writes out/ (about 4 minutes)"
 	@echo "make work-precision  speed against accuracy, beside Exudyn, OpenSeesPy, PyElastica, CalculiX, welleng and torque-drag (half an hour at most)"

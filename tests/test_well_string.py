@@ -432,7 +432,8 @@ def test_doubts_are_said_once_and_without_code(tmp_path):
     operation = "[[operations]]\ntype = 'RotaryDrilling'\nweight = 60\ntorque = 5\n[torque_and_drag]\nmodel = 'soft'\n"
     (tmp_path / "well.toml").write_text(stations + rest + operation, encoding="utf-8")
     command = [sys.executable, "-m", "cosserat_fenicsx", "run", "well.toml"]
-    told = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True).stderr.splitlines()
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, encoding="utf-8", check=True)
+    told = done.stderr.splitlines()
     assert len(told) == 4 and all(line.startswith("cosserat: warning: ") for line in told)
     for words in ("survey ends at 3281 m and the sections at 1000 m.*3.28 times as deep", "hardly that of a mud",
                   "RotaryDrilling.weight = 60 N is hardly", "RotaryDrilling.torque = 5 N m is hardly"):  # fmt: skip
