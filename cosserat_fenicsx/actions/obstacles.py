@@ -109,7 +109,7 @@ class Obstacle(Pressing, LineAction):
 
     @property
     def smooth(self):
-        """The same obstacle without friction, at rest."""
+        """See `Action`."""
         without = {"friction": 0.0, "stick": None, "velocity": None, "spin": 0.0}
         return replace(self, **{field.name: without[field.name] for field in fields(self) if field.name in without})
 

@@ -251,7 +251,7 @@ def _in_time(item):
     parts = []
     for field, signal in signals_of(item).items():
         given = signal.function
-        if item.station is None and getattr(item, "carried", None) is signal:
+        if getattr(item, "carried", None) is signal:
             parts.append(f"its surface moves, {signal.field} = {getattr(item, signal.field)} {signal.unit}/s")
             continue
         name = type(given).__name__ if type(given).__module__.endswith("signals") else "a function of time"

@@ -205,6 +205,11 @@ class Action(Part, family="load or action", homes=("cosserat_fenicsx.scene.loads
         far the rod may move from there, m; else None."""
         return None
 
+    @property
+    def smooth(self):
+        """The same action without friction and at rest, by which equilibria with and without friction are compared."""
+        return self
+
     def drawn(self, low, high):
         """For pictures, of an obstacle: (n, m, 3) points of its surface, m, as large as the box with the corners low
         and high (3,), m; else None."""

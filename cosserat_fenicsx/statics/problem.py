@@ -63,7 +63,7 @@ def check_static(scene):
         )
     for item in scene.moving:
         still = "a vector, a function of the arc length as Along(function)"
-        if item in scene.actions and item.gaps is not None:
+        if getattr(item, "gaps", None) is not None:
             still = "a surface without velocity or spin"
         raise SceneError(
             f"Scene: the {type(item).__name__} depends on time, which a static analysis excludes: expected {still}, "

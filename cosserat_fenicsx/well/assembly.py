@@ -427,13 +427,16 @@ def build_rate(
     straight = beam.at(0.0)
 
     def at(curvature):
-        try:
-            held = straight if curvature == 0 else beam.at(curvature)
-        except NotConverged:
-            return math.nan, math.nan
+        held = straight if curvature == 0 else beam.at(curvature)
         return held.side_force, held.tilt
 
-    side_force, tilt = np.array([at(float(k)) for k in _LOOKED_FOR]).T
+    def tried(curvature):
+        try:
+            return at(curvature)
+        except NotConverged:
+            return math.nan, math.nan
+
+    side_force, tilt = np.array([tried(float(k)) for k in _LOOKED_FOR]).T
     measures = {
         "side force": lambda force, tilt: force,
         "tilt": lambda force, tilt: tilt,
@@ -445,8 +448,7 @@ def build_rate(
         for i, j in itertools.pairwise(np.flatnonzero(~np.isnan(values))):
             if values[i] * values[j] <= 0:
                 try:
-                    found.append(brentq(_known(lambda k, measure=measure: measure(*at(k))), *_LOOKED_FOR[[i, j]],
-                                        xtol=1e-9))  # fmt: skip
+                    found.append(brentq(lambda k, measure=measure: measure(*at(k)), *_LOOKED_FOR[[i, j]], xtol=1e-9))
                 except NotConverged:
                     hidden.append(f"between {_told(_LOOKED_FOR[i])} and {_told(_LOOKED_FOR[j])}")
         rates.append(min(found, key=abs, default=math.nan))
@@ -471,17 +473,6 @@ def build_rate(
         )
     return BuildRate(np.array([*rates, three]), tuple(why), anisotropy, straight.side_force, straight.tilt,
                      tuple(straight.contacts), _LOOKED_FOR, side_force, tilt, beam)  # fmt: skip
-
-
-def _known(function):
-    """The function, which raises NotConverged where its value is NaN."""
-
-    def value(k):
-        if math.isnan(found := function(k)):
-            raise NotConverged("no equilibrium was found")
-        return found
-
-    return value
 
 
 def _told(curvature):

@@ -343,9 +343,8 @@ class Differentiated:
                 weight += (each[:, None] - weight) * change.weight
                 friction += (each[:, None] - friction) * change.friction
         for motor in self.string.components if "operation.torque" in known and len(values) else ():
-            if isinstance(motor, MudMotor):
-                if torque.any() or motor.stall_torque() > 0:  # else it stands, as on a trip without flow
-                    motor.running(type(self.operation).__name__, float(torque.max()))
+            if isinstance(motor, MudMotor) and not motor.stands(float(np.abs(torque).max())):
+                motor.running(type(self.operation).__name__, float(torque.max()))
         found = _many(pieces, coulomb, weight, friction, tension, torque)
         sizes, rounding = np.abs(found[:, 2:4]), 2 * _EPS * len(pieces.top)
         cut, failures = ~(found[:, :2] <= self.tol * sizes).all(axis=1), {}

@@ -391,7 +391,7 @@ def _on_motor(string, operation):
     motors = [part for part in string.components if isinstance(part, MudMotor)]
     check_flows(motors)
     for motor in motors:
-        if operation.torque == 0 and motor.stall_torque() <= 0:  # as on a trip without flow
+        if motor.stands(operation.torque):
             yield f"{motor.name}: stands, since its flow does not turn it"
             continue
         speed = motor.running(type(operation).__name__, operation.torque)

@@ -342,6 +342,10 @@ class MudMotor(_Tool):
              for T, om in zip(wanted, straight, strict=True)]
         )  # fmt: skip
 
+    def stands(self, torque: float) -> bool:
+        """Whether it neither turns nor stalls under a torque (N m): there is none, as on a trip without flow."""
+        return torque == 0 and self.stall_torque() <= 0
+
     def running(self, owner: str, torque: float) -> float:
         """The speed under a steady torque on bit (N m), rad/s.
 
