@@ -5,9 +5,9 @@
     python demos/model_server.py --port 5000
 
 One input, the values of `PARAMETERS`; two outputs: the displacement of the tip (m) and the moment at the foot (N m),
-along inertial axes. The Jacobian is that of `Path.sensitivity`. The configuration of a request holds arguments of `solve`. What
-is refused or does not converge reaches the client in words. Requests are answered one after the other: start a server for
-each core, each on a port of its own.
+along inertial axes. The Jacobian is that of `Path.sensitivity`. The configuration of a request holds arguments of
+`solve`. What is refused or does not converge reaches the client in words. Requests are answered one after the other:
+start a server for each core, each on a port of its own.
 """
 
 import argparse

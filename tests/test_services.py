@@ -39,7 +39,7 @@ def test_the_development_container():
 
 
 def test_read_the_docs():
-    """Every package that the site needs, and that PyPI has not, comes from conda-forge; the names of files are right."""
+    """Every package that the site needs and PyPI has not comes from conda-forge; the names of files are right."""
     yaml = pytest.importorskip("yaml")
     found = yaml.safe_load((ROOT / ".readthedocs.yaml").read_text(encoding="utf-8"))
     assert found["version"] == 2 and set(found) == {"version", "build", "conda", "python", "sphinx"}

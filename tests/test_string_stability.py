@@ -470,8 +470,8 @@ def test_a_bit_on_high_lobes_leaves_the_rock_and_is_not_pulled():
 
 
 def test_what_is_recalled_goes_on_to_the_same_digits():
-    for scene in (drilling(weight=100e3), drilling(law=cf.drilling.Lobes(3, 0.002), weight=80e3)):
-        model, again = AxialTorsional(scene, 0.004, 60), AxialTorsional(scene, 0.004, 60)
+    for given in (drilling(weight=100e3), drilling(law=cf.drilling.Lobes(3, 0.002), weight=80e3)):
+        model, again = AxialTorsional(given, 0.004, 60), AxialTorsional(given, 0.004, 60)
         model.advance(700)
         again.recall(model.memory())
         np.testing.assert_array_equal(model.advance(300), again.advance(300))

@@ -250,7 +250,8 @@ def two_bars():
 @problem(
     "Portal frames that sway",
     "stability",
-    f"{TIMOSHENKO}, section 2.12: hinged feet k h tan(k h) = 6, clamped feet k h/tan(k h) = -6 (for equal lengths and EI)",
+    f"{TIMOSHENKO}, section 2.12: hinged feet k h tan(k h) = 6, clamped feet k h/tan(k h) = -6 (for equal lengths and "
+    "EI)",
     "columns and beam of 1 m, EI = 1 N m^2, inextensible; one load on each column",
 )
 def portal_frames():
@@ -325,8 +326,8 @@ class FluidPressure(cf.LineAction):
 @problem(
     "Ring and arches under the pressure of a fluid",
     "stability",
-    f"M. Levy 1884: p R^3/EI = 3; {TIMOSHENKO}, section 7.6: pi^2/a^2 - 1 for hinged arches of half angle a, k^2 - 1 with k "
-    "tan a cot(k a) = 1 for clamped ones",
+    f"M. Levy 1884: p R^3/EI = 3; {TIMOSHENKO}, section 7.6: pi^2/a^2 - 1 for hinged arches of half angle a, k^2 - 1 "
+    "with k tan a cot(k a) = 1 for clamped ones",
     "R = 1 m, EI = 1 N m^2, inextensible, in its plane; arches with a = 60 degrees",
     "The pressure follows the rod. On the ring and between fixed ends it has a potential, but the package makes no "
     "use of that: events of the path are located with the unsymmetric tangent.",
