@@ -97,6 +97,15 @@ def test_files_that_are_refused(tmp_path, text, words):
         cf.drilling.Readings.from_csv(tmp_path / "rig.csv", NOISE)
 
 
+@pytest.mark.parametrize(("name", "value", "words"), [
+    ("drive_speed", 120.0, "1146 rev/min"), ("surface_torque", 12.0, "hardly a torque of a drive"),
+    ("hook_load", 900.0, "hardly a hook load"), ("weight_on_bit", 25.0, "hardly a weight on bit"),
+])  # fmt: skip
+def test_readings_in_other_units_are_doubted(name, value, words):
+    with pytest.warns(cf.SceneWarning, match=words):
+        cf.drilling.Readings([0.0, 1.0, 2.0], {name: [value, np.nan, 0.0]}, {name: 1.0})
+
+
 @pytest.mark.parametrize(("unknowns", "words"), [
     ({"bit.low.static": (1.0, 2.0)}, "did you mean 'law'"),
     ({"bit.law.static": (9e3, 4e3)}, "ascending"),

@@ -13,6 +13,7 @@ from scipy.optimize import minimize_scalar
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.numerics import PLACES, derivative
+from cosserat_fenicsx.quantities import Units
 from cosserat_fenicsx.well import criteria
 
 pytestmark = [pytest.mark.serial, pytest.mark.once]
@@ -129,6 +130,39 @@ def test_a_survey_from_a_file(tmp_path):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         assert cf.well.WellPath.from_csv(file, length_unit="m").length == 9000
+
+
+def test_plain_depths_that_are_as_large_as_feet_are_doubted():
+    stations = [0, 9000], [0, 30], [0, 0]
+    with pytest.warns(cf.SceneWarning, match="md has no unit, .* at 9000 m: if these are feet, say length_unit = 'ft'"):
+        assert cf.well.WellPath.from_survey(*stations).length == 9000
+    section = cf.well.HoleSection("9000 m", 0.2, 0.2)
+    with pytest.warns(cf.SceneWarning, match="stations: their depths have no unit"):
+        cf.well.Borehole.from_survey([section], stations=np.transpose(stations).tolist())
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert cf.well.WellPath.from_survey(*stations, length_unit="m").length == 9000
+        feet = cf.well.WellPath.from_survey(np.array([0, 9000]), [0, 30], [0, 0], length_unit="ft")
+        assert feet.length == pytest.approx(2743.2) and feet.unit == "ft"
+        assert cf.well.tortuosity(feet, 0.5, "300 ft", seed=1).unit == "ft"
+    with pytest.raises(cf.SceneError, match="length_unit = 'ft': expected None, since depths have units of their own"):
+        cf.well.WellPath.from_survey(["0 m", "90 m"], [0, 30], [0, 0], length_unit="ft")
+
+
+def test_vertical_stations_need_no_azimuth(tmp_path):
+    given = cf.well.WellPath.from_survey([0, 100, 400], [0, 0, 30], [70, 70, 70])
+    (tmp_path / "survey.csv").write_text("MD (m),Inc (deg),Azi (deg)\n0,0,\n100,0,\n400,30,70\n", encoding="utf-8")
+    for path in (
+        cf.well.WellPath.from_survey([0, 100, 400], [0, 0, 30], [None, math.nan, 70]),
+        cf.well.WellPath.from_csv(tmp_path / "survey.csv"),
+        cf.well.Borehole.from_survey([cf.well.HoleSection(400.0, 0.2, 0.2)],
+                                     stations=[(0, 0, None), (100, 0, None), (400, 30, 70)]).path,
+    ):
+        assert (path.position(400.0) == given.position(400.0)).all() and path.filled == (0, 100)
+    hole = cf.well.Borehole(path, cf.well.HoleSection(400.0, 0.2, 0.2))
+    assert "No azimuth was given at md = 0 m, 100 m, which is vertical" in "".join(hole.sentences(Units()))
+    with pytest.raises(cf.SceneError, match=r"azi\[1\] = None: expected a number, .* \(inclination 5\)"):
+        cf.well.WellPath.from_survey([0, 100], [0, 5], [None, None])
 
 
 def test_a_survey_from_a_workbook(tmp_path):

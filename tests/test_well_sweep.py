@@ -124,12 +124,24 @@ def test_a_sweep_by_the_rod_is_stopped_and_goes_on(monkeypatch, tmp_path):
 @pytest.mark.once
 @pytest.mark.parametrize(("depths", "words"), [
     ([1000, 2600], "hole, which ends at 2500 m"), ([], "at least one measured depth"),
-    ([1000, 50], "above the surface at the depth 50 m"),
+    ([60, 50], "above the surface at the depth 50 m"),
     (["3000 psi"], r"depths\[0\] = '3000 psi': psi is a unit of pressure"),
 ])  # fmt: skip
 def test_depths_that_do_not_fit_are_refused_first(depths, words):
     with pytest.raises(cf.SceneError, match=words):
         cf.well.depth_sweep(HOLE, STRING, OPERATIONS, depths, mud=MUD)
+
+
+@pytest.mark.once
+def test_depths_at_which_heavy_pipe_stands_out_are_left_out(tmp_path):
+    given, settings = (HOLE, STRING, OPERATIONS[:2]), {"mud": MUD, "model": "soft", "folder": tmp_path / "sweep"}
+    least = STRING.least_depth
+    swept = cf.well.depth_sweep(*given, [least / 2, least, 1000], **settings)
+    assert np.isnan(swept.hook_load[0, 0]).tolist() == [True, True, False] and swept.done.all()
+    note = f"left out, since the string is {least:.6g} m long below its drill pipe"
+    assert swept.noted() == [f"bit at {x:g} m: {note}" for x in (least / 2, least)]
+    again = cf.resume(tmp_path / "sweep")
+    assert again.noted() == swept.noted() and again.hook_load[0, 0, 2] == swept.hook_load[0, 0, 2]
 
 
 @pytest.mark.once
@@ -231,6 +243,17 @@ def test_the_interval_covers_as_often_as_it_says():
         assert "Standard deviations: 300 N m of surface torques." in str(fit)
         hits += int(fit.interval[0, 0] < 0.2 < fit.interval[0, 1])
     assert 11 <= hits <= 29  # 20 with a standard deviation of 3.2
+
+
+@pytest.mark.once
+@pytest.mark.parametrize(("given", "words"), [
+    ({"hook_load": 250}, "RigMeasurement.hook_load, at most = 250 N is hardly a hook load of a string"),
+    ({"torque": 12.5}, "RigMeasurement.torque, at most = 12.5 N m is hardly a torque of a string"),
+])  # fmt: skip
+def test_readings_in_other_units_are_doubted(given, words):
+    readings = [cf.well.RigMeasurement(depth, cf.well.BackReam(0.2, 60), **given) for depth in (2300.0, 2400.0, 2500.0)]
+    with pytest.warns(cf.SceneWarning, match=words):
+        cf.well.calibrate_friction(HOLE, STRING, readings, mud=MUD)
 
 
 @pytest.mark.once

@@ -12,7 +12,9 @@ import numpy as np
 from cosserat_fenicsx.checks import File, finite_array, instance, number, refuse, text_of
 from cosserat_fenicsx.quantities import BY_UNIT, DIMENSIONS
 from cosserat_fenicsx.drilling.history import DrillingHistory
+from cosserat_fenicsx.drilling.signals import doubt_speed
 from cosserat_fenicsx.errors import SceneError, nearest
+from cosserat_fenicsx.well.operations import doubt_load
 
 # Numbers that stand for none in files of rigs; usual names of columns beside those of a `DrillingHistory`.
 _NONE = (-999.25, -999.0, -9999.0, -9999.25)
@@ -63,6 +65,7 @@ class Readings:
                 refuse(self, f"values['{name}']", np.shape(column), f"as many as there are times, {len(times)}")
         if not any(np.isfinite(column).any() for column in found.values()):
             refuse(self, "values", self.values, "at least one quantity with readings")
+        _doubt(found)
         noise = {}
         for name in found:
             if name not in self.noise:
@@ -113,6 +116,15 @@ class Readings:
             for name, k in known.items()
         }
         return cls(times, values, {name: noise[name] for name in known if name in noise})
+
+
+def _doubt(values):
+    """Warn of readings that are probably in other units."""
+    largest = {name: float(np.nanmax(np.abs(x))) for name, x in values.items() if np.isfinite(x).any()}
+    doubt_speed("Readings", "values['drive_speed']", largest.get("drive_speed", 0.0))
+    for name, what, of in (("surface_torque", "torque", "drive"), ("hook_load", "hook load", "string"),
+                           ("weight_on_bit", "weight", "bit"), ("torque_on_bit", "torque", "bit")):  # fmt: skip
+        doubt_load(f"Readings.values['{name}']", largest.get(name, 0.0), what, of=of)
 
 
 # Quantities at the ends of steps; all others are means over them.

@@ -29,7 +29,7 @@ from cosserat_fenicsx.results.screen import InWords
 from cosserat_fenicsx.units import rpm
 from cosserat_fenicsx.well.components import DrillString, in_columns
 from cosserat_fenicsx.well.hole import Borehole, Mud
-from cosserat_fenicsx.well.operations import doubt_on_bit
+from cosserat_fenicsx.well.operations import doubt_load
 from cosserat_fenicsx.well.tools import check_flows
 
 
@@ -192,14 +192,14 @@ class Drilling(InWords, Part):
         """Warn of weights and torques at bit and drive that are probably in other units."""
         control, bit = self.drive.control, self.bit
         if isinstance(control, Motor):
-            doubt_on_bit("Motor.torque", control.torque, "torque", of="drive")
+            doubt_load("Motor.torque", control.torque, "torque", of="drive")
         if bit is None:
             return
-        doubt_on_bit("BitOnRock.weight", bit.most or 0.0, "weight")
+        doubt_load("BitOnRock.weight", bit.most or 0.0, "weight")
         law = None if bit.law.needs_weight else bit.law.resistance(bit.most)  # one by the weight may be small
         if law is not None:
             called = f"The torque of {type(bit.law).__name__}(...)"
-            doubt_on_bit(called, max(law.still, law.kinetic), "torque", "; coefficients of friction need radius= (m)")
+            doubt_load(called, max(law.still, law.kinetic), "torque", "; coefficients of friction need radius= (m)")
 
     @property
     def discs(self) -> Discs | None:

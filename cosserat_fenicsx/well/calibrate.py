@@ -24,7 +24,7 @@ from cosserat_fenicsx.quantities import Quantity
 from cosserat_fenicsx.results.result import Charted, by_name
 from cosserat_fenicsx.well.components import DrillString
 from cosserat_fenicsx.well.hole import Borehole, Mud
-from cosserat_fenicsx.well.operations import Operation
+from cosserat_fenicsx.well.operations import Operation, doubt_load
 from cosserat_fenicsx.well.solve import BUCKLED, SOFT, torque_and_drag
 
 
@@ -283,6 +283,9 @@ def calibrate_friction(
     measurements = [
         instance("calibrate_friction", "measurements", m, RigMeasurement, "Measurements") for m in measurements
     ]
+    for field in ("hook_load", "torque"):
+        largest = max((getattr(m, field) or 0.0 for m in measurements), key=abs, default=0.0)
+        doubt_load(f"RigMeasurement.{field}, at most", largest, field.replace("_", " "), of="string")
     if model not in (SOFT, BUCKLED):
         refuse("calibrate_friction", "model", model, f"'{SOFT}' or '{BUCKLED}'")
     confidence = number("calibrate_friction", "confidence", confidence, "a number between 0 and 1", lambda x: 0 < x < 1)

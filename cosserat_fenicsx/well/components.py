@@ -235,6 +235,10 @@ class Centraliser(Part):
     spacing: Length
     diameter: Diameter
 
+    def validate(self):
+        """Warn of a diameter that is probably in inches."""
+        doubt_width(self, "diameter")
+
 
 @dataclass(frozen=True)
 class _Tubular(_Bendable):
@@ -310,6 +314,7 @@ class _Tubular(_Bendable):
             if getattr(self, field) is None:
                 refuse(self, field, None, "a diameter (m), or the name of a standard size, size='...'")
         doubt_width(self, "outer_diameter")
+        doubt_width(self, "tool_joint")
         Tube(self.outer_diameter, self.inner_diameter)  # refuses diameters of no tube
         if self.mass is None:
             store(self, mass=self.material.density * math.pi / 4 * (self.outer_diameter**2 - self.inner_diameter**2))
@@ -569,6 +574,15 @@ class DrillString(InWords, Part):
     def bent(self) -> str:
         """Names of the components with a bend, from the bit up; "" where there are none."""
         return " and ".join(part.name for part in self.components if part.bend)
+
+    @property
+    def least_depth(self) -> float:
+        """Measured depth (m) below which all of it is in the hole: the length below a component that fills up."""
+        return 0.0 if self.components[-1].length is not None else math.fsum(x.length for x in self.components[:-1])
+
+    def fitting(self, depths):
+        """Those of measured depths (m) at which all of it is in the hole, or all depths where there are none."""
+        return [x for x in depths if x > self.least_depth * (1 + 1e-9)] or depths
 
     def sentences(self, units: Units):
         """On its components from the bit up, in some units."""

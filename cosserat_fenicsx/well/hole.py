@@ -21,6 +21,7 @@ from cosserat_fenicsx.scene.rod import Rod
 from cosserat_fenicsx.scene.sections import Circle, Tube
 from cosserat_fenicsx.well.components import standard_size
 from cosserat_fenicsx.well.path import Tortuosity, WellPath, tortuosity as made_crooked
+from cosserat_fenicsx.well.survey import doubt_depth
 
 # Pa, standard.
 _ATMOSPHERE = 101325.0
@@ -151,6 +152,8 @@ class Borehole(InWords, Part):
                     raise
                 refuse("Borehole", "stations", stations, "rows of three numbers: md, inclination, azimuth")
             path = WellPath.of_unit(md, inc, azi, degrees, length_unit_of(given))
+            if length_unit is None and not isinstance(given, str):
+                doubt_depth("stations: their depths have", path.length)
         if tortuosity is not None:
             path = made_crooked(path, **tortuosity.arguments())
         return cls(path, sections, wall_stiffness)
@@ -186,11 +189,13 @@ class Borehole(InWords, Part):
         north, east, down = (units.told(round(x, 6) + 0.0, "m", form=".2f") for x in path.position(path.length))
         worst = int(np.argmax(path.dogleg_severity))
         unit, size = ("30 m", constants.deg_per_30m) if units.si else ("100 ft", constants.deg_per_100ft)
+        blank = ", ".join(units.told(md, "m") for md in path.filled)
         return (
             f"Well: {len(path.md)} stations to md = {units.told(path.length, 'm')}, which is north {north}, east "
             f"{east} and down {down}; largest inclination {math.degrees(path.inclination.max()):.2f} degrees, largest "
             f"dogleg {path.dogleg_severity[worst] / size:.2f} degrees per {unit} below "
             f"{units.told(path.md[worst], 'm')}."
+            + f" No azimuth was given at md = {blank}, which is vertical: that of the next station." * bool(blank)
             + (f" A plan made crooked by tortuosity: {path.crooked.in_words(units)}." if path.crooked else "")
         )
 

@@ -16,15 +16,15 @@ from cosserat_fenicsx import units
 from cosserat_fenicsx.checks import warn
 from cosserat_fenicsx.parts import ForceSize, Part, Rotation, Speed, Torque, positive
 
-# Weights (N) and torques (N m) on bit below these are probably in other units.
-_DOUBTFUL = {"weight": (500.0, "N"), "torque": (50.0, "N m")}
+# Weights (N) and torques (N m) on bit, and hook loads (N), below these are probably in other units.
+_DOUBTFUL = {"weight": (500.0, "N"), "torque": (50.0, "N m"), "hook load": (5000.0, "N")}
 # Revolutions per minute below this are probably rad/s: 80 rev/min are 8.4 rad/s.
 _SLOW = 20.0
 
 
-def doubt_on_bit(called, value, what, more="", of="bit"):
-    """Warn of a "weight" or "torque" on bit (N, N m), or of the drive, that is probably in another unit; `called`: its
-    name in the warning, which ends with `more`."""
+def doubt_load(called, value, what, more="", of="bit"):
+    """Warn of a "weight" or "torque" on bit (N, N m), or of the drive, or a "hook load" of a string, that is probably
+    in another unit; `called`: its name in the warning, which ends with `more`."""
     least, unit = _DOUBTFUL[what]
     if 0 < abs(value) < least:
         place = "on bit" if of == "bit" else f"of a {of}"
@@ -55,8 +55,8 @@ class Operation(Part, family="operation"):
 
     def validate(self):
         """Warn of a weight or a torque on bit that is probably in another unit."""
-        for name in _DOUBTFUL:
-            doubt_on_bit(f"{type(self).__name__}.{name}", getattr(self, name), name)
+        for name in ("weight", "torque"):
+            doubt_load(f"{type(self).__name__}.{name}", getattr(self, name), name)
 
     def direction(self, radius: float) -> tuple[float, float]:
         """(c, e) for a contact radius (m)."""

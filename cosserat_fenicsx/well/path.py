@@ -22,7 +22,7 @@ from cosserat_fenicsx.actions.walls import TubeAxis
 from cosserat_fenicsx.quantities import Units, length_unit_of, size_of
 from cosserat_fenicsx.parts import Length, Number, Part, at_least, between
 from cosserat_fenicsx.units import deg_per_100ft, deg_per_30m, foot
-from cosserat_fenicsx.well.survey import read_columns
+from cosserat_fenicsx.well.survey import doubt_depth, read_columns, unit_asked
 
 
 #: The arcs between stations, arrays over these: md of the start (m), there position (m, 3), tangent (3) and curvature
@@ -46,9 +46,10 @@ class WellPath(TubeAxis):
         dogleg_severity: (n - 1,) dogleg per length, rad/m: over `units.deg_per_30m` in degrees per 30 m.
         crooked: the `Tortuosity` by which `tortuosity` made it from a plan, or None.
         unit: the unit of length of its survey, which messages have.
+        filled: measured depths (m) of the vertical stations that were given without an azimuth.
     """
 
-    crooked, unit = None, "m"
+    crooked, unit, filled = None, "m", ()
 
     md: np.ndarray
     inclination: np.ndarray
@@ -71,7 +72,14 @@ class WellPath(TubeAxis):
             array.flags.writeable = False
 
     @classmethod
-    def from_survey(cls, md: Numbers, inc: Numbers, azi: Numbers, degrees: bool | None = None) -> "WellPath":
+    def from_survey(
+        cls,
+        md: Numbers,
+        inc: Numbers,
+        azi: Numbers,
+        degrees: bool | None = None,
+        length_unit: float | str | None = None,
+    ) -> "WellPath":
         """The axis through the stations of a survey.
 
         Args:
@@ -79,27 +87,39 @@ class WellPath(TubeAxis):
                 station (0, 0, azimuth of the next) of a vertical start).
             inc: inclinations from the vertical, 0 to 180 degrees; above 90 the hole climbs.
             azi: azimuths from north towards east, of any turn from -360 to 360 degrees; without meaning at a vertical
-                station.
+                station, where None or NaN takes that of the next station.
             degrees: False where the angles are in radians. None: degrees, refused where they look like radians; True:
                 degrees, whatever they look like.
+            length_unit: of plain numbers in `md`, in m or by name, such as "ft"; None for m, with a `SceneWarning`
+                where these are as large as feet are.
 
         Raises:
             SceneError: fewer than two stations, numbers that are missing or out of their range, depths that do not
                 ascend from 0, or two stations of opposite directions, between which no arc is defined.
         """
         texts = [x for x in md if isinstance(x, str)] if isinstance(md, list | tuple) else []
-        return cls.of_unit(md, inc, azi, degrees, length_unit_of(texts[0] if texts else 1.0))
+        who = "WellPath.from_survey"
+        if texts and length_unit is not None:
+            refuse(who, "length_unit", length_unit, "None, since depths have units of their own")
+        size = 1.0 if texts else unit_asked(who, length_unit)
+        if size not in (None, 1.0):
+            md = finite_array("WellPath", "md", md, "finite numbers, one a station") * size
+        path = cls.of_unit(md, inc, azi, degrees, length_unit_of(texts[0] if texts else size or 1.0))
+        if size is None:
+            doubt_depth(f"{who}: md has", path.length, ", and '12000 ft' wherever else a depth or a length is in feet")
+        return path
 
     @classmethod
     def of_unit(cls, md, inc, azi, degrees, unit):
         """From measured depths (m) that were given in this unit."""
-        path = cls(*checked_survey(md, inc, azi, degrees, unit))
-        store(path, unit=unit)
+        *columns, filled = checked_survey(md, inc, azi, degrees, unit)
+        path = cls(*columns)
+        store(path, unit=unit, filled=filled)
         return path
 
     def told(self, text):
         """A sentence with its lengths in the unit of the survey; its loads in field units where these are feet."""
-        loads = {"force": "klbf", "moment": "ft-lbf"} if self.unit == "ft" else {}
+        loads = {"force": "klbf", "moment": "ft-lbf", "rad/m": "deg/100ft"} if self.unit == "ft" else {}
         return Units({"length": self.unit, **loads}).sentence(text)
 
     @classmethod
@@ -317,12 +337,14 @@ _FULL = math.radians(360)
 
 
 def checked_survey(md, inc, azi, degrees, given="m"):
-    """Measured depths (m), inclinations and azimuths (rad) as arrays, see `WellPath.from_survey`; messages have depths
-    in the unit in which they were given."""
+    """Measured depths (m), inclinations and azimuths (rad) as arrays, and depths of stations whose azimuth was filled
+    in, see `WellPath.from_survey`; messages have depths in the unit in which they were given."""
     who, length = "WellPath", size_of("WellPath", given, "length")
     instance(who, "degrees", degrees, (bool, type(None)), "True (degrees), False (radians) or None")
-    columns = {}
+    columns, blank = {}, np.zeros(1, dtype=bool)
     for name, values, unit in (("md", md, "m"), ("inc", inc, "degrees or radians"), ("azi", azi, "degrees or radians")):
+        if name == "azi" and np.iterable(values) and len(values) == len(columns["inc"]):
+            values, blank = _filled(values, columns["inc"])
         columns[name] = finite_array(who, name, values, f"finite numbers ({unit}), one a station")
         if columns[name].ndim != 1 or len(columns[name]) < 2:
             refuse(who, name, values, f"at least two stations ({unit})")
@@ -357,7 +379,22 @@ def checked_survey(md, inc, azi, degrees, given="m"):
             f"WellPath: the hole turns by 180 degrees between md = {told[i]} and {told[i + 1]} {given}: expected less "
             "(no arc is defined by two opposite directions)"
         )
-    return md, inc, azi
+    return md, inc, azi, tuple(md[: len(blank)][blank].tolist())
+
+
+def _filled(azi, inc):
+    """Azimuths in which vertical stations without one have that of the next station, and which have none (n,)."""
+    blank = np.array([x is None or (isinstance(x, float) and math.isnan(x)) for x in azi])
+    if not blank.any():
+        return azi, blank
+    slanted = np.flatnonzero(blank & (inc != 0))
+    if len(slanted):
+        refuse("WellPath", f"azi[{slanted[0]}]", None, f"a number, since the hole is not vertical there (inclination "
+               f"{inc[slanted[0]]:g}); vertical stations need none")  # fmt: skip
+    azi = list(azi)
+    for i in np.flatnonzero(blank)[::-1]:
+        azi[i] = azi[i + 1] if i + 1 < len(azi) else 0.0
+    return azi, blank
 
 
 def _doubt_degrees(inc, azi, degrees):
@@ -436,7 +473,7 @@ def tortuosity(path: WellPath, amplitude: float | str, period: float | str, seed
     tangent, across, aside = _frames(path, md)
     bent = tangent + np.tan(high)[:, None] * across + np.tan(right)[:, None] * aside
     inc, azi = np.arctan2(np.hypot(bent[:, 0], bent[:, 1]), bent[:, 2]), np.arctan2(bent[:, 1], bent[:, 0])
-    found = WellPath.from_survey(md, inc, azi % (2 * np.pi), degrees=False)
+    found = WellPath.of_unit(md, inc, azi % (2 * np.pi), False, path.unit)
     store(found, crooked=given)
     return found
 

@@ -195,7 +195,7 @@ class WellScene(InWords, Part):
                 hole.with_friction(value)
         self._check(settings, here)
         with concerning("depth_sweep"):
-            self._check({**settings, **of_sweep}, depths)
+            self._check({**settings, **of_sweep}, self.string.fitting(depths))
         if self.strength is not None:
             with concerning("strength"):
                 strengths_of("strength", self.string.laid(here[0]), self.strength.grade, self.strength.wear)

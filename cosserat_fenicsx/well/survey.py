@@ -74,7 +74,7 @@ def read_columns(who, file, names, degrees, length_unit, sheet=None):
         try:
             if any(cell.strip() for cell in row[len(heading) :]):
                 raise ValueError
-            values.append([_number(cell) for cell in cells])
+            values.append([*map(_number, cells[:2]), _number(cells[2] or "nan")])  # of vertical stations: no azimuth
         except ValueError:
             point = any("," in cell for cell in row) or len(row) > len(heading)
             hint = "; decimals stand behind a point, as in 10.5" if point else ""
@@ -214,22 +214,31 @@ def _is_number(cell):
 
 def _length_unit(who, file, heading, says, given, deepest):
     """The unit (m) of measured depths: as given, or as the heading says; deepest: the largest number there."""
-    if isinstance(given, str):
-        given = size_of(f"{who}.length_unit", given, "length")
-    says = _LENGTHS.get(says)
-    if given is not None:
-        given = positive(who, "length_unit", given, "m")
-        if says is not None and not math.isclose(says, given, rel_tol=1e-3):
-            raise SceneError(
-                f"{file}: '{heading}' says a unit of {says:g} m, and length_unit {given:g} m: expected one of them, or "
-                "none given"
-            )
-    if given is None and says is None and deepest > _DEEP:
-        warn(
-            f"{file}: '{heading.strip()}' names no unit, so that the deepest station is at {deepest:g} m: if these are "
-            "feet, say length_unit = 'ft', or 'MD (ft)' there; length_unit = 'm' ends this warning"
+    given, says = unit_asked(who, given), _LENGTHS.get(says)
+    if given is not None and says is not None and not math.isclose(says, given, rel_tol=1e-3):
+        raise SceneError(
+            f"{file}: '{heading}' says a unit of {says:g} m, and length_unit {given:g} m: expected one of them, or "
+            "none given"
         )
+    if given is None and says is None:
+        doubt_depth(f"{file}: '{heading.strip()}' names", deepest, ", or 'MD (ft)' there")
     return given or says or 1.0
+
+
+def unit_asked(who, length_unit):
+    """A unit of measured depths (m) that is given by its name or its size; None stays."""
+    if isinstance(length_unit, str):
+        return size_of(f"{who}.length_unit", length_unit, "length")
+    return None if length_unit is None else positive(who, "length_unit", length_unit, "m")
+
+
+def doubt_depth(told, deepest, more=""):
+    """Warn of measured depths (m) without a unit that are probably in feet: the warning begins with `told`."""
+    if deepest > _DEEP:
+        warn(
+            f"{told} no unit, so that the deepest station is at {deepest:g} m: if these are feet, say "
+            f"length_unit = 'ft'{more}; length_unit = 'm' ends this warning"
+        )
 
 
 def _degrees(file, headings, says, given):

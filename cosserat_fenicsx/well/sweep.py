@@ -111,13 +111,14 @@ class DepthSweep(Charted):
 
     def noted(self, k: int | None = None, units: str | Mapping | Units = "SI") -> list[str]:
         """The notes in words, with operation, friction and depth; those of depth k alone where it is given."""
-        units = Units(units)
-        return [
-            f"{self.label(*index[:2])}, bit at {self._told('depth', units, self.depths[index[2]])}: "
-            + units.sentence(note)
-            for index, note in sorted(self.notes.items())
-            if k in (None, index[2])
-        ]
+        units, found = Units(units), {}  # each sentence once
+        lines = [*np.ndindex(self.done.shape[:2])]
+        for (*line, at), note in sorted(self.notes.items()):
+            if k in (None, at):
+                alike = len(lines) > 1 and all(self.notes.get((*other, at)) == note for other in lines)
+                who = "" if alike else f"{self.label(*line)}, "
+                found[f"{who}bit at {self._told('depth', units, self.depths[at])}: {units.sentence(note)}"] = None
+        return [*found]
 
     def columns(self, units: str | Mapping = "SI", axis: str = "") -> dict[str, np.ndarray]:
         """{heading: (depths,)} of loads and models of each operation and friction, and notes."""
@@ -174,7 +175,8 @@ def depth_sweep(
         hole, string, mud, model, tol, torque_convention: see `torque_and_drag`.
 
     Returns:
-        a `DepthSweep`. Where a string locks up, or no equilibrium is found, its loads are NaN, and its `notes` say so.
+        a `DepthSweep`. Where a string locks up, no equilibrium is found, or parts below the uppermost one stand out
+        above the surface, its loads are NaN, and its `notes` say so.
 
     Raises:
         SceneError: see `torque_and_drag`; a folder that holds another sweep.
@@ -192,9 +194,9 @@ def depth_sweep(
     friction = tuple(friction) if isinstance(friction, Sequence | np.ndarray) else (friction,)
     holes = [hole if value is None else hole.with_friction(value) for value in friction]
     settings = {"mud": mud, "model": model, "tol": tol, "torque_convention": torque_convention}
-    for depth in (depths.min(), depths.max()):  # refuse misfits before the computation
+    for depth in (min(string.fitting(depths)), depths.max()):  # refuse misfits before the computation
         pieces_of(hole, string, operations[0], mud, float(depth))
-    sweep = _empty(operations, depths, friction)
+    sweep = _empty(operations, depths, friction, string)
     store = Nowhere()
     if folder is not None:
         about = {"hole": hole, "string": string, "operations": operations, "depths": depths, "friction": friction}
@@ -225,14 +227,17 @@ def go_on(store, scene, duration, progress):
 def read(store, scene):
     """The answers of a sweep that are stored so far."""
     asked = _asked(store)
-    sweep = _empty(*(asked[name] for name in ("operations", "depths", "friction")))
+    sweep = _empty(*(asked[name] for name in ("operations", "depths", "friction", "string")))
     _put_stored(sweep, store)
     return sweep
 
 
-def _empty(operations, depths, friction):
-    shape = (len(operations), len(friction), len(depths))
-    return DepthSweep(operations, depths, friction, {name: np.full(shape, np.nan) for name in KEPT})
+def _empty(operations, depths, friction, string):
+    """A sweep without answers, with notes on the depths at which the string stands out above the surface."""
+    shape, fits = (len(operations), len(friction), len(depths)), string.fitting(depths)
+    note = f"left out, since the string is {string.least_depth:.6g} m long below its {string.components[-1].name}"
+    notes = {(i, j, k): note for i, j, k in np.ndindex(shape) if depths[k] not in fits}
+    return DepthSweep(operations, depths, friction, {name: np.full(shape, np.nan) for name in KEPT}, notes)
 
 
 def _as_data(about):
