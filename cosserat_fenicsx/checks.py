@@ -214,11 +214,12 @@ def bytes_of(file, expected, *, pipes=False):
 
 
 def call(function, x, name, where):
-    """function(x) of a user's function; exceptions become a SceneError whose message begins `name`, ends `where`."""
+    """function(x) of a user's function of a number; exceptions become a SceneError whose message begins `name` and ends
+    `where`, such as " at t = {:g} s" with x in it."""
     try:
         return function(x)
     except Exception as problem:  # a user's function may raise any exception
-        raise SceneError(f"{name} raised {type(problem).__name__} ({problem}){where}") from problem
+        raise SceneError(f"{name} raised {type(problem).__name__} ({problem}){where.format(x)}") from problem
 
 
 def doubt_width(owner, field):

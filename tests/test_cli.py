@@ -229,16 +229,6 @@ def test_what_cannot_be_used_is_said(tmp_path):
         require_real_scalars(np.complex128)
 
 
-def test_a_second_process_compiles_nothing(tmp_path):
-    """The names in the code cache must not depend on the forms compiled before."""
-    words, counts = ("run", DEMO, "--load-factors", "0.5", "--degree", "1", "--elements", "2"), []
-    for _ in range(2):
-        done = cosserat(*words, XDG_CACHE_HOME=str(tmp_path))
-        assert done.returncode == 0, done.stderr
-        counts.append(len(list(tmp_path.rglob("*.so"))))
-    assert counts[0] == counts[1] > 0
-
-
 def many_points(folder):
     """The file of a scene whose path takes far longer than a test."""
     head, _, _ = DEMO.read_text(encoding="utf-8").partition("[solve]")

@@ -19,6 +19,14 @@ pytestmark = pytest.mark.serial
 EVIDENCE = Path(__file__).parent.parent / "demos" / "evidence"
 
 
+@pytest.fixture(autouse=True)
+def one_picture(monkeypatch):
+    """Charts are drawn once, and not for wide pages and narrow ones."""
+    import harness
+
+    monkeypatch.setattr(harness, "draw_both", lambda plot, file: plot(file=file))
+
+
 def lies_and_falls(found):
     """What lies on the wall stays there and loses energy, what falls is above it."""
     lies, falls = (history for _, history in found.values())
@@ -52,9 +60,9 @@ def covered(found):
 #: not tested.
 QUICK = {
     "overhead": ({"runs": 1}, lambda found: np.max(found[2]) < 1e-10, ()),
-    "cases": ({"cases": 8, "calls": 2, "runs": 1}, lambda found: all(x < 1e-12 and not left for x, left in found), ()),
     "first_runs": ({"runs": 1, "kinds": ["a column in a plane"]}, lambda found: all(
         files in (4, 5) and first[0] > following[0] > 0 for first, following, files in found.values()), ()),
+    "cases": ({"cases": 8, "calls": 2, "runs": 1}, lambda found: all(x < 1e-12 and not left for x, left in found), ()),
     "wall_in_motion": ({"runs": 1, "duration": 0.02, "length": 250.0, "elements": 40}, lies_and_falls, ()),
     "rods_in_wells": ({"quick": True}, covered, (
         "| P | trip in | ", "the models that answered: 3 rod.", "| largest | ")),
@@ -72,7 +80,7 @@ ONCE, SLOW = pytest.mark.once, pytest.mark.slow
 
 
 @pytest.mark.parametrize(
-    "name", ["overhead", *(pytest.param(x, marks=[ONCE] if x in FAST else [ONCE, SLOW]) for x in [*QUICK][1:])]
+    "name", [*FAST[:2], *(pytest.param(x, marks=[ONCE] if x in FAST else [ONCE, SLOW]) for x in [*QUICK][2:])]
 )
 def test_quick(name, tmp_path):
     if name == "ranks" and shutil.which("mpirun") is None:
@@ -110,11 +118,12 @@ def test_sanitizers_find_what_is_read_out_of_bounds(tmp_path, monkeypatch):
 
 
 @pytest.mark.once
-def test_mutants_quick():
+def test_mutants_quick(monkeypatch):
     """A wrong sign in the direction of a line is found by the tests of curves, and they pass without it."""
     import mutants
 
     assert mutants.quickly() == ["killed", "survived"]
+    monkeypatch.setattr(mutants, "PARTS", {"forms": mutants.PARTS["forms"], "C": mutants.PARTS["C"]})
     chosen = mutants.chosen(mutants.ROOT, 30, seed=0)
     assert chosen == mutants.chosen(mutants.ROOT, 30, seed=0) and {x.part for x in chosen} == {*mutants.PARTS}
     lines = {
@@ -597,8 +606,8 @@ def test_ratios_that_are_asked_for():
 def test_truths_are_told_with_their_errors(tmp_path):
     import truths
 
-    (row,) = truths.main("lifted_from", tmp_path)
+    (row,) = truths.main("lifted_from", tmp_path, "test_obstacles.py")
     assert row[0] == "obstacles" and 0 < row[2] < 1e-6 and row[3] == 1e-5
     assert "| obstacles | rod lifted from a plane, moment at its level end |" in (tmp_path / "truths.md").read_text()
     with pytest.raises(RuntimeError, match="the tests fail"):
-        truths.compared("no test has this name")
+        truths.compared("no test has this name", "test_obstacles.py")

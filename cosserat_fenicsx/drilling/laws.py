@@ -51,7 +51,7 @@ class Resistance:
     def __call__(self, s):
         """R at slips (n,) or a number, above 0."""
         if self.function is not None:
-            return np.vectorize(self.function, otypes=[float])(s)
+            return np.array([*map(self.function, np.ravel(s))]).reshape(np.shape(s))
         falling = np.exp(-np.asarray(s) / self.decay) if self.decay > 0 else 0.0
         return self.slipping + (self.still - self.slipping) * falling
 
@@ -127,7 +127,9 @@ def checked(owner, name, *more):
     method, where = getattr(owner, name), f"{type(owner).__name__}.{name}"
 
     def function(s):
-        value = call(lambda x: method(x, *more), float(s), where, f" at the speed {s:g}")
+        value = call(lambda x: method(x, *more), float(s), where, " at the speed {:g}")
+        if type(value) is float and 0 <= value < math.inf:  # every step asks
+            return value
         return number(owner, name, value, f"a number, not negative, at the speed {s:g}", lambda x: 0 <= x < math.inf)
 
     return function

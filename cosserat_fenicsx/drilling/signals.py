@@ -65,7 +65,7 @@ class ScalarSignal:
     def __call__(self, t: float) -> float:
         if self.constant:
             return self._value
-        given = call(self._value, t, self._where, f" at t = {t:g} s")
+        given = call(self._value, t, self._where, " at t = {:g} s")
         if type(given) is float and math.isfinite(given):  # what follows takes as long as the function
             return given
         found = np.asarray(given).reshape(-1) if np.size(given) == 1 else np.array([np.nan])

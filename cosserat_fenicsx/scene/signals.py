@@ -378,7 +378,7 @@ _SAMPLES = 33
 
 def vector_at(owner, field, function, s, unit, size=3):
     """The vector that a user's function of the arc length returns at s, m; its errors become `SceneError`s."""
-    given = call(function, s, f"{name_of(owner)}.{field}", f" at s = {s:g} m")
+    given = call(function, s, f"{name_of(owner)}.{field}", " at s = {:g} m")
     return vector(owner, f"{field}({s:g})", given, unit, size)
 
 

@@ -220,6 +220,13 @@ class MudMotor(_Tool):
         return np.concatenate(found)
 
     @cached_property
+    def _charts(self):
+        """[(largest load, N m, speeds over the share of it)] of the curves."""
+        loads = [np.array(x.torques or np.array(x.pressures) * self.per_radian) for x in self.curves]
+        return [(load[-1], PchipInterpolator(load / load[-1], x.speeds))
+                for x, load in zip(self.curves, loads, strict=True)]  # fmt: skip
+
+    @cached_property
     def _laws(self):
         """{flow: `law_at` that flow}, of the last ones asked for."""
         return {}
@@ -239,16 +246,14 @@ class MudMotor(_Tool):
                 self, "flow", flow, f"a flow of the curves, {flows[0]:.4g} to {flows[-1]:.4g} m^3/s, or further curves"
             )
         k = min(max(int(np.searchsorted(flows, flow)), 1), max(len(flows) - 1, 1))
-        near = self.curves[k - 1 : k + 1]
-        share = (flow - near[0].flow) / (near[-1].flow - near[0].flow) if len(near) > 1 else 0.0
-        loads = [np.array(x.torques or np.array(x.pressures) * self.per_radian) for x in near]
-        kept = [(x, load) for x, load, part in zip(near, loads, (1 - share, share), strict=False) if abs(part) > 1e-9]
-        at = np.unique(np.concatenate([load / load[-1] for _, load in kept]).round(12))
-        parts = [1.0] if len(kept) == 1 else [1 - share, share]
-        torque = at * sum(part * load[-1] for part, (_, load) in zip(parts, kept, strict=True))
-        speed = sum(
-            part * PchipInterpolator(load / load[-1], x.speeds)(at) for part, (x, load) in zip(parts, kept, strict=True)
-        )
+        near = self._charts[k - 1 : k + 1]
+        share = (flow - flows[k - 1]) / (flows[k] - flows[k - 1]) if len(near) > 1 else 0.0
+        kept = [(part, *x) for part, x in zip((1 - share, share), near, strict=False) if abs(part) > 1e-9]
+        at = np.unique(np.concatenate([speeds.x for *_, speeds in kept]).round(12))
+        if len(kept) == 1:
+            kept = [(1.0, *kept[0][1:])]
+        torque = at * sum(part * most for part, most, _ in kept)
+        speed = sum(part * speeds(at) for part, _, speeds in kept)
         om, T = speed[::-1], torque[::-1] + self.lost_torque
         ends = om[-1] * np.array([-1, 1])
         straight = [(T[1] - T[0]) / (om[1] - om[0]), (T[-1] - T[-2]) / (om[-1] - om[-2])]
@@ -265,11 +270,11 @@ class MudMotor(_Tool):
         Raises:
             SceneError: no number from 0 on.
         """
-        flow, where = self.flow, f" at t = {t:g} s"
+        flow, where = self.flow, " at t = {:g} s"
         if callable(flow):
             flow = np.ravel(call(flow, t, "MudMotor.flow", where)).tolist()
             flow = flow[0] if len(flow) == 1 else flow
-        return number(self, "flow", flow, f"a flow (m^3/s){where}, from 0 on", lambda x: 0 <= x < math.inf)
+        return number(self, "flow", flow, f"a flow (m^3/s){where.format(t)}, from 0 on", lambda x: 0 <= x < math.inf)
 
     def sentence(self, units: Units) -> str:
         """On its flow, speed and torque at the start, in some units."""

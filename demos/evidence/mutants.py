@@ -340,7 +340,7 @@ def quickly(root=ROOT):
     same = Mutant("scene", name, wrong.line, "none", wrong.offset, wrong.old, wrong.old)
     with tempfile.TemporaryDirectory() as place:
         copy = copied(root, Path(place))
-        return [verdict(x, copy, ["tests/test_curves.py"])[0] for x in (wrong, same)]
+        return [verdict(x, copy, ["tests/test_curves.py::test_helix"])[0] for x in (wrong, same)]
 
 
 if __name__ == "__main__":

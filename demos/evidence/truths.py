@@ -20,15 +20,15 @@ from harness import command, in_words, table, write
 ROOT = Path(__file__).resolve().parents[2]
 
 
-def compared(only=""):
-    """[(file of tests, problem, error, error asked for)], of the tests with a text in their names. Raises RuntimeError:
-    a test fails."""
+def compared(only="", among="test_*.py"):
+    """[(file of tests, problem, error, error asked for)], of the tests with a text in their names, in files whose names
+    match a pattern. Raises RuntimeError: a test fails."""
     with tempfile.TemporaryDirectory() as folder:
         told = Path(folder) / "found.xml"
         words = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "--truths", "-o",
                  "junit_family=xunit1", f"--junitxml={told}"]  # fmt: skip
         takes = re.compile(r"def test_\w+\([^)]*\btruth\b")  # other files need not be imported
-        files = [file for file in sorted((ROOT / "tests").glob("test_*.py")) if takes.search(file.read_text("utf-8"))]
+        files = [file for file in sorted((ROOT / "tests").glob(among)) if takes.search(file.read_text("utf-8"))]
         words += [*map(str, files), *(["-k", only] if only else [])]
         done = subprocess.run(words, cwd=ROOT, capture_output=True, text=True)
         if done.returncode:
@@ -44,9 +44,9 @@ def compared(only=""):
     return [(file, what, error, asked) for (file, what, asked), error in sorted(rows.items())]
 
 
-def main(only="", out="out"):
+def main(only="", out="out", among="test_*.py"):
     """Compare, write the table, and return its rows."""
-    rows = compared(only)
+    rows = compared(only, among)
     judged = [(file.replace("_", " "), what, f"{error:.1e}" if error <= asked else f"**{error:.1e}, missed**",
                f"{asked:g}") for file, what, error, asked in rows]  # fmt: skip
     lines = table("tests of | problem and quantity | error | asked at most", judged)
