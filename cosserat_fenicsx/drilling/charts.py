@@ -40,7 +40,7 @@ MAPPED = {
     "velocity": (Quantity("velocity downwards", unit="m/s"), True),
 }
 DRIVE, BIT = "tab:blue", "tab:red"
-# Bands of a chart of a long run; about the most times at which the motion of the block is looked at.
+# Most bands of a chart of a long run; about the most times at which the motion of the block is looked at.
 _BANDS, _SOME = 400, 2000
 
 
@@ -60,12 +60,12 @@ def times_between(where, times, between):
     return rows
 
 
-def bands(times, *lines):
-    """(middles, [(least, largest)]) of lines in intervals of equal numbers of rows, for oscillations of a long run."""
-    edges = np.linspace(0, len(times), _BANDS + 1).astype(int)[:-1]
-    ends = np.append(edges[1:], len(times)) - 1
-    extremes = [(np.minimum.reduceat(line, edges), np.maximum.reduceat(line, edges)) for line in lines]
-    return (times[edges] + times[ends]) / 2, extremes
+def bands(times, line, count):
+    """(middles, least, largest, mean) of a line in `count` intervals of about equal numbers of rows."""
+    edges = np.linspace(0, len(times), count + 1).astype(int)
+    first, last, numbers = edges[:-1], edges[1:] - 1, np.diff(edges)
+    least, largest, total = (each.reduceat(line, first) for each in (np.minimum, np.maximum, np.add))
+    return (times[first] + times[last]) / 2, least, largest, total / numbers
 
 
 def advance_unit(metres):
@@ -171,8 +171,9 @@ def _panels(history, rows):
 _COLOURS = ("tab:blue", "tab:orange", "tab:green", "tab:olive", "tab:cyan", "tab:red", "tab:brown", "tab:purple",
             "tab:gray")  # fmt: skip
 _STYLES = {"work": "--", "lost": ":"}
-# A chart with more oscillations of the bit than this shows the bands between their extremes.
-_SWINGS = 80
+# A chart with more oscillations of the bit than this shows the bands between their extremes; oscillations that can be
+# seen one by one.
+_SWINGS, _SOME_SWINGS = 80, 20
 
 
 def over_time_figure(history, between=None):
@@ -180,15 +181,17 @@ def over_time_figure(history, between=None):
     rows = times_between("plot", history.times, between)
     t = history.times[rows]
     panels = _panels(history, rows)
-    many = max(swings(history.bit_speed[rows]), swings(np.nan_to_num(history.bit_velocity[rows]))) > _SWINGS
+    many = max(swings(history.bit_speed[rows]), swings(np.nan_to_num(history.bit_velocity[rows])))
+    many = many if many > _SWINGS else 0
     figure, axes = stacked(10, [2.3] * len(panels))
     for panel, (quantity, lines) in zip(axes, panels, strict=True):
         every = [values for values, *_ in lines]
         heading, size = scale(quantity, *every)
         for values, label, colour in lines[::-1]:
             if many:
-                middles, ((least, most),) = bands(t, values / size)
-                panel.fill_between(middles, least, most, color=colour, label=label, alpha=0.4)
+                middles, least, most, mean = bands(t, values / size, min(_BANDS, many // 2))
+                panel.fill_between(middles, least, most, color=colour, label=label, alpha=0.4, linewidth=0)
+                panel.plot(middles, mean, color=colour, linewidth=1.1)
             else:
                 panel.plot(t, values / size, color=colour, label=label, linewidth=1.1)
         panel.set_ylabel(heading)
@@ -200,7 +203,10 @@ def over_time_figure(history, between=None):
     legend(*axes)
     axes[-1].set_xlabel("time (s)")
     caution = history.stick_slip().caution.replace(" and nothing", "\nand nothing") if len(history) > 5 else ""
-    text = "\nbands between the extremes of oscillations" if many else ""
+    text = ""
+    if many:
+        some = f"between=({t[-1] - (t[-1] - t[0]) * _SOME_SWINGS / many:.4g}, {t[-1]:.6g})"
+        text = f"\nbands between the extremes of oscillations, lines: their means; single ones: {some}"
     figure.suptitle(title_of(history) + text + (f"\n{caution}" if caution else ""))
     return figure
 
@@ -376,7 +382,17 @@ def _maps(answer, modes):
     for panel in axes[:, 0]:
         panel.set_ylabel(across)
     figure.colorbar(drawn, ax=axes, label="growth (1/s); black: the limit")
+    figure.suptitle(_on_stability(answer))
     return figure
+
+
+def _on_stability(answer):
+    """A title: the kind of motion, the drive or the hook, and the bit."""
+    scene, words = answer.scene, [f"Growth of small motions, {answer.kind}"]
+    if answer.kind == "torsion":
+        words.append(_words_on_drive(scene).partition(" at ")[0])
+    words += [f"{type(scene.bit.law).__name__} bit"] if scene.bit is not None else ["off bottom"]
+    return ", ".join(words)
 
 
 def _lines(answer, modes):
@@ -393,6 +409,7 @@ def _lines(answer, modes):
     panel.axhline(0.0, color="black", linewidth=0.8)
     panel.set(xlabel=heading, ylabel="growth (1/s)")
     legend(panel)
+    figure.suptitle(_on_stability(answer))
     return figure
 
 

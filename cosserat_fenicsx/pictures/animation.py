@@ -38,7 +38,7 @@ from cosserat_fenicsx.pictures.drawing import (
     thickening,
     thicker,
 )
-from cosserat_fenicsx.pictures.view import plain, round_step
+from cosserat_fenicsx.pictures.view import plain, round_step, seen_moving
 from cosserat_fenicsx.ranks import Alone, on_first
 
 #: Default frames per second, and width and height in pixels.
@@ -171,7 +171,8 @@ class _Stage:
         add_lines(self._plotter, pyvista, resting, "lightgrey")
         self._head, self._letters = history.scene.title or "Motion", size[0] // _LETTER
         self._notes = self._not_to_scale()
-        frame(self._plotter, everywhere)
+        moved = [body.line - first.line for made in bodies for body, first in zip(made, bodies[0], strict=True)]
+        frame(self._plotter, everywhere, span=seen_moving(np.ptp(everywhere, axis=0), np.concatenate(moved)))
 
     def _bodies(self, t):
         return self._enlarged.bodies(self._between.bodies(t, self._x, self._magnify), self._x)

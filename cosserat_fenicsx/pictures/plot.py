@@ -37,7 +37,7 @@ from cosserat_fenicsx.pictures.drawing import (
     together,
 )
 from cosserat_fenicsx.pictures.signs import Deformed, Resting, signs_of, span_of, without_sign
-from cosserat_fenicsx.pictures.view import Labels, axes_of, plain, view_of
+from cosserat_fenicsx.pictures.view import Labels, axes_of, plain, seen_moving, view_of
 from cosserat_fenicsx.quantities import Units
 from cosserat_fenicsx.ranks import communicator, on_first
 
@@ -54,6 +54,8 @@ _SMALLER = 0.7
 # Maximum number of rods that are named in the picture of a scene; maximum number of names in larger letters.
 _NAMED, _FEW = 40, 8
 _AT_REST = "#9db4cc"
+# Distance of shapes, over the extent of a rod, below which they have one label.
+_AT_ONE = 0.015
 # Intervals on the longest axis, at most, around the first of shapes that are side by side.
 _TICKS_APART = 4
 
@@ -114,6 +116,8 @@ def _draw(path, points, magnify, color, side_by_side):
         shown = shown[-1:]
         bodies, factors = ({key: of[key] for key in of if key[0] == shown[0]} for of in (bodies, factors))
     span = span_of(path.scene, [Deformed(path, k, {}, magnify, 0.0) for k in shown], everywhere)
+    still = dict(zip(path.scene.rods, resting, strict=True))
+    span = seen_moving(span, np.concatenate([body.line - still[rod] for (_, rod), body in bodies.items()]))
     moved, apart = dict.fromkeys(shown, np.zeros(3)), _apart(path.scene, shown, bodies, everywhere, span, side_by_side)
     small = _small(path, shown, size, magnify)
     if apart:
@@ -235,7 +239,7 @@ def _small(path, shown, size, magnify):
 
 def _title(path, shown, magnify, small, apart, factors):
     """The lines of the title: the points shown, and notes in parentheses."""
-    some = "" if len(shown) == len(path) else f" (of {len(path)})"
+    some = "" if len(shown) == len(path) else f" ({len(shown)} of {len(path)} states)"
     values = ", ".join(path.label(k) for k in shown)
     title = f"{path.scene.title or 'Deformed rods'}:"
     several = "s" if len(shown) > 1 else ""
@@ -294,13 +298,20 @@ def _label(labels, path, shown, bodies, span, apart, font):
     rod = max(range(len(rods)), key=lambda i: (round(spread[i].max() / size, 6), -i))
     place = len(spread[rod]) - 1 - int(np.argmax(spread[rod][::-1]))  # the last one of equal maxima, nearest to the end
     middle = np.mean([bodies[k, rods[rod]].line[place] for k in shown], axis=0)
+    at_one = []  # lists of shapes that have one place there
     for k in reversed(shown):
+        here = bodies[k, rods[rod]].line[place]
+        near = (x for x in at_one if np.linalg.norm(here - bodies[x[0], rods[rod]].line[place]) < _AT_ONE * size)
+        if (same := next(near, None)) is None:
+            at_one.append(same := [])
+        same.append(k)
+    for k, *others in at_one:
         body = bodies[k, rods[rod]]
         end = 1 if place == len(body.line) - 1 else -1 if place == 0 else 0
         towards = _beyond(body.directors[place, :, 2], end)
         if not end and (body.line[place] - middle) @ towards < 0:
             towards = -towards  # off the other shapes
-        labels.near(path.label(k), body.line[place], towards, size=font)
+        labels.near(", ".join(map(path.label, sorted([k, *others]))), body.line[place], towards, size=font)
 
 
 def _name(labels, scene, font):

@@ -22,7 +22,7 @@ from cosserat_fenicsx.pictures.drawing import (
     thicker,
 )
 from cosserat_fenicsx.pictures.plot import deliver
-from cosserat_fenicsx.pictures.view import view_of
+from cosserat_fenicsx.pictures.view import seen_moving, view_of
 from cosserat_fenicsx.ranks import on_first
 
 # Panels of a picture, and in a row of it.
@@ -33,8 +33,6 @@ _WIDTH, _HEIGHTS, _TITLE, _LINE = 640, (560, 680), 90, 38
 _STEEPEST = 1.0
 # Largest displacement in a picture, over the structure's size, that could not be seen; least share of it that moves.
 _SEEN, _MOVES = 0.02, 0.2
-# Share of a mode's displacement normal to a plane from which on a plane structure is seen from a corner.
-_LEAVES = 0.1
 # Displacement of a rod over its length and its rotation, below which it only twists.
 _IN_PLACE = 0.01
 # Memory for frames of a film, which are drawn once, bytes.
@@ -185,12 +183,11 @@ def _most_at(found, k, shape):
 
 
 def _span(found, modes, everywhere):
-    """(3,) the extents that decide on the view of points (n, 3), m: the largest one for all axes where the points
-    lie in a plane that one of the modes leaves."""
-    span, moved = np.ptp(everywhere, axis=0), np.abs(found.shapes[list(modes)][..., :3])
-    normal = np.abs(view_of(span)[0])
-    leaves = (moved @ normal).max(axis=1) > _LEAVES * np.linalg.norm(moved, axis=2).max(axis=1)
-    return np.full(3, span.max()) if normal.max() == 1.0 and leaves.any() else span
+    """(3,) the extents that decide on the view of points (n, 3), m, see `seen_moving`, so that all modes are seen."""
+    span = np.ptp(everywhere, axis=0)
+    for k in modes:
+        span = seen_moving(span, np.abs(found.shapes[k][:, :3]))
+    return span
 
 
 def _height(everywhere, span):

@@ -35,6 +35,19 @@ def view_of(span):
     return view, right, np.cross(view, right), up
 
 
+# Share of a displacement normal to a plane from which on what lies in the plane is seen from a corner; displacements
+# over the extents that are none.
+_LEAVES, _STILL = 0.1, 1e-9
+
+
+def seen_moving(span, moved):
+    """The extents that decide on the view of what has the extents `span` (3,): the largest one for all axes where it
+    lies in a plane that its displacements (..., 3) leave."""
+    normal, size = np.abs(view_of(span)[0]), np.linalg.norm(moved, axis=-1).max()
+    leaves = size > _STILL * span.max() and (np.abs(moved) @ normal).max() > _LEAVES * size
+    return np.full(3, span.max()) if normal.max() == 1.0 and leaves else span
+
+
 @dataclass(frozen=True)
 class View:
     """A parallel projection; to_camera, right, above: unit vectors (3,), inertial; up: the upward direction in space;

@@ -33,7 +33,7 @@ from cosserat_fenicsx.pictures.signs import (
     without_sign,
 )
 from cosserat_fenicsx.pictures.symbols import COLOURS, GROUPS, arrows_along
-from cosserat_fenicsx.pictures.view import axes_of, view_of
+from cosserat_fenicsx.pictures.view import axes_of, seen_moving, view_of
 from cosserat_fenicsx.scene.signals import at, signals_of
 
 #: Fields that can be chosen in the file, where the result has them, beside that of `default_colour`, which is first.
@@ -96,6 +96,7 @@ def _data(result, magnify):
     for shape, factor in zip(shapes, factors, strict=True):
         shape.radius *= factor
     span = span_of(result.scene, [Deformed(result, int(k), {}, magnify, 0.0) for k in shown[-1:]], everywhere)
+    span = seen_moving(span, np.concatenate([(shape.positions - shape.rest).reshape(-1, 3) for shape in shapes]))
     drawn, undrawn = signs(result, shown, shapes, span, lambda points: (points - middle) / size)
     largest = float(max(np.linalg.norm(shape.positions - shape.rest, axis=-1).max() for shape in shapes))
     return {
