@@ -191,6 +191,7 @@ def test_a_taut_line_has_no_critical_load(tmp_path):
     found = cf.buckling(scene, 3)
     assert len(found) == 0 == found.modes.shape[0]
     assert "no critical load factor up to 18.84, where linear" in repr(found)
+    assert "limit loads are found by `solve` (`cosserat run`)" in str(found)
     before = time.process_time()
     cf.buckling(scene, 3)  # compiled by now
     assert time.process_time() - before < 2.0

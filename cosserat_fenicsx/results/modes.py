@@ -89,7 +89,11 @@ class Buckling(Shapes):
         """That there is no critical load factor, in words."""
         if math.isinf(self.bound):
             return "no critical load factor: no rod bears the loads, which the supports take where they act"
-        return f"no critical load factor up to {self.bound:.4g}, where linear extrapolation of the state ends"
+        return (
+            f"no critical load factor up to {self.bound:.4g}, where linear extrapolation of the state ends: loads that "
+            "only pull or bend have none, and limit loads are found by `solve` (`cosserat run`), which follows the "
+            "structure as it bends"
+        )
 
     @property
     def caution(self):

@@ -55,7 +55,7 @@ class States(OnNodes):
             formulation=formulation,
             degree=model.signature.degree,
             unknowns=model.unknowns,
-            why=[*why, *(model.scene.cautions if cls.counts_modes else model.scene.doubts)],
+            why=[*why, *(model.scene.cautions if cls.counts_modes else model.scene.doubts), *model.scene.by_default],
             connections=model.signature.connections,
             expand=model.expansion(),
         )

@@ -16,6 +16,7 @@ from cosserat_fenicsx.checks import instance, store, warn
 from cosserat_fenicsx.errors import SceneError, nearest
 from cosserat_fenicsx.parts import Items, Object, Part, concerning
 from cosserat_fenicsx.scene.action import Action, describe, powers, some_of
+from cosserat_fenicsx.scene.curves import Line
 from cosserat_fenicsx.scene.planes import bent_weakly, find_plane
 from cosserat_fenicsx.scene.profiles import Stiffnesses
 from cosserat_fenicsx.scene.rod import Rod, Station, StationOrName, station_named, with_names
@@ -28,10 +29,13 @@ from cosserat_fenicsx.scene.supports import InitialVelocity, Joint, Support
 
 # Largest load over the largest EA, and over EI/L^2 where a rod's EA is infinite: beyond, rounding errors dominate.
 _MOST_STRAIN, _MOST_BENDING = 1e6, 1e15
-# Largest load over EA where Young's modulus is doubted: of metals, and of others.
-_MOST_OF_METAL, _MOST_OF_SOFT = 0.5, 10.0
+# Largest load over EA of metals and other stiff materials, with a Young's modulus (Pa) from which on they are; and of
+# materials whose modulus is doubted.
+_MOST_OF_STIFF, _STIFF, _MOST_OF_SOFT = 0.5, 1e9, 10.0
 # Largest prescribed displacement over the longest rod, and largest prescribed rotation, rad.
 _MOST_MOTION = 1e6
+# Bending stiffnesses about two axes that differ by less are those of a round or a square section.
+_ALIKE = 1e-9
 # Samples of a distributed load along a rod.
 _SAMPLES = 9
 # Young's moduli below this, Pa, are probably mistakes in units; of materials of these densities, kg/m^3, below this.
@@ -54,14 +58,17 @@ def magnitudes(scene, doubts=True):
     limits = [_doubted(rod) if doubts else ("", _MOST_STRAIN) for rod in scene.rods]
     most, k = max((size * strain, k) for k, (size, (_, strain)) in enumerate(zip(K, limits, strict=True)))
     doubt, strain = limits[k]
-    limit = f"{strain:g} EA = {most:.3g} N, {f'where {doubt}{_WAY_OUT}' if strain < _MOST_STRAIN else _ROUNDING}"
+    why = f"{f'where {doubt}' if doubt else 'beyond which no such material is elastic'}{_WAY_OUT}"
+    limit = f"{strain:g} EA = {most:.3g} N, {why if strain < _MOST_STRAIN else _ROUNDING}"
+    # the arm by which a moment strains a section as much as a force does, where strains are bounded
+    lever = np.sqrt(J[k] / K[k]) if strain <= _MOST_OF_STIFF and np.isfinite(most) else length
     if np.isinf(most):
         most = _MOST_BENDING * max(J) / length**2
         limit = f"{_MOST_BENDING:g} EI/L^2 = {most:.3g} N, {_ROUNDING}"
     found = []
     for load in scene.loads:
         if load.scaled or load.permanent:
-            size = max((_force(now, scene, length) for now in _sampled(load, scene.horizon)), default=0.0)
+            size = max((_force(now, scene, length, lever) for now in _sampled(load, scene.horizon)), default=0.0)
             found.append(Magnitude(size / most, load.scaled, f"{describe(load)}: {size:.3g} N", limit))
     for support in scene.supports:
         for name, most, unit in (("displacement", _MOST_MOTION * length, "m"), ("rotation", _MOST_MOTION, "rad")):
@@ -83,10 +90,10 @@ def _doubted(rod):
     if metal and not _METAL[0] <= E <= _METAL[1]:
         low = E < _METAL[0]
         told = f"E = {E:g} Pa {metal} is {'less' if low else 'more'} than that of steel or cast iron"
-        return told, _MOST_OF_METAL if low else _MOST_STRAIN
+        return told, _MOST_OF_STIFF if low else _MOST_STRAIN
     if E < (_SOFTEST_RUBBER if _RUBBER[0] <= (density or 0) <= _RUBBER[1] else _SOFTEST):
         return f"E = {E:g} Pa is softer than most rubbers", _MOST_OF_SOFT
-    return "", _MOST_STRAIN
+    return "", _MOST_OF_STIFF if E >= _STIFF else _MOST_STRAIN
 
 
 def _sampled(item, until):
@@ -96,8 +103,8 @@ def _sampled(item, until):
             yield at(item, t)
 
 
-def _force(load, scene, length):
-    """The size of a load, N: moments are divided by the longest length, loads per length multiplied by it."""
+def _force(load, scene, length, lever):
+    """The size of a load, N: moments are divided by the lever (m), loads per length multiplied by the longest one."""
     size = 0.0
     for rod in scene.rods_of(load):
         s = np.zeros(1) if load.station is not None else np.linspace(0.0, rod.length, _SAMPLES)
@@ -105,7 +112,7 @@ def _force(load, scene, length):
             force, lengths, _ = powers(datum.unit)
             if force:
                 values = np.linalg.norm(np.atleast_2d(datum.value), axis=-1)
-                size = max(size, float(values.max()) / length**lengths)
+                size = max(size, float(values.max()) / (lever if lengths > 0 else length) ** lengths)
     return abs(load.amplitude) * size
 
 
@@ -383,6 +390,17 @@ class Scene(Part):
     def cautions(self) -> list[str]:
         """Warnings that belong to every result, a list of sentences."""
         return [*self.doubts, *self._following(), *self._outside()]
+
+    @property
+    def by_default(self) -> list[str]:
+        """A sentence on sections whose weak and strong axes nobody turned, in a list; [] where there are none."""
+        bending = self.extremes[1].J
+        unlike = np.abs(bending[:, 0] - bending[:, 1]) > _ALIKE * bending[:, 0]
+        rods = [self.rods[i] for i in np.flatnonzero(unlike)]
+        names = [f"'{rod.name}'" for rod in rods if isinstance(rod.curve, Line) and rod.curve.d1 is None]
+        told = "sections that are not round stand upright by default, with d1 level (of vertical rods along x) and d2, "
+        told += f"along heights and webs, across it: {some_of(names)}; `d1=` of Line or frame turns them"
+        return [told] if names else []
 
     @cached_property
     def doubts(self):
