@@ -32,8 +32,9 @@ _PREFIXED = {
 }
 # Numbers, also "a to b", with a unit in a sentence, and no longer unit after it.
 _NUMBER = r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?"
-_WITH_UNIT = re.compile(rf"(?<![\w.])({_NUMBER})(?: (to|and) ({_NUMBER}))? (m|k?N m|N/m|k?N|kJ)(?![\w/^]| m\b| s\b)")
-_SI = {"kN m": ("N m", 1e3), "kN": ("N", 1e3), "kJ": ("J", 1e3)}
+_UNIT = r"(m|k?N m|N/m|k?N|kJ|deg/30m)"
+_WITH_UNIT = re.compile(rf"(?<![\w.])({_NUMBER})(?: (to|and) ({_NUMBER}))? {_UNIT}(?![\w/^]| m\b| s\b)")
+_SI = {"kN m": ("N m", 1e3), "kN": ("N", 1e3), "kJ": ("J", 1e3), "deg/30m": ("rad/m", units.deg_per_30m)}
 # Numbers below this are written without an exponent.
 _PLAIN = 1e7
 #: Lengths (m) are shown in mm only below this.

@@ -237,6 +237,7 @@ def test_dimensions_in_other_units_are_warned_of():
         "HoleSection.diameter": lambda: cf.well.HoleSection(100.0, 8.5, 0.2),
         "Bit.diameter": lambda: cf.well.Bit(8.5),
         "Collar.outer_diameter": lambda: cf.well.Collar(90.0, outer_diameter=6.5, inner_diameter=0.07),
+        "DrillPipe.tool_joint": lambda: cf.well.DrillPipe(size="5 in 19.50 lb/ft", tool_joint=6.5),
     }.items():
         with pytest.warns(cf.SceneWarning, match=rf"{field} = [68].5 m is wider than holes are: is it in inches"):
             make()
@@ -393,9 +394,9 @@ def test_the_command_line_in_field_units(tmp_path, capsys):
     assert rows[0].startswith("measured depth (ft),north (ft)")
     assert float(rows[-1].split(",")[0]) == pytest.approx(3438 / 0.3048)
     assert "hook load (klbf)" in (tmp_path / "depth_sweep.csv").read_text(encoding="utf-8").splitlines()[0]
-    for file, word, words in ((VOLVE, "metric", "expected SI or field"), (RODS, "field", "this scene is of rods")):
-        for command in ("run", "explain"):
-            assert main([command, str(file), "--units", word]) == 2 and words in capsys.readouterr().err
+    refused = (VOLVE, "run", "ft,ell", "'ell' is none"), (RODS, "run", "ell", "'ell'"), (RODS, "explain", "kN", "in SI")
+    for file, command, word, words in refused:
+        assert main([command, str(file), "--units", word]) == 2 and words in capsys.readouterr().err
 
 
 @pytest.mark.once

@@ -110,9 +110,9 @@ def _outputs(parser):
 
 
 def _units(parser):
-    parser.add_argument("--units", metavar="SI | field",
-                        help="of strings in wells and drill-strings in motion: units of tables, charts and .csv files; "
-                        "field: ft, in, klbf, ft-lbf, ppg, rpm, psi [SI]")  # fmt: skip
+    parser.add_argument("--units", metavar="SI | field | kN,mm,...",
+                        help="of tables, charts and .csv files; field: ft, in, klbf, ft-lbf, ppg, rpm, psi; or some, "
+                        "with SI for all others [SI]")  # fmt: skip
 
 
 def _film(name):

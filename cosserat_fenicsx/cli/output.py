@@ -21,6 +21,7 @@ from cosserat_fenicsx.errors import (
     SceneWarning,
 )
 from cosserat_fenicsx.interrupts import obey, patience
+from cosserat_fenicsx.quantities import DIMENSIONS
 from cosserat_fenicsx.ranks import all_are_here, end_all, launched
 
 # Options that are for rods alone, but for those that a kind of scene takes; and the kinds in words.
@@ -42,11 +43,18 @@ def given(options, names):
 
 
 def units_of(options):
-    """The value of --units: "SI", which is the default, or "field"."""
+    """The value of --units: "SI", which is the default, "field", or {dimension: unit} of the units that it names."""
     asked = getattr(options, "units", None)
-    if asked not in (None, "SI", "field"):
-        raise SceneError(f"--units {asked}: expected SI or field (ft, in, klbf, ft-lbf, ppg, rpm, psi)")
-    return asked or "SI"
+    if asked in (None, "SI", "field"):
+        return asked or "SI"
+    units = [unit.strip() for unit in asked.split(",")]
+    chosen = [{name: unit for name, x in DIMENSIONS.items() if unit in x.units} for unit in units]
+    if not all(chosen):
+        raise SceneError(
+            f"--units {asked}: expected SI, field (ft, in, klbf, ft-lbf, ppg, rpm, psi) or units with commas between, "
+            f"such as kN,mm: '{units[chosen.index({})]}' is none"
+        )
+    return {name: unit for known in chosen for name, unit in known.items()}
 
 
 def refuse_of_rods(options, kind):

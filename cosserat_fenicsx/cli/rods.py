@@ -3,7 +3,7 @@
 import warnings
 from functools import partial
 
-from cosserat_fenicsx.cli.output import deliver, given, say
+from cosserat_fenicsx.cli.output import deliver, given, say, units_of
 from cosserat_fenicsx.errors import SceneError, SceneWarning
 
 # Options of a motion, of an equilibrium path and of both: names of arguments of `simulate` and `solve`.
@@ -14,15 +14,8 @@ _MOTION, _PATH = (
 _BOTH = ("tol", "elements", "degree", "model")
 
 
-def _refuse_units(options):
-    if options.units is not None:
-        raise SceneError("--units is for strings in wells and drill-strings in motion, and this scene is of rods: "
-                         "their tables are in SI; in Python print(path.summary('field')) shows others")  # fmt: skip
-
-
 def _asked(options, found):
     """Whether a motion is requested, and the arguments of `simulate` or `solve`: options replace those of the file."""
-    _refuse_units(options)
     asked, motion = given(options, (*_MOTION, *_PATH, *_BOTH)), found.motion
     moves = not options.static and bool(motion or "duration" in asked)
     for name in (name for name in (_PATH if moves else _MOTION) if name in asked):
@@ -65,6 +58,8 @@ def explain(options, found):
     from cosserat_fenicsx.cli import explain as sentences
 
     (moving, settings), scene = _asked(options, found), found.scene
+    if units_of(options) != "SI":
+        raise SceneError("--units: `cosserat explain` tells rods in SI, `cosserat run` in any units")
     if moving:
         text = sentences.explain_motion(scene, settings)
     else:
@@ -103,7 +98,7 @@ def deliver_rods(computed, options, moving, tables=None):
     from cosserat_fenicsx.checks import positive
     from cosserat_fenicsx.pictures.drawing import colour_of
 
-    _refuse_units(options)
+    units = units_of(options)
     at, color, picture = _numbers(options.at), options.color, not options.no_picture
     magnify = 1.0 if options.magnify is None else positive("plot", "magnify", options.magnify, "-")
     if color is not None:
@@ -115,13 +110,13 @@ def deliver_rods(computed, options, moving, tables=None):
     def files(path):
         shown, several = _shown(path, at), moving and len(path) > 1
         return {
-            f"{name}.csv": partial(path.write, station=options.station),
+            f"{name}.csv": partial(path.write, station=options.station, units=units),
             f"{name}.xdmf": path.write,
             f"{name}.h5": True,
             "result.h5": path.save,
-            "rods.png": picture and (lambda file: path.plot(file, shown, magnify=magnify, color=color)),
+            "rods.png": picture and (lambda file: path.plot(file, shown, magnify=magnify, color=color, units=units)),
             "rods.html": picture and partial(path.write, magnify=magnify),
-            "energy.png": picture and several and path.plot_energy,
+            "energy.png": picture and several and partial(path.plot_energy, units=units),
             film: film and several and partial(path.animate, speed=options.speed, magnify=magnify, color=color),
         }
 

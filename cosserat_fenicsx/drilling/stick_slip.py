@@ -16,8 +16,8 @@ WEIGHT = Quantity("weight on bit", unit="N", shown="kN")
 AT_REST = 1e-6
 # A bit that has started reaches this share.
 _FAST = 0.5
-# Periods that differ by less, over their mean, are those of a periodic motion.
-_REGULAR = 0.2
+# Periods that differ by less, over their mean, are those of a periodic motion, and are the same.
+_REGULAR, _SAME = 0.2, 0.02
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,15 @@ class StickSlip:
     @property
     def irregular(self) -> bool:
         """Whether the times between starts differ by more than a fifth: peaks of such a motion depend on any step."""
-        return len(self.periods) > 2 and bool(np.ptp(self.periods) > _REGULAR * self.period)
+        return len(self.periods) > 1 and bool(np.ptp(self.periods) > _REGULAR * self.period)
+
+    def _period_in_words(self):
+        """The mean time between starts, and the shortest and the longest one where they differ."""
+        low, high = self.periods.min(), self.periods.max()
+        if high - low < _SAME * self.period:
+            return f"period {self.period:.5g} s"
+        what = "no single period" if self.irregular else "the period changes"
+        return f"{what}: starts {low:.3g} to {high:.3g} s apart, {self.period:.3g} s in the mean"
 
     def __str__(self):
         return self.summary()
@@ -82,7 +90,7 @@ class StickSlip:
             return f"From {self.since:g} to {self.until:g} s neither drive nor bit turns."
         least, peak, mean = (x / turning for x in (self.least, self.peak, self.mean))
         speed = f"bit speed {least:.4g} to {peak:.4g} {rpm}, mean {mean:.4g} {rpm}"
-        again = "" if np.isnan(self.period) else f"period {self.period:.5g} s, "
+        again = "" if np.isnan(self.period) else f"{self._period_in_words()}, "
         if self.unbounded:
             what = f"UNSTABLE, the motion grows without bound: {speed}"
         elif self.stuck == 1:

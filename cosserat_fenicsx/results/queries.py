@@ -32,6 +32,8 @@ _UNITS = {
     "normal stress": "Pa",
     "von Mises stress": "Pa",
 }
+# Share of a motion that is its start.
+_EARLY = 0.02
 # States that are computed at once.
 _BLOCK = 64
 
@@ -56,13 +58,16 @@ class Largest:
 class Extremes(OnNodes):
     """The largest contact forces, moments and stresses of a path or a motion."""
 
-    def largest(self) -> dict[str, "Largest"]:
+    def largest(self, first: int = 0) -> dict[str, "Largest"]:
         """The largest contact forces, moments and stresses over all points of a path (or times of a motion) and all
         rods.
 
         Both sides of jumps are included, and places between the nodes. Values are for the mesh used: the `errors` of a
         path say how accurate n and m are; `tol` of a motion limits the error of positions only. With t = d_3:
         bending ``|m - (m.t) t|``, twisting ``|m.t|``, shear ``|n - (n.t) t|``, tension ``n.t``, compression ``-n.t``.
+
+        Args:
+            first: the state from which on, such as one of a motion after a shock at its start.
 
         Returns:
             {quantity: `Largest`}, the quantities "bending moment", "twisting moment" (N m), "shear force", "tension",
@@ -71,7 +76,7 @@ class Extremes(OnNodes):
         """
         found = {what: Largest(0.0, None, 0, unit) for what, unit in _UNITS.items()}
         inside = np.linspace(0, 1, _PLACES * self.degree + 1)
-        for first in range(0, len(self), _BLOCK):
+        for first in range(range(len(self))[first] if first else 0, len(self), _BLOCK):
             which = range(first, min(first + _BLOCK, len(self)))
             contact = np.array([self._contact_of(k) for k in which])
             for i, rod in enumerate(self.scene.rods):
@@ -124,10 +129,23 @@ class Extremes(OnNodes):
 
 def largest_in_words(path):
     """`Extremes.largest` as a line of text, and which rods' stresses it cannot know."""
-    told = [f"{what} {x} ({x.station}, {path.when(x.point, '.4g')})" for what, x in path.largest().items()]
+    largest = path.largest()
+    told = [f"{what} {x} ({x.station}, {path.when(x.point, '.4g')})" for what, x in largest.items()]
     limits = " (tol limits errors of positions only)" if path.axis == "time" else ""
     line = f"Largest on this mesh{limits}: {'; '.join(told) or 'no force or moment'}."
-    return "\n".join([line, *_unknown_in_words(path)])
+    return "\n".join([line, *_early_in_words(path, largest), *_unknown_in_words(path)])
+
+
+def _early_in_words(path, largest):
+    """A sentence on what of the largest belongs to the start of a motion."""
+    times, start = path.along_axis, _EARLY * path.along_axis[-1]
+    early = [what for what, x in largest.items() if path.axis == "time" and 0 < times[x.point] <= start]
+    if early:
+        later = int(np.searchsorted(times, start, side="right"))
+        yield (
+            f"{some_of(early)}: at the start of the motion, where a load or a motion that begins at once is a shock; "
+            f"largest({later}) has those from t = {times[later]:.4g} s on, and a Ramp begins without a shock."
+        )
 
 
 def _unknown_in_words(path):

@@ -26,6 +26,7 @@ from cosserat_fenicsx.checks import number, refuse
 from cosserat_fenicsx.errors import NotConverged, SceneError
 from cosserat_fenicsx.quantities import Quantity
 from cosserat_fenicsx.results.result import Charted, by_name
+from cosserat_fenicsx.units import deg_per_30m
 from cosserat_fenicsx.well.components import DrillString, in_columns
 from cosserat_fenicsx.well.hole import Borehole, Mud
 from cosserat_fenicsx.well.operations import Operation
@@ -378,7 +379,7 @@ class BuildRate(Charted):
             "Rates of build by criteria, which differ; law: anisotropy "
             f"{self.anisotropy:g}."
         )
-        yield from self.why
+        yield from map(units.sentence, self.why)
 
     def _more(self, units):
         for s, force in self.contacts:
@@ -450,19 +451,18 @@ def build_rate(
                 try:
                     found.append(brentq(lambda k, measure=measure: measure(*at(k)), *_LOOKED_FOR[[i, j]], xtol=1e-9))
                 except NotConverged:
-                    hidden.append(f"between {_told(_LOOKED_FOR[i])} and {_told(_LOOKED_FOR[j])}")
+                    hidden.append(_between(*_LOOKED_FOR[[i, j]]))
         rates.append(min(found, key=abs, default=math.nan))
         if hidden:
             why.append(f"{name}: it changes its sign {' and '.join(hidden)}, where no equilibrium was found")
         elif not found:
-            why.append(f"{name}: it does not vanish in any hole between {_told(_LOOKED_FOR[0])} and "
-                       f"{_told(_LOOKED_FOR[-1])}")  # fmt: skip
+            why.append(f"{name}: it does not vanish in any hole {_between(*_LOOKED_FOR[[0, -1]])}")
         if len(found) > 1:
             why.append(f"{name}: it vanishes in several holes: {', '.join(map(_told, found))}")
     unknown = _LOOKED_FOR[np.isnan(side_force)]
     if len(unknown):
-        why.append(f"no equilibrium was found in {len(unknown)} of {len(_LOOKED_FOR)} holes that were tried, between "
-                   f"{_told(unknown[0])} and {_told(unknown[-1])}")  # fmt: skip
+        tried = f"{len(unknown)} of {len(_LOOKED_FOR)} holes that were tried, {_between(*unknown[[0, -1]])}"
+        why.append(f"no equilibrium was found in {tried}")
     three, reason = _three_points(beam, laid, depth)
     why += [f"three-point: {reason}"] if reason else []
     turning = [place.component.name for place in laid if place.component.bend] if operation.direction(1.0)[1] else []
@@ -476,7 +476,11 @@ def build_rate(
 
 
 def _told(curvature):
-    return f"{math.degrees(curvature) * 30:.4g} deg/30 m"
+    return f"{curvature / deg_per_30m:.4g} deg/30m"
+
+
+def _between(*curvatures):
+    return f"between {' and '.join(map(_told, curvatures))}"
 
 
 def _three_points(beam, laid, depth):

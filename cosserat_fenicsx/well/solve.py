@@ -243,7 +243,7 @@ MODELS = (AUTO, SOFT, BUCKLED, ROD)
 CONVENTIONS = ("coulomb", "johancsik")
 _QUANTITIES = {"hook load": "N", "surface torque": "N m"}
 _LOCKS_UP = "WITH THE WALL FORCE OF A HELIX IT LOCKS UP"
-_HOW_LONG = "solving the rod in contact mostly takes a second, and ends after about"
+_HOW_LONG = "solving the rod in contact mostly takes a second, and ends after about {:.0f} s of processor time"
 _NO_ROD = (
     "the exact rod in contact is not tried: beyond helical buckling there are many equilibria, and it may return "
     "another one than the string's; use model='rod' to force it"
@@ -296,7 +296,11 @@ def torque_and_drag(
     tol = check_settings(model, tol, torque_convention)
     pieces, laid = pieces_of(hole, string, operation, mud, depth)
     given = hole, string, operation, mud, depth
-    flexible = _flexible(given, model, tol, torque_convention, pieces, laid)
+    try:
+        flexible = _flexible(given, model, tol, torque_convention, pieces, laid)
+    except LockUp as locked:
+        locked.args = (hole.path.told(str(locked)),)
+        raise
     if model in (SOFT, BUCKLED) or (model == AUTO and flexible.enough):
         return flexible
     if model == AUTO and flexible.model == BUCKLED:
@@ -304,7 +308,8 @@ def torque_and_drag(
     why = flexible.judged.decided
     told = "" if model == ROD else f"{why[-1].rpartition(': ')[0] or why[-1]}: "
     try:
-        with Plan(f"torque_and_drag, {operation.name}: {told}{_HOW_LONG} {longest(tol):.0f}", progress, world()):
+        how_long = _HOW_LONG.format(longest(tol))
+        with Plan(f"torque_and_drag, {operation.name}: {told}{how_long}", progress, world()):
             return rod_in_contact(flexible, why, progress, exact=model == ROD)
     except (SceneError, NotConverged, InstallationError) as problem:
         if model == ROD:
