@@ -21,7 +21,7 @@ from cosserat_fenicsx.pictures.drawing import colour_of, default_colour, known, 
 from cosserat_fenicsx.pictures.plot import tangled
 from cosserat_fenicsx.pictures.shapes import Drawn
 from cosserat_fenicsx.pictures.signs import Resting, has_sign, loads_of, signs_of, without_sign
-from cosserat_fenicsx.pictures.view import Labels, View, axes_of, view_of
+from cosserat_fenicsx.pictures.view import Labels, View, axes_of, seen_moving, view_of
 
 STEEL = cf.Material(E=210e9, nu=0.3, density=7850.0)
 
@@ -616,3 +616,10 @@ def test_progress_tells_meshes_and_the_time(capsys, monkeypatch):
     monkeypatch.setattr(progress.sys, "stderr", screen)
     cf.buckling(scene, progress=True)
     assert " buckling" in screen.getvalue() and screen.getvalue().endswith("\x1b[2K"), "the line is removed at the end"
+
+
+def test_motions_across_a_plane_are_seen_from_a_corner():
+    span = np.array([4.0, 0.0, 3.0])
+    assert (seen_moving(span, np.array([[0.0, 1e-3, 0.0]])) == 4.0).all()
+    for moved in ([[1e-3, 0.0, 1e-3]], [[1e-3, 5e-5, 0.0]], [[0.0, 1e-10, 0.0]]):
+        assert seen_moving(span, np.array(moved)) is span

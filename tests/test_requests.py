@@ -109,7 +109,7 @@ def test_enormous_loads_and_motions_are_refused_before_the_work():
     clamp, big = cf.Clamp(rod.start), (0, 0, 1e30)
     small = cf.Force(rod.end, (0, 0, 1.0))
     for supports, load, words in (
-        ([clamp], cf.Force(rod.end, big), "Force at .*: 1e.30 N: expected at most (0.5 EA = 3.3e.09|1e.06 EA = 6.6e.15) N"),
+        ([clamp], cf.Force(rod.end, big), "Force at .*: 1e.30 N: expected at most (0.5 EA = 3.3e.09|1e.06 EA = 6)"),
         ([clamp], cf.FollowerMoment(rod.end, big), "FollowerMoment at .*: (2e.31|5e.28) N"),
         ([clamp], cf.LineForce(rod, big), "LineForce on .*: 2e.31 N"),
         ([clamp], cf.Weight((0, 0, 1e30)), "Weight: "),

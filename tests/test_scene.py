@@ -510,3 +510,13 @@ def test_profiles_that_nobody_turned_into_the_plane_are_asked_about():
     assert doubts((0, 0, -1e3)) == doubts((1e3, 0, 0), d1=(1, 0, 0)) == doubts((1e3, 0, 0), d1=(0, 1, 0)) == ()
     assert doubts((0, 0, 1.0), top=(3, 0, 0)) == ()  # a beam stands upright
     assert "'post' of HEA 160 is 3000 m long: are all lengths in m?" in doubts((0, 0, 1.0), top=(3000, 0, 0))[0]
+
+
+def test_sections_that_nobody_turned_are_told():
+    def told(section, **d1):
+        rod = cf.Rod(cf.Line((0, 0, 0), (3, 0, 0), **d1), section, cf.Material(E=210e9, nu=0.3), name="beam")
+        return cf.Scene([rod], [cf.Clamp(rod.start)]).by_default
+
+    (sentence,) = told(cf.Rectangle(0.1, 0.2))
+    assert "stand upright by default" in sentence and "'beam'; `d1=`" in sentence
+    assert told(cf.Rectangle(0.1, 0.2), d1=(0, 1, 0)) == told(cf.Circle(0.1)) == told(cf.Rectangle(0.1, 0.1)) == []

@@ -458,6 +458,7 @@ def test_a_motion_that_is_not_periodic_says_that_its_errors_are_not_known(second
     history = cf.drilling.DrillingHistory(pipe_and_collars(), "torsion", (), 0.01, np.arange(2.0), rows)
     history.errors = Cycle(0.001, 0.01, 5.0, 5.0)
     assert history.stick_slip().irregular == told == ("The motion is not periodic" in " ".join(str(history).split()))
+    assert ("no single period: starts 1 to 2 s apart, 1.5 s in the mean" in str(history.stick_slip())) == told
 
 
 @pytest.mark.parametrize(
