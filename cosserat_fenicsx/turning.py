@@ -5,7 +5,12 @@ the tension there times exp(-mu times the turning up to a place). The directions
 are interpolated over an element and halves of its neighbours, if these are about as long; |t'| of the polynomials is
 integrated in parts, since it has a kink where a curve in a plane bends back. At stations and kinks t may jump, by the
 angle between its two sides.
+
+A thread that stretches need not slide: between two of its cells the larger tension is at most exp(mu times the turning)
+of the other. It sticks where it is less, and where it would be more, thread passes towards the larger one (`slipped`).
 """
+
+from typing import NamedTuple
 
 import numpy as np
 from numpy.polynomial.polynomial import polypow
@@ -24,6 +29,9 @@ _BESIDE = 0.1
 # tension along the element, over itself, that matters; and the distance from an end, over the element's length, to
 # which kinks count as there: they matter by its square.
 _KINK, _SLIGHT, _AT_END = 0.1, 1e-9, 1e-3
+# What decides between stick and slip is above rounding by this share; smaller angles (rad) hold nothing; rounds in
+# which all wrong ends of cells change, and all rounds; iterations for a tension.
+_ABOVE, _SMOOTH, _TOGETHER, _ROUNDS, _FOUND = 1e-12, 1e-14, 30, 1000, 30
 
 
 class Turning:
@@ -68,7 +76,7 @@ class Turning:
     def along(self, t):
         """The turning, rad, from the start to the begin, the Gauss points and the end of every element, (.., elements,
         points + 2), of the directions at the Gauss points, (.., elements, points, 3); and a function from changes of
-        the directions to those of the turning."""
+        the directions, one or, where the first dimension is 1, several, to those of the turning."""
         c = self._polynomials(t)
         k = c[..., 1:, :] * np.arange(1, c.shape[-2])[:, None]
         bend = _least(k)[..., None]
@@ -84,7 +92,7 @@ class Turning:
         far = np.linalg.norm(away, axis=-1)
 
         def up_to(rates, angles):
-            parts = (weights * rates).reshape(*sizes.shape, -1).sum(axis=-1)
+            parts = (weights * rates).reshape(*rates.shape[:-1], sizes.shape[-1], -1).sum(axis=-1)
             inside = np.cumsum(np.concatenate([np.zeros((*parts.shape[:-1], 1)), parts], axis=-1), axis=-1)
             passed = np.zeros(inside.shape[:-1])
             passed[..., 1:] = np.cumsum(inside[..., :-1, -1], axis=-1)
@@ -125,6 +133,94 @@ class Turning:
 
         share = np.exp(-friction * way(turned))
         return share, lambda dt: -friction * share * way(change(dt))
+
+
+class Slipped(NamedTuple):
+    """Cells of a thread, from its pulled end on: their tensions and their lengths without tension, (n,); ways (n,):
+    whether thread passes at the begin of each, 1 towards the pulled end, -1 back, 0 where it sticks; change: a function
+    from changes (.., n) of the sizes and of the angles to those of the tensions."""
+
+    tensions: np.ndarray
+    material: np.ndarray
+    ways: np.ndarray
+    change: object
+
+
+def slipped(sizes, material, angles, pull, stiffness, ways):
+    """The `Slipped` cells of a thread that is held at its other end.
+
+    A cell of the size l with thread of the length a without tension has the tension EA (l/a - 1), or none. Which ends
+    slip is found by active sets: cells between two ends that stick share their thread, with tensions of known ratios.
+    All wrong ends change at once; after some rounds, which may come back to the same sets, a random half of them.
+
+    Args:
+        sizes, material: (n,) of the cells, and the lengths without tension before.
+        angles: (n,) friction times turning, from the pulled end to the first cell, then between cells.
+        pull: the tension at the pulled end. stiffness: EA. ways: (n,) to begin with.
+
+    Returns:
+        Slipped; None where no state was found.
+    """
+    free, grow, ways = angles <= _SMOOTH, np.exp(angles) * (1 + _ABOVE), np.where(angles <= _SMOOTH, 1, ways)
+    random = None
+    for tried in range(_ROUNDS):
+        tensions, now, change = _between(sizes, material, angles, pull, stiffness, ways)
+        passed = np.cumsum((material - now)[::-1])[::-1]
+        before = np.concatenate([[pull], tensions[:-1]])
+        slips = (before > tensions * grow) * 1 - (tensions > before * grow)
+        wanted = np.where(free, 1, np.where(ways == 0, slips, np.where(passed * ways < -_ABOVE * sizes, 0, ways)))
+        wrong = np.flatnonzero(wanted != ways)
+        if not len(wrong):
+            return Slipped(tensions, now, ways, change)
+        which = wrong
+        if tried >= _TOGETHER:
+            random = random or np.random.default_rng(0)
+            which = wrong[random.random(len(wrong)) < 0.5]
+        ways = ways.copy()
+        ways[which] = wanted[which]
+    return None
+
+
+def _between(sizes, material, angles, pull, stiffness, ways):
+    """Tensions, lengths without tension, and the function of changes of `Slipped`, for given ways."""
+    heads = np.flatnonzero(ways == 0)  # first cells of those that share their thread
+    group, first = np.cumsum(ways == 0), heads[0] if len(heads) else len(sizes)
+    inside = slice(first, None)
+
+    def ratios(angles):
+        """Logarithms of the tensions over that of the first cell that shares its thread, or over the pull."""
+        fallen = -np.cumsum(ways * angles, axis=-1)
+        return fallen - np.where(group > 0, fallen[..., np.concatenate([[0], heads])[group]], 0.0)
+
+    def total(values):
+        """(.., groups) sums of values (.., cells from `first` on)."""
+        return np.add.reduceat(values, heads - first, axis=-1)
+
+    r, of_cell = np.exp(ratios(angles)), group[inside] - 1
+    tensions, now = pull * r, material.copy()
+    if len(heads):
+        own, ratio, there = sizes[inside], r[inside], total(material[inside])
+        tau = np.zeros(len(heads))
+        for _ in range(_FOUND):  # Newton's, of convex functions that fall, from the left
+            left = stiffness * own / (stiffness + tau[of_cell] * ratio)
+            step = (total(left) - there) / total(left * ratio / (stiffness + tau[of_cell] * ratio))
+            tau = np.maximum(tau + step, 0.0)
+            if ((np.abs(step) <= _ABOVE * tau) | (tau == 0)).all():
+                break
+        tensions[inside] = tau[of_cell] * ratio
+    taut = np.concatenate([np.ones(first, dtype=bool), tensions[inside] > 0])
+    now[taut] = stiffness * sizes[taut] / (stiffness + tensions[taut])
+
+    def change(of_sizes, of_angles):
+        moved = ratios(of_angles) * tensions
+        if len(heads):
+            soft = stiffness / (stiffness + tensions[inside])
+            gained = of_sizes[..., inside] * soft - own * soft / (stiffness + tensions[inside]) * moved[..., inside]
+            rise = total(gained) / total(own * soft * ratio / (stiffness + tensions[inside]))
+            moved[..., inside] += np.where(taut[inside], rise[..., of_cell] * ratio, 0.0)
+        return moved
+
+    return tensions, now, change
 
 
 def _apart(at, which, most, h):

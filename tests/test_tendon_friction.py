@@ -5,6 +5,7 @@ import pytest
 from scipy.integrate import quad
 
 import cosserat_fenicsx as cf
+from cosserat_fenicsx.turning import slipped
 
 EI, GJ, EA, GA, LENGTH, E, MU, T = 0.02, 0.016, 5000.0, 3000.0, 0.3, 0.01, 0.5, 8.0
 SECTION = cf.Stiffness((GA, GA), EA, (EI, EI), GJ, mass=0.3, inertia=(1e-5, 1e-5, 2e-5))
@@ -141,6 +142,56 @@ def test_derivatives(truth):
 
 
 @pytest.mark.serial
+@pytest.mark.parametrize("cells", [12, 60])
+def test_where_it_sticks(cells):
+    """In any state and after any change the cells satisfy the law, no thread is lost, and the derivatives are those of
+    differences; in a guide of given shape the tension is Euler's, pulled, and where it is let go."""
+    random, sizes, angles, EA = np.random.default_rng(3), np.full(cells, 1.0 / cells), np.full(cells, 1.0 / cells), 50.0
+    pulled = slipped(sizes, sizes, angles, 8.0, EA, np.ones(cells, dtype=int))
+    let_go = slipped(sizes, pulled.material, angles, 5.0, EA, pulled.ways)
+    fallen = np.exp(-np.cumsum(angles))
+    assert pulled.tensions == pytest.approx(8.0 * fallen, rel=1e-12)
+    assert let_go.tensions == pytest.approx(np.minimum(5.0 / fallen, 8.0 * fallen), rel=1e-12)
+    held = let_go
+    for pull in (0.0, 6.0, 9.0, 1.0, 3.0):
+        size = sizes * random.uniform(0.98, 1.02, cells)
+        angle = random.uniform(0, 2, cells) * angles * (random.random(cells) > 0.1)
+        before, held = held, slipped(size, held.material, angle, pull, EA, held.ways)
+        own = np.maximum(EA * (size / held.material - 1), 0.0)
+        assert held.tensions == pytest.approx(own, abs=1e-9)
+        ahead, grown = np.concatenate([[pull], own[:-1]]), np.exp(angle) * (1 + 1e-9)
+        assert (ahead <= own * grown + 1e-9).all() and (own <= ahead * grown + 1e-9).all()
+        passed = np.cumsum((before.material - held.material)[::-1])[::-1]
+        moves = (np.abs(passed) > 1e-12) & (angle > 0) & (ahead + own > 1e-9)
+        assert (np.sign(passed[moves]) == np.sign(ahead - own)[moves]).all()
+        by = 1e-8 * random.normal(size=(2, cells)) * [sizes, angle]
+        sides = [slipped(size + sign * by[0], before.material, angle + sign * by[1], pull, EA, held.ways)
+                 for sign in (1, -1)]  # fmt: skip
+        difference = (sides[0].tensions - sides[1].tensions) / 2
+        assert held.change(*by) == pytest.approx(difference, abs=1e-6 * np.abs(difference).max())
+
+
+@pytest.mark.serial
+def test_modes_of_one_that_sticks(truth):
+    """As if it were a part of the section: EA of the tendon times the square of its strain, v_3 + e_2 u_1 - e_1 u_2."""
+    axial, (e_1, e_2), row = 300.0, (E, 0.6 * E), np.array([0, 0, 1, 0.6 * E, -E, 0])
+    whole = np.diag([GA, GA, EA, EI, EI, GJ]) + axial * np.outer(row, row)
+    section = cf.Stiffness(matrix=whole.tolist(), mass=0.3, inertia=(1e-5, 1e-5, 2e-5))
+    glued = cf.Rod(ROD.curve, section, name="arm")
+    expected = cf.modes(cf.Scene([glued], [cf.Clamp(glued.start)]), 6, elements=4).frequencies
+    for pulled in ("start", "end"):
+        tendon = cf.Tendon(ROD, (e_1, e_2), 1e-6, friction=MU, axial=axial, pulled=pulled)
+        found = cf.modes(arm(tendon), 6, load_factor=1.0, elements=4)
+        truth("tendons: friction, frequencies of one that sticks", found.frequencies, expected, 1e-7)
+    assert found.left_out == ("the slip of Tendon on arm",) and found.negative_modes == 0
+    bent = arm(cf.Tendon(ROD, cf.Helical(E, LENGTH / 2), T, friction=MU, axial=axial))
+    plain, damped = (cf.modes(bent, 4, load_factor=1.0, elements=4, damped=x) for x in (False, True))
+    assert damped.frequencies == pytest.approx(plain.frequencies, rel=1e-8)
+    path = cf.solve(bent, [1.0], elements=4)
+    assert path.modes(4).modes[0].frequencies == pytest.approx(plain.frequencies, rel=1e-8)
+
+
+@pytest.mark.serial
 def test_in_stages():
     """What slides in one direction alone does not depend on the order of the loads. A load that comes later bends the
     arm at its foot, so that the tension falls farther up, and the tendon would slide back there."""
@@ -164,8 +215,10 @@ def test_in_stages():
         (lambda: cf.Tendon(ROD, (E, 0), shortening=0.01, friction=0.1), "a given tension"),
         (lambda: cf.solve(arm(beside(), cf.Tendon(ROD, (0, E), shortening=1e-3)), [1.0]), "has friction"),
         (lambda: cf.solve(arm(beside()), [1.0], model="planar"), "has friction, which only the spatial model knows"),
-        (lambda: cf.simulate(arm(beside()), 0.1), "friction, which acts in equilibria alone"),
-        (lambda: cf.modes(arm(beside()), load_factor=1.0), "has friction"),
+        (lambda: cf.simulate(arm(beside()), 0.1), "does not stretch, and would stick with a blow"),
+        (lambda: cf.simulate(arm(beside(axial=1e3)), 0.1, load_factor=0.0), "the load factor 0 no tension at all"),
+        (lambda: cf.modes(arm(beside()), load_factor=1.0), "sticks in small motions: expected its stiffness EA"),
+        (lambda: cf.modes(arm(beside(axial=1e3)), elements=2), "has friction and no tension"),
         (lambda: cf.buckling(arm(beside())), "has friction"),
     ],
 )  # fmt: skip

@@ -80,10 +80,12 @@ class Tendon(Load, LineAction):
             load factor 0; negative to slacken it; or a function of time. In `solve`, `modes`, derivatives of states,
             and motions. A tendon does not push: where it would, its tension is zero, and it is shorter along the rod
             than its length.
-        axial: of a tendon of given length, its stiffness EA, N; None where it does not stretch, in equilibria alone.
-        friction: its coefficient of Coulomb friction with the rod, of a tendon of given tension, in `solve`. It slides
+        axial: of a tendon of given length or with friction, its stiffness EA, N; None where it does not stretch, in
+            equilibria alone.
+        friction: its coefficient of Coulomb friction with the rod, of a tendon of given tension. In `solve` it slides
             towards its pulled end, where it has its tension; the tension falls with exp(-friction times the angle by
-            which the tendon turns, rad) on the way to the other end. A path on which it would slide back is refused.
+            which the tendon turns, rad) on the way to the other end. A path on which it would slide back is refused. In
+            `simulate` it slides both ways, or sticks. In `modes` it sticks where it has a tension.
         pulled: "start" or "end" of the rod: where it is pulled, which matters with friction alone.
         jumps: times where a function of time is not smooth, s.
         permanent: whether it acts in full, before all that the load factor multiplies.
@@ -113,8 +115,8 @@ class Tendon(Load, LineAction):
             refuse(self, "offset", self.offset, "a function without jumps, Along or AlongTable")
         if (self.tension is None) == (self.shortening is None):
             refuse(self, "tension", self.tension, "either tension (N) or shortening (m)")
-        if self.axial is not None and not self.shortens:
-            refuse(self, "axial", self.axial, "None, since the tension is given")
+        if self.axial is not None and not (self.shortens or self.rough):
+            refuse(self, "axial", self.axial, "None, since the tension is given, without friction")
         if self.permanent and self.shortens:
             refuse(self, "permanent", True, "False: the load factor multiplies a shortening")
         if self.friction and self.shortens:

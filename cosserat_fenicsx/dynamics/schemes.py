@@ -222,8 +222,7 @@ class CollocationProblem(StepProblem):
     def clamp_forces(self):
         """See `StepProblem`: at the end of the step."""
         if self.model.clamps.count:
-            self._take_loads(self.loaded_at)
-            self._refresh(self.acting_share)
+            self.take_where_it_acts()
         return super().clamp_forces()
 
     def free_velocities(self, t, h):

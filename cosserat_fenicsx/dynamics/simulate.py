@@ -129,7 +129,6 @@ def simulate(
             "they have none, or that is without them, and friction begins at zero"
         )
     refuse_stages("simulate", scene)
-    _refuse_tendons(scene)
     if scene.rod_contact and (scene.rod_contact.stiffness is None or comm.size > 1):
         raise SceneError(
             "simulate: rods touch each other on one process, with elastic surfaces: expected one process, and a "
@@ -142,6 +141,7 @@ def simulate(
     scene_over = scene.over(duration)
     check_magnitudes(scene_over, load_factor)
     check_tensions(scene, [load_factor])
+    _refuse_tendons(scene, load_factor)
     if comm.rank == 0:
         scene.warn()
     cautions = []
@@ -156,6 +156,8 @@ def simulate(
         cautions += pace.watch(scene, duration, load_factor, stepper.impulse_error)
         cautions += [*put_start(problem.model, start), *_braked(scene)]
         problem.begin()
+        if problem.slipping:
+            problem.slipping.start(_pulls(scene_over, start))
         stepper.begin()
         history = (History if folder is None else StoredHistory).of(problem.model, scheme, [why, *cautions])
         store = Nowhere()
@@ -189,18 +191,33 @@ def _may_start(action, start):
     )
 
 
-def _refuse_tendons(scene):
-    """Refuse (SceneError) tendons of given length that do not stretch, and tendons with friction."""
+def _refuse_tendons(scene, load_factor):
+    """Refuse (SceneError) tendons of given length or with friction that do not stretch, and friction at a load factor
+    of zero."""
+    for load in scene.actions:
+        if (load.shortens or load.rough) and load.axial is None:
+            why = "would stick with a blow" if load.rough else "would be taut with a blow"
+            raise SceneError(
+                f"simulate: {describe(load)} does not stretch, and {why}: expected its stiffness EA, axial= (N)"
+            )
+        if load.rough and load.scaled and not load_factor:
+            raise SceneError(f"simulate: {describe(load)} has friction, and the load factor 0 no tension at all: "
+                             "expected a tension that falls with time")  # fmt: skip
+
+
+def _pulls(scene, start):
+    """[tension, N] at their pulled ends of the tendons with friction of a scene, with which they have slid before a
+    motion; 0 of those that the start does not have. A SceneError where they have another friction there."""
+    path, k = (None, 0) if start is None else point_of(start)
+    before, found = [x for x in path.scene.loads if x.is_thread] if path else [], []
     for load in scene.actions:
         if load.rough:
-            raise SceneError(
-                f"simulate: {describe(load)} has friction, which acts in equilibria alone: expected friction=0"
-            )
-        if load.shortens and load.axial is None:
-            raise SceneError(
-                f"simulate: {describe(load)} does not stretch, and would be taut with a blow: expected its stiffness "
-                "EA, axial= (N)"
-            )
+            known = [x for x in before if (x.rod, x.offset) == (load.rod, load.offset)]
+            if any((x.friction, x.pulled) != (load.friction, load.pulled) or x.shortens for x in known[:1]):
+                raise SceneError(f"simulate.start: {describe(load)} has another friction or pulled end in the path: "
+                                 "expected the same ones")  # fmt: skip
+            found.append(float(path.tendon(known[0]).tension[k]) if known else 0.0)
+    return found
 
 
 def pace_of(duration, *, tol=None, dt=None, scheme="momentum", save_every=None, elements=ELEMENTS):

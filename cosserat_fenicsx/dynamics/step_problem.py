@@ -150,13 +150,100 @@ class TensionsInSteps(ThreadLengths):
         self.put(memory["tensions"])
 
 
+class SlippingInSteps:
+    """Threads with friction in the steps of a `StepProblem`; methods as of `NodalContact`.
+
+    Their tensions are those at the state where actions act in a step: the end, or the middle, from middle to middle
+    then. They are data of the form of a `Tendon`, whose work the books of a step have, that of friction included.
+    """
+
+    def __init__(self, problem):
+        self._problem = problem
+        self._column, self._without, self._vector = (problem.numbering.vector() for _ in range(3))
+
+    def load(self):
+        """Take the threads of the scene that the model was loaded with."""
+        model = self._problem.model
+        factors = {"load": self._problem.load_factor, "permanent": 1.0}
+        found = {id(x.action): (x, factors[term.kind.scaled]) for term, xs in model.actions.sliding for x in xs}
+        self._threads = [found[id(action)] for action in model.scene.actions if action.rough]
+        self.start([0.0] * len(self._threads))
+
+    def start(self, pulls):
+        """Begin a motion at the state, where threads have slid with tensions (N) of their pulled ends."""
+        for (thread, factor), pull in zip(self._threads, pulls, strict=True):
+            thread.let_stick(pull, factor)
+
+    def _changes(self, vectors):
+        """(k, tensions) changes of the tensions with k changes of the solver's unknowns."""
+        moved = np.zeros((len(vectors), len(self._problem.state)))
+        for vector, local in zip(vectors, moved, strict=True):
+            self._vector.array_w[:] = vector
+            self._problem.numbering.to_local(self._vector, local)
+        moved *= self._problem.acting_share
+        return np.concatenate([thread.change(moved).reshape(len(moved), -1) for thread, _ in self._threads], axis=1)
+
+    def _found_answers(self):
+        """(tensions, unknowns) by unit tensions, by the first tangent of a step."""
+        problem, found = self._problem, []
+        problem.function(problem.x, self._without)
+        for thread, _ in self._threads:
+            for k in range(thread.tensions.size):
+                unit = np.zeros(thread.tensions.size)
+                unit[k] = 1.0
+                thread.keep(thread.tensions + unit.reshape(thread.tensions.shape))
+                problem.function(problem.x, self._column)
+                self._column.axpy(-1.0, self._without)
+                problem.solve(self._column, self._vector)
+                found.append(self._vector.array_r.copy())
+            thread.keep(None)
+        problem.function(problem.x, self._without)
+        return np.array(found)
+
+    def begin(self, h):
+        self._answers = None
+
+    def add_forces(self, b):
+        """They are in the forms."""
+
+    def meet(self, x, change):
+        """Change Newton's step so that the tensions follow it."""
+        if self._answers is None:
+            self._answers = self._found_answers()
+        free, *follow = self._changes([change, *self._answers])
+        change -= np.linalg.solve(np.eye(len(free)) + np.transpose(follow), free) @ self._answers
+
+    def give_up(self):
+        """Nothing was accepted."""
+
+    def accept(self):
+        self._problem.take_where_it_acts()
+        for thread, _ in self._threads:
+            thread.accept()
+
+    def books(self):
+        """They have the work of the tensions already."""
+        return 0.0, 0.0
+
+    def here(self, t):
+        """[(n,) tensions at the Gauss points] at the state, at a time (s)."""
+        return [factor * thread.here(t).ravel() for thread, factor in self._threads]
+
+    def memory(self):
+        return {"held": [thread.held for thread, _ in self._threads]}
+
+    def recall(self, memory):
+        for (thread, _), held in zip(self._threads, memory["held"], strict=True):
+            thread.held = tuple(held)
+
+
 class StepProblem(Equations):
     """The equations of a step, whatever the scheme that made the forms of its model (`models.moving.Moving`); see
     `Equations`; x is the state at the end of the step.
 
     fresh: whether the next iteration takes a new tangent; h: the length of the step, dimensionless; load_factor:
     multiplies all loads and prescribed motions; loaded_at: time (s) of the loads of the step; tensions: the
-    `TensionsInSteps` of tendons of given length, or None.
+    `TensionsInSteps` of tendons of given length, slipping: the `SlippingInSteps` of those with friction, or None.
     """
 
     ties_class = MovingTies
@@ -176,6 +263,7 @@ class StepProblem(Equations):
         self.load_factor, self.fresh, self.contact, self.touching, self._laws = 1.0, True, None, [], []
         self._at_stations = []
         self.rods_touching, self.tensions = None, TensionsInSteps(self) if model.actions.tensions else None
+        self.slipping = SlippingInSteps(self) if any(term.kind.slides for term in model.actions.terms) else None
         self._hooks = self.c.hooks
         self._pack()
 
@@ -193,9 +281,10 @@ class StepProblem(Equations):
         self.contact = NodalContact(self, walls, at_end=self.acting_share == 1) if walls else None
         self._at_stations = [StationLaw(self, action) for action in scene.actions if action.resists]
         self.rods_touching = RodsTouching(self) if scene.rod_contact else None
-        if self.tensions:
-            self.tensions.load()
-        self._laws = [*filter(None, [self.tensions, *self._at_stations, self.rods_touching])]
+        threads = [*filter(None, [self.tensions, self.slipping])]
+        for found in threads:
+            found.load()
+        self._laws = [*threads, *self._at_stations, *filter(None, [self.rods_touching])]
         self.touching = [self.contact, *self._laws] if walls else self._laws
         self.c.contact = self.contact.c if walls else self._ffi.NULL
         of_contact = NODES * (model.comm.size > 1) * bool(walls)
@@ -356,8 +445,15 @@ class StepProblem(Equations):
         return found
 
     def multipliers_at(self, t):
-        """`multipliers`, then the tensions of tendons of given length at the state, of the time t (s)."""
-        return np.concatenate([self.multipliers(), *([self.tensions.here(t)] if self.tensions else [])])
+        """`multipliers`, then the tensions of tendons at the state, of the time t (s): of those with friction at the
+        Gauss points, and of those of given length."""
+        slipping, tensions = self.slipping.here(t) if self.slipping else [], self.tensions
+        return np.concatenate([self.multipliers(), *slipping, *([tensions.here(t)] if tensions else [])])
+
+    def take_where_it_acts(self):
+        """Evaluate data that depend on time or on the position where the actions of the step just solved act."""
+        self._take_loads(self.loaded_at)
+        self._refresh()
 
     def momenta(self):
         """Linear and angular momentum of the state, see `Moving.momenta`."""

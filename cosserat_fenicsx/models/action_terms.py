@@ -375,6 +375,8 @@ class Term:
                 continue
             rough = self.kind.at_gauss and len(now.kinks(rod))
             self._take(nearest_polynomials(now, rod, s, *elements) if rough else now.data(rod, s), rod, rows)
+        for thread in self.sliding:
+            thread.pull(t)
         return True
 
     def soften(self, share):

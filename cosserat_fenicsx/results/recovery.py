@@ -8,7 +8,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from cosserat_fenicsx.numerics import conjugate_product, directors, product_conjugate
+from cosserat_fenicsx.numerics import conjugate_product, directors, lagrange, product_conjugate
 from cosserat_fenicsx.quantities import Quantity, Units, span_in_words
 from cosserat_fenicsx.results.records import Records
 from cosserat_fenicsx.results.compared import all_cell_nodes, cell_nodes
@@ -199,7 +199,7 @@ class Threads:
         self._result, self._records = result, result._all
         if self._records is None:  # on a disk
             self._records = Records.of(list(result._records))
-        self._threads, self._shares = [thread for thread in result.scene.actions if thread.is_thread], {}
+        self._threads, self._found = [thread for thread in result.scene.actions if thread.is_thread], {}
 
     def at_gauss(self):
         """(n, elements, points, 6) force T t and moment R a x T t of all threads, inertial, dimensionless."""
@@ -250,27 +250,48 @@ class Threads:
         full = thread.amplitude * np.array([np.reshape(at(thread, t).tension, -1)[0] for t in times], dtype=float)
         return full * records["load_factor"] if thread.scaled else full
 
-    def share(self, thread):
-        """Arc lengths s (elements + 1,), m, of the ends of elements, and the tension there over that at the pulled end,
-        (n, elements + 1)."""
-        share, breaks = self._left(thread), self._result.layout.breaks[self._result._rows(thread.rod)[0]]
-        return breaks * thread.rod.length, np.concatenate([share[:, :, 0], share[:, -1:, -1]], axis=1)
+    def along(self, thread, pulled):
+        """Arc lengths s (elements + 1,), m, of the ends of elements, and the tension there (n, elements + 1), N, with
+        that of the pulled end, (n,)."""
+        found, breaks = self._tensions(thread, pulled), self._result.layout.breaks[self._result._rows(thread.rod)[0]]
+        found = np.concatenate([found[:, :, 0], found[:, -1:, -1]], axis=1)
+        return breaks * thread.rod.length, found * self._result.scales.force
 
-    def _left(self, thread):
-        """(n, elements, points + 2) the share of the tension that friction leaves, at the begin, the Gauss points and
-        the end of every element."""
-        places, R, v, k = self._strained(thread)
-        if not thread.rough:
-            return np.ones((len(v), v.shape[1], v.shape[2] + 2))
-        if id(thread) not in self._shares:
-            turning, t = self._turning(thread, places, R, v, k)
-            self._shares[id(thread)] = turning.left(t, thread.friction, thread.pulled == "start")[0]
-        return self._shares[id(thread)]
+    def _tensions(self, thread, pulled=None):
+        """(n, elements, points + 2) the tension at the begin, the Gauss points and the end of every element,
+        dimensionless; pulled: (n,) that of the pulled end, N, where it is not that of the result's scene."""
+        if id(thread) not in self._found:
+            places, R, v, k = self._strained(thread)
+            pulled = (self.tension(thread) if pulled is None else pulled) / self._result.scales.force
+            found = np.broadcast_to(pulled[:, None, None], (len(v), v.shape[1], v.shape[2] + 2))
+            if thread.rough and "time" in self._records.columns:
+                found = self._recorded(thread, found)
+            elif thread.rough:
+                turning, t = self._turning(thread, places, R, v, k)
+                found = found * turning.left(t, thread.friction, thread.pulled == "start")[0]
+            self._found[id(thread)] = found
+        return self._found[id(thread)]
 
-    def left_at_nodes(self, thread):
-        """(n, nodes) the share of the tension that friction leaves at the nodes of the thread's rod."""
-        left = np.einsum("ij,nej->nei", self._result.rule.from_ends_and_gauss, self._left(thread))
-        return np.concatenate([left[:, :, :-1].reshape(len(left), -1), left[:, -1:, -1]], axis=1)
+    def _recorded(self, thread, pulled):
+        """`_tensions` of a thread with friction in a motion, from those at the Gauss points, and at its pulled end."""
+        rough = [other for other in self._threads if other.rough]
+        sizes = [self._result.layout.counts[self._result._rows(x.rod)[0]] * (pulled.shape[2] - 2) for x in rough]
+        last = self._records["reactions"].shape[1] - sum(other.shortens for other in self._threads)
+        first = last - sum(sizes[rough.index(thread) :])
+        inside = self._records["reactions"][:, first : first + sizes[rough.index(thread)]]
+        inside = inside.reshape(*pulled.shape[:2], -1)
+        to_ends = np.transpose([lagrange(self._result.rule.gauss, x) for x in (0.0, 1.0)])
+        ends = np.maximum(inside @ to_ends, 0.0)
+        found = np.concatenate([ends[..., :1], inside, ends[..., 1:]], axis=-1)
+        end = (slice(None), 0, 0) if thread.pulled == "start" else (slice(None), -1, -1)
+        found[end] = pulled[end]
+        return found
+
+    def at_nodes(self, thread, pulled):
+        """(n, nodes) the tension at the nodes of the thread's rod, N, with that of the pulled end, (n,)."""
+        found = np.einsum("ij,nej->nei", self._result.rule.from_ends_and_gauss, self._tensions(thread, pulled))
+        found = found * self._result.scales.force
+        return np.concatenate([found[:, :, :-1].reshape(len(found), -1), found[:, -1:, -1]], axis=1)
 
     def _turning(self, thread, places, R, v, k):
         """The `Turning` of a thread, and its directions at the Gauss points (n, elements, points, 3), inertial."""
@@ -305,9 +326,8 @@ class Threads:
         arm, along = _along(thread, places, v, k)
         size = np.linalg.norm(along, axis=-1, keepdims=True)
         t, lever = along / size, np.concatenate([np.broadcast_to(np.eye(3), (*arm.shape, 3)), _skew(arm)], axis=-2)
-        share = self._left(thread)  # `places` are the Gauss points of elements, or their ends
-        share = share[..., [0, -1]] if places.ends else share[..., 1:-1]
-        tension = self.tension(thread)[:, None, None, None] / self._result.scales.force * share[..., None]
+        tension = self._tensions(thread)  # `places` are the Gauss points of elements, or their ends
+        tension = (tension[..., [0, -1]] if places.ends else tension[..., 1:-1])[..., None]
         across = (tension / size)[..., None] * (np.eye(3) - t[..., :, None] * t[..., None, :])
         return np.einsum("ekij,nekj->neki", lever, tension * t), lever @ across @ np.swapaxes(lever, -1, -2)
 
@@ -375,7 +395,7 @@ def _tensions(result, rod):
     """(n, nodes, parts) tensions of the threads along a rod, N, NaN beyond its own; None without any."""
     threads, most = Threads(result), _most_threads(result.scene)
     found = [x for x in result.scene.all_loads if x.is_thread and x.rod is rod]
-    found = [result._tension(x)[:, None] * threads.left_at_nodes(x) for x in found]
+    found = [threads.at_nodes(x, result._tension(x)) for x in found]
     if not found:
         return None
     found += [np.full_like(found[0], np.nan)] * (most - len(found))

@@ -171,9 +171,9 @@ class RodResult(Result, Extremes, Reactions, Stresses, States):
         """
         if not any(load.is_thread and load == tendon for load in self.scene.all_loads):
             raise SceneError(f"tendon: {tendon!r} is no tendon of the scene: expected one of result.scene.loads")
-        tension, (s, share) = self._tension(tendon), Threads(self).share(tendon)
         places = tuple(map(self.place_of, range(len(self))))
-        return TendonState(tension, self.thread_length(tendon), s, tension[:, None] * share, places)
+        tension, length = self._tension(tendon), self.thread_length(tendon)
+        return TendonState(tension, length, *Threads(self).along(tendon, tension), places)
 
     def thread_length(self, thread):
         """(n,) length along its rod, m, of a thread that need not be there."""

@@ -44,7 +44,9 @@ from cosserat_fenicsx.statics.small_motions import (
     circulatory_part,
     corrected,
     edges_of_contact,
+    of_blocks,
     resisting,
+    rows_of_rods,
     softness,
     stiffness,
 )
@@ -180,7 +182,13 @@ def admit(owner, scene, damped):
             )
     refuse_stages(owner, scene)
     refuse_rod_contact(owner, scene)
-    refuse_rough_threads(owner, scene)
+    refuse_rough_threads(owner, scene, False)
+    for load in scene.actions:
+        if load.rough and load.axial is None:
+            raise SceneError(
+                f"{owner}: {describe(load)} has friction, and sticks in small motions: expected its stiffness EA, "
+                "axial= (N)"
+            )
     if damped is not None and not isinstance(damped, bool):
         refuse(owner, "damped", damped, "True, False, or None")
     if damped is False and _rotation(scene) is not None:
@@ -219,7 +227,8 @@ def _slowed(scene):
 
 def _at_kinks(scene):
     """Descriptions of resistances with a kink at rest, which no linear theory covers."""
-    return tuple(describe(x) for x in scene.actions if x.touches or x.resists)
+    sticks = (f"the slip of {describe(x)}" for x in scene.actions if x.rough)
+    return (*(describe(x) for x in scene.actions if x.touches or x.resists), *sticks)
 
 
 def _rotation(scene):
@@ -298,8 +307,19 @@ def _on_mesh(scene, layout, count, load_factor, degree, comm, damped, near, rota
                 expected = "a load factor at which it has a tension, or is longer than its way along the rod"
                 problem.tensions.refuse("modes", between, expected)
             K, held = problem.tensions.border(K, held)
+        if problem.sliding:
+            for thread, *blocks in problem.sliding.stuck(rows_of_rods(model, state)):
+                if not blocks[0].any():
+                    raise SceneError(
+                        f"modes: {describe(thread)} has friction and no tension: it neither sticks nor slides, and no "
+                        "linear theory has it: expected a load factor at which it has a tension"
+                    )
+                K = K + of_blocks(*blocks, K.shape[0])
         unit = max(float(rod.profile.range[1].mass) for rod in scene.rods)
         bodies, time = Bodies(model, unit), math.sqrt(unit * scales.length**2 / scales.force)
+        if problem.sliding and negative:  # counted without the stiffness of what sticks
+            squares, *_ = Pencil(K, bodies.mass(), held).lowest(negative)
+            negative = np.count_nonzero(squares < 0)
         layers = layers_of(model) if loaded else None
         rq, n = model.snapshot()
     with circulatory_part(scene, layout, degree, comm) as circulatory:

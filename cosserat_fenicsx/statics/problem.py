@@ -45,7 +45,7 @@ def check_arguments(scene, tol, elements, bound=NAMES, *, owner="solve"):
         refuse_rod_contact(owner, scene)
     if owner not in ("solve", "modes") or scene.rod_contact:
         refuse_given_lengths(owner, scene)
-    refuse_rough_threads(owner, scene, scene.rod_contact or owner != "solve")
+    refuse_rough_threads(owner, scene, scene.rod_contact or owner not in ("solve", "modes"))
     tolerance(owner, tol)
     criteria_of(bound)
     if elements is not None:
@@ -103,8 +103,9 @@ def refuse_rough_threads(owner, scene, all_of_them=True):
     for load in scene.all_loads:
         if load.rough and (all_of_them or any(other.shortens for other in scene.all_loads)):
             raise SceneError(
-                f"{owner}: {describe(load)} has friction, which equilibria by `solve` and derivatives of their states "
-                "alone know, without tendons of given length and rods that touch each other: expected friction=0"
+                f"{owner}: {describe(load)} has friction, which `solve`, derivatives of states, `modes` and `simulate` "
+                "alone know, the first three without tendons of given length and rods that touch each other: expected "
+                "friction=0"
             )
 
 

@@ -84,7 +84,7 @@ def edges_of_contact(model, state):
     if not state.scene.has_walls:
         return None
     rule, p, at, blocks, places = state.rule, state.degree, [], [], [np.empty(0) for _ in state.scene.rods]
-    of_nodes = _rows_of_rods(model, state)
+    of_nodes = rows_of_rods(model, state)
     samples = np.unique(np.concatenate([rule.nodes[:-1] + t * np.diff(rule.nodes) for t in _SAMPLED] + [[1.0]]))
     nodes, gauss_points = np.searchsorted(samples, rule.nodes), gauss(p + 1)
     for i, contact in first_contacts_at(state):
@@ -130,7 +130,7 @@ def switched(model, here, there):
     """What the stiffness of walls at nodes lacks `there` since other nodes touch than at another `Equilibrium`, `here`;
     None where the same ones do."""
     changes, at = [], []
-    of_nodes = _rows_of_rods(model, here)
+    of_nodes = rows_of_rods(model, here)
     for (i, contact), (_, moved) in zip(first_contacts_at(here), first_contacts_at(there), strict=True):
         x = here.s(here.scene.rods[i]) / here.scene.rods[i].length
         (before, _), (after, stiff) = contact(x), moved(x)
@@ -143,7 +143,7 @@ def switched(model, here, there):
     return of_blocks(np.concatenate(changes), np.concatenate(at), model.rows_of_nodes.max() + 1)
 
 
-def _rows_of_rods(model, state):
+def rows_of_rods(model, state):
     """[(nodes, 6) row numbers of the nodes of each rod]."""
     return np.split(model.rows_of_nodes, np.cumsum([len(state.s(rod)) for rod in state.scene.rods])[:-1])
 

@@ -45,11 +45,21 @@ class ThreadFriction:
         self._local, self._column = np.zeros_like(model.state.x.array), self._problem.numbering.vector()
         self._before = None
 
+    def stuck(self, rows):
+        """[(thread, blocks, rows)] of the stiffness of threads that stick, see `small_motions.of_blocks`, zero where
+        they have no tension; rows: [(nodes, 6) row numbers of each rod]."""
+        found, p = [], self._model.signature.degree
+        for thread, factor in self._threads:
+            factor = float(factor.value) * thread.action.amplitude
+            own, first = rows[self._model.scene.number(thread.action.rod)], p * np.arange(len(thread.tensions))
+            at = own[first[:, None] + np.arange(p + 1)].reshape(len(first), -1)
+            found.append((thread.action, thread.stuck(factor), at))
+        return found
+
     def _changes(self, x):
         """C times a vector of the solver."""
-        self._local[:] = 0.0
         self._problem.numbering.to_local(x, self._local)
-        return np.concatenate([thread.change(self._local).ravel() for thread, _ in self._threads])
+        return np.concatenate([thread.change(self._local[None]).ravel() for thread, _ in self._threads])
 
     def _moved(self, t):
         """K^-1 G times changes of the tensions."""
