@@ -50,7 +50,7 @@ ROOMS = {
     "actions": {"scene", "forms"},
     "algebra": set(),
     "models": {"scene", "forms"},
-    "results": {"scene", "pictures"},
+    "results": {"scene", "pictures", "algebra"},
     "storage": {"scene", "results"},
     "pictures": {"scene"},
     "statics": {"scene", "models", "algebra", "results"},

@@ -139,6 +139,15 @@ class Pointers:
         return self._ffi.cast("int *", array.ctypes.data)
 
 
+    def call(self, name, *given):
+        """Call a function of C; arrays are given as pointers to their numbers, None as 0."""
+        ffi, given = self._ffi, [np.ascontiguousarray(x) if isinstance(x, np.ndarray) else x for x in given]
+        pointers = (ffi.from_buffer(_POINTERS[x.dtype.char], x) if isinstance(x, np.ndarray) else x for x in given)
+        return getattr(self._lib, name)(*(ffi.NULL if x is None else x for x in pointers))
+
+
+# C's types of numpy's arrays.
+_POINTERS = {"d": "double[]", "i": "int[]"}
 _MARK = 0.8765432198765432
 
 

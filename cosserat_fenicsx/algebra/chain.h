@@ -289,26 +289,32 @@ typedef struct {
 /* Unknowns of a model: theta, q, (r, theta) or (r, q). */
 enum { IN_PLANE, IN_SPACE, PLANAR, SPATIAL };
 
-/* A mesh of rods that clamps and rigid joints hold, without couplings of strains, and its last state. Elements and
-   nodes are in the order of the scene; a rod's first node is p times its first element plus the number of the rod.
-   Frames and units are those of the forms. */
+/* A mesh of rods and its last state. Elements and nodes are in the order of the scene; a rod's first node is p times
+   its first element plus the number of the rod. Frames and units are those of the forms. What follows `density` is of
+   rods that clamps and rigid joints hold, without couplings of strains. */
 typedef struct {
-    sweep *sweep;
-    int kind, rods, elements, nodes, p, points, components, forces; /* of a node's unknowns; of n */
+    int rods, elements, nodes, p, points;
     const int *first;               /* (rods + 1,) elements */
+    const double *by_fields, *by_densities, *leading, *weights; /* see ElementRule */
+    const double *sizes;            /* (elements,) lengths */
+    const double *gyrations, *limits; /* (rods,) radii; rounding of n and of m, least stiffness J, of bending, relative
+                                       rounding of the motion; the last three of many cases alone */
+    double length;                  /* of the longest rod */
+    double *motion, *gauss, *contact; /* (nodes, 7) displacement and q, (elements, points, 9) n, m and r', (elements,
+                                         p + 1, 6) n and m */
+    const double *density;          /* (elements, points, 6) loads per length, or 0 */
+    sweep *sweep;
+    int kind, components, forces;   /* of a node's unknowns; of n */
     const int *order;               /* (rods, 3) of a tree, from the clamps on: rod, its element end there, node of the
                                        rod before or -1 */
     const int *from, *field_from;   /* (nodes, components) unknowns, or -1 where held at rest; (elements, points, n) */
     const double *at_rest, *rest, *reference; /* a point of the sweep; (nodes, components); (nodes, 3) positions */
-    const double *basis, *slopes, *from_slopes, *by_fields, *by_densities; /* see ElementRule */
-    const double *sizes, *axes;     /* (elements,) lengths; (3, 3) rows */
-    const double *K, *J, *R_R, *v_R, *known, *density; /* (elements, points, n): law, reference, n at load factor 1
-                                                          where statics gives it, loads per length, or 0 */
-    const double *gyrations, *limits; /* (rods,) radii; rounding of n and of m, least stiffness J, of bending, relative
-                                       rounding of the motion */
+    const double *basis, *slopes, *from_slopes; /* see ElementRule */
+    const double *axes;             /* (3, 3) rows */
+    const double *K, *J, *R_R, *v_R, *known; /* (elements, points, n): law, reference, n at load factor 1 where statics
+                                                gives it */
     double longest;                 /* element */
-    double *nodal, *placed, *motion, *gauss, *contact; /* (nodes, components), (nodes, 3), (nodes, 7) displacement and
-                                                          q, (elements, points, 9) n, m and r', (elements, p + 1, 6) */
+    double *nodal, *placed;         /* (nodes, components), (nodes, 3) */
 } mesh;
 
 /* kind: position, rotation, force or moment; place: among displacement, q, n and m. */
@@ -318,7 +324,7 @@ typedef struct {
     double offset, unit;            /* of the value: offset + unit * number */
 } query;
 
-/* Two meshes that are compared, see compared.c; the constants are those of results/accuracy.py and compared.py. */
+/* Two meshes that are compared, see compared.c; the constants are those of results/accuracy.py. */
 typedef struct {
     mesh *coarse, *fine;
     int places, equal, single; /* places of a coarse element; fine elements are of one length; one is a rod */
@@ -327,9 +333,8 @@ typedef struct {
     const int *cells;               /* (all places,) fine elements */
     const double *start, *move_weight; /* (numbers,) a point of the fine mesh at rest; numbers of what is added to it */
     const int *move_to, *move_from; /* the coarse state, each (moves,): unknowns of the nodes, then n at Gauss points */
-    double length, held[2];         /* longest rod; force and moment that actions without stress would need */
-    double ahead, far, of_ends, safety, safety_below, asymptotic, nothing, still, least_moment, vanishing, rounding;
-    double noise;
+    double held[2];                 /* force and moment that actions without stress would need */
+    double ahead, far, of_ends, safety, safety_below, asymptotic;
     double resolved, tol, in_layer, turned;
     query *query;
 } comparison;
@@ -419,6 +424,15 @@ void run_all(const group *g, int *why);
 int run(sweep *s);
 int correct(sweep *s, const double *starts, const int *expected, double near);
 int run_cases(cases *c);
+void recover_all(const mesh *m, int count, const double *gauss, const double *density, double *contact);
+void find_leading(const mesh *m, int count, const double *motion, double *found);
+void measure(const mesh *m, int count, const double *motion, const double *gauss, const double *held, double *sizes,
+             int *turning, int *still, double *largest);
+void compare_all(const comparison *p, int count, const double *coarse_motion, const double *coarse_contact,
+                 const double *motion, const double *contact, const int *turning, const int *still, double *found);
+void spread_errors(int quantities, int count, int known, const int *which, const double *indicator,
+                   const double *sizes, const double *errors, const double *between, int of_mesh, double *work,
+                   double *found);
 
 #if 0
 extern "Python" int python_hook(void *self, int what, double *a, double *b);

@@ -2,12 +2,35 @@
    from rest on the first, corrected on the second, and judged by both. Cases not decided here are left to Python.
 
    Two meshes of a case: the state of the finer one from that of the coarser, the error estimate of both, and queries.
-   What is compared, and with what margins, is said in results/compared.py and results/accuracy.py, contact forces at
-   nodes in results/recovery.py, and the states of each model in its file of models/. */
+   What is compared is said in results/compared.py, with what margins in results/accuracy.py, contact forces at nodes in
+   results/recovery.py, and the states of each model in its file of models/.
+
+   The same of the states of a path, which Python has: sizes, differences of two meshes, contact forces at nodes. */
 #include "chain.h"
 
 #include <math.h>
 #include <string.h>
+
+/* Differences of positions and of rotations up to this are rounding alone, in units of the scales' length and rad. */
+static const double ROUNDING = 1e-14;
+/* Sizes, in the scales' units, below which a quantity is taken to vanish; and the least moment over n times the length.
+ */
+static const double NOTHING = 1e-9, LEAST_MOMENT = 1e-9;
+/* Differences of positions and of rotations up to this are rounding alone where displacement or rotation vanish: an
+   unloaded rod holds its line to the rounding of many elements, and so does a straight column, whose load amplifies it.
+ */
+static const double STILL = 1e-11;
+/* Least size of positions and of rotations over the largest of the path: unloaded states differ by rounding. */
+static const double AT_REST = 1e-6;
+/* Moments up to this multiple of their rounding at all points of a path count as zero, as in straight bars. */
+static const double VANISHING = 10;
+/* Multiple of their rounding up to which differences of n and m on two meshes count as zero. */
+static const double NOISE = 2;
+/* Exponents by which an error is extrapolated over its indicator, below and above the known range. Safety factor of
+   errors interpolated over leading coefficients: exponent of the distance from the nearest sample, and largest factor.
+ */
+static const double BELOW = 0.7, ABOVE = 1.4, WIDENED = 0.5, WIDEST = 2;
+static const double TINY = 1e-300;
 
 static double square(const double *a, int n)
 {
@@ -203,28 +226,85 @@ static void transfer(const comparison *p, double *start)
     }
 }
 
-/* The sizes that errors are relative to, see `sizes_of`; whether that of positions is a rotation. */
-static int find_sizes(const comparison *p, const mesh *m, double *sizes)
+/* The mesh with the k-th of several states. */
+static mesh with_state(const mesh *m, int k, const double *motion, const double *gauss, const double *contact)
 {
-    double moved = 0, turned = 0, rotation = 0, force, moment;
-    for (int rod = 0; rod < m->rods; rod++) {
-        double half = 0;
-        for (int i = m->p * m->first[rod] + rod; i <= m->p * m->first[rod + 1] + rod; i++) {
-            moved = fmax(moved, square(m->motion + 7 * i, 3));
-            half = fmax(half, square(m->motion + 7 * i + 4, 3));
+    mesh at = *m;
+    at.motion = motion ? (double *)motion + 7 * (size_t)k * m->nodes : 0;
+    at.gauss = gauss ? (double *)gauss + 9 * (size_t)k * m->elements * m->points : 0;
+    at.contact = contact ? (double *)contact + 6 * (size_t)k * m->elements * (m->p + 1) : 0;
+    return at;
+}
+
+/* Of states their `Sizes`, see `sizes_of`: (4, count), (count,), (2, count); held: (2, count) force and moment that
+   actions without stress would need, or 0; largest: of all states contact force, moment, and its mean over an element.
+ */
+void measure(const mesh *model, int count, const double *motion, const double *gauss, const double *held, double *sizes,
+             int *turning, int *still, double *largest)
+{
+    double most[2] = {0, 0}, vanishing = 1;
+    for (int k = 0; k < 3; k++) largest[k] = 0;
+    for (int k = 0; k < count; k++) {
+        const mesh at = with_state(model, k, motion, gauss, 0), *m = &at;
+        double moved = 0, turned = 0, rotation = 0, force, moment;
+        for (int rod = 0; rod < m->rods; rod++) {
+            double half = 0;
+            for (int i = m->p * m->first[rod] + rod; i <= m->p * m->first[rod + 1] + rod; i++) {
+                moved = fmax(moved, square(m->motion + 7 * i, 3));
+                half = fmax(half, square(m->motion + 7 * i + 4, 3));
+            }
+            half = sqrt(half);
+            rotation = fmax(rotation, 2 * half);
+            turned = fmax(turned, sqrt(8) * half * m->gyrations[rod]); /* |R - 1| = sqrt(8) |sin(angle/2)| */
         }
-        half = sqrt(half);
-        rotation = fmax(rotation, 2 * half);
-        turned = fmax(turned, sqrt(8) * half * m->gyrations[rod]);
+        for (int e = 0; e < m->elements; e++) {
+            double mean = 0;
+            for (int g = 0; g < m->points; g++)
+                mean += m->weights[g] * sqrt(square(m->gauss + 9 * (e * m->points + g) + 3, 3));
+            largest[2] = fmax(largest[2], mean);
+        }
+        largest_contact(m, &force, &moment);
+        largest[0] = fmax(largest[0], force), largest[1] = fmax(largest[1], moment);
+        moved = fmax(sqrt(moved), NOTHING);
+        if (held) force = fmax(force, LEAST_MOMENT * held[k]), moment = fmax(moment, held[count + k]);
+        force = fmax(fmax(force, moment / m->length), NOTHING);
+        if (moment > VANISHING * m->limits[1]) vanishing = LEAST_MOMENT;
+        sizes[k] = fmax(moved, turned), sizes[count + k] = fmax(rotation, moved / m->length);
+        sizes[2 * count + k] = force, sizes[3 * count + k] = moment, turning[k] = turned > moved;
+        for (int i = 0; i < 2; i++) most[i] = fmax(most[i], sizes[i * count + k]);
     }
-    largest_contact(m, &force, &moment);
-    moved = fmax(sqrt(moved), p->nothing), force = fmax(force, p->least_moment * p->held[0]);
-    moment = fmax(moment, p->held[1]);
-    force = fmax(fmax(force, moment / p->length), p->nothing);
-    const double least = moment <= p->vanishing * m->limits[1] ? 1.0 : p->least_moment;
-    sizes[0] = fmax(moved, turned), sizes[1] = fmax(rotation, moved / p->length), sizes[2] = force;
-    sizes[3] = fmax(fmax(moment, least * p->length * force), p->nothing);
-    return turned > moved;
+    for (int k = 0; k < count; k++) {
+        double *moment = sizes + 3 * count + k;
+        *moment = fmax(fmax(*moment, vanishing * model->length * sizes[2 * count + k]), NOTHING);
+        for (int i = 0; i < 2; i++) {
+            const double least = fmax(NOTHING / (i ? model->length : 1), AT_REST * most[i]);
+            still[i * count + k] = sizes[i * count + k] <= least;
+            sizes[i * count + k] = fmax(sizes[i * count + k], least);
+        }
+    }
+}
+
+/* (2, count, elements) sizes of the leading coefficients of displacements and of q in the elements. */
+void find_leading(const mesh *m, int count, const double *motion, double *found)
+{
+    const size_t half = (size_t)count * m->elements;
+    for (int k = 0; k < count; k++, motion += 7 * m->nodes)
+        for (int rod = 0; rod < m->rods; rod++)
+            for (int e = m->first[rod]; e < m->first[rod + 1]; e++, found++) {
+                double leading[7];
+                weigh(m->leading, m->p + 1, motion + 7 * (m->p * e + rod), 7, 1, leading);
+                found[0] = sqrt(square(leading, 3)), found[half] = sqrt(square(leading + 3, 4));
+            }
+}
+
+/* `recover` of states: (count, elements, p + 1, 6); density: of each, or 0. */
+void recover_all(const mesh *m, int count, const double *gauss, const double *density, double *contact)
+{
+    for (int k = 0; k < count; k++) {
+        mesh at = with_state(m, k, 0, gauss, contact);
+        at.density = density ? density + 6 * (size_t)k * m->elements * m->points : 0;
+        recover(&at);
+    }
 }
 
 /* The values of both meshes at a place, of n weights each: displacement, q, n, m. */
@@ -234,14 +314,18 @@ static void at_place(const mesh *m, int rod, int e, const double *w, double *out
     weigh(w, m->p + 1, m->contact + 6 * (m->p + 1) * e, 6, 1, out + 7);
 }
 
-/* The largest differences of the four quantities at all places, and at ends of coarse elements, see `differences`. */
-static void find_differences(const comparison *p, int turning, double *everywhere, double *at_ends)
+/* The largest differences of the four quantities at all places, at ends of coarse elements, and shared, see
+   `differences`; still: of positions and rotations. */
+static void find_differences(const comparison *p, int turning, const int *still, double *everywhere, double *at_ends,
+                             double *shared)
 {
     const mesh *coarse = p->coarse, *fine = p->fine;
     const int n = fine->p + 1;
     int place = 0;
-    for (int k = 0; k < 4; k++) everywhere[k] = at_ends[k] = 0;
-    for (int rod = 0; rod < fine->rods; rod++)
+    for (int k = 0; k < 4; k++) everywhere[k] = at_ends[k] = shared[k] = 0;
+    for (int rod = 0; rod < fine->rods; rod++) {
+        const double less = 2.0 * (coarse->first[rod + 1] - coarse->first[rod]);
+        const double share = fmin(pow(less / (fine->first[rod + 1] - fine->first[rod]), fine->p), 1);
         for (int e = coarse->first[rod]; e < coarse->first[rod + 1]; e++)
             for (int i = 0; i < p->places; i++, place++) {
                 double here[13], off[13], apart[4];
@@ -249,29 +333,92 @@ static void find_differences(const comparison *p, int turning, double *everywher
                 at_place(coarse, rod, e, p->inside + i * n, off);
                 double along = 0;
                 for (int k = 0; k < 13; k++) off[k] -= here[k];
+                /* without the part along q, since interpolated q are no unit quaternions */
                 for (int k = 3; k < 7; k++) along += off[k] * here[k];
                 apart[0] = sqrt(square(off, 3)), apart[1] = 2 * sqrt(fmax(square(off + 3, 4) - along * along, 0));
                 apart[2] = sqrt(square(off + 7, 3)), apart[3] = sqrt(square(off + 10, 3));
                 if (turning) apart[0] = fmax(apart[0], fine->gyrations[rod] * apart[1]);
                 for (int k = 0; k < 4; k++) {
+                    const int at_end = i == 0 || i == p->places - 1;
+                    if (!isfinite(apart[k])) apart[k] = INFINITY;
                     everywhere[k] = fmax(everywhere[k], apart[k]);
-                    if (i == 0 || i == p->places - 1) at_ends[k] = fmax(at_ends[k], apart[k]);
-                    if (!isfinite(apart[k])) everywhere[k] = INFINITY;
+                    if (at_end) at_ends[k] = fmax(at_ends[k], apart[k]);
+                    shared[k] = fmax(shared[k], at_end ? apart[k] : share * apart[k]);
                 }
             }
-    for (int k = 0; k < 4; k++)
-        if (everywhere[k] <= fmax(p->rounding, k < 2 ? 0 : p->noise * fine->limits[k - 2])) everywhere[k] = 0;
+    }
+    for (int k = 0; k < 4; k++) {
+        const double noise = k < 2 ? still[k] ? STILL : ROUNDING : fmax(ROUNDING, NOISE * fine->limits[k - 2]);
+        if (everywhere[k] <= noise) everywhere[k] = shared[k] = 0;
+    }
+}
+
+/* `find_differences` of states: (3, 4, count). */
+void compare_all(const comparison *both, int count, const double *coarse_motion, const double *coarse_contact,
+                 const double *motion, const double *contact, const int *turning, const int *still, double *found)
+{
+    for (int k = 0; k < count; k++) {
+        mesh coarse = with_state(both->coarse, k, coarse_motion, 0, coarse_contact);
+        mesh fine = with_state(both->fine, k, motion, 0, contact);
+        const int at_rest[2] = {still[k], still[count + k]};
+        double apart[3][4];
+        comparison p = *both;
+        p.coarse = &coarse, p.fine = &fine;
+        find_differences(&p, turning[k], at_rest, apart[0], apart[1], apart[2]);
+        for (int i = 0; i < 12; i++) found[i * count + k] = apart[i / 4][i % 4];
+    }
+}
+
+/* Errors (count,) of a quantity from those of the samples `which`, see `spread_error`; errors: of these, relative;
+   of_mesh: whether the indicator is the difference of two meshes; work: (3, known). */
+static void spread_one(int count, int known, const int *which, const double *indicator, const double *sizes,
+                       const double *errors, double between, int of_mesh, double *work, double *found)
+{
+    double *x = work, *y = work + known, *relative = work + 2 * known;
+    int n = 0;
+    for (int j = 0; j < known; j++) {
+        const double here = indicator[which[j]], size = sizes[which[j]];
+        if (!(here > 100 * ROUNDING && errors[j] * size > 0)) continue;
+        int i = n++;
+        for (; i > 0 && x[i - 1] > log(here); i--) x[i] = x[i - 1], y[i] = y[i - 1];
+        x[i] = log(here), y[i] = log(errors[j] * size), relative[n - 1] = log(fmax(here / size, TINY));
+    }
+    for (int i = 1; i < n; i++) y[i] = fmax(y[i], y[i - 1]);
+    for (int k = 0; k < count; k++) {
+        if (!n || indicator[k] <= ROUNDING) {
+            found[k] = n || !of_mesh ? 0 : indicator[k] / sizes[k];
+            continue;
+        }
+        const double at = log(indicator[k]), of_size = log(fmax(indicator[k] / sizes[k], TINY));
+        double unlike = INFINITY, beyond = BELOW * fmin(at - x[0], 0) + ABOVE * fmax(at - x[n - 1], 0);
+        int i = 0;
+        while (i < n - 1 && x[i + 1] <= at) i++;
+        double value = y[i];
+        if (i < n - 1 && at > x[i] && y[i] < y[i + 1]) value += (y[i + 1] - y[i]) * (at - x[i]) / (x[i + 1] - x[i]);
+        for (int j = 0; j < n; j++) unlike = fmin(unlike, fmin(fabs(at - x[j]), fabs(of_size - relative[j])));
+        if (!of_mesh) beyond += fmin(WIDENED * unlike, log(WIDEST));
+        found[k] = between * exp(value + beyond) / sizes[k];
+    }
+}
+
+/* The same of several quantities one after another. */
+void spread_errors(int quantities, int count, int known, const int *which, const double *indicator,
+                   const double *sizes, const double *errors, const double *between, int of_mesh, double *work,
+                   double *found)
+{
+    for (int k = 0; k < quantities; k++)
+        spread_one(count, known, which, indicator + k * count, sizes + k * count, errors + k * known, between[k],
+                   of_mesh, work, found + k * count);
 }
 
 /* The relative differences and the errors by the meshes of the four quantities, see `estimate_error`. */
-static void estimate(const comparison *p, const double *sizes, int turning, double *relative, double *errors)
+static void estimate(const comparison *p, const double *sizes, int turning, const int *still, double *relative,
+                     double *errors)
 {
-    double apart[4], at_ends[4];
+    double apart[4], at_ends[4], shared[4];
     int ahead[4], far[4], sure = p->equal;
     const double half = pow(2, p->fine->p + 1);
-    find_differences(p, turning, apart, at_ends);
-    for (int k = 0; k < 2; k++)
-        if (sizes[k] <= p->nothing / (k ? p->length : 1) && apart[k] <= p->still) apart[k] = 0;
+    find_differences(p, turning, still, apart, at_ends, shared);
     for (int k = 0; k < 4; k++) {
         relative[k] = apart[k] / sizes[k];
         ahead[k] = apart[k] > p->ahead * at_ends[k], far[k] = apart[k] > p->far * at_ends[k];
@@ -300,9 +447,10 @@ static int resolves(const comparison *p, const mesh *m)
 static int answer(const comparison *p, double *values, double *errors)
 {
     const mesh *fine = p->fine;
-    double sizes[4], relative[4], by_mesh[4];
-    const int turning = find_sizes(p, fine, sizes);
-    estimate(p, sizes, turning, relative, by_mesh);
+    double sizes[4], relative[4], by_mesh[4], largest[3];
+    int turning, still[2];
+    measure(fine, 1, fine->motion, fine->gauss, p->held, sizes, &turning, still, largest);
+    estimate(p, sizes, turning, still, relative, by_mesh);
     int enough = relative[0] <= p->resolved && fine->limits[4] <= p->tol && p->coarse->limits[4] <= p->tol;
     for (int k = 0; k < 4; k++) enough &= by_mesh[k] <= p->tol;
     if (!enough || !resolves(p, p->coarse) || !resolves(p, fine)) return 1;

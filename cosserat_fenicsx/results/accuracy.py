@@ -11,7 +11,6 @@ from cosserat_fenicsx.results.compared import (
     POSITION,
     ROTATION,
     ROUNDING,
-    all_cell_nodes,
     cells_of,
     differences,
     halfway,
@@ -35,11 +34,6 @@ _ROUGH, _NEARLY = 2.0, 4.0
 _CAUTION, _LIKELY = 2, 1.5
 # Element lengths of a rod within this ratio count as equal.
 _UNEQUAL = 1.9
-# Extrapolation exponents of an error over its indicator, below and above the known range.
-_BELOW, _ABOVE = 0.7, 1.4
-# Safety factor of errors interpolated over leading coefficients: exponent of the distance from the nearest sample, and
-# largest factor.
-_WIDENED, _WIDEST = 0.5, 2.0
 # Safety factors of interpolated errors: of n, and of all others.
 _BETWEEN_FORCES, _BETWEEN = 2.0, 1.25
 # Samples whose leading coefficients differ by more than this factor get another one between them.
@@ -198,10 +192,9 @@ def spread_error(path, few, which, coarse=None):
         indicator = path._roughness.max(axis=1)[[POSITION] + [ROTATION] * (len(sizes) - 1)]
     between = np.full(len(sizes), _BETWEEN)
     between[FORCE] = _BETWEEN_FORCES
-    found = np.array([
-        _spread(*numbers, which, of_mesh=coarse is not None)
-        for numbers in zip(indicator, sizes, few.by_mesh, between, strict=True)
-    ])  # fmt: skip
+    found, work, samples = np.empty(sizes.shape), np.empty((3, len(which))), which.astype(np.int32)
+    given = indicator, sizes, few.by_mesh, between, coarse is not None
+    path._mesh.call("spread_errors", *found.shape, len(which), samples, *given, work, found)
     least = _as_positions(found * sizes, few.by_mesh * sizes[:, which], which) / sizes[ROTATION]
     found[ROTATION] = np.maximum(found[ROTATION], least)
     found[:, which] = few.by_mesh
@@ -217,41 +210,19 @@ def _as_positions(found, known, which):
     return found[POSITION] * np.exp(np.interp(np.arange(found.shape[1]), which[usable], ratios))
 
 
-def _spread(indicator, sizes, errors, between, which, *, of_mesh):
-    """(n,) errors of a quantity at all points from those at the samples `which`, by an indicator (n,)."""
-    known, absolute = indicator[which], errors * sizes[which]
-    usable = (known > 100 * ROUNDING) & (absolute > 0)
-    if not usable.any():
-        return indicator / sizes if of_mesh else np.zeros(len(indicator))
-    still = indicator <= ROUNDING
-    order = np.argsort(known[usable])
-    relative = np.log(np.maximum(indicator / sizes, 1e-300))
-    known, absolute = np.log(known[usable][order]), np.log(np.maximum.accumulate(absolute[usable][order]))
-    indicator = np.log(np.maximum(indicator, 1e-300))
-    beyond = _BELOW * np.minimum(indicator - known[0], 0) + _ABOVE * np.maximum(indicator - known[-1], 0)
-    if not of_mesh:
-        unlike = np.minimum(
-            np.abs(indicator[:, None] - known).min(axis=1),
-            np.abs(relative[:, None] - relative[which][usable]).min(axis=1),
-        )
-        beyond += np.minimum(_WIDENED * unlike, np.log(_WIDEST))
-    found = between * np.exp(np.interp(indicator, known, absolute) + beyond) / sizes
-    found[still] = 0.0
-    return found
-
-
 def leading_of(path):
     """(2, rods, points) the largest leading coefficient of an element's displacement, and twice that of q."""
     first = [cells.start for cells in cells_of(path.layout)]
-    moved, turned = (leading_coefficients(path, path._motion[..., part]) for part in (slice(0, 3), slice(3, 7)))
-    return np.array([np.maximum.reduceat(found, first, axis=1).T for found in (moved, 2 * turned)])
+    found = np.maximum.reduceat(leading_coefficients(path), first, axis=2).swapaxes(1, 2)
+    found[1] *= 2
+    return found
 
 
-def leading_coefficients(path, values):
-    """(points, elements) sizes of the leading coefficients of nodal values (points, nodes, k) in all elements."""
-    of_elements = values[:, all_cell_nodes(path.layout, path.degree)]
-    found = path.rule.leading @ of_elements
-    return np.sqrt(np.einsum("kci,kci->kc", found, found))
+def leading_coefficients(path):
+    """(2, points, elements) sizes of the leading coefficients of displacements and of q in all elements."""
+    found, mesh = np.empty((2, len(path), sum(path.elements))), path._mesh
+    mesh.call("find_leading", mesh.c, len(path), path._motion, found)
+    return found
 
 
 def expected_differences(path):
@@ -263,7 +234,7 @@ def expected_differences(path):
     """
     x, nodes = np.linspace(-1, 1, 101)[:, None], 2 * path.rule.nodes - 1
     between = np.abs(np.prod(x - nodes, axis=1)).max() / (2 * len(nodes))
-    turned = 2 * leading_coefficients(path, path._motion[..., 3:])
+    turned = 2 * leading_coefficients(path)[1]
     off = between * turned * path.layout.sizes(path.scene) / path.scales.length
     force = np.linalg.norm(path._stacked("gauss_fields")[..., :3], axis=3).max(axis=2)
     sizes = path._reference.sizes[..., None]

@@ -49,15 +49,12 @@ class Compared(NamedTuple):
     """Where two meshes are compared: at the nodes of every element of the coarse one and half way between them.
 
     inside: (places per element, nodes per element) weights of a coarse element's nodes, the same in all elements;
-    cells (places,), weights (places, nodes per element): of the fine elements, on the same side of a jump;
-    ends: (places,) whether at an end of a coarse element; rods: for every rod the slice of its places.
+    cells (places,), weights (places, nodes per element): of the fine elements, on the same side of a jump.
     """
 
     inside: np.ndarray
     cells: np.ndarray
     weights: np.ndarray
-    ends: np.ndarray
-    rods: tuple
 
 
 # Distance from the end of an element, over its length, at which a place surely belongs to it.
@@ -68,7 +65,6 @@ _INWARDS = 1e-6
 def compared(coarse, fine, rule):
     """`Compared` for two `Layout`s with elements of the same `ElementRule`."""
     local = halfway(rule.nodes)
-    ends = (local == local[0]) | (local == local[-1])
     near = np.clip(local, _INWARDS, 1 - _INWARDS)
     found, xs, sures = [], coarse.inside(local), coarse.inside(near)
 
@@ -76,12 +72,11 @@ def compared(coarse, fine, rule):
         breaks = fine.breaks[i]
         cells, _ = rule.locate_all(breaks, sures[i].ravel())
         of_cells = (xs[i].ravel() - breaks[cells]) / np.diff(breaks)[cells]
-        return cells, rule.basis(np.clip(of_cells, 0.0, 1.0)), np.tile(ends, len(xs[i]))
+        return cells, rule.basis(np.clip(of_cells, 0.0, 1.0))
 
-    for (cells, *others), of_rod in zip(_by_pair(of_pair, coarse, fine), cells_of(fine), strict=True):
-        found.append((of_rod.start + cells, *others))
-    parts = map(np.concatenate, zip(*found, strict=True))
-    return Compared(rule.basis(local), *parts, in_turn(x.size for x in xs))
+    for (cells, weights), of_rod in zip(_by_pair(of_pair, coarse, fine), cells_of(fine), strict=True):
+        found.append((of_rod.start + cells, weights))
+    return Compared(rule.basis(local), *map(np.concatenate, zip(*found, strict=True)))
 
 
 @lru_cache(maxsize=16)
@@ -210,26 +205,59 @@ def _norms(values):
     return np.linalg.norm(np.reshape(values, (len(values), -1)), axis=1)
 
 
-# Differences of positions and of rotations up to this are rounding alone, in units of the scales' length and rad.
-ROUNDING = 1e-14
-# Sizes, in the scales' units, below which a quantity is taken to vanish; and the least moment over n times the length.
-NOTHING, LEAST_MOMENT = 1e-9, 1e-9
-# Differences of positions and of rotations up to this are rounding alone where displacement or rotation vanish: an
-# unloaded rod holds its line to the rounding of many elements, and so does a straight column, whose load amplifies it.
-STILL = 1e-2 * NOTHING
-# Least size of positions and of rotations over the largest of the path: unloaded states differ by rounding.
-_AT_REST = 1e-6
-# Moments up to this multiple of their rounding at all points of a path count as zero, as in straight bars.
-VANISHING = 10.0
-# Rounding of n over the stiffness times the rounding of one difference of positions; multiple of their rounding up to
-# which differences of n and m on two meshes count as zero.
-OF_FORCE, NOISE = 4.0, 2.0
+# Differences up to this are rounding alone; and the least size over the largest of the path: see algebra/compared.c.
+ROUNDING, _AT_REST = 1e-14, 1e-6
+# Rounding of n over the stiffness times the rounding of one difference of positions.
+OF_FORCE = 4.0
 _EPS = np.finfo(float).eps
 
 #: sizes: (4, points) that the errors are relative to, dimensionless; turning: (points,) whether the size of positions
 #: is a rotation times the radius of gyration; rounding: (4, points) errors by rounding alone, dimensionless; still:
-#: (2, points) whether displacement and rotation vanish.
-Sizes = namedtuple("Sizes", "sizes turning rounding still")
+#: (2, points) whether displacement and rotation vanish; largest: of all points the contact force, the moment and its
+#: mean over an element, dimensionless.
+Sizes = namedtuple("Sizes", "sizes turning rounding still largest")
+
+
+def of_rule(kept, c, layout, rule):
+    """Tell C's `mesh` of the layout and the elements; kept: the `Pointers`."""
+    c.rods, c.elements, c.p, c.points = len(layout.counts), sum(layout.counts), len(rule.nodes) - 1, len(rule.gauss)
+    c.nodes, c.first = c.p * c.elements + c.rods, kept.integers(np.cumsum([0, *layout.counts]))
+    for name, array in (("by_fields", rule.contact_from_fields), ("by_densities", rule.contact_from_densities),
+                        ("leading", rule.leading), ("weights", rule.weights)):  # fmt: skip
+        setattr(c, name, kept.doubles(np.ascontiguousarray(array)))
+
+
+@per_scene
+def mesh_of(scene, scales, layout, rule, by_statics):
+    """What C knows of the mesh of a result, as `Pointers`, whose `c` is the `mesh` of chain.h."""
+    from cosserat_fenicsx.algebra.building import Pointers  # late: dolfinx is slow to import
+
+    kept = Pointers()
+    c = kept.c = kept._ffi.new("mesh *")
+    of_rule(kept, c, layout, rule)
+    gyrations, c.length, kept.noise = of_sections(scene, scales, layout, c.p, by_statics)
+    c.gyrations, c.limits = kept.doubles(gyrations), kept.doubles(kept.noise[2:, 0].copy())
+    c.sizes = kept.doubles(layout.sizes(scene) / scales.length)
+    return kept
+
+
+@per_scene
+def comparison_of(scene, scales, coarse, fine, rule, by_statics):
+    """The `comparison` of chain.h of the meshes of two results, as `mesh_of`."""
+    from cosserat_fenicsx.algebra.building import Pointers
+
+    kept = Pointers()
+    c = kept.c = kept._ffi.new("comparison *")
+    kept.meshes = [mesh_of(scene, scales, layout, rule, by_statics) for layout in (coarse, fine)]
+    c.coarse, c.fine = (mesh.c for mesh in kept.meshes)
+    of_places(kept, c, compared(coarse, fine, rule))
+    return kept
+
+
+def of_places(kept, c, places):
+    """Tell C's `comparison` of the places, a `Compared`; kept: the `Pointers`."""
+    c.places, c.cells = len(places.inside), kept.integers(places.cells)
+    c.inside, c.weights = (kept.doubles(np.ascontiguousarray(x)) for x in (places.inside, places.weights))
 
 
 def sizes_of(path):
@@ -242,36 +270,22 @@ def sizes_of(path):
     that length; |n| times that length where m is rounding alone on the whole path. Where actions change the strains
     without stress, m is at least the moment, and n 1e-9 of the force, that would hold the rods as in the reference.
     """
-    gyrations, length, noise = path._of_sections
-    motion, fields = path._motion, path._stacked("gauss_fields")
-    moved = np.maximum(np.sqrt(_squares(motion[..., :3]).max(axis=1)), NOTHING)
-    half = np.sqrt(np.maximum.reduceat(_squares(motion[..., 4:]), _first_nodes(path.layout, path.degree), axis=1))
-    turned = np.sqrt(8) * (half * gyrations).max(axis=1)  # |R - 1| = sqrt(8) |sin(angle/2)|
-    rotation = np.maximum(2 * half.max(axis=1), moved / length)
-    force, moment = (np.sqrt(_squares(fields[..., i : i + 3]).reshape(len(path), -1).max(axis=1)) for i in (0, 3))
+    mesh, count, held = path._mesh, len(path), None
     if path.scene.acts_in_law:
 
         def without(rod, s):
             return path._without_stress(range(len(path)), rod, s)
 
-        held = held_by_law(path.scene, path.layout, path.rule, path.scales, without, len(path))
-        force, moment = np.maximum(force, LEAST_MOMENT * held[0]), np.maximum(moment, held[1])
-    force = np.maximum(np.maximum(force, moment / length), NOTHING)
-    vanishing = moment <= VANISHING * noise[3]
-    least = 1.0 if vanishing.all() else LEAST_MOMENT
-    moment = np.maximum(np.maximum(moment, least * length * force), NOTHING)
-    sizes = np.array([np.maximum(moved, turned), rotation, force, moment])
-    least = np.maximum([[NOTHING], [NOTHING / length]], _AT_REST * sizes[:2].max(axis=1, initial=0.0)[:, None])
-    still, sizes[:2] = sizes[:2] <= least, np.maximum(sizes[:2], least)
+        held = held_by_law(path.scene, path.layout, path.rule, path.scales, without, count)
+    sizes, largest = np.empty((len(NAMES), count)), np.empty(3)
+    turning, still = np.empty(count, np.int32), np.empty((2, count), np.int32)
+    given = path._motion, path._stacked("gauss_fields"), held
+    mesh.call("measure", mesh.c, count, *given, sizes, turning, still, largest)
+    noise = np.repeat(mesh.noise, count, axis=1)
     for criterion in path.criteria:
         own = np.maximum(criterion.sizes(path), 1e-300)
-        sizes, noise = np.vstack([sizes, own]), np.vstack([noise, np.zeros((1, noise.shape[1]))])
-    return Sizes(sizes, turned > moved, noise + np.zeros_like(sizes), still)
-
-
-def _squares(vectors):
-    """(..) squares of the sizes of vectors (.., n)."""
-    return np.einsum("...i,...i->...", vectors, vectors)
+        sizes, noise = np.vstack([sizes, own]), np.vstack([noise, np.zeros(count)])
+    return Sizes(sizes, turning, noise, still, largest)
 
 
 def held_by_law(scene, layout, rule, scales, without, count):
@@ -287,13 +301,6 @@ def held_by_law(scene, layout, rule, scales, without, count):
     return sizes
 
 
-@lru_cache(maxsize=32)
-def _first_nodes(layout, degree):
-    """The first node of every rod."""
-    return [rows.start for _, rows in cell_nodes(layout, degree)]
-
-
-@per_scene
 def of_sections(scene, scales, layout, p, by_statics):
     """The radii of gyration of the rods, the longest length, and errors by rounding, (4, 1), of n and m."""
     (least, _), (K, J) = ((x.K / scales.force, x.J / (scales.force * scales.length**2)) for x in scene.extremes)
@@ -330,30 +337,12 @@ def differences(fine, coarse):
         errors there that halved elements would have: (4, points), dimensionless, rotations in rad; then further
         criteria, in all. Differences within rounding are 0.
     """
-    sizes = fine._reference
-    places = compared(coarse.layout, fine.layout, coarse.rule)
-    here = (places.weights[:, None] @ fine._in_elements[:, places.cells])[:, :, 0]
-    off = np.matmul(places.inside, coarse._in_elements).reshape(here.shape) - here
-    squares = np.add.reduceat(np.square(off), (0, 3, 7, 10), axis=2)
-    # without the part along q, since interpolated q are no unit quaternions
-    squares[..., 1] -= np.square(np.einsum("kxi,kxi->kx", off[..., 3:7], here[..., 3:7]))
-    apart = np.sqrt(np.maximum(squares, 0.0))
-    apart[..., 1] *= 2
-    if sizes.turning.any():
-        gyrations, *_ = fine._of_sections
-        for radius, part in zip(np.atleast_2d(gyrations).T[:, :, None], places.rods, strict=True):
-            turned = np.where(sizes.turning[:, None], radius * apart[:, part, 1], 0.0)
-            apart[:, part, 0] = np.maximum(apart[:, part, 0], turned)
-    everywhere, at_ends = apart.max(axis=1).T, apart[:, places.ends].max(axis=1).T
-    everywhere[everywhere <= np.maximum(ROUNDING, NOISE * sizes.rounding[: len(NAMES)])] = 0.0
-    everywhere[:2][sizes.still & (everywhere[:2] <= STILL)] = 0.0
-    shared, ratios = everywhere, np.divide(fine.layout.counts, coarse.layout.counts)
-    if ratios.max() > 2:
-        shares = np.minimum((2 / ratios) ** fine.degree, 1.0)
-        apart *= np.repeat(shares, [part.stop - part.start for part in places.rods])[:, None]
-        shared = np.where(everywhere > 0, np.maximum(apart.max(axis=1).T, at_ends), 0.0)
+    sizes, found = fine._reference, np.empty((3, len(NAMES), len(fine)))
+    pair = comparison_of(fine.scene, fine.scales, coarse.layout, fine.layout, fine.rule, fine.model == "determinate")
+    states = (x for path in (coarse, fine) for x in (path._motion, path._contact))
+    pair.call("compare_all", pair.c, len(fine), *states, sizes.turning, sizes.still, found)
     for k, criterion in enumerate(fine.criteria, start=len(NAMES)):
         apart = _norms(criterion.values(fine) - criterion.values(coarse))
         apart[apart <= ROUNDING * sizes.sizes[k].max(initial=0.0)] = 0.0
-        everywhere, at_ends, shared = (np.vstack([known, apart]) for known in (everywhere, at_ends, shared))
-    return everywhere, at_ends, shared
+        found = np.concatenate([found, np.tile(apart, (3, 1, 1))], axis=1)
+    return found

@@ -11,7 +11,7 @@ from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.quantities import Quantity
 from cosserat_fenicsx.results import screen
 from cosserat_fenicsx.results.accuracy import leading_of
-from cosserat_fenicsx.results.compared import NAMES, Errors, all_cell_nodes, of_sections, sizes_of, words_of
+from cosserat_fenicsx.results.compared import NAMES, Errors, mesh_of, sizes_of, words_of
 from cosserat_fenicsx.results.contacts import (
     ROD_FORCE,
     Contacts,
@@ -97,7 +97,7 @@ class Path(RodResult):
     _quantities = _QUANTITIES
     #: whether the formulation's virtual rotations are changes of q instead of independent small rotations
     galerkin = False
-    _computed = (*RodResult._computed, "_contact", "_cut", "conservative", "_reference", "_roughness", "_in_elements")
+    _computed = (*RodResult._computed, "_contact", "_cut", "conservative", "_reference", "_roughness")
     # functions of a path that compute its `conservative` and its `sensitivity`
     _potential = _differentiated = _vibrating = None
 
@@ -128,15 +128,9 @@ class Path(RodResult):
         path._potential, path._differentiated, path._vibrating = potential, differentiated, vibrating
         return path
 
-    @cached_property
-    def _in_elements(self):
-        """(points, elements, nodes per element, 13) `_motion`, n and m."""
-        nodal = self._motion[:, all_cell_nodes(self.layout, self.degree)]
-        return np.concatenate([nodal, self._contact], axis=3)
-
     @property
-    def _of_sections(self):
-        return of_sections(self.scene, self.scales, self.layout, self.degree, self.model == "determinate")
+    def _mesh(self):
+        return mesh_of(self.scene, self.scales, self.layout, self.rule, self.model == "determinate")
 
     @cached_property
     def _reference(self):
@@ -458,7 +452,7 @@ class Path(RodResult):
     @cached_property
     def _cut(self):
         """As `_contact`, with the forces of threads along the rods: all that a cut carries."""
-        carried = Threads(self).at_gauss() if self.scene.has_threads else 0.0
+        carried = Threads(self).at_gauss() if self.scene.has_threads else None
         return element_contact(self, self._all, carried)
 
     def _at_clamp(self, point, joined):

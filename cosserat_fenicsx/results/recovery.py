@@ -18,7 +18,7 @@ from cosserat_fenicsx.scene.signals import at
 from cosserat_fenicsx.turning import Turning
 
 
-def element_contact(path, records, carried=0.0):
+def element_contact(path, records, carried=None):
     """(n, elements, p + 1, 6) n and m (dimensionless, inertial) of `Records` at the nodes of every element: those of
     the rods, and `carried`, what threads along them carry at the Gauss points (`carried_by_threads`).
 
@@ -26,21 +26,22 @@ def element_contact(path, records, carried=0.0):
     which is as accurate as the nodal positions (order 2p). At the nodes between they are interpolated by the polynomial
     through both ends and the Gauss points. Virtual rotations are those of the formulation, see `Path.galerkin`.
     """
-    rule, p, r_s = path.rule, path.degree, records["gauss_fields"][..., 6:]
-    h, cells = _elements(path.layout, path.scene, path.scales.length, p)
-    fields = records["gauss_fields"][..., :6] + carried
-    n = fields[..., :3]
+    rule, p, mesh, fields = path.rule, path.degree, path._mesh, records["gauss_fields"]
+    if carried is not None:
+        fields = np.concatenate([fields[..., :6] + carried, fields[..., 6:]], axis=3)
     at_gauss, at_nodes = records["densities"]
-    density = np.zeros_like(fields) if at_gauss is None else at_gauss.copy()
-    density[..., 3:] += r_s[..., _NEXT] * n[..., _LAST] - r_s[..., _LAST] * n[..., _NEXT]
-    along = np.matmul(rule.contact_from_fields, fields)
-    along += np.matmul(rule.contact_from_densities, density * h)
+    along = np.empty((*fields.shape[:2], p + 1, 6))
+    mesh.call("recover_all", mesh.c, len(fields), fields, at_gauss, along)
     if path.galerkin or at_nodes is not None:
+        h, cells = _elements(path.layout, path.scene, path.scales.length, p)
         more = np.zeros((*along.shape[:2], 2, 6))
         if at_nodes is not None:
             more -= h * rule.lobatto[[0, p], None] * at_nodes[:, :, [0, p]]
         if path.galerkin:
-            q, m = records["rq"][:, :, 3:][:, cells], fields[..., 3:]
+            n, r_s, density = fields[..., :3], fields[..., 6:], np.zeros_like(fields[..., :6])
+            density[..., 3:] = r_s[..., _NEXT] * n[..., _LAST] - r_s[..., _LAST] * n[..., _NEXT]
+            density += 0.0 if at_gauss is None else at_gauss
+            q, m = records["rq"][:, :, 3:][:, cells], fields[..., 3:6]
             for i, end in enumerate((0, p)):
                 grad, value = rule.weights * rule.slopes[:, end], rule.weights * rule.at_gauss[:, end]
                 plain = np.matmul(grad, m) - h[..., 0] * np.matmul(value, density[..., 3:])

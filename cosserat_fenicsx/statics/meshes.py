@@ -313,15 +313,14 @@ def surely_resolved(scene, layout, degree):
 def plainly_resolved(path):
     """Whether the mesh of a path surely resolves boundary layers, half-waves of buckling and turns in all its points,
     by bounds that need no look at its elements."""
-    fields, scene, scales = path._stacked("gauss_fields"), path.scene, path.scales
-    force, moment = (unit * np.sqrt(np.einsum("kcgi,kcgi->kcg", x, x))
-                     for x, unit in ((fields[..., :3], scales.force), (fields[..., 3:6], scales.moment)))  # fmt: skip
+    scene, scales = path.scene, path.scales
+    force, moment, mean = path._reference.largest * (scales.force, scales.moment, scales.moment)
     J, longest = scene.extremes[0].J, path.layout.sizes(scene).max()
     least, bending = J.min(), J[:, :2].min()
     flat = path.model != "spatial" and scene.plane is not None and not any(rod.profile.coupled for rod in scene.rods)
-    turn = (moment @ path.rule.weights).max() * longest / (bending if flat else least)
-    layers = force.max() * (longest / LONGEST_IN_LAYER) ** 2 <= bending
-    twisted = moment.max() * longest <= LONGEST_IN_LAYER * least
+    turn = mean * longest / (bending if flat else least)
+    layers = force * (longest / LONGEST_IN_LAYER) ** 2 <= bending
+    twisted = moment * longest <= LONGEST_IN_LAYER * least
     return layers and twisted and turn <= min(_GRADING.turned, path.degree / 2)
 
 
@@ -362,7 +361,7 @@ def balanced(fine, coarse, above):
     layout, order = coarse.layout, coarse.degree + 1
     if sum(fine.elements) * above ** (1 / order) < _GRADING.many:
         return None
-    rough = leading_coefficients(fine, fine._motion[..., :3]).max(axis=0)
+    rough = leading_coefficients(fine)[0].max(axis=0)
     if _even(rough ** (1 / coarse.degree)):
         return None
     differences = element_differences(fine, coarse)

@@ -44,15 +44,9 @@ class Pair(Pointers):
         p.coarse, p.fine, p.tol, p.resolved, p.in_layer = coarse.c, fine.c, tol, RESOLVED, LONGEST_IN_LAYER
         for name in ("ahead", "of_ends", "safety", "safety_below", "asymptotic"):
             setattr(p, name, getattr(accuracy, name.upper()))
-        for name in ("nothing", "still", "least_moment", "vanishing", "rounding", "noise"):
-            setattr(p, name, getattr(compared, name.upper()))
         p.far, p.equal, p.single = accuracy.FAR_AHEAD, equal_elements(fine.layout), min(coarse.layout.counts) == 1
         rule = fine.model.rule
-        places = compared.compared(coarse.layout, fine.layout, rule)
-        p.places = len(places.inside)
-        for name, array in (("inside", places.inside), ("weights", places.weights)):
-            setattr(p, name, self.doubles(np.ascontiguousarray(array)))
-        p.cells = self.integers(places.cells)
+        compared.of_places(self, p, compared.compared(coarse.layout, fine.layout, rule))
         self._transfer(rule)
         self._told = self._ffi.new("query[]", len(queries))
         p.query, p.queries = self._told, len(queries)
@@ -132,7 +126,7 @@ class Pair(Pointers):
     def _take(self, scene):
         p, (_, fine) = self._compared, self.meshes
         scales, rule = fine.model.scales, fine.model.rule
-        p.length, p.turned = scene.lengths.max() / scales.length, fine.turned
+        fine.c.length, p.turned = scene.lengths.max() / scales.length, fine.turned
         if scene.acts_in_law:
 
             def without(rod, s):
@@ -348,9 +342,8 @@ class Loaded(Pointers):
         elements, points = model._in_space.K.shape[:2]
         components = model.components - getattr(model, "multipliers", 0)
         c.kind = getattr(self._lib, _KINDS[components])
-        c.rods, c.elements, c.nodes, c.p = len(self.layout.counts), elements, len(model.reference), len(rule.nodes) - 1
-        c.points, c.components, c.forces = points, model.components, model.force_size
-        c.first = self.integers(np.cumsum([0, *self.layout.counts]))
+        c.components, c.forces = model.components, model.force_size
+        compared.of_rule(self, c, self.layout, rule)
         if hasattr(model, "_tree"):
             order = [(rod, entry, -1 if before is None else before) for rod, entry, before in model._tree._order]
             c.order = self.integers(np.array(order))
@@ -362,9 +355,8 @@ class Loaded(Pointers):
         if fields:
             c.field_from = self.integers(which[0])
         for name, matrix in (
-            ("basis", rule.at_gauss), ("slopes", rule.slopes), ("from_slopes", rule.from_slopes),
-            ("by_fields", rule.contact_from_fields), ("by_densities", rule.contact_from_densities),
-        ):  # fmt: skip
+            ("basis", rule.at_gauss), ("slopes", rule.slopes), ("from_slopes", rule.from_slopes)
+        ):
             setattr(c, name, self.doubles(np.ascontiguousarray(matrix)))
         for name, shape in (
             ("nodal", (c.nodes, c.components)), ("placed", (c.nodes, 3)), ("motion", (c.nodes, 7)),
