@@ -21,7 +21,6 @@ from cosserat_fenicsx.errors import (
     SceneWarning,
 )
 from cosserat_fenicsx.interrupts import obey, patience
-from cosserat_fenicsx.quantities import DIMENSIONS
 from cosserat_fenicsx.ranks import all_are_here, end_all, launched
 
 # Options that are for rods alone, but for those that a kind of scene takes; and the kinds in words.
@@ -47,6 +46,8 @@ def units_of(options):
     asked = getattr(options, "units", None)
     if asked in (None, "SI", "field"):
         return asked or "SI"
+    from cosserat_fenicsx.quantities import DIMENSIONS  # loads numpy, which --help does without
+
     units = [unit.strip() for unit in asked.split(",")]
     chosen = [{name: unit for name, x in DIMENSIONS.items() if unit in x.units} for unit in units]
     if not all(chosen):
