@@ -177,9 +177,9 @@ def test_explain(here):
 
 
 def test_not_converged_is_exit_code_1_with_the_partial_path(tmp_path, here):
-    """Two elements cannot carry a load a billion times the critical one."""
-    more = ("--elements", "2", "-o", tmp_path, "--no-picture")
-    code, said, trouble = here("run", DEMO, "--load-factors", "0.5,1e9", *more)
+    """Load control does not pass the limit point of Lee's frame."""
+    more = ("--elements", "2", "-o", tmp_path, "--no-picture", "--control", "load")
+    code, said, trouble = here("run", Path(DEMO).parent / "lees_frame.toml", "--load-factors", "0.5,5", *more)
     assert code == 1 and "no equilibrium was found beyond the load factor" in trouble
     assert "0.5" in said and (tmp_path / "path.xdmf").is_file()
 
