@@ -42,6 +42,7 @@ def test_a_beam_on_an_elastic_bed():
     assert cf.solve(scene, [1.0], elements=4).model == "planar"
 
 
+@pytest.mark.serial
 def test_springs_hold_a_rod_and_each_model_agrees():
     """A nearly rigid rod on a rotational and a lateral spring; for a
     rigid one c theta + k L sin(theta) L cos(theta) = M."""
@@ -87,6 +88,7 @@ def rayleigh(ratio):
     return brentq(f, 1e-3, 1.8751040687)
 
 
+@pytest.mark.serial
 @pytest.mark.parametrize("ratio", [0.1, 1.0, 10.0])
 def test_a_mass_at_the_end_of_a_cantilever(ratio):
     scene = cf.Scene([ROD], [cf.Clamp(ROD.start)], [cf.PointMass(ROD.end, ratio * RHO)])
@@ -98,6 +100,7 @@ def test_a_mass_at_the_end_of_a_cantilever(ratio):
     np.testing.assert_allclose(path.force(ROD.start)[0], (0, 0, -1e-2 * (1 + ratio) * RHO), atol=1e-9)
 
 
+@pytest.mark.serial
 def test_a_body_that_turns():
     """A stiff shaft with a disc: the torsional mode of a cantilever whose end has the moment J, omega^2 = GJ/(L J)."""
     J = 0.05
@@ -190,6 +193,7 @@ def test_a_bottom_hole_assembly_lies_on_the_wall(case):
     assert path.position(rod.at(truth["arc_length_to_tangency"]))[0, 1] == pytest.approx(r, rel=1e-3)
 
 
+@pytest.mark.serial
 def test_a_column_on_an_elastic_bed_buckles_in_waves():
     """Timoshenko & Gere, Theory of Elastic Stability (1961), 2.10: P =
     pi^2 EI/L^2 (m^2 + k L^4/(m^2 pi^4 EI)), least over m."""

@@ -69,6 +69,7 @@ def test_euler_columns(section):
         cf.buckling(scene, load_factor=1.5)
 
 
+@pytest.mark.serial
 def test_from_a_prestressed_state_it_nears_the_bifurcation():
     for out_of_plane, far in ((50.0, 3.0), (1.0, 1.0)):
         _, scene = clamped_ring(out_of_plane)
@@ -276,6 +277,7 @@ def test_a_shaft_under_a_dead_axial_moment(tmp_path, capsys):
         assert "The loads have no potential: no static bifurcation" in said and "may flutter" in said
 
 
+@pytest.mark.serial
 @pytest.mark.parametrize("load_factor", [0.0, 5.0])
 def test_becks_column(load_factor):
     """It flutters at 20.05 and never diverges; the symmetric part is singular at pi^2."""

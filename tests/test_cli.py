@@ -66,7 +66,7 @@ def test_help_and_version_load_nothing_heavy():
     assert cosserat("--version").stdout.startswith("cosserat_fenicsx 0.")
 
 
-@pytest.mark.parametrize("arguments", [["--help"], ["run", "--help"], ["schema"], ["explain", DEMO], None])
+@pytest.mark.parametrize("arguments", [["run", "--help"], ["explain", DEMO], None])
 def test_a_reader_that_has_enough_ends_no_command(arguments):
     """Such as `head`: the pipe is closed before the first line. A script ends as Python does (None): PETSc takes the
     signal of a closed pipe, and would abort MPI."""
@@ -467,8 +467,7 @@ def test_a_run_up():
 
 
 @pytest.mark.parametrize(
-    ("number", "module"),
-    [(signal.SIGINT, "cosserat_fenicsx.cli.main"), (signal.SIGTERM, "dolfinx"), (signal.SIGHUP, "dolfinx")],
+    ("number", "module"), [(signal.SIGINT, "cosserat_fenicsx.cli.main"), (signal.SIGTERM, "dolfinx")]
 )
 def test_while_modules_are_imported(number, module):
     code = f"""

@@ -19,6 +19,7 @@ def off(found, exact):
     return np.abs(found.eigenvalues / np.array(exact) - 1)
 
 
+@pytest.mark.serial
 def test_a_dashpot_at_the_end_may_overdamp(truth):
     """Roots of Euler's beam with a dashpot c = 2 and Kelvin-Voigt's damping; shear changes the third by about 4e-6."""
     rod, clamp = cantilever(stiff=1e7, J=1e-9)
@@ -123,6 +124,7 @@ def test_flutter_is_an_event_of_a_path(tmp_path_all, truth):
         path.sensitivity(event, ["rods.beam.length"])
 
 
+@pytest.mark.serial
 def test_whirl_of_a_shaft_between_bearings(tmp_path_all, truth):
     """Timoshenko's shaft, whirl rates in space at 300 rad/s (closed form); forward and backward; Campbell diagram."""
     E, d, nu, rho, spin = 210e9, 0.1, 0.3, 7850.0, 300.0

@@ -160,6 +160,7 @@ def test_turned_principal_axes_are_turned_directors(load, formulation):
         np.testing.assert_allclose(a.fields(-1)[name], b.fields(-1)[name] @ turn.T, atol=1e-9, err_msg=name)
 
 
+@pytest.mark.serial
 def test_critical_loads_of_turned_principal_axes():
     for rod, count in zip(turned_and_plain(), (4, 4), strict=True):
         assert cf.euler_load(rod) == pytest.approx(np.pi**2 * 1.0 / (2 * L) ** 2)

@@ -218,6 +218,7 @@ def changed(one, other):
     return (np.abs(one - other).max(axis=2) > 40).sum() > 50
 
 
+@pytest.mark.serial
 def test_tables_have_their_width_in_a_dumb_terminal(monkeypatch):
     """As under mpirun, whose output is a terminal, in an editor or a service whose TERM is dumb."""
     monkeypatch.setenv("TERM", "dumb")

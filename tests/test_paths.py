@@ -118,6 +118,7 @@ def test_load_factors_are_the_next_along_the_path_or_the_next_of_load_control():
     np.testing.assert_allclose(load(path.rotation_angle(rod.end)[[0, 3]]), [5.0, 1.0], rtol=1e-9)
 
 
+@pytest.mark.serial
 def test_a_path_that_begins_nearly_linearly_takes_long_steps():
     """Where they are no results: of a tenth of the way the first one, then to the load factors."""
     _, scene = column()
@@ -207,6 +208,7 @@ def test_branch_of_the_perfect_column(section, branch):
         assert loads(found, "bifurcation") == pytest.approx([critical(rod)], rel=2e-8)
 
 
+@pytest.mark.serial
 def test_a_ring_sways_and_tips():
     """In its plane, whatever its stiffness out of it; out of it if that is low. The branches are mirror images."""
     sways = []
@@ -339,6 +341,7 @@ def test_rounding_of_a_column_that_keeps_its_line_is_no_error(apart, counts):
     assert (compared.differences(fine, coarse)[0][0] > 0).all() == counts
 
 
+@pytest.mark.serial
 def test_thin_guys_hold_a_mast_in_the_count_of_its_modes():
     """Its buckling between its foot and the guyed head, twice, which guys of bounded stiffness would lower."""
     steel = cf.Material(E=210e9, nu=0.3)

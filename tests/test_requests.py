@@ -264,7 +264,9 @@ FILES = {
 }
 
 
-@pytest.mark.parametrize("name", FILES)
+@pytest.mark.parametrize(
+    "name", [name if name[:4] == "path" else pytest.param(name, marks=pytest.mark.serial) for name in FILES]
+)
 def test_a_full_disk(name, results, tmp_path_all):
     if COMM.rank == 0:
         (tmp_path_all / name).write_text("old")
@@ -339,7 +341,9 @@ def meshes(monkeypatch):
     gc.enable()
 
 
-@pytest.mark.parametrize("work", WORK)
+@pytest.mark.parametrize(
+    "work", [work if work[0] == "s" else pytest.param(work, marks=pytest.mark.serial) for work in WORK]
+)
 def test_what_leaves_the_cache_is_freed_at_once(work, small_cache, meshes):
     _, scene = column()
     for n in range(2, 6):

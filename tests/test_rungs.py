@@ -289,6 +289,7 @@ HELD = {
 }  # fmt: skip
 
 
+@pytest.mark.serial
 @pytest.mark.parametrize("name", HELD)
 def test_every_support_joint_and_load_as_mixed_has_them(name):
     """Both converge to the same solution; P4 on 8 elements differ by less than 1e-8 at element ends (order 2p)."""

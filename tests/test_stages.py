@@ -36,6 +36,7 @@ def test_the_order_of_loads_on_a_buckled_column(truth):
     truth("buckled column, side load before thrust, end over length", tip(path)[[0, 2]], SIDE_FIRST, 1e-8, of=1.0)
 
 
+@pytest.mark.serial
 def test_a_stage_has_events_and_is_followed_in_arc_length(truth):
     path = cf.solve(
         column([cf.Force("rod.end", (0, 0, -P))], [cf.Stage([cf.Force("rod.end", (-0.3, 0, 0))], name="side")]),
@@ -97,6 +98,7 @@ def test_a_support_holds_what_it_finds_and_leaves_as_its_reaction(how):
     np.testing.assert_allclose(place[-1], (0, 0, 1), rtol=0, atol=1e-8)
 
 
+@pytest.mark.serial
 def test_a_reaction_that_the_structure_cannot_carry():
     """A column is pressed with more than its load as a cantilever, and released: it would jump."""
     press = cf.Prescribed("rod.end", displacement=(0, 0, -0.02))
@@ -145,6 +147,7 @@ def held():
     return cf.solve(column([push], stages, section=SOFT))
 
 
+@pytest.mark.serial
 def test_errors_of_stages_are_those_of_the_whole_history(held):
     """Against the same path on a mesh four times as fine."""
     fine = cf.solve(held.scene, elements=4 * max(held.elements))

@@ -63,6 +63,7 @@ def test_it_does_not_push():
     assert back.tendon(tendon).tension == pytest.approx(tension[[4, 1]], abs=1e-8)
 
 
+@pytest.mark.serial
 def test_two_of_them_hold_a_column(truth):
     """Two tendons on both sides keep the end of a column from turning in their plane, where it buckles as between two
     guides that move aside: P l + P^2/(GA + T/l) = pi^2 EI/L^2, with the stretch l and the sum T of the tensions. Across
@@ -86,6 +87,7 @@ def test_two_of_them_hold_a_column(truth):
     assert bent.argmax() == 1 and across.argmax() == 0
 
 
+@pytest.mark.serial
 def test_shortenings_that_reach_a_point(truth):
     """Derivatives by shortenings, a stiffness and an offset are those of differences, and lead to given shortenings."""
     names = ["loads[0].shortening", "loads[1].shortening", "loads[0].axial", "loads[1].offset[1]"]

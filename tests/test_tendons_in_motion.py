@@ -17,6 +17,7 @@ def arm(*loads, rod=ROD):
     return cf.Scene([rod], [cf.Clamp(rod.start)], loads)
 
 
+@pytest.mark.serial
 def test_it_vibrates_as_its_modes(truth):
     """Released from a small force. Steps h turn the phase of a vibration by 2 arctan(omega h/2)."""
     tendon, share, steps = cf.Tendon(ROD, (E, 0), shortening=0.006, axial=300.0), 0.01, 48

@@ -223,6 +223,7 @@ def test_equilibria_and_other_schemes_refuse_it():
         cf.simulate(scene, 0.1, dt=0.01, model="planar")
 
 
+@pytest.mark.serial
 def test_forces_of_walls_are_told(tmp_path_all):
     """The weight of a rod that slides, and friction against it; from memory, a folder and a file alike."""
     mu, v = 0.3, 0.2
