@@ -96,18 +96,18 @@ def pytest_runtest_makereport(item, call):
 def truth(record_property):
     """Compare with an independent truth, and record a row for `make truths` (demos/evidence/truths.py)."""
 
-    def compare(what, found, exact, asked, *, of=None, most=None):
+    def compare(what, found, exact, asked, *, of=None, most=None, why=""):
         """Assert that numbers are those of a truth.
 
         Args:
             what: the problem and the quantity. found, exact: numbers of the same shape.
             asked: the largest error that is asked for, over `of`: a scale, None for each exact number's own size.
-            most: the largest error that the test allows, where what is asked for is missed.
+            most: the largest error that the test allows, where what is asked for is missed; why: that is so.
         """
         exact = np.asarray(exact)
         scale = np.abs(exact) if of is None else of
         error = float(np.max(np.abs(np.asarray(found) - exact) / scale))
-        record_property("truth", json.dumps([what, error, asked]))
+        record_property("truth", json.dumps([what, error, asked, why]))
         assert error <= (most or asked), (what, found, exact)
 
     return compare

@@ -43,29 +43,30 @@ HOW = {"displacement": {"formulation": "displacement", "degree": 4}, "multiplier
 
 @pytest.mark.parametrize(("name", "how"), [*((name, {}) for name in BENT), *(("helix", how) for how in HOW.values()),
                                            ("helix under a force", HOW["multiplier"])], ids=str)  # fmt: skip
-def test_a_muscle_bends_and_twists(name, how):
+def test_a_muscle_bends_and_twists(name, how, truth):
     curvature, loads, tip, model = BENT[name]
     scene = cantilever(cf.Actuation(ROD, curvature=curvature), *loads)
     path = cf.solve(scene, [1.0], tol=1e-7, **how)
     assert path.model == model
-    assert path.position(ROD.end)[-1] == pytest.approx(tip, abs=1e-8)
+    truth(f"actuation: {name}, end (m)", path.position(ROD.end)[-1], tip, 1e-8, of=1.0)
     if not loads:
         assert np.abs(path.fields(-1)["moment"]).max() < 1e-6 * EI * 8 and np.abs(path.force(ROD.start)).max() < 1e-5
 
 
-def test_bimetal_strip():
+def test_bimetal_strip(truth):
     """Timoshenko, J. Opt. Soc. Am. 11 (1925) 233, with twice the modulus and 1.5 times the thickness of the other."""
     n, m, h, of_strip = 2.0, 1.5, 1e-3, 8e-6 * 100.0
     k = 6 * of_strip * (1 + m) ** 2 / (h * (3 * (1 + m) ** 2 + (1 + m * n) * (m**2 + 1 / (m * n))))
     strip = rod_of(0.1)
     path = cf.solve(cantilever(cf.Actuation(strip, curvature=(0, k, 0)), rod=strip), [1.0], tol=1e-9)
-    assert path.position(strip.end)[-1] == pytest.approx((0.005153021547173833, 0, 0.09982275587737727), abs=1e-10)
+    tip = 0.005153021547173833, 0, 0.09982275587737727
+    truth("actuation: bimetal strip, end (m)", path.position(strip.end)[-1], tip, 1e-8, of=1.0, most=1e-10)
     fields = path.fields(-1)
     assert fields["curvature"][:, 1] == pytest.approx(k, rel=1e-9) and np.abs(fields["moment"]).max() < 1e-10
 
 
 @pytest.mark.parametrize("model", ["planar", "spatial"])
-def test_a_heated_bar_between_walls(model):
+def test_a_heated_bar_between_walls(model, truth):
     """N = -EA alpha dT at once, also where no node moves; and it buckles at P (1 + P/GA) = 4 pi^2 EI/L^2."""
     scene = held(cf.Thermal(ROD, alpha=1e-5, dT=100.0))
     path = cf.solve(scene, [0.5, 1.0], model=model, elements=1)
@@ -75,7 +76,8 @@ def test_a_heated_bar_between_walls(model):
         Euler = 4 * np.pi**2 * EI / 0.3**2
         critical = GA / 2 * (np.sqrt(1 + 4 * Euler / GA) - 1) / EA / 1e-3
         found = cf.solve(scene, (0, 2.0), model=model, tol=1e-9)
-        assert [event.load_factor for event in found.events] == pytest.approx([critical] * 2, rel=1e-8)
+        events = [event.load_factor for event in found.events]
+        truth("actuation: heated bar, load factors at which it buckles", events, [critical] * 2, 1e-8)
         derivatives = found.sensitivity(found.events[0], ["loads[0].dT", "rods.rod.section.axial"]).derivatives
         assert derivatives["loads[0].dT"] == pytest.approx(-critical / 100.0, rel=1e-6)
         assert derivatives["rods.rod.section.axial"] == pytest.approx(-critical / EA, rel=1e-6)

@@ -34,14 +34,14 @@ def test_a_dashpot_at_the_end_may_overdamp(truth):
     assert found.damping_ratios[0] == 1 and off(near, exact[2]).max() < 6e-6
 
 
-def test_kelvin_voigt_and_drag_of_the_rod_and_as_an_action():
+def test_kelvin_voigt_and_drag_of_the_rod_and_as_an_action(truth):
     """l^2 + (drag + tau w^2) l + w^2 = 0; linear drag along the rod is the same as drag times a mass of 1 kg/m."""
     w = np.repeat([3.5160152685, 22.0344915647, 61.6972144134], 2)
     ratio = 0.4 / 2 / w + 0.01 * w / 2
     exact = w * (-ratio + 1j * np.sqrt(1 - ratio**2))
     rod, clamp = cantilever(stiff=1e7, J=1e-9, damping=cf.Damping(time=0.01, drag=0.4))
     found = cf.modes(cf.Scene([rod], [clamp]), 6, elements=8)
-    assert off(found, exact).max() < 6e-6
+    truth("cantilever, Kelvin-Voigt and drag, without shear", found.eigenvalues, exact, 6e-6)
     rod, clamp = cantilever(stiff=1e7, J=1e-9, damping=cf.Damping(time=0.01))
     again = cf.modes(cf.Scene([rod], [clamp], [cf.LinearDrag(rod, 0.4, 0.4)]), 6, elements=8)
     np.testing.assert_allclose(again.eigenvalues, found.eigenvalues, rtol=1e-6)
@@ -160,7 +160,7 @@ def test_the_unbalance_of_a_rotation_stiffens_the_twist(truth):
         assert cf.modes(scene, 1, elements=2).eigenvalues.imag[0] < 0.2 * exact
 
 
-def test_a_rotor_with_damping_inside_and_outside():
+def test_a_rotor_with_damping_inside_and_outside(truth):
     """s^2 + c s + w1^2 tau (s - i W) + w1^2 = 0 in the inertial frame: stable below 30.13 rad/s, at 60 it grows."""
     W, J = 60.0, 1e-9
     section = cf.Stiffness((1e7, 1e7), 1e7, (1.0, 1.0), 1.0, mass=1.0, inertia=(J, J, 2 * J))
@@ -168,8 +168,49 @@ def test_a_rotor_with_damping_inside_and_outside():
     bearings = [cf.Pin(shaft.start), cf.Roller(shaft.end, (1, 0, 0)), cf.Roller(shaft.end, (0, 1, 0))]
     held = [cf.Spring(shaft.start, rotational=1e-6), cf.Centrifugal((0, 0, W))]
     found = cf.modes(cf.Scene([shaft], bearings, held), 1, elements=4, near=0.3 + 50.1j)
-    assert found.eigenvalues[0] == pytest.approx(0.293974563757 + 1j * (W - 9.88283226073), rel=1e-6)
+    exact = 0.293974563757 + 1j * (W - 9.88283226073)
+    truth("rotor with damping inside and outside, eigenvalue", found.eigenvalues[0], exact, 1e-6)
     assert found.kind.tolist() == ["flutter"] and not found.stable and found.whirl(0) == 1
+
+
+@pytest.mark.serial
+def test_a_string_with_a_damper(truth):
+    """A dashpot c at a = L/50 on a taut string, c = 5 sqrt(T m): sinh(x) + 5 sinh(x/50) sinh(49 x/50) = 0, with
+    x = lambda L sqrt(m/T). The rod's EI/T L^2 is 1e-8."""
+    section = cf.Stiffness((1e4, 1e4), 1e4, (1e-8, 1e-8), 1e-8, mass=1.0, inertia=(1e-12, 1e-12, 2e-12))
+    wire = cf.Rod(cf.Line((0, 0, 0), (1, 0, 0)), section)
+    loads = [cf.Pretension(wire, force=1.0), cf.Dashpot(wire.at(0.02), 5.0, direction=(0, 1, 0)),
+             cf.Spring(wire.start, rotational=1e-3)]  # fmt: skip
+    scene = cf.Scene([wire], [cf.Pin(wire.start), cf.Pin(wire.end)], loads)
+    found = cf.modes(scene, 4, near=3.15j, tol=1e-5).eigenvalues
+    exact = -0.01810027925704 + 3.14705773154j
+    nearest = found[np.argmin(np.abs(found - exact))]
+    truth("taut string with a damper at L/50, eigenvalue", nearest, exact, 1e-3)
+
+
+@pytest.mark.serial
+@pytest.mark.parametrize(
+    ("rpm", "sweep", "hertz"),
+    [
+        (0, 0, (1.48721362, 9.32008145, 23.5930445, 26.0959222)),
+        (750, 45, (13.5653517, 24.9004048, 26.0807308, 42.9989091)),
+    ],
+)
+def test_a_blade_with_a_swept_tip(rpm, sweep, hertz, truth):
+    """That of Epps & Chandra (J. Am. Helicopter Soc. 41 (1996) 29), lb, in, s; by collocation of the intrinsic
+    equations."""
+    E, nu, rho, b, h = 1.06e7, 0.325, 2.51e-4, 1.0, 0.063
+    G, A, flap, lag = E / 2 / (1 + nu), b * h, b * h**3 / 12, h * b**3 / 12
+    J = b * h**3 * (1 / 3 - 0.21 * h / b * (1 - h**4 / (12 * b**4)))
+    section = cf.Stiffness((5 / 6 * G * A,) * 2, E * A, (E * flap, E * lag), G * J, mass=rho * A,
+                           inertia=(rho * flap, rho * lag, rho * (flap + lag)))  # fmt: skip
+    along = np.array([np.cos(np.deg2rad(sweep)), -np.sin(np.deg2rad(sweep)), 0])
+    blade = cf.Rod(cf.Line((2.5, 0, 0), (34, 0, 0), d1=(0, 1, 0)), section)
+    tip = cf.Rod(cf.Line((34, 0, 0), (34, 0, 0) + 6 * along, d1=(-along[1], along[0], 0)), section)
+    spin = [cf.Centrifugal((0, 0, rpm * np.pi / 30))] if rpm else []
+    scene = cf.Scene([blade, tip], [cf.Clamp(blade.start)], spin, [cf.Joint(blade.end, tip.start)])
+    found = cf.modes(scene, 4, elements=8)
+    truth(f"blade with a tip swept by {sweep} degrees at {rpm} rpm, Hz", found.frequencies, hertz, 2e-6)
 
 
 @pytest.mark.serial

@@ -21,8 +21,8 @@ ROOT = Path(__file__).resolve().parents[2]
 
 
 def compared(only="", among="test_*.py"):
-    """[(file of tests, problem, error, error asked for)], of the tests with a text in their names, in files whose names
-    match a pattern. Raises RuntimeError: a test fails."""
+    """[(file of tests, problem, error, error asked for, why it is missed)], of the tests with a text in their names, in
+    files whose names match a pattern. Raises RuntimeError: a test fails."""
     with tempfile.TemporaryDirectory() as folder:
         told = Path(folder) / "found.xml"
         words = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "--truths", "-o",
@@ -38,19 +38,19 @@ def compared(only="", among="test_*.py"):
         for case in cases:
             for found in case.iter("property"):
                 if found.get("name") == "truth":
-                    what, error, asked = json.loads(found.get("value"))
-                    key = (case.get("classname").split(".")[1].removeprefix("test_"), what, asked)
+                    what, error, asked, why = json.loads(found.get("value"))
+                    key = (case.get("classname").split(".")[1].removeprefix("test_"), what, asked, why)
                     rows[key] = max(error, rows.get(key, 0.0))
-    return [(file, what, error, asked) for (file, what, asked), error in sorted(rows.items())]
+    return [(file, what, error, asked, why) for (file, what, asked, why), error in sorted(rows.items())]
 
 
 def main(only="", out="out", among="test_*.py"):
     """Compare, write the table, and return its rows."""
     rows = compared(only, among)
-    judged = [(file.replace("_", " "), what, f"{error:.1e}" if error <= asked else f"**{error:.1e}, missed**",
-               f"{asked:g}") for file, what, error, asked in rows]  # fmt: skip
+    judged = [(file.replace("_", " "), what, f"{error:.1e}" if error <= asked else f"**{error:.1e}, missed**: {why}",
+               f"{asked:g}") for file, what, error, asked, why in rows]  # fmt: skip
     lines = table("tests of | problem and quantity | error | asked at most", judged)
-    missed = sum(error > asked for _, _, error, asked in rows)
+    missed = sum(error > asked for _, _, error, asked, _ in rows)
     print(write("truths", [*lines, "", f"{len(rows)} comparisons, {missed} missed. {in_words()}"], out))
     return rows
 
