@@ -23,6 +23,8 @@ AT_BOUND = 1e-6
 _PLACES, _STEPS, _LONGEST, _ENOUGH, _ROUNDED, _ROUGH = 4, 40, 0.7, 1e-10, 8, 1e-7
 # Smallest determinant of the equations of two nearest points, for unit tangents, at which both are varied.
 _PARALLEL = 1e-3
+# Least curvature of half the square of the distance of strands that cross, over that of straight ones at their angle.
+_FLAT = 0.04
 # The neighbours of a pair of places.
 _BESIDE = [(a, b) for a in (-1, 0, 1) for b in (-1, 0, 1) if a or b]
 
@@ -254,10 +256,10 @@ class Strands:
         found = self._once(found)
         total = self.radii[found.element].sum(axis=1)
         closest = (found.distance / total).min(initial=np.inf)
-        crosses = (self._sines(x, found) > CROSSING) | ~found.slides.all(axis=1)
+        crosses = ~self._side_by_side(x, found) | ~found.slides.all(axis=1)
         parts = [found.of(crosses & (found.gap < reach))]
-        along = self.at(x, self._of, self._at, 1)
-        if (_sine(along[i], along[j]) <= CROSSING).any():
+        bent = self.at(x, self._of, self._at, (1, 2)).swapaxes(0, 1)
+        if _side_by_side(points[j] - points[i], bent[:, i], bent[:, j]).any():
             parts.append(self._lines(x, points, cut, reach))
         joined = Touches(*(np.concatenate([getattr(p, n) for p in parts]) for n in Touches.__dataclass_fields__))
         return joined, closest
@@ -316,30 +318,29 @@ class Strands:
         nodes = x[self.cells[self._slave, self._slave_node]]
         rod, sizes = self.rods[self._of], self.sizes
         mean = np.bincount(self.rods, sizes) / np.bincount(self.rods)
-        rows = []
-        for k, near in enumerate(cKDTree(points).query_ball_point(nodes, cut)):
-            near = np.sort(np.array(near, dtype=int))
-            e, own = self._slave[k], self.rods[self._slave[k]]
-            finer = (mean[own] < mean[rod[near]]) | ((mean[own] == mean[rod[near]]) & (own < rod[near]))
-            later = (rod[near] == own) & (self.s(self._of[near], self._at[near]) > self.s(e, places[k]))
-            near = near[np.where(rod[near] == own, later, finer)]
-            many = np.full(len(near), e), np.full(len(near), places[k])
-            near = near[self._may_touch(many, (self._of[near], self._at[near]))] if len(near) else near
-            if not len(near):
-                continue
-            for run in np.split(near, np.flatnonzero((np.diff(near) > 1) | (np.diff(rod[near]) != 0)) + 1):
-                rows.append((k, run[np.argmin(np.linalg.norm(points[run] - nodes[k], axis=1))]))
-        if not rows:
+        near = cKDTree(points).query_ball_point(nodes, cut, return_sorted=True)
+        k = np.repeat(np.arange(len(nodes)), [len(found) for found in near])
+        near = np.concatenate(near).astype(int)
+        e, own, other = self._slave[k], self.rods[self._slave[k]], rod[near]
+        finer = (mean[own] < mean[other]) | ((mean[own] == mean[other]) & (own < other))
+        later = self.s(self._of[near], self._at[near]) > self.s(e, places[k])
+        kept = np.where(other == own, later, finer)
+        kept &= self._may_touch((e, places[k]), (self._of[near], self._at[near]))
+        k, near = k[kept], near[kept]
+        if not len(k):
             return self._none()
-        k, master = np.array(rows).T
+        runs = np.append(True, (np.diff(near) > 1) | (np.diff(rod[near]) != 0) | (np.diff(k) != 0))
+        nearest = np.lexsort((np.linalg.norm(points[near] - nodes[k], axis=1), np.cumsum(runs)))[runs]
+        k, master = k[nearest], near[nearest]
         element = np.c_[self._slave[k], self._of[master]]
         node = self.cells[self._slave[k], self._slave_node[k]]
         found = self._made(x, element, np.c_[places[k], self._at[master]], node)
-        return found.of((self._sines(x, found) <= CROSSING) & found.slides[:, 1] & (found.gap < reach))
+        return found.of(self._side_by_side(x, found) & found.slides[:, 1] & (found.gap < reach))
 
-    def _sines(self, x, found):
-        """(m,) sines of the angles of the strands."""
-        return _sine(*(self.at(x, e, place, 1) for e, place in zip(found.element.T, found.place.T, strict=True)))
+    def _side_by_side(self, x, found):
+        """See `_side_by_side`, at pairs of points."""
+        bent = (self.at(x, e, a, (1, 2)).swapaxes(0, 1) for e, a in zip(found.element.T, found.place.T, strict=True))
+        return _side_by_side(found.normal * found.distance[:, None], *bent)
 
     # -- derivatives -------------------------------------------------------------------------------------------------
 
@@ -423,9 +424,16 @@ def across(direction, normal=None):
     return np.stack([first, cross(n, first)], axis=1)
 
 
-def _sine(t, u):
-    """(n,) sines of the angles of vectors (n, 3)."""
-    return np.linalg.norm(np.cross(t, u), axis=1) / np.linalg.norm(t, axis=1) / np.linalg.norm(u, axis=1)
+def _side_by_side(w, first, second):
+    """(n,) whether strands touch along a line: at a small angle, or, as those that wind around each other, at any angle
+    where their distance hardly changes along them. w: (n, 3) from the first to the second points; first, second: (2, n,
+    3) first and second derivatives of positions by arc length there."""
+    (t, tt), (u, uu) = first, second
+    G, K, C = (np.sum(a * b, axis=1) for a, b in ((t, t), (u, u), (t, u)))
+    cosine = np.abs(C) / np.sqrt(G * K)
+    G, K = G - np.sum(w * tt, axis=1), K + np.sum(w * uu, axis=1)
+    least = (G + K) / 2 - np.hypot((G - K) / 2, C)  # of half the square of the distance, by both places
+    return (1 - cosine**2 <= CROSSING**2) | (least <= _FLAT * (1 - cosine))
 
 
 def closest_segments(points, rods, s, radii, apart, reach):

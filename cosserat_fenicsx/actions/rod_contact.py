@@ -64,8 +64,9 @@ class RodContact(LineAction):
     """Rods that do not pass through each other or themselves, with Coulomb friction.
 
     It stands among the loads, once in a scene, and is not multiplied by the load factor. Where strands cross at more
-    than 11.5 degrees they touch in one point, between the nearest points of both centrelines; otherwise along a line,
-    at the nodes of the strand with the shorter elements. Ends of rods are hemispheres.
+    than 11.5 degrees they touch in one point, between the nearest points of both centrelines; otherwise, and where they
+    wind around each other, along a line, at the nodes of the strand with the shorter elements. Ends of rods are
+    hemispheres.
 
     In `solve` surfaces are hard, without `stiffness`. Friction depends on the path there: load factors are taken in
     their order, and a contact does not slip from one accepted state to the next, or friction is at its bound and

@@ -6,7 +6,7 @@ In every iteration the step dx and the contact forces l follow from
 
 with the rods' tangent K and residual r without contact, the gaps g, their derivatives G, and their second derivatives
 d2g, in which the nearest points slide. K is never assembled: the columns of G^T and of the few eigenvectors of d2g are
-solved with its factors, and what is left is a small complementarity problem.
+solved with its factors, and what is left is a small complementarity problem, for the changes of the forces.
 
 With friction, contacts that touched in the last accepted state have two more forces across the normal, on the surfaces
 and so with moments about the centrelines. Coulomb's law is exact: such a contact does not slip since that state, or
@@ -48,9 +48,11 @@ _SAME, _REGULAR = 4.0, 1e-12
 _TOUCHES, _GIVES, _FORCES = 1e-5, 1e-6, [0, 1, 2, 4, 5, 6]
 # Laws of friction: iterations; error that ends them; least share of a step; error that is none.
 _MOST_LAWS, _LAWS, _LEAST, _LAWS_MET = 60, 1e-13, 1e-3, 1e-8
-# First stiffness of springs that keep the tangent stable, over that of the rods at a contact; factor of the next one;
-# the largest; eigenvalues of the compliance that need none, over its mean: out of equilibrium it is not symmetric.
-_SPRING, _STIFFER, _STIFFEST, _NOTHING = 1e-3, 10.0, 1e6, 1e-6
+# Springs that keep the tangent stable, over the stiffness of rods at a contact: against gaps of contacts that press,
+# which do not move where they go on pressing, and then against motions across them too, which makes steps short;
+# eigenvalues of the compliance that need none, over its mean: out of equilibrium it is not symmetric.
+_SPRINGS = ((0.0, 0.0), (1.0, 0.0), (30.0, 0.0), (1e3, 0.0), *((1e3, 10.0**k) for k in range(-3, 7)))
+_NOTHING = 1e-6
 
 
 def complementary(A, b):
@@ -195,7 +197,7 @@ class RodContacts:
         `accepted`, from which it starts otherwise. Returns Solved."""
         problem, newton = self._problem, self._newton
         problem.set_load_factor(load_factor)
-        newton.iterations, spring, sizes, why = 0, 0.0, [], ""
+        newton.iterations, sizes, why = 0, [], ""
         problem.put(accepted)
         self._accepted = self._x, self._q, self._touches.of(self._touches.gap < _TOUCHES * self._largest)
         found, closest = self._look()
@@ -206,13 +208,15 @@ class RodContacts:
             if closest < _CLOSEST:
                 problem.put(accepted)
                 found, closest = self._look()
-        self._spring = spring
+        self._springs = 0  # the index of the last iteration's `_SPRINGS`
         while newton.iterations < _MOST and len(sizes) < _MOST_FULL:
             obey()
-            self.force[:] = 0.0
-            self._touches_now = found
-            newton.limit(self._allowed(found))
-            before, share = problem.numbers(), _SHARES[newton.iterations % 3] if len(sizes) > _PATIENCE else 1.0
+            allowed = self._allowed(found)
+            newton.limit(allowed)
+            self._near = found.gap < 2.7 * max(allowed, self._radius)
+            self._take(found, self._known_forces(found) * self._near[:, None], 0)
+            before, q = problem.numbers(), self._q
+            share = _SHARES[newton.iterations % 3] if len(sizes) > _PATIENCE else 1.0
             step = newton.step(share)
             if step is None:
                 why = "the tangent is singular or the residual is not a number"
@@ -227,15 +231,19 @@ class RodContacts:
                 newton.take(share)
                 found, closest = self._look()
             self._touches, self._forces = touches, forces
-            size = max(step.moved, step.turned)
+            # without the norms of quaternions, which no law knows at the nodes: rounding changes them
+            turned = np.einsum("nij,nj->ni", small_rotations((q + self._q) / 2), self._q - q) / min(step.share, share)
+            size = max(step.moved, np.linalg.norm(turned, axis=1).max())
             whole = step.share == 1.0
             last = sizes[-1] if sizes else 0.0  # of a full step before
             shrinks = size < 0.1 * last and size * size < _SETTLED * last
             if whole and (size < _SETTLED or shrinks or 0.3 * last < size < _ROUNDING > last > 0):
                 self._take(touches, forces, 0)
-                return self._confirmed(newton.iterations)
+                solved = self._confirmed(newton.iterations)
+                if solved.converged or len(sizes) > _PATIENCE:
+                    return solved
             sizes = [*sizes, size] if whole or len(sizes) > _PATIENCE else []
-            self._spring = self._spring / _STIFFER if self._spring > 1e-14 else 0.0
+            self._springs = max(self._springs - 1, 0)
         why = why or f"Newton's iterations ran out, {self._in_words(found)}"
         return Solved(False, newton.iterations, why)
 
@@ -312,14 +320,12 @@ class RodContacts:
 
     def complete(self, change):
         """Complete Newton's change without contact, K^-1 r, by the contacts; False where the tangent is singular."""
-        touches, largest, parts = self._touches_now, self._newton._longest, self._parts
-        near = touches.gap < 2.7 * max(largest, self._radius)
+        touches, near, parts = self._touches, self._near, self._parts
         self._found, self._broken, self._gives = np.zeros((len(touches), parts)), 0.0, 0.0
         if not near.any():
             self._last = np.zeros((self._found.size,) * 2), 0
             return True
-        touches = touches.of(near)
-        known = self._known_forces(touches)
+        touches, known = touches.of(near), self._forces[near]
         nodes, pulls = self._pulls(touches)
         pressed, m = np.flatnonzero(known[:, 0] > 0), len(touches)
         columns, factors = self.strands.curvatures(self._x, touches.of(pressed))
@@ -356,33 +362,34 @@ class RodContacts:
         if parts == 1:
             S = (S + S.T) / 2
         normal = q + parts * np.arange(m)
-        D, springs = np.r_[factors, np.zeros(m * parts)], np.r_[np.ones(q), np.zeros(m * parts)]
-        springs[normal] = 1.0
+        D, springs = np.r_[factors, np.zeros(m * parts)], np.zeros((2, q + m * parts))
+        springs[0, normal[pressed]] = springs[1, :q] = 1.0
         typical = np.abs(np.diag(S))[normal].mean()
         while True:
-            E = D - self._spring / typical * springs
-            M = np.linalg.solve(np.eye(len(E)) - E[:, None] * S, np.diag(E)) if self._spring or q else np.zeros_like(S)
+            E = D - np.array(_SPRINGS[self._springs]) / typical @ springs
+            M = np.linalg.solve(np.eye(len(E)) - E[:, None] * S, np.diag(E)) if q else np.zeros_like(S)
             A = S[q:, q:] + S[q:] @ M @ S[:, q:]
             lowest = np.linalg.eigvalsh((A + A.T)[::parts, ::parts] / 2)[0]
             if lowest > -_NOTHING * typical:
                 break
-            if self._spring > _STIFFEST:
+            if self._springs == len(_SPRINGS) - 1:
                 return False
-            self._spring = max(self._spring * _STIFFER, _SPRING)
+            self._springs += 1
         A = (A + A.T) / 2 if parts == 1 else A
         if parts > 1:
             lowest = np.linalg.eigvalsh((A + A.T) / 2)[0]
         added = 2 * max(-lowest, 0.0)
         A += (_REGULAR * typical + added) * np.eye(m * parts)
-        free = start.ravel() + d[q:] + S[q:] @ M @ d
+        free = start.ravel() + d[q:] + S[q:] @ M @ d - A @ known.ravel()
         if parts == 1:
             forces = complementary(A, free)[:, None]
         else:
             rubs = np.where(self._same(touches, self._accepted[2]) >= 0, self._friction, 0.0)
             forces, self._broken = rubbing(A, free, rubs, known)
-        self._gives = added * np.abs(forces).max()
-        spread = M @ (d + S[:, q:] @ forces.ravel())
-        spread[q:] += forces.ravel()
+        more = (forces - known).ravel()
+        self._gives = added * np.abs(more).max()
+        spread = M @ (d + S[:, q:] @ more)
+        spread[q:] += more
         change.array_w[:] -= solved @ spread
         self._found[near] = forces
         removed = 0
