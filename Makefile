@@ -21,7 +21,7 @@ export PYTHONNOUSERSITE = 1
 # Two workers, each a process without MPI.
 WORKERS = $(PYTHON) -m pytest -n 2 --dist worksteal
 
-.PHONY: help setup packages demo animation motion heap gallery well string whirl recipes test slow docs tutorials tables figure3 work-precision benchmarks cosseratbench failures rods-in-wells folders tangles truths random random-wells random-strings imperfect mutants sanitizers release clean
+.PHONY: help setup packages demo animation motion heap knot gallery well string whirl recipes test slow docs tutorials tables figure3 work-precision benchmarks cosseratbench failures rods-in-wells folders tangles truths random random-wells random-strings imperfect mutants sanitizers release clean
 
 help:
 	@echo "Times are those of two idle cores and an empty cache of compiled forms, after \`make setup\`; beside other work they are two to three times as long."
@@ -29,6 +29,7 @@ help:
 	@echo "make animation  the animation at the top of the README: the column far past its limit load (a quarter of a minute)"
 	@echo "make motion  seven motions, each a scene file, a picture and a number that must come out; writes out/ (half a minute)"
 	@echo "make heap    thirty rods that fall on each other and come to rest; writes out/ (two minutes)"
+	@echo "make knot    an overhand knot at rest under a pull; writes out/ (half a minute)"
 	@echo "make gallery the scene files of demos/, each with a picture and a number that must come out; writes out/ (a minute)"
 	@echo "make well    strings in wells: torque and drag, each with pictures and a number that must come out; writes out/wells/ (two minutes)"
 	@echo "make string  drill-strings in motion: stick-slip, waves, a map of stability, each with pictures and numbers that must come out; writes out/strings/ (a minute)"
@@ -67,6 +68,9 @@ motion: setup
 
 heap: setup
 	$(PYTHON) demos/heap.py
+
+knot: setup
+	$(PYTHON) demos/knot.py
 
 gallery: setup
 	$(PYTHON) demos/gallery.py

@@ -112,6 +112,16 @@ def test_a_small_heap():
     assert np.diff(history.dissipated).min() >= 0
 
 
+@pytest.mark.slow
+@pytest.mark.serial
+def test_an_overhand_knot():
+    import knot
+
+    path, checks = knot.at_rest()
+    assert all(deviation(check) <= check.allowed for check in checks), checks
+    assert path.stable.all()
+
+
 STRINGS = sorted((DEMOS / "strings").glob("*.toml"))
 
 
