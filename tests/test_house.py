@@ -49,7 +49,7 @@ ROOMS = {
     "signals": set(),
     "actions": {"scene", "forms"},
     "algebra": set(),
-    "models": {"scene", "forms"},
+    "models": {"scene", "forms", "algebra"},
     "results": {"scene", "pictures", "algebra"},
     "storage": {"scene", "results"},
     "pictures": {"scene"},

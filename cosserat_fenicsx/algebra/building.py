@@ -138,12 +138,31 @@ class Pointers:
         self._arrays.append(array)
         return self._ffi.cast("int *", array.ctypes.data)
 
-
     def call(self, name, *given):
         """Call a function of C; arrays are given as pointers to their numbers, None as 0."""
         ffi, given = self._ffi, [np.ascontiguousarray(x) if isinstance(x, np.ndarray) else x for x in given]
         pointers = (ffi.from_buffer(_POINTERS[x.dtype.char], x) if isinstance(x, np.ndarray) else x for x in given)
         return getattr(self._lib, name)(*(ffi.NULL if x is None else x for x in pointers))
+
+
+class Mesh(Pointers):
+    """The C structure `mesh` (`c`) of elements on rods, `counts` on each, of an `ElementRule`."""
+
+    def __init__(self, counts, rule, **arrays):
+        super().__init__()
+        self.c = c = self._ffi.new("mesh *")
+        c.rods, c.elements, c.p, c.points = len(counts), sum(counts), len(rule.nodes) - 1, len(rule.gauss)
+        c.nodes, c.first = c.p * c.elements + c.rods, self.integers(np.cumsum([0, *counts]))
+        self.keep(
+            at_gauss=rule.at_gauss, slopes=rule.slopes, from_slopes=rule.from_slopes, leading=rule.leading,
+            weights=rule.weights, by_fields=rule.contact_from_fields, by_densities=rule.contact_from_densities, **arrays
+        )  # fmt: skip
+
+    def keep(self, **arrays):
+        """Give C arrays of floats, but those that are None."""
+        for name, array in arrays.items():
+            if array is not None:
+                setattr(self.c, name, self.doubles(np.ascontiguousarray(array, dtype=float)))
 
 
 # C's types of numpy's arrays.

@@ -290,12 +290,12 @@ typedef struct {
 enum { IN_PLANE, IN_SPACE, PLANAR, SPATIAL };
 
 /* A mesh of rods and its last state. Elements and nodes are in the order of the scene; a rod's first node is p times
-   its first element plus the number of the rod. Frames and units are those of the forms. What follows `density` is of
-   rods that clamps and rigid joints hold, without couplings of strains. */
+   its first element plus the number of the rod. Frames and units are those of the forms. What follows `coupled` is of
+   many cases alone. */
 typedef struct {
     int rods, elements, nodes, p, points;
     const int *first;               /* (rods + 1,) elements */
-    const double *by_fields, *by_densities, *leading, *weights; /* see ElementRule */
+    const double *at_gauss, *slopes, *from_slopes, *by_fields, *by_densities, *leading, *weights; /* ElementRule's */
     const double *sizes;            /* (elements,) lengths */
     const double *gyrations, *limits; /* (rods,) radii; rounding of n and of m, least stiffness J, of bending, relative
                                        rounding of the motion; the last three of many cases alone */
@@ -303,18 +303,20 @@ typedef struct {
     double *motion, *gauss, *contact; /* (nodes, 7) displacement and q, (elements, points, 9) n, m and r', (elements,
                                          p + 1, 6) n and m */
     const double *density;          /* (elements, points, 6) loads per length, or 0 */
-    sweep *sweep;
-    int kind, components, forces;   /* of a node's unknowns; of n */
+    int kind, components;           /* of a node's unknowns */
     const int *order;               /* (rods, 3) of a tree, from the clamps on: rod, its element end there, node of the
                                        rod before or -1 */
+    const double *reference, *axes; /* (nodes, 3) positions; (3, 3) rows */
+    const double *R_R, *v_R, *known, *lasting; /* (elements, points, n): reference, n at load factor 1 where statics
+                                                  gives it, and at any load factor, or 0 */
+    const double *K, *J, *coupled; /* (elements, points, 3), or matrices (elements, points, 3, 3, 3) of strain by n and,
+                                       subtracted, by the change of curvature, by which that gives m; or 0 */
+    sweep *sweep;
+    int forces;                     /* of n */
     const int *from, *field_from;   /* (nodes, components) unknowns, or -1 where held at rest; (elements, points, n) */
-    const double *at_rest, *rest, *reference; /* a point of the sweep; (nodes, components); (nodes, 3) positions */
-    const double *basis, *slopes, *from_slopes; /* see ElementRule */
-    const double *axes;             /* (3, 3) rows */
-    const double *K, *J, *R_R, *v_R, *known; /* (elements, points, n): law, reference, n at load factor 1 where statics
-                                                gives it */
+    const double *at_rest, *rest;   /* a point of the sweep; (nodes, components) */
     double longest;                 /* element */
-    double *nodal, *placed;         /* (nodes, components), (nodes, 3) */
+    double *nodal, *fields;         /* (nodes, components); (elements, points, n) */
 } mesh;
 
 /* kind: position, rotation, force or moment; place: among displacement, q, n and m. */
@@ -424,6 +426,8 @@ void run_all(const group *g, int *why);
 int run(sweep *s);
 int correct(sweep *s, const double *starts, const int *expected, double near);
 int run_cases(cases *c);
+void expand_all(const mesh *m, int count, const double *load_factors, const double *nodal, const double *fields,
+                double *rq, double *gauss);
 void recover_all(const mesh *m, int count, const double *gauss, const double *density, double *contact);
 void find_leading(const mesh *m, int count, const double *motion, double *found);
 void measure(const mesh *m, int count, const double *motion, const double *gauss, const double *held, double *sizes,

@@ -60,31 +60,56 @@ static void weigh(const double *w, int n, const double *a, int size, double scal
     for (int k = 0; k < size; k++) b[k] *= scale;
 }
 
+/* The force that statics gives at the i-th Gauss point. */
+static void force_at(const mesh *m, int i, int n, double load_factor, double *force)
+{
+    for (int k = 0; k < n; k++)
+        force[k] = load_factor * m->known[n * i + k] + (m->lasting ? m->lasting[n * i + k] : 0);
+}
+
+/* The change of strain and the moment there by the material force and change of curvature. */
+static void apply_law(const mesh *m, int i, const double *force, const double *curvature, double *strain,
+                      double *moment)
+{
+    if (!m->coupled) {
+        for (int k = 0; k < 3; k++) strain[k] = force[k] / m->K[3 * i + k], moment[k] = m->J[3 * i + k] * curvature[k];
+        return;
+    }
+    const double *A = m->coupled + 27 * i, *G = A + 9, *S = A + 18;
+    for (int k = 0; k < 3; k++) {
+        strain[k] = moment[k] = 0;
+        for (int l = 0; l < 3; l++) {
+            strain[k] += A[3 * k + l] * force[l] - G[3 * k + l] * curvature[l];
+            moment[k] += G[3 * l + k] * force[l] + S[3 * k + l] * curvature[l];
+        }
+    }
+}
+
 /* n, m and r' of a determinate planar model at a Gauss point, in the plane: g = (n, m, r') (5,). */
 static void plane_point(const mesh *m, int e, int g, const double *theta, double load_factor, double *out)
 {
     const int i = e * m->points + g, n = m->p + 1;
-    const double *t_R = m->R_R + 2 * i, *v_R = m->v_R + 2 * i, *K = m->K + 3 * i, *known = m->known + 2 * i;
-    double turned, curvature;
-    weigh(m->basis + g * n, n, theta, 1, 1, &turned);
+    const double *t_R = m->R_R + 2 * i, *v_R = m->v_R + 2 * i;
+    double turned, curvature, strain[3], moment[3];
+    weigh(m->at_gauss + g * n, n, theta, 1, 1, &turned);
     weigh(m->slopes + g * n, n, theta, 1, 1 / m->sizes[e], &curvature);
     const double c = cos(turned), s = sin(turned);
     const double t[2] = {c * t_R[0] - s * t_R[1], s * t_R[0] + c * t_R[1]}, a[2] = {-t[1], t[0]};
-    const double force[2] = {load_factor * known[0], load_factor * known[1]};
-    const double sheared = v_R[0] + (a[0] * force[0] + a[1] * force[1]) / K[0];
-    const double stretched = v_R[1] + (t[0] * force[0] + t[1] * force[1]) / K[2];
-    out[2] = m->J[3 * i + 1] * curvature;
-    for (int k = 0; k < 2; k++) out[k] = force[k], out[3 + k] = sheared * a[k] + stretched * t[k];
+    force_at(m, i, 2, load_factor, out);
+    const double force[3] = {a[0] * out[0] + a[1] * out[1], 0, t[0] * out[0] + t[1] * out[1]};
+    const double bent[3] = {0, curvature, 0};
+    apply_law(m, i, force, bent, strain, moment);
+    out[2] = moment[1];
+    for (int k = 0; k < 2; k++) out[3 + k] = (v_R[0] + strain[0]) * a[k] + (v_R[1] + strain[2]) * t[k];
 }
 
 /* The same in space: out = (n, m, r') (9,), from the quaternions of the element's nodes. */
 static void space_point(const mesh *m, int e, int g, const double *nodes, double load_factor, double *out)
 {
     const int i = e * m->points + g, n = m->p + 1;
-    const double *R_R = m->R_R + 9 * i, *K = m->K + 3 * i, *J = m->J + 3 * i, *v_R = m->v_R + 3 * i;
-    const double *known = m->known + 3 * i;
-    double q[4], s[4], T[3][3];
-    weigh(m->basis + g * n, n, nodes, 4, 1, q);
+    const double *R_R = m->R_R + 9 * i, *v_R = m->v_R + 3 * i;
+    double q[4], s[4], T[3][3], force[3], bent[3], strain[3], moment[3];
+    weigh(m->at_gauss + g * n, n, nodes, 4, 1, q);
     weigh(m->slopes + g * n, n, nodes, 4, 1 / m->sizes[e], s);
     const double a = q[0], b = q[1], c = q[2], d = q[3], squared = square(q, 4);
     const double R[3][3] = {{a * a + b * b - c * c - d * d, 2 * (b * c - a * d), 2 * (b * d + a * c)},
@@ -95,11 +120,15 @@ static void space_point(const mesh *m, int e, int g, const double *nodes, double
     for (int k = 0; k < 3; k++)
         for (int l = 0; l < 3; l++)
             T[k][l] = (R[k][0] * R_R[l] + R[k][1] * R_R[3 + l] + R[k][2] * R_R[6 + l]) / squared;
-    for (int k = 0; k < 3; k++) out[k] = load_factor * known[k], out[3 + k] = out[6 + k] = 0;
+    force_at(m, i, 3, load_factor, out);
     for (int l = 0; l < 3; l++) {
-        const double curvature = 2 * (R_R[l] * turn[0] + R_R[3 + l] * turn[1] + R_R[6 + l] * turn[2]) / squared;
-        const double v = v_R[l] + (T[0][l] * out[0] + T[1][l] * out[1] + T[2][l] * out[2]) / K[l];
-        for (int k = 0; k < 3; k++) out[3 + k] += T[k][l] * J[l] * curvature, out[6 + k] += T[k][l] * v;
+        force[l] = T[0][l] * out[0] + T[1][l] * out[1] + T[2][l] * out[2];
+        bent[l] = 2 * (R_R[l] * turn[0] + R_R[3 + l] * turn[1] + R_R[6 + l] * turn[2]) / squared;
+    }
+    apply_law(m, i, force, bent, strain, moment);
+    for (int k = 0; k < 3; k++) {
+        out[3 + k] = out[6 + k] = 0;
+        for (int l = 0; l < 3; l++) out[3 + k] += T[k][l] * moment[l], out[6 + k] += T[k][l] * (v_R[l] + strain[l]);
     }
 }
 
@@ -112,34 +141,76 @@ static void in_space(const double *axes, const double *in, double *out)
     }
 }
 
-/* Displacements of the nodes of all rods of a tree from r' at the Gauss points, from the clamps outwards. */
-static void place_nodes(const mesh *m)
+/* Positions of the nodes of all rods of a tree, in rq, from r' at the Gauss points, from the clamps outwards. */
+static void place_nodes(const mesh *m, const double *gauss, double *rq)
 {
     const int n = m->p + 1;
     for (const int *order = m->order; order < m->order + 3 * m->rods; order += 3) {
-        const int rod = order[0], entry = m->first[rod] + order[1];
-        const double *start = order[2] < 0 ? m->reference + 3 * (m->p * entry + rod) : m->placed + 3 * order[2];
-        memmove(m->placed + 3 * (m->p * entry + rod), start, 3 * sizeof *start);
+        const int rod = order[0], entry = m->first[rod] + order[1], first = m->p * entry + rod;
+        memmove(rq + 7 * first, order[2] < 0 ? m->reference + 3 * first : rq + 7 * order[2], 3 * sizeof *rq);
         for (int k = entry; k < m->first[rod + 1] + entry - m->first[rod]; k++) {
             const int forward = k < m->first[rod + 1], e = forward ? k : m->first[rod + 1] - 1 - k + entry;
-            double *at = m->placed + 3 * (m->p * e + rod), whole[3], within[3];
-            for (int i = 0; i < 3; i++) {
-                whole[i] = 0;
-                for (int g = 0; g < m->points; g++)
-                    whole[i] += m->from_slopes[m->p * m->points + g] * m->gauss[9 * (e * m->points + g) + 6 + i];
-                whole[i] *= m->sizes[e];
-            }
-            if (!forward)
-                for (int i = 0; i < 3; i++) at[i] = at[3 * m->p + i] - whole[i];
-            for (int j = 1; j < n - !forward; j++) {
+            double *at = rq + 7 * (m->p * e + rod), steps[3 * (m->p + 1)];
+            for (int j = 1; j < n; j++)
                 for (int i = 0; i < 3; i++) {
-                    within[i] = 0;
+                    double step = 0;
                     for (int g = 0; g < m->points; g++)
-                        within[i] += m->from_slopes[j * m->points + g] * m->gauss[9 * (e * m->points + g) + 6 + i];
-                    at[3 * j + i] = at[i] + within[i] * m->sizes[e];
+                        step += m->from_slopes[j * m->points + g] * gauss[9 * (e * m->points + g) + 6 + i];
+                    steps[3 * j + i] = step * m->sizes[e];
                 }
-            }
+            if (!forward)
+                for (int i = 0; i < 3; i++) at[i] = at[7 * m->p + i] - steps[3 * m->p + i];
+            for (int j = 1; j < n - !forward; j++)
+                for (int i = 0; i < 3; i++) at[7 * j + i] = at[i] + steps[3 * j + i];
         }
+    }
+}
+
+/* r and q of all nodes, rq (nodes, 7), and n, m and r' at the Gauss points, inertial, at a load factor from the model's
+   unknowns of the nodes and its fields, if it has any. */
+static void expand(const mesh *m, const double *nodal, const double *fields, double load_factor, double *rq,
+                   double *gauss)
+{
+    const int c = m->components, plane = m->kind == IN_PLANE || m->kind == PLANAR;
+    const int known = m->kind == IN_PLANE || m->kind == IN_SPACE, each = plane ? 5 : 9;
+    for (int rod = 0; rod < m->rods; rod++)
+        for (int e = m->first[rod]; e < m->first[rod + 1]; e++)
+            for (int g = 0; g < m->points; g++, gauss += 9) {
+                const double *nodes = nodal + c * (m->p * e + rod);
+                double values[9];
+                if (m->kind == IN_PLANE) plane_point(m, e, g, nodes, load_factor, values);
+                else if (m->kind == IN_SPACE) space_point(m, e, g, nodes, load_factor, values);
+                else memcpy(values, fields + each * (e * m->points + g), each * sizeof *values);
+                if (plane) in_space(m->axes, values, gauss);
+                else memcpy(gauss, values, sizeof values);
+            }
+    for (int i = 0; i < m->nodes; i++) {
+        const double *w = nodal + c * i, *rest = m->reference + 3 * i, *normal = m->axes + 6;
+        double *at = rq + 7 * i;
+        for (int k = 0; k < 3 && m->kind == SPATIAL; k++) at[k] = w[k];
+        for (int k = 0; k < 3 && m->kind == PLANAR; k++) {
+            const double off = rest[0] * normal[0] + rest[1] * normal[1] + rest[2] * normal[2];
+            at[k] = w[0] * m->axes[k] + w[1] * m->axes[3 + k] + off * normal[k];
+        }
+        if (plane) {
+            const double half = w[c - 1] / 2, s = sin(half);
+            at[3] = cos(half);
+            for (int k = 0; k < 3; k++) at[4 + k] = s * normal[k];
+        } else {
+            memcpy(at + 3, w + (known ? 0 : 3), 4 * sizeof *w);
+        }
+    }
+    if (known) place_nodes(m, gauss - 9 * m->elements * m->points, rq);
+}
+
+/* `expand` of states: (count, nodes, 7), (count, elements, points, 9). */
+void expand_all(const mesh *m, int count, const double *load_factors, const double *nodal, const double *fields,
+                double *rq, double *gauss)
+{
+    const int points = m->elements * m->points, each = fields ? m->kind == PLANAR ? 5 : 9 : 0;
+    for (int k = 0; k < count; k++, fields += each * points) {
+        expand(m, nodal, fields, load_factors[k], rq, gauss);
+        nodal += m->nodes * m->components, rq += 7 * m->nodes, gauss += 9 * points;
     }
 }
 
@@ -162,46 +233,6 @@ static void recover(const mesh *m)
             }
         }
     }
-}
-
-/* The state of all nodes and Gauss points in space from the unknowns x and the fields, at a load factor. */
-static void expand(const mesh *m, const double *x, const double *fields, double load_factor)
-{
-    const int n = m->p + 1, c = m->components, plane = m->kind == IN_PLANE || m->kind == PLANAR;
-    const int known = m->kind == IN_PLANE || m->kind == IN_SPACE, each = plane ? 5 : 9;
-    double values[9];
-    for (int i = 0; i < m->nodes * c; i++) m->nodal[i] = m->from[i] < 0 ? m->rest[i] : x[m->from[i]];
-    for (int rod = 0; rod < m->rods; rod++)
-        for (int e = m->first[rod]; e < m->first[rod + 1]; e++)
-            for (int g = 0; g < m->points; g++) {
-                double *out = m->gauss + 9 * (e * m->points + g);
-                const double *nodes = m->nodal + c * (m->p * e + rod);
-                if (m->kind == IN_PLANE) plane_point(m, e, g, nodes, load_factor, values);
-                else if (m->kind == IN_SPACE) space_point(m, e, g, nodes, load_factor, out);
-                else
-                    for (int k = 0; k < each; k++)
-                        (plane ? values : out)[k] = fields[m->field_from[each * (e * m->points + g) + k]];
-                if (plane) in_space(m->axes, values, out);
-            }
-    if (known) place_nodes(m);
-    for (int i = 0; i < m->nodes; i++) {
-        const double *w = m->nodal + c * i;
-        double *moved = m->motion + 7 * i;
-        for (int k = 0; k < 3; k++) {
-            if (known) moved[k] = m->placed[3 * i + k] - m->reference[3 * i + k];
-            else if (!plane) moved[k] = w[k] - m->rest[c * i + k];
-            else
-                moved[k] = (w[0] - m->rest[c * i]) * m->axes[k] + (w[1] - m->rest[c * i + 1]) * m->axes[3 + k];
-        }
-        if (plane) {
-            const double half = w[c - 1] / 2, s = sin(half);
-            moved[3] = cos(half);
-            for (int k = 0; k < 3; k++) moved[4 + k] = s * m->axes[6 + k];
-        } else {
-            memcpy(moved + 3, w + (known ? 0 : 3), 4 * sizeof *w);
-        }
-    }
-    recover(m);
 }
 
 /* ---- two meshes -------------------------------------------------------------------------------------------------- */
@@ -506,9 +537,18 @@ static void correct_cases(const cases *c, const group *g, int *in)
     }
 }
 
+/* The state that was recorded, expanded. */
 static void expand_recorded(const mesh *m)
 {
-    expand(m, m->sweep->recorded, m->sweep->recorded_fields, *m->sweep->load_factors);
+    const int fields = m->kind == PLANAR ? 5 : m->kind == SPATIAL ? 9 : 0;
+    for (int i = 0; i < m->nodes * m->components; i++)
+        m->nodal[i] = m->from[i] < 0 ? m->rest[i] : m->sweep->recorded[m->from[i]];
+    for (int i = 0; i < fields * m->elements * m->points; i++)
+        m->fields[i] = m->sweep->recorded_fields[m->field_from[i]];
+    expand(m, m->nodal, m->fields, *m->sweep->load_factors, m->motion, m->gauss);
+    for (int i = 0; i < m->nodes; i++)
+        for (int k = 0; k < 3; k++) m->motion[7 * i + k] -= m->reference[3 * i + k];
+    recover(m);
 }
 
 /* Solve `count` cases from the next one on, each with meshes of its own. */

@@ -9,6 +9,7 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from cosserat_fenicsx import compat
+from cosserat_fenicsx.algebra.building import Mesh
 from cosserat_fenicsx.compat import compiling
 from cosserat_fenicsx.forms.equilibrium import Section
 from cosserat_fenicsx.forms.law import stiffness_for
@@ -111,6 +112,8 @@ class RodModel:
     data_derivative = energy_of_motion = None
     #: see `compiled.together`
     given = None
+    #: of the unknowns, in chain.h
+    kind = ""
 
     def __init__(self, comm, signature):
         self.comm, self.signature, self.axes = comm, signature, np.eye(3)
@@ -203,7 +206,22 @@ class RodModel:
     def expansion(self):
         """A function from load factors (k,) and stacked arrays of snapshots to (r, q) (k, N, 7) and (n, m, r') (k,
         cells, points, 9), dimensionless, inertial. It stays valid for the current scene after another is loaded."""
-        raise NotImplementedError
+        if self._expanding is None:
+            self._expanding = self._mesh_in_c()
+        mesh, c = self._expanding, self._expanding.c
+
+        def expand(load_factors, nodal, gauss):
+            rq, fields = np.empty((*nodal.shape[:2], 7)), np.empty((len(nodal), c.elements, c.points, 9))
+            mesh.call("expand_all", c, len(nodal), load_factors, nodal, gauss, rq, fields)
+            return rq, fields
+
+        return expand
+
+    def _mesh_in_c(self):
+        """The `Mesh` of the scene that is loaded, for `expansion`."""
+        mesh = Mesh(self.layout.counts, self.rule, reference=self.reference, axes=self.axes)
+        mesh.c.kind, mesh.c.components = getattr(mesh._lib, self.kind), self.components
+        return mesh
 
     # -- building ----------------------------------------------------------------------------------------------------
 
@@ -312,7 +330,7 @@ class RodModel:
 
     def load(self, scene, layout):
         """Fill in the data of a scene of this signature; the state becomes its reference configuration."""
-        self.scene, self.layout, self.scales = scene, layout, Scales.of(scene, self.EI)
+        self.scene, self.layout, self.scales, self._expanding = scene, layout, Scales.of(scene, self.EI), None
         scales, rods = self.scales, self.rods
         rods.place([b * rod.length / scales.length for rod, b in zip(scene.rods, layout.breaks, strict=True)])
         self.axes = np.array(scene.plane.axes) if self.signature.flat else np.eye(3)

@@ -45,7 +45,7 @@ _EYE = np.eye(3)
 class SpatialModel(RodModel):
     """The model for any scene."""
 
-    name, moves, turn = "spatial", 3, 2.0
+    name, kind, moves, turn = "spatial", "SPATIAL", 3, 2.0
     variations = ((6, False, small_motion_of),)
 
     def __init__(self, comm, signature):
@@ -315,25 +315,10 @@ def _to_plane(t):
     return P
 
 
-def in_space(axes, offset, r, theta, n, m, r_s):
-    """Results of a planar model as vectors and quaternions in space. axes: (3, 3) rows e_1, e_2, e_3; offset: (N, 3)
-    the constant part of the positions; r, theta: at the nodes, (k, N, 2) and (k, N); n, m, r_s: at the Gauss points,
-    (.., 2), (..), (.., 2). Returns (r, q) (k, N, 7) and (n, m, r') (.., 9), inertial; q is continuous where theta is,
-    beyond full turns too."""
-    rq, fields = np.empty((*theta.shape, 7)), np.empty((*m.shape, 9))
-    half = theta / 2
-    rq[..., :3] = r @ axes[:2] + offset
-    rq[..., 3], rq[..., 4:] = np.cos(half), np.sin(half)[..., None] * axes[2]
-    for first, part in ((0, n), (6, r_s)):
-        fields[..., first : first + 3] = part @ axes[:2]
-    fields[..., 3:6] = m[..., None] * axes[2]
-    return rq, fields
-
-
 class PlanarModel(PlaneModel):
     """The model for scenes in a plane."""
 
-    name, components, moves, turn = "planar", 3, 2, 1.0
+    name, kind, components, moves, turn = "planar", "PLANAR", 3, 2, 1.0
     variations = (
         (3, False, lambda w: planar.tests_of(w, along(w))),
         (3, True, lambda w: planar.sideways_tests_of(w, along(w))),
@@ -389,12 +374,3 @@ class PlanarModel(PlaneModel):
 
     def unknowns_of(self, rq):
         return np.concatenate([rq[..., :3] @ self.axes[:2].T, self._angles(rq)[..., None]], axis=-1)
-
-    def expansion(self):
-        axes, offset = self.axes, self._out_of_plane()
-
-        def expand(load_factors, nodal, gauss):
-            n, m, r_s = gauss[..., :2], gauss[..., 2], gauss[..., 3:]
-            return in_space(axes, offset, nodal[..., :2], nodal[..., 2], n, m, r_s)
-
-        return expand

@@ -218,27 +218,16 @@ _EPS = np.finfo(float).eps
 Sizes = namedtuple("Sizes", "sizes turning rounding still largest")
 
 
-def of_rule(kept, c, layout, rule):
-    """Tell C's `mesh` of the layout and the elements; kept: the `Pointers`."""
-    c.rods, c.elements, c.p, c.points = len(layout.counts), sum(layout.counts), len(rule.nodes) - 1, len(rule.gauss)
-    c.nodes, c.first = c.p * c.elements + c.rods, kept.integers(np.cumsum([0, *layout.counts]))
-    for name, array in (("by_fields", rule.contact_from_fields), ("by_densities", rule.contact_from_densities),
-                        ("leading", rule.leading), ("weights", rule.weights)):  # fmt: skip
-        setattr(c, name, kept.doubles(np.ascontiguousarray(array)))
-
-
 @per_scene
 def mesh_of(scene, scales, layout, rule, by_statics):
-    """What C knows of the mesh of a result, as `Pointers`, whose `c` is the `mesh` of chain.h."""
-    from cosserat_fenicsx.algebra.building import Pointers  # late: dolfinx is slow to import
+    """What C knows of the mesh of a result, as a `Mesh`; noise: (4, 1) see `Sizes.rounding`."""
+    from cosserat_fenicsx.algebra.building import Mesh  # late: dolfinx is slow to import
 
-    kept = Pointers()
-    c = kept.c = kept._ffi.new("mesh *")
-    of_rule(kept, c, layout, rule)
-    gyrations, c.length, kept.noise = of_sections(scene, scales, layout, c.p, by_statics)
-    c.gyrations, c.limits = kept.doubles(gyrations), kept.doubles(kept.noise[2:, 0].copy())
-    c.sizes = kept.doubles(layout.sizes(scene) / scales.length)
-    return kept
+    gyrations, length, noise = of_sections(scene, scales, layout, len(rule.nodes) - 1, by_statics)
+    sizes = layout.sizes(scene) / scales.length
+    mesh = Mesh(layout.counts, rule, sizes=sizes, gyrations=gyrations, limits=noise[2:, 0])
+    mesh.c.length, mesh.noise = length, noise
+    return mesh
 
 
 @per_scene

@@ -11,7 +11,7 @@ from functools import cached_property
 import numpy as np
 from dolfinx import fem
 
-from cosserat_fenicsx.algebra.building import LockStep, Pointers, allowed
+from cosserat_fenicsx.algebra.building import LockStep, Mesh, Pointers, allowed
 from cosserat_fenicsx.interrupts import obey
 from cosserat_fenicsx.models.rod_data import bending_lengths, bounded, field_values
 from cosserat_fenicsx.results import accuracy, compared
@@ -304,14 +304,12 @@ def _line(at, known, derivatives):
 _STEPS = StepControl()
 # Rejected steps after which a case is left to `solve`, whose load control looks at the stiffness at rest then.
 _PATIENCE = 2
-# The kinds of chain.h by the components of a node's unknowns.
-_KINDS = {1: "IN_PLANE", 4: "IN_SPACE", 3: "PLANAR", 7: "SPATIAL"}
 
 #: Places of an array that C reads, and which of the numbers of a case they take.
 Place = namedtuple("Place", "array places which")
 
 
-class Loaded(Pointers):
+class Loaded(Mesh):
     """A problem of its own on one mesh, with what C needs to expand its states (`c`, the `mesh` of chain.h).
 
     EI, N m^2, is that of the units, which then depend on no case; load_factor: of all cases; iterations: of Newton's
@@ -319,11 +317,11 @@ class Loaded(Pointers):
     """
 
     def __init__(self, solvers, scene, layout, EI, load_factor, *, iterations):
-        super().__init__()
         self.problem, self.newton, self.stability = self.solvers = solvers
         self.model, self.layout = self.problem.model, layout
+        super().__init__(layout.counts, self.model.rule)
         self.model.EI = EI
-        self._load_factor, self.c, self._kept, self._nodal = np.array([load_factor]), self._ffi.new("mesh *"), {}, None
+        self._load_factor, self._kept, self._nodal = np.array([load_factor]), {}, None
         self.load(scene)
         track = Track(*solvers, iterations)
         track.begin_here()
@@ -338,15 +336,10 @@ class Loaded(Pointers):
 
     def _describe(self):
         """Tell C what does not depend on the scene."""
-        c, model, rule = self.c, self.model, self.model.rule
-        elements, points = model._in_space.K.shape[:2]
-        components = model.components - getattr(model, "multipliers", 0)
-        c.kind = getattr(self._lib, _KINDS[components])
-        c.components, c.forces = model.components, model.force_size
-        compared.of_rule(self, c, self.layout, rule)
-        if hasattr(model, "_tree"):
-            order = [(rod, entry, -1 if before is None else before) for rod, entry, before in model._tree._order]
-            c.order = self.integers(np.array(order))
+        c, model = self.c, self.model
+        c.kind, c.components, c.forces = getattr(self._lib, model.kind), model.components, model.force_size
+        if hasattr(model, "tree"):
+            c.order = self.integers(model.tree.order)
         unknowns, fields = self.problem.numbering.size, self.problem.fields
         numbers = np.arange(1.0, unknowns + 1)
         of_fields = np.arange(float(fields.elements * fields.size)).reshape(1, fields.elements, -1) if fields else None
@@ -354,15 +347,10 @@ class Loaded(Pointers):
         c.__setattr__("from", self.integers(np.where(here[1] == here[0], -1, here[1] - 1)))
         if fields:
             c.field_from = self.integers(which[0])
-        for name, matrix in (
-            ("basis", rule.at_gauss), ("slopes", rule.slopes), ("from_slopes", rule.from_slopes)
-        ):
-            setattr(c, name, self.doubles(np.ascontiguousarray(matrix)))
-        for name, shape in (
-            ("nodal", (c.nodes, c.components)), ("placed", (c.nodes, 3)), ("motion", (c.nodes, 7)),
-            ("gauss", (elements, points, 9)), ("contact", (elements, c.p + 1, 6)),
-        ):  # fmt: skip
-            setattr(c, name, self.doubles(np.zeros(shape)))
+        at_gauss = c.elements, c.points, 9
+        shapes = {"nodal": (c.nodes, c.components), "fields": at_gauss, "motion": (c.nodes, 7), "gauss": at_gauss,
+                  "contact": (c.elements, c.p + 1, 6)}  # fmt: skip
+        self.keep(**{name: np.zeros(shape) for name, shape in shapes.items()})
 
     def load(self, scene):
         """Load a scene of the same signature; its rest state is that of the cases."""
