@@ -290,14 +290,16 @@ _MOST = 64
 def per_scene(function):
     """Decorator of a function (scene, ...) whose results depend on its arguments alone and are never changed. Arguments
     that cannot be hashed are passed on; so are exceptions, which are not remembered."""
-    known = weakref.WeakKeyDictionary()
+    known = {}  # by the scene's id, which its end takes out
 
     @functools.wraps(function)
     def remembered(scene, *args, **named):
         key = (*args, *named.items())
         key += (*map(type, args), *map(type, named.values()))  # True is not 1 where a number is expected
         try:
-            results = known.setdefault(scene, {})
+            if id(scene) not in known:
+                known[id(scene)] = {}, weakref.ref(scene, lambda _, number=id(scene): known.pop(number, None))
+            results, _ = known[id(scene)]
             if key in results:
                 return results[key]
         except TypeError:

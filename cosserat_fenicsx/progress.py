@@ -1,9 +1,11 @@
 """Progress of long runs on rank 0: a bar in a terminal, lines of text elsewhere, nothing for short runs."""
 
+import itertools
 import math
 import sys
 import threading
 import time
+from functools import cached_property
 
 from cosserat_fenicsx.ranks import are_apart
 
@@ -25,13 +27,15 @@ class Progress:
     def __init__(self, targets, wanted, comm, quantity="load factor"):
         self._quantity, self._show, self._now = quantity, _shown(wanted, comm), wanted is True
         self._terminal = sys.stderr.isatty()
-        way = [0.0, *targets]
-        self._way = sum(abs(b - a) for a, b in zip(way[:-1], way[1:], strict=True)) or 1.0
-        self._bar, self._meshes = None, 0
+        self._targets, self._bar, self._meshes = targets, None, 0
 
     def __enter__(self):
         self._began = self._last = time.monotonic()
         return self
+
+    @cached_property
+    def _way(self):
+        return sum(abs(b - a) for a, b in itertools.pairwise([0.0, *self._targets])) or 1.0
 
     def on_mesh(self):
         """The runs that follow are on another mesh, of which at least two are needed."""

@@ -140,9 +140,12 @@ class Pointers:
 
     def call(self, name, *given):
         """Call a function of C; arrays are given as pointers to their numbers, None as 0."""
-        ffi, given = self._ffi, [np.ascontiguousarray(x) if isinstance(x, np.ndarray) else x for x in given]
-        pointers = (ffi.from_buffer(_POINTERS[x.dtype.char], x) if isinstance(x, np.ndarray) else x for x in given)
-        return getattr(self._lib, name)(*(ffi.NULL if x is None else x for x in pointers))
+        pointers, at, null = [], self._ffi.from_buffer, self._ffi.NULL
+        for x in given:
+            if isinstance(x, np.ndarray):
+                x = at(_POINTERS[x.dtype.char], x if x.flags.c_contiguous else np.ascontiguousarray(x))
+            pointers.append(null if x is None else x)
+        return getattr(self._lib, name)(*pointers)
 
 
 class Mesh(Pointers):

@@ -123,8 +123,9 @@ class Newton(Pointers):
 
     def allow(self, iterations):
         """Set the largest number of iterations."""
-        self.c.most = iterations
-        self.snes.setTolerances(max_it=iterations + 1)  # newton.c stops before SNES's own limit
+        if iterations != self.c.most:
+            self.c.most = iterations
+            self.snes.setTolerances(max_it=iterations + 1)  # newton.c stops before SNES's own limit
 
     def _take_loads(self):
         """Set the limits of the residual's norm."""

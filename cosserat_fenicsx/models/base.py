@@ -346,8 +346,9 @@ class RodModel:
         fill_fields(self.data, rods, self.section, self.bounded_K)
         self.round_off = float(self.round_off_of(self.section, sizes))
         self._rest = self._at_rest()
+        self._rest_state = np.zeros_like(self.state.x.array)
+        self._rest_state[self.nodal] = self._rest[self.slots]
         self.rest()
-        self._rest_state = self.state.x.array.copy()
         self.actions.fill(self, self.time)
         self.densities.load(self)
         self.clamps.load()
@@ -360,9 +361,7 @@ class RodModel:
 
     def rest(self):
         """The state becomes the reference configuration of the scene."""
-        x = self.state.x.array
-        x[:] = 0
-        x[self.nodal] = self._rest[self.slots]
+        self.state.x.array[:] = self._rest_state
         for function in self.carried:
             function.x.array[:] = 0
 

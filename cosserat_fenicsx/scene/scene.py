@@ -391,8 +391,8 @@ class Scene(Part):
         """Warnings that belong to every result, a list of sentences."""
         return [*self.doubts, *self._following(), *self._outside()]
 
-    @property
-    def by_default(self) -> list[str]:
+    @cached_property
+    def by_default(self):
         """A sentence on sections whose weak and strong axes nobody turned, in a list; [] where there are none."""
         bending = self.extremes[1].J
         unlike = np.abs(bending[:, 0] - bending[:, 1]) > _ALIKE * bending[:, 0]

@@ -231,9 +231,7 @@ class Tracing:
             "neutral": np.zeros(count, dtype=bool),
             "densities": model.densities.at(swept.load_factors),
             "tie_forces": forces,
-            "clamp_loads": np.broadcast_to(
-                model.clamps.loads(swept.load_factors[:, None, None]), (count, model.clamps.count, 6)
-            ),
+            "clamp_loads": model.clamps.loads(swept.load_factors[:, None, None]) + np.zeros((count, 1, 1)),
             "steps": swept.steps.astype(int),
             "rod_forces": None,
         }
