@@ -66,6 +66,7 @@ def warn(text, kind=SceneWarning):
     warnings.warn(text, kind, stacklevel=2 if frame is None else level)
 
 
+@functools.lru_cache
 def _unit_of(expected):
     unit = re.search(r"\(([^(),]+)", expected)
     return unit[1] if unit else ""

@@ -436,7 +436,7 @@ class RodModel:
     def snapshots(self, x, fields):
         """`snapshot` at states of one process: from unknowns (k, unknowns), and fields (k, elements, n) or None."""
         numbering = self.numbering
-        state = np.tile(self._rest_state, (len(x), 1))
+        state = np.zeros((len(x), 1)) + self._rest_state
         state[:, numbering.free] = x[:, numbering.of_free]
         nodal = np.empty((len(x), *self.nodal.shape))
         nodal[:, self.slots] = state[:, self.nodal]

@@ -4,6 +4,7 @@ the compiled code and the mesh."""
 import numbers
 from collections import Counter, namedtuple
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -96,7 +97,7 @@ class Signature:
         """Whether a distributed action depends on the state."""
         return any(kind.place != "point" and not kind.dead for kind in self.terms)
 
-    @property
+    @cached_property
     def unknowns(self):
         """Number of unknowns, without making a mesh."""
         cells, links = sum(self.counts), self.connections

@@ -1,6 +1,8 @@
 """Error estimates of a path from two meshes, transfer of its points to another mesh, and where a solution needs short
 elements: in boundary layers of bending, and where two meshes differ most."""
 
+import math
+
 import numpy as np
 
 from cosserat_fenicsx.numerics import conjugate_product, directors
@@ -171,9 +173,9 @@ def hardest(path):
     if rough[seen].min() < _SMOOTHER * rough.max():
         which.add(int(seen[np.argmin(rough[seen])]))
     indicator = np.log(np.maximum(rough, 1e-300))
-    ends = np.array([min(indicator[list(which)]), max(indicator[list(which)])])
-    if np.ptp(ends) > np.log(_APART):
-        which.add(int(np.argmin(np.abs(indicator - ends.mean()))))
+    known = indicator[list(which)].tolist()
+    if max(known) - min(known) > math.log(_APART):
+        which.add(int(np.argmin(np.abs(indicator - (min(known) + max(known)) / 2))))
     which = np.array(sorted(which))
     return path.at_points(which), which
 

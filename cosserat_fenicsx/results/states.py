@@ -115,7 +115,7 @@ class States(OnNodes):
         is no whole number."""
         if isinstance(k, slice):
             return self.at_points(list(range(len(self))[k]))
-        return self.at_points([self._index(k, f"[{k!r}]")])
+        return self.at_points([self._index(k, "[{!r}]")])
 
     def at_points(self, which: Sequence[int] | np.ndarray) -> Self:
         """The result with some of its states only.
@@ -126,16 +126,15 @@ class States(OnNodes):
         Raises:
             IndexError, SceneError: as of `result[k]`.
         """
-        return self._with(self._taken([self._index(k, f"at_points([{k!r}])") for k in which]))
+        return self._with(self._taken([self._index(k, "at_points([{!r}])") for k in which]))
 
     def _index(self, k, where):
-        """The index k of a state, checked; `where` for messages."""
-        expected = f"expected the index of a {self.counted}, a whole number from {-len(self)} to {len(self) - 1}"
-        if isinstance(k, bool | np.bool_) or not hasattr(k, "__index__") or np.ndim(k):
-            raise SceneError(f"{where}: {expected}")
-        if not -len(self) <= k < len(self):
-            raise IndexError(f"{where}: {expected}")
-        return k
+        """The index k of a state, checked; `where` for messages, with {!r} for k."""
+        count, whole = len(self), hasattr(k, "__index__") and not isinstance(k, bool | np.bool_) and not np.ndim(k)
+        if whole and -count <= k < count:
+            return k
+        expected = f"expected the index of a {self.counted}, a whole number from {-count} to {count - 1}"
+        raise (IndexError if whole else SceneError)(f"{where.replace('{!r}', repr(k))}: {expected}")
 
     def _taken(self, which):
         """The `_expanded` of a result with the states `which` alone."""

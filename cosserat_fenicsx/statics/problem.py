@@ -120,6 +120,14 @@ def refuse_given_lengths(owner, scene):
             )
 
 
+@per_scene
+def _has_numbers_alone(scene):
+    """Whether no data of a scene are functions, whose values may change."""
+    own = all(type(load).__module__.startswith("cosserat_fenicsx.") for load in scene.loads)
+    called = any(map(callable, (value for load in scene.loads for value in vars(load).values())))
+    return own and not called and all(rod.profile.uniform for rod in scene.rods)
+
+
 #: Change of the load factor for central differences, whose error is of second order in that of prescribed rotations.
 CHANGE = 1e-4
 
@@ -199,11 +207,7 @@ class Problem(Equations):
 
     def _holds(self, scene, layout):
         """Whether this scene is loaded on this mesh, without user-defined functions, whose values may change."""
-        if self._loaded is None or self._loaded[0] is not scene or not all(rod.profile.uniform for rod in scene.rods):
-            return False
-        if self._remembers or not all(type(load).__module__.startswith("cosserat_fenicsx.") for load in scene.loads):
-            return False
-        if any(map(callable, (value for load in scene.loads for value in vars(load).values()))):
+        if self._loaded is None or self._loaded[0] is not scene or self._remembers or not _has_numbers_alone(scene):
             return False
         return self._loaded[1].keys == layout.keys
 
