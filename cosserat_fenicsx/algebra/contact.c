@@ -50,23 +50,21 @@ void begin_contact(contact *c, const int *slots, int count, const double *away, 
 void pack_contact(contact *c)
 {
     for (int i = 0; i < c->positions; i++) {
-        walled w = {0};
-        axes a = {0};
+        walled *w = walled_at(c, i);
+        axes *a = axes_at(c, i);
         for (int lane = 0, j; lane < c->lanes && (j = node_of(c, i, lane)) >= 0; lane++) {
             const double *t = c->tangent + 3 * j, *u = c->across + 3 * j;
             double v[3];
             cross3(t, u, v);
             for (int k = 0; k < 3; k++) {
-                a.t[k][lane] = t[k], a.u[k][lane] = u[k], a.v[k][lane] = v[k];
-                w.law[k][lane] = c->law[3 * j + k];
+                a->t[k][lane] = t[k], a->u[k][lane] = u[k], a->v[k][lane] = v[k];
+                w->law[k][lane] = c->law[3 * j + k];
             }
-            a.arm[lane] = c->arm[j], w.start[0][lane] = c->start[2 * j], w.start[1][lane] = c->start[2 * j + 1];
-            w.clearance[lane] = c->clearance[j], w.stiffness[lane] = c->stiffness[j];
-            w.friction[lane] = c->friction[j], w.damping[lane] = c->damping[j];
-            w.multiplier[lane] = c->multiplier[j], w.inner[lane] = c->inner[j];
+            a->arm[lane] = c->arm[j], w->start[0][lane] = c->start[2 * j], w->start[1][lane] = c->start[2 * j + 1];
+            w->clearance[lane] = c->clearance[j], w->stiffness[lane] = c->stiffness[j];
+            w->friction[lane] = c->friction[j], w->damping[lane] = c->damping[j];
+            w->multiplier[lane] = c->multiplier[j], w->inner[lane] = c->inner[j];
         }
-        memcpy(c->walled + (size_t)LANES * WALLED * i, &w, sizeof w);
-        memcpy(c->axes + (size_t)LANES * AXES * i, &a, sizeof a);
     }
 }
 
@@ -286,12 +284,13 @@ static inline void foretell_turning(vector W[4][4], const place *p, vector N, ve
 static vector settle_nodes(contact *c, int i, const vector *motion, vector *change)
 {
     double *forces = c->forces + LANES * 4 * i;
-    walled here = walled_at(c, i);
+    walled *here = walled_at(c, i);
     const vector none = {0};
     vector W[4][4], by[3][4], slip[4], moving[4], T[2] = {none, none}, size = none;
-    const place p = place_of(c, here.start, motion);
-    const mask idle = (p.R0 <= here.clearance) & (p.R <= here.clearance) & (here.law[0] == 0) & (here.law[1] == 0)
-                      & (here.law[2] == 0);
+    vector multiplier = here->multiplier;
+    const place p = place_of(c, here->start, motion);
+    const mask idle = (p.R0 <= here->clearance) & (p.R <= here->clearance) & (here->law[0] == 0) & (here->law[1] == 0)
+                      & (here->law[2] == 0);
     if (!any(~idle)) return none;
     for (int k = 0; k < 4; k++)
         for (int l = 0; l < 4; l++) W[k][l] = widen(c->compliance + LANES * (MOTIONS * (4 * (size_t)i + k) + l));
@@ -299,22 +298,21 @@ static vector settle_nodes(contact *c, int i, const vector *motion, vector *chan
     const vector round[4] = {-p.e[1], p.e[0], none, 1 + none}, along[4] = {none, none, 1 + none, none};
     respond(W, inward, by[0]);
     const vector give = only(p.R > 0, -(p.x[0] * by[0][0] + p.x[1] * by[0][1]) / p.R);
-    const vector N = settle_normal(c, &here, ~idle, p.R0, p.R, give);
-    const mask rubs = ~idle & (here.friction > 0) & (N > 0);
+    const vector N = settle_normal(c, here, ~idle, p.R0, p.R, give);
+    const mask rubs = ~idle & (here->friction > 0) & (N > 0);
     if (any(rubs)) {
         respond(W, round, by[1]), respond(W, along, by[2]);
-        for (int k = 0; k < 4; k++) slip[k] = motion[k] + by[0][k] * (N - here.law[0]);
+        for (int k = 0; k < 4; k++) slip[k] = motion[k] + by[0][k] * (N - here->law[0]);
         const vector A[3] = {dot4(round, by[1]), (dot4(round, by[2]) + by[1][2]) / 2, by[2][2]};
-        const vector b[2] = {dot4(round, slip) - A[0] * here.law[1] - A[1] * here.law[2],
-                             slip[2] - A[1] * here.law[1] - A[2] * here.law[2]};
-        settle_friction(A, b, here.friction * N, rubs, &here.multiplier, T);
+        const vector b[2] = {dot4(round, slip) - A[0] * here->law[1] - A[1] * here->law[2],
+                             slip[2] - A[1] * here->law[1] - A[2] * here->law[2]};
+        settle_friction(A, b, here->friction * N, rubs, &multiplier, T);
     }
-    here.law[0] = only(~idle, N), here.law[1] = T[0], here.law[2] = T[1];
+    here->multiplier = multiplier, here->law[0] = only(~idle, N), here->law[1] = T[0], here->law[2] = T[1];
     for (int k = 0; k < 4; k++)
         change[k] = only(~idle, N * inward[k] + T[0] * round[k] + T[1] * along[k] - load(forces + LANES * k));
-    foretell_turning(W, &p, here.law[0], change);
+    foretell_turning(W, &p, here->law[0], change);
     for (int k = 0; k < 4; k++) keep(load(forces + LANES * k) + change[k], forces + LANES * k);
-    memcpy(c->walled + (size_t)LANES * WALLED * i, &here, sizeof here);
     respond(W, change, moving);
     for (int k = 0; k < 4; k++) size = greater(size, absolute(moving[k]));
     return size;
@@ -360,7 +358,7 @@ static double sweep_nodes(contact *c, int back, int solved)
             const vector known = change[k];
             change[k] += load(late + LANES * k), keep(known, late + LANES * k);
         }
-        const mask inner = walled_at(c, i).inner != 0;
+        const mask inner = walled_at(c, i)->inner != 0;
         for (int k = 4 * inside; k-- > 0;) recent[k] = only(inner, k < 4 ? change[k] : recent[k - 4]);
         if (any_of(change, 4)) add_by(own, 4, change, passed);
         for (int k = 0; k < MOTIONS; k++) d[k] = choose(inner, d[k], passed[k]);
@@ -374,13 +372,13 @@ static double sweep_nodes(contact *c, int back, int solved)
 static void take_axes(contact *c)
 {
     for (int i = 0; i < c->positions; i++) {
-        const axes a = axes_at(c, i);
-        const walled w = walled_at(c, i);
+        const axes *a = axes_at(c, i);
+        const walled *w = walled_at(c, i);
         vector motion[MOTIONS] = {0}, force[3]; /* of rotations about u and v only the change is asked for */
         motion_of(c, i, motion), gather(c, c->force, 6, i, 0, force);
-        const vector forces[4] = {dot3v(a.u, force), dot3v(a.v, force), w.law[2], w.law[1]};
-        memcpy(c->motion + LANES * MOTIONS * i, motion, sizeof motion);
-        memcpy(c->forces + LANES * 4 * i, forces, sizeof forces);
+        const vector forces[4] = {dot3v(a->u, force), dot3v(a->v, force), w->law[2], w->law[1]};
+        for (int k = 0; k < MOTIONS; k++) keep(motion[k], c->motion + LANES * (MOTIONS * i + k));
+        for (int k = 0; k < 4; k++) keep(forces[k], c->forces + LANES * (4 * i + k));
     }
     memset(c->late, 0, (size_t)LANES * 4 * c->positions * sizeof *c->late);
     memset(c->passing, 0, (size_t)2 * LANES * (MOTIONS + 4 * c->inside) * sizeof *c->passing);
@@ -389,14 +387,14 @@ static void take_axes(contact *c)
 /* The forces and moments of the nodes at position i by their law, where they are. */
 static void put_forces(contact *c, int i, const place *p)
 {
-    const axes a = axes_at(c, i);
-    const walled w = walled_at(c, i);
-    const vector *law = w.law, inward = -law[0] * p->share;
+    const axes *a = axes_at(c, i);
+    const walled *w = walled_at(c, i);
+    const vector law[3] = {w->law[0], w->law[1], w->law[2]}, inward = -law[0] * p->share;
     const vector in_u = inward * p->e[0] - law[1] * p->e[1], in_v = inward * p->e[1] + law[1] * p->e[0];
     vector force[6];
     for (int k = 0; k < 3; k++) {
-        force[k] = in_u * a.u[k] + in_v * a.v[k] + law[2] * a.t[k] + 0.0; /* never -0 */
-        force[3 + k] = a.arm * (law[1] * a.t[k] + law[2] * (p->e[1] * a.u[k] - p->e[0] * a.v[k])) + 0.0;
+        force[k] = in_u * a->u[k] + in_v * a->v[k] + law[2] * a->t[k] + 0.0; /* never -0 */
+        force[3 + k] = a->arm * (law[1] * a->t[k] + law[2] * (p->e[1] * a->u[k] - p->e[0] * a->v[k])) + 0.0;
     }
     for (int lane = 0, j; lane < c->lanes && (j = node_of(c, i, lane)) >= 0; lane++)
         for (int k = 0; k < 6; k++) c->force[6 * j + k] = force[k][lane];
@@ -416,25 +414,25 @@ void aim(contact *c)
 static void leave_axes(contact *c)
 {
     for (int i = 0; i < c->positions; i++) {
-        const walled w = walled_at(c, i);
-        const axes a = axes_at(c, i);
+        const walled *w = walled_at(c, i);
+        const axes *a = axes_at(c, i);
         vector change[4], motion[MOTIONS], more[6];
         const place before = motion_of(c, i, change);
-        memcpy(motion, c->motion + LANES * MOTIONS * i, sizeof motion);
+        for (int k = 0; k < MOTIONS; k++) motion[k] = load(c->motion + LANES * (MOTIONS * i + k));
         for (int k = 0; k < 4; k++) change[k] = motion[k] - change[k];
-        const vector *turned = motion + 4, spin = change[3] / choose(a.arm > 0, a.arm, LEAST_LEVER + 0 * a.arm);
+        const vector *turned = motion + 4, spin = change[3] / choose(a->arm > 0, a->arm, LEAST_LEVER + 0 * a->arm);
         const vector tilt = before.e[0] * turned[1] - before.e[1] * turned[0];
-        const vector slid = change[2] + a.arm * tilt; /* of the displacement alone */
+        const vector slid = change[2] + a->arm * tilt; /* of the displacement alone */
         for (int k = 0; k < 3; k++) {
-            more[k] = change[0] * a.u[k] + change[1] * a.v[k] + slid * a.t[k];
-            more[3 + k] = turned[0] * a.u[k] + turned[1] * a.v[k] + spin * a.t[k];
+            more[k] = change[0] * a->u[k] + change[1] * a->v[k] + slid * a->t[k];
+            more[3 + k] = turned[0] * a->u[k] + turned[1] * a->v[k] + spin * a->t[k];
         }
-        const place p = place_of(c, w.start, motion);
+        const place p = place_of(c, w->start, motion);
         put_forces(c, i, &p);
         for (int lane = 0, j; lane < c->lanes && (j = node_of(c, i, lane)) >= 0; lane++) {
             for (int k = 0; k < 6; k++) c->moved[6 * j + k] += more[k][lane];
-            for (int k = 0; k < 3; k++) c->law[3 * j + k] = w.law[k][lane];
-            c->multiplier[j] = w.multiplier[lane];
+            for (int k = 0; k < 3; k++) c->law[3 * j + k] = w->law[k][lane];
+            c->multiplier[j] = w->multiplier[lane];
         }
     }
 }
@@ -460,12 +458,12 @@ int broken(const contact *c)
 {
     for (int i = 0; i < c->positions; i++) {
         vector slope, motion[4];
-        const walled w = walled_at(c, i);
+        const walled *w = walled_at(c, i);
         const place p = motion_of(c, i, motion);
-        const vector off = absolute(normal_force(c, &w, p.R0, p.R, &slope) - w.law[0]);
-        if (any(~(off <= 1e-6 * w.law[0] + 1e-10 * w.stiffness))) return 1;
-        const vector turned = p.x[0] * w.start[0] + p.x[1] * w.start[1];
-        if (any((w.law[0] > 0) & (w.clearance > 0) & (turned <= 0))) return 1;
+        const vector off = absolute(normal_force(c, w, p.R0, p.R, &slope) - w->law[0]);
+        if (any(~(off <= 1e-6 * w->law[0] + 1e-10 * w->stiffness))) return 1;
+        const vector turned = p.x[0] * w->start[0] + p.x[1] * w->start[1];
+        if (any((w->law[0] > 0) & (w->clearance > 0) & (turned <= 0))) return 1;
     }
     return 0;
 }
@@ -484,10 +482,10 @@ double gained(const contact *c)
     const vector none = {0};
     for (int i = 0; i < c->positions; i++) {
         vector motion[4];
-        const walled w = walled_at(c, i);
+        const walled *w = walled_at(c, i);
         const place p = motion_of(c, i, motion);
-        const vector deep = greater(p.R - w.clearance, none), before = greater(p.R0 - w.clearance, none);
-        end += w.stiffness * deep * deep / 2, start += w.stiffness * before * before / 2;
+        const vector deep = greater(p.R - w->clearance, none), before = greater(p.R0 - w->clearance, none);
+        end += w->stiffness * deep * deep / 2, start += w->stiffness * before * before / 2;
     }
     return sum_of(end) - sum_of(start);
 }
@@ -501,13 +499,14 @@ double lost(const contact *c, const double *before)
     const vector none = {0};
     for (int i = 0; i < c->positions; i++) {
         vector motion[4], start[3];
-        const walled w = walled_at(c, i);
+        const walled *w = walled_at(c, i);
         const place p = motion_of(c, i, motion);
         gather(c, before, 3, i, 0, start);
-        const vector k = w.stiffness, p0 = greater(p.R0 - w.clearance, none);
-        const vector at_end = w.law[0] - k * greater(p.R - w.clearance, none);
+        const vector k = w->stiffness, p0 = greater(p.R0 - w->clearance, none);
+        const vector at_end = w->law[0] - k * greater(p.R - w->clearance, none);
         const vector damping = at_end + choose((p0 > 0) & (start[0] == 0), at_end, start[0] - k * p0);
-        const vector round = slip_round(&p, motion) * (start[1] + w.law[1]), along = motion[2] * (start[2] + w.law[2]);
+        const vector round = slip_round(&p, motion) * (start[1] + w->law[1]);
+        const vector along = motion[2] * (start[2] + w->law[2]);
         sum += greater(damping * (p.R - p.R0) / 2, none) + greater(-(round + along) / 2, none);
     }
     return sum_of(sum);

@@ -67,28 +67,23 @@ static inline vector absolute(vector a)
    (normal, friction round and along) and multiplier; whether they are inside an element. Zero in lanes without a
    node. */
 typedef struct {
-    vector start[2], clearance, stiffness, friction, damping, law[3], multiplier, inner;
+    place_of_vector start[2], clearance, stiffness, friction, damping, law[3], multiplier, inner;
 } walled;
 
 /* Axes of nodes along and across their tubes, and their arms. */
 typedef struct {
-    vector t[3], u[3], v[3], arm;
+    place_of_vector t[3], u[3], v[3], arm;
 } axes;
 
-enum { WALLED = sizeof(walled) / sizeof(vector), AXES = sizeof(axes) / sizeof(vector) };
-
-static inline walled walled_at(const contact *c, int i)
+/* Those at position i: what is asked for is read from there, as copies of all of it take longer than the laws. */
+static inline walled *walled_at(const contact *c, int i)
 {
-    walled w;
-    memcpy(&w, c->walled + (size_t)LANES * WALLED * i, sizeof w);
-    return w;
+    return (walled *)c->walled + i;
 }
 
-static inline axes axes_at(const contact *c, int i)
+static inline axes *axes_at(const contact *c, int i)
 {
-    axes a;
-    memcpy(&a, c->axes + (size_t)LANES * AXES * i, sizeof a);
-    return a;
+    return (axes *)c->axes + i;
 }
 
 /* Node of a lane at a position, or -1. */
@@ -111,7 +106,7 @@ static inline void gather(const contact *c, const double *of, int width, int i, 
         for (int lane = 0; lane < LANES; lane++) to[l][lane] = of[at[lane] + l];
 }
 
-static inline vector dot3v(const vector *a, const vector *b)
+static inline vector dot3v(const place_of_vector *a, const vector *b)
 {
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
@@ -208,13 +203,13 @@ typedef struct {
 } place;
 
 /* moved: motion along u and v in the step. */
-static inline place place_of(const contact *c, const vector *x0, const vector *moved)
+static inline place place_of(const contact *c, const place_of_vector *x0, const vector *moved)
 {
     place p;
     vector m[2];
     for (int k = 0; k < 2; k++) {
-        p.x[k] = x0[k] + moved[k];
-        m[k] = c->at_end ? p.x[k] : x0[k] + p.x[k];
+        m[k] = p.x[k] = x0[k] + moved[k];
+        if (!c->at_end) m[k] += x0[k];
     }
     p.R0 = root(x0[0] * x0[0] + x0[1] * x0[1]), p.R = root(p.x[0] * p.x[0] + p.x[1] * p.x[1]);
     const vector size = c->at_end ? p.R : root(m[0] * m[0] + m[1] * m[1]);
@@ -227,13 +222,13 @@ static inline place place_of(const contact *c, const vector *x0, const vector *m
    along the tube, and what the rotation about the tube adds to the slip round it. */
 static inline place motion_of(const contact *c, int i, vector *motion)
 {
-    const axes a = axes_at(c, i);
-    const walled w = walled_at(c, i);
+    const axes *a = axes_at(c, i);
+    const walled *w = walled_at(c, i);
     vector moved[3], turned[3];
     gather(c, c->moved, 6, i, 0, moved), gather(c, c->moved, 6, i, 3, turned);
-    motion[0] = dot3v(a.u, moved), motion[1] = dot3v(a.v, moved), motion[3] = a.arm * dot3v(a.t, turned);
-    const place p = place_of(c, w.start, motion);
-    motion[2] = dot3v(a.t, moved) + a.arm * (p.e[1] * dot3v(a.u, turned) - p.e[0] * dot3v(a.v, turned));
+    motion[0] = dot3v(a->u, moved), motion[1] = dot3v(a->v, moved), motion[3] = a->arm * dot3v(a->t, turned);
+    const place p = place_of(c, w->start, motion);
+    motion[2] = dot3v(a->t, moved) + a->arm * (p.e[1] * dot3v(a->u, turned) - p.e[0] * dot3v(a->v, turned));
     return p;
 }
 
