@@ -5,7 +5,7 @@ import pytest
 from conftest import COMM, column
 from dolfinx.fem import petsc as fem_petsc
 
-from cosserat_fenicsx.algebra.building import Packed
+from cosserat_fenicsx.algebra.building import Packed, functions_in_lanes
 from cosserat_fenicsx.models.rodmesh import Layout
 from cosserat_fenicsx.statics.problem import solvers_of
 
@@ -56,6 +56,32 @@ def test_packed_forms_are_the_forms(formulation, degree):
                         whole.axpy(-1.0, assembled(part, my.add_to_matrix))
                         assert whole.norm() == 0
                     assert total.norm() < 1e-14 * size
+
+
+def test_several_elements_at_once_are_each_alone():
+    """A residual of two parts, of numbers of elements that are no multiples of how many are computed at once."""
+    random, packed = np.random.default_rng(COMM.rank), None
+    for length in (20.0, 30.0):
+        _, scene = column(arm=True, length=length)
+        with solvers_of(scene, Layout.of(scene, 3), formulation="displacement", degree=2) as (problem, _, _):
+            model = problem.model
+            if packed is None:
+                factors = model.load_factor, model.permanent_factor
+                packed = [Packed(model.forms.residual, [model.state], factors) for _ in range(2)]
+                parts = [*packed[0].parts()]
+                packed[1].take_together(functions_in_lanes(tuple(part.address for part in parts), 4))
+                assert len(parts) == 2 and (COMM.size > 1 or parts[0].elements % 4)
+            found, size = [], len(model.state.x.array)
+            model.state.x.array[:] = random.normal(size=size)
+            problem.set_load_factor(0.3)
+            for form in packed:
+                form.refresh()
+                model.state.x.array[:] += 0.1
+                problem.set_load_factor(0.8)
+                found.append(np.zeros(size))
+                form.add_to_vector(found[-1])
+                model.state.x.array[:] -= 0.1
+            np.testing.assert_allclose(*found, rtol=0, atol=1e-14 * np.abs(found[0]).max(initial=0))
 
 
 def assembled(form, add):

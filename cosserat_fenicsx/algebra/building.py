@@ -11,6 +11,7 @@ import contextlib
 import ctypes
 import functools
 import hashlib
+import math
 import os
 import re
 import shlex
@@ -137,6 +138,14 @@ class Pointers:
         array = np.ascontiguousarray(array, dtype=np.int32)
         self._arrays.append(array)
         return self._ffi.cast("int *", array.ctypes.data)
+
+    def in_lanes(self, *shape):
+        """(array (.., LANES), C's pointer to it) for numbers of all lanes, where a vector may begin."""
+        shape, size = (*shape, self._lib.LANES), 8 * self._lib.LANES
+        room = np.zeros(math.prod(shape) + self._lib.LANES)
+        first = -room.ctypes.data % size // 8
+        array = room[first : first + math.prod(shape)].reshape(shape)
+        return array, self.doubles(array)
 
     def call(self, name, *given):
         """Call a function of C; arrays are given as pointers to their numbers, None as 0."""
@@ -265,8 +274,29 @@ class Packed(_Kernel):
         for packed in self._pack().values():
             self._w[:] = packed
         self._c[:] = cpp.fem.pack_constants(self._form)
+        if self.c.together:
+            self._fill_lanes()
         if self._others:
             self._others.refresh()
+
+    def take_together(self, functions):
+        """Let C compute LANES elements of a vector at once, by `functions_in_lanes`; before `refresh`."""
+        groups, lanes = -(-self.elements // self._lib.LANES), {}
+        shapes = {"w": (groups, self._w.shape[1]), "c": (self._c.size,), "x": (groups, 6), "A": (self.size,)}
+        for name, shape in shapes.items():
+            lanes[name], pointer = self.in_lanes(*shape)
+            setattr(self.c, f"lanes_{name}", pointer)
+        self._lanes, self.c.together = lanes, functions[self.address]
+        if self._others:
+            self._others.take_together(functions)
+
+    def _fill_lanes(self):
+        mesh, lanes = self._form.mesh, self._lanes
+        ends = mesh.geometry.x[compat.geometry_dofs(mesh)[: self.elements]].reshape(self.elements, 6)
+        for to, numbers in ((lanes["w"], self._w), (lanes["x"], ends)):
+            last = np.repeat(numbers[-1:], -len(numbers) % self._lib.LANES, axis=0)  # where no element is
+            to[:] = np.concatenate([numbers, last]).reshape(len(to), -1, to.shape[1]).transpose(0, 2, 1)
+        lanes["c"][:] = self._c[:, None]
 
     def add_to_vector(self, array):
         """Add a linear form to an array of local degrees of freedom, ghosts included."""
@@ -350,16 +380,15 @@ def _up_to_its_last_brace(code):
 
 
 def _in_lanes(code):
-    """A kernel with vectors in place of numbers; tables and coordinates stay as they are."""
+    """A kernel with vectors in place of numbers; tables stay as they are."""
     code = re.sub(r"(?<!static const )\bdouble\b", "lanes", code)
-    code = code.replace("const lanes* restrict coordinate_dofs", "const double* restrict coordinate_dofs")
     code = re.sub(r"\blanes (\w+) = 0(\.0)?;", r"lanes \1 = {0};", code)
     return "static " + re.sub(rf"\b({'|'.join(_FUNCTIONS)})\(", r"lanes_\1(", code)
 
 
 @functools.cache
-def _functions(addresses, lanes):
-    """{address: C's function for one element of each lane}; None where there is none."""
+def functions_in_lanes(addresses, lanes):
+    """{address of a compiled kernel: C's function for one element of each lane}; None where there is none."""
     sources = {address: _source(address) for address in addresses}
     if None in sources.values():
         return None
@@ -403,7 +432,7 @@ class LockStep(Pointers):
         parts = [part.form for part in variations.parts]
         forms = [problem._residual, problem.tangent_form, *parts]
         self.c, lanes = None, self._lib.LANES
-        self._functions = _functions(tuple(x.address for form in forms for x in form.parts()), lanes)
+        self._functions = functions_in_lanes(tuple(x.address for form in forms for x in form.parts()), lanes)
         if self._functions is None:
             return
         self.c, self._kernels = self._ffi.new("lock_step *"), []
@@ -411,9 +440,11 @@ class LockStep(Pointers):
         for k, kernel in enumerate(second):
             self.c.second[k] = kernel
         chains = [problem.c.chain, *(variations.c.chain[k] for k in range(variations.c.parts))]
-        self.c.A = self._room(max(form.size for form in forms))
-        self.c.front = self._room(max(x.elements * x.room * (x.room + 1) for x in chains))
-        self.c.x = self._room(problem.c.size)
+        rooms = {"A": max(form.size for form in forms), "x": problem.c.size,
+                 "front": max(x.elements * x.room * (x.room + 1) for x in chains)}  # fmt: skip
+        for name, size in rooms.items():
+            _, pointer = self.in_lanes(size)
+            setattr(self.c, name, pointer)
 
     def _kernel(self, form):
         """C's `lane_kernel` of a form and of those that are added to it."""
@@ -421,14 +452,8 @@ class LockStep(Pointers):
         for part in [*form.parts()][::-1]:
             kernel = self._ffi.new("lane_kernel *")
             kernel.tabulate, kernel.next = self._functions[part.address], found
-            kernel.w, kernel.c, kernel.constants = self._room(part._w.size), self._room(part._c.size), part._c.size
+            (_, kernel.w), (_, kernel.c) = self.in_lanes(part._w.size), self.in_lanes(part._c.size)
+            kernel.constants = part._c.size
             self._kernels.append(kernel)
             found = kernel
         return found
-
-    def _room(self, count):
-        """C's pointer to numbers of all lanes, where a vector may begin."""
-        size = 8 * self._lib.LANES
-        room = np.zeros(self._lib.LANES * (count + 1))
-        first = -room.ctypes.data % size // 8
-        return self.doubles(room[first:])

@@ -25,7 +25,11 @@ typedef void tabulator(double *, const double *, const double *, const double *,
 static void take_constants(kernel *k)
 {
     for (; k; k = k->next)
-        for (int i = 0; i < k->constants; i++) k->c[k->slot[i]] = *k->constant[i];
+        for (int i = 0; i < k->constants; i++) {
+            k->c[k->slot[i]] = *k->constant[i];
+            for (int lane = 0; k->together && lane < LANES; lane++)
+                k->lanes_c[LANES * k->slot[i] + lane] = *k->constant[i];
+        }
 }
 
 static double *coefficients(kernel *k, int e)
@@ -56,11 +60,36 @@ static const double *element(kernel *k, int e, double *A)
     return A;
 }
 
+/* The numbers of `count` elements from e on, at most LANES, next to each other. */
+static const double *elements_together(kernel *k, int e, int count)
+{
+    double *A = k->lanes_A;
+    const double *x = k->lanes_x + 6 * (size_t)e;
+    memset(A, 0, LANES * k->size * sizeof *A);
+    for (; k; k = k->next) {
+        double *w = k->lanes_w + (size_t)e * k->width;
+        for (const source *s = k->source; s < k->source + k->sources; s++)
+            for (int i = 0; i < s->count; i++)
+                for (int lane = 0; lane < LANES; lane++) { /* the first element stands in lanes without one */
+                    const int *which = s->which + (size_t)(lane < count ? e + lane : e) * s->count;
+                    w[LANES * (s->column + i) + lane] = s->values[which[i]];
+                }
+        ((tabulator *)k->together)(A, w, k->lanes_c, x, 0, 0 LAST);
+    }
+    return A;
+}
+
 /* Add a vector's elements to values (local degrees of freedom); dofs: (elements, size). */
 void add_vector(kernel *k, const int *dofs, double *values)
 {
     take_constants(k);
-    for (int e = 0; e < k->elements; e++, dofs += k->size) {
+    for (int e = 0; k->together && e < k->elements; e += LANES) {
+        const int count = k->elements - e < LANES ? k->elements - e : LANES;
+        const double *A = elements_together(k, e, count);
+        for (int lane = 0; lane < count; lane++, dofs += k->size)
+            for (int i = 0; i < k->size; i++) values[dofs[i]] += A[LANES * i + lane];
+    }
+    for (int e = k->together ? k->elements : 0; e < k->elements; e++, dofs += k->size) {
         const double *A = element(k, e, k->A);
         for (int i = 0; i < k->size; i++) values[dofs[i]] += A[i];
     }

@@ -25,6 +25,9 @@ typedef struct kernel {
     const double *x;               /* (points, 3) the mesh's geometry */
     const int *corners;            /* (elements, 2) */
     double *A;                     /* (size,) work space */
+    void *together;                /* FFCx's function for LANES elements at once, of a vector; or 0 */
+    double *lanes_w, *lanes_c, *lanes_x, *lanes_A; /* for it: (groups, width, LANES), (constants, LANES), (groups, 6,
+                                      LANES) ends of elements, (size, LANES) work space */
     struct kernel *next;           /* another part of the same form, which is added; or 0 */
 } kernel;
 

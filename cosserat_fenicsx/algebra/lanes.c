@@ -10,9 +10,9 @@
 typedef double vector __attribute__((vector_size(LANES * sizeof(double))));
 
 #if KERNEL_ARGUMENTS == 6
-typedef void lane_tabulator(vector *, const vector *, const vector *, const double *, const int *, const uint8_t *);
+typedef void lane_tabulator(vector *, const vector *, const vector *, const vector *, const int *, const uint8_t *);
 #else
-typedef void lane_tabulator(vector *, const vector *, const vector *, const double *, const int *, const uint8_t *,
+typedef void lane_tabulator(vector *, const vector *, const vector *, const vector *, const int *, const uint8_t *,
                             void *);
 #endif
 
@@ -86,8 +86,8 @@ static void tabulate_lanes(const lane_kernel *v, kernel *const *of, const int *i
                            vector *A)
 {
     const kernel *parts[LANES], *k = of[first];
-    double x[6];
-    for (int i = 0; i < 2; i++) memcpy(x + 3 * i, k->x + 3 * (size_t)k->corners[2 * e + i], 3 * sizeof *x);
+    vector x[6], zero = {0};
+    for (int i = 0; i < 6; i++) x[i] = zero + k->x[3 * (size_t)k->corners[2 * e + i / 3] + i % 3];
     memset(A, 0, k->size * sizeof *A);
     for (int i = 0; i < count; i++) parts[i] = of[i];
     for (; v; v = v->next) {

@@ -16,13 +16,17 @@ takes of the kinetic energy counts as dissipated.
 import numpy as np
 from dolfinx import fem
 
-from cosserat_fenicsx.algebra.building import Packed
+from cosserat_fenicsx.algebra.building import Packed, functions_in_lanes
 from cosserat_fenicsx.algebra.equations import CONTACT, NODES, RESIDUAL, STATE, Equations
 from cosserat_fenicsx.algebra.tie_rows import TieRows
 from cosserat_fenicsx.dynamics.contact import NodalContact, TouchingNodes, motion_between
 from cosserat_fenicsx.dynamics.touching import RodsTouching
 from cosserat_fenicsx.numerics import directors, small_rotations
 from cosserat_fenicsx.statics.tensions import ThreadLengths
+
+
+# Number of elements from which several are computed at once: the code for it takes a second to compile.
+_MANY_ELEMENTS = 100
 
 
 class MovingTies(TieRows):
@@ -301,6 +305,12 @@ class StepProblem(Equations):
         self._live, self._momentum, self._dead, self._permanent = (
             self._pack_form(form) for form in (forms.live, forms.momentum, forms.dead, forms.permanent)
         )
+        if sum(self.model.signature.counts) >= _MANY_ELEMENTS:
+            forms = self._residual, self._momentum
+            addresses = tuple(part.address for form in forms for part in form.parts())
+            functions = functions_in_lanes(addresses, self._lib.LANES)
+            for form in forms if functions else ():
+                form.take_together(functions)
 
     def _pack_form(self, form):
         """A form, or the sum of a tuple of forms, for assembly, with data that may change in time; None for None."""
