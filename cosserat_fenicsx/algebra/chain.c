@@ -20,6 +20,20 @@ typedef void tabulator(double *, const double *, const double *, const double *,
 #define LAST , 0
 #endif
 
+/* Numbers next to each other in the processor, and where they are in memory. */
+typedef double vector __attribute__((vector_size(LANES * sizeof(double))));
+typedef double place_of_vector __attribute__((vector_size(LANES * sizeof(double)), aligned(sizeof(double)), may_alias));
+
+static inline vector load(const double *from)
+{
+    return *(const place_of_vector *)from;
+}
+
+static inline void keep(vector a, double *to)
+{
+    *(place_of_vector *)to = a;
+}
+
 /* ---- elements ---------------------------------------------------------------------------------------------------- */
 
 static void take_constants(kernel *k)
@@ -247,7 +261,7 @@ static inline double dot(const double *restrict a, const double *restrict b, int
 
 /* ---- along the rods ---------------------------------------------------------------------------------------------- */
 
-enum { BESIDE = 4 }; /* numbers of a front that are taken together */
+enum { BESIDE = LANES }; /* numbers of a front that are taken together */
 
 static inline int round_down(int i)
 {
@@ -344,6 +358,65 @@ static inline const double *subtract_column(double *restrict z, const double *re
     return column;
 }
 
+/* z without the columns of L times their numbers of z, of which one depends on those before: a vector of them is found
+   in the processor and subtracted from the others at once. */
+static inline void subtract_below(double *restrict z, const double *l, int n, int k, const int many)
+{
+    const int end = round_up(n);
+    int j = 0;
+    for (; many == 1 && j + BESIDE <= k; j += BESIDE) {
+        const int apart = end - j;
+        vector v = load(z + j), by[BESIDE];
+        for (int c = 0; c < BESIDE; c++) {
+            by[c] = v[c] - (vector){0};
+            if (c + 1 < BESIDE) v -= load(l + c * apart) * by[c];
+        }
+        keep(v, z + j);
+        for (int i = BESIDE; i < apart; i += BESIDE) {
+            vector other = load(z + j + i);
+            for (int c = 0; c < BESIDE; c++)
+                other -= load(l + c * apart + i - (c + 1 < BESIDE ? 0 : BESIDE)) * by[c];
+            keep(other, z + j + i);
+        }
+        l += BESIDE * apart - BESIDE;
+    }
+    for (; j < k; j++) l = subtract_column(z, l, z + many * j, round_down(j + 1), end, many);
+}
+
+/* The first k numbers of z by the columns of U, from the last one on, whose numbers of z from k on are known. */
+static inline void subtract_above(double *restrict z, const double *u, const double *restrict inverse, int n, int k,
+                                  const int many)
+{
+    const int known = many > 1 ? 0 : n - k, all = round_up(k);
+    int j = n - 1 - known;
+    for (int i = 0; known && i < all; i += BESIDE) {
+        vector other = load(z + i);
+        for (int l = 0; l < known; l++) other -= load(u + l * all + i) * z[n - 1 - l];
+        keep(other, z + i);
+    }
+    u += known * all;
+    for (; j >= 0 && (many > 1 || (j + 1) % BESIDE); j--) {
+        for (int r = 0; r < many && j < k; r++) z[many * j + r] *= inverse[j];
+        u = subtract_column(z, u, z + many * j, 0, round_up(j < k ? j : k), many);
+    }
+    for (j++; j > 0; j -= BESIDE) {
+        const int first = j - BESIDE;
+        vector v = load(z + first), by[BESIDE];
+        for (int l = 0; l < BESIDE; l++) { /* upwards, or the compiler does not unroll it */
+            const int c = BESIDE - 1 - l;
+            v[c] *= inverse[first + c], by[l] = v[c] - (vector){0};
+            if (c) v -= load(u + l * j + first) * by[l];
+        }
+        keep(v, z + first);
+        for (int i = 0; i < first; i += BESIDE) {
+            vector other = load(z + i);
+            for (int l = 0; l < BESIDE; l++) other -= load(u + l * j + i) * by[l];
+            keep(other, z + i);
+        }
+        u += (BESIDE - 1) * j + first;
+    }
+}
+
 /* Factors of the sum of the elements: of the kernel, or matrices that are given. Returns 0, or 1 if it is singular. */
 int eliminate(chain *s, kernel *k, const double *matrices)
 {
@@ -414,7 +487,7 @@ static inline void forward_of(const chain *s, const double *b, double *interface
             for (int r = 0; r < many; r++) y[many * carried_to(i, d + shape[0], shape) + r] += carry[many * i + r];
         for (int i = 0; i < n; i++)
             for (int r = 0; r < many; r++) z[many * i + r] = y[many * row[i] + r];
-        for (int j = 0; j < k; j++) l = subtract_column(z, l, z + many * j, round_down(j + 1), round_up(n), many);
+        subtract_below(z, l, n, k, many);
         d = m - k, carried = n - k;
         if (s->ends[t] == -1) {
             memcpy(carry, z + many * k, many * carried * sizeof *carry);
@@ -447,10 +520,9 @@ static inline void backward_of(const chain *s, const double *interface, double *
                 z[many * i + r] = column[i] < s->size ? x[many * column[i] + r]
                                                       : interface[many * (column[i] - s->size) + r];
             }
-        for (int j = n - 1; j >= 0; j--) {
-            for (int r = 0; r < many && j < k; r++) x[many * column[j] + r] = z[many * j + r] *= inverse[j];
-            u = subtract_column(z, u, z + many * j, 0, round_up(j < k ? j : k), many);
-        }
+        subtract_above(z, u, inverse, n, k, many);
+        for (int j = 0; j < k; j++)
+            for (int r = 0; r < many; r++) x[many * column[j] + r] = z[many * j + r];
     }
 }
 

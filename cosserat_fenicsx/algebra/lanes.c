@@ -7,8 +7,6 @@
 #include <stdint.h>
 #include <string.h>
 
-typedef double vector __attribute__((vector_size(LANES * sizeof(double))));
-
 #if KERNEL_ARGUMENTS == 6
 typedef void lane_tabulator(vector *, const vector *, const vector *, const vector *, const int *, const uint8_t *);
 #else

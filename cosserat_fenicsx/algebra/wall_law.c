@@ -10,24 +10,12 @@ enum { MOST_LOCAL = 60 };
 /* ---- four nodes at once ------------------------------------------------------------------------------------------ */
 
 /* Nodes far apart are solved together, one in each lane of a vector: the forces of one do not move the others. */
-typedef double vector __attribute__((vector_size(LANES * sizeof(double))));
-typedef double place_of_vector __attribute__((vector_size(LANES * sizeof(double)), aligned(sizeof(double)), may_alias));
 typedef float place_of_floats __attribute__((vector_size(LANES * sizeof(float)), aligned(sizeof(float)), may_alias));
 typedef __typeof__((vector){0} < (vector){0}) mask;
-
-static inline vector load(const double *from)
-{
-    return *(const place_of_vector *)from;
-}
 
 static inline vector widen(const float *from)
 {
     return __builtin_convertvector(*(const place_of_floats *)from, vector);
-}
-
-static inline void keep(vector a, double *to)
-{
-    *(place_of_vector *)to = a;
 }
 
 static inline int any(mask m)
