@@ -148,6 +148,13 @@ typedef struct {
     double missing, omitted;        /* the last of these errors; by it, norm of what the last response leaves out */
 } contact;
 
+/* The axis of a tube: circular arcs and straight lines one after another, see well/path.py. */
+typedef struct {
+    int sections;
+    const double *start, *length, *bend; /* (sections,) depth where each starts; size of the curvature */
+    const double *position, *tangent, *curvature; /* (sections, 3) there */
+} arcs;
+
 /* Contacts of rods with each other in a time step, see contact.c. Each has a normal force and, with friction, two
    forces across it; their motions are the gap at the end of the step and two slips in it. */
 typedef struct {
@@ -412,6 +419,9 @@ double gained(const contact *c);
 double lost(const contact *c, const double *before);
 
 int settle_pairs(pairs *c);
+
+void nearest_on_arcs(const arcs *a, int count, const double *points, int whole, double *md, double *position,
+                     double *tangent, double *curvature);
 
 double step_goal(const step_control *c, double here, double load_factor);
 double step_growth(const step_control *c, double off, int order, int iterations, int linear);

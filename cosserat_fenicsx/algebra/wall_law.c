@@ -236,6 +236,70 @@ static inline void respond(vector W[4][4], const vector *v, vector *Wv)
     for (int k = 0; k < 4; k++) Wv[k] = W[0][k] * v[0] + W[1][k] * v[1] + W[2][k] * v[2] + W[3][k] * v[3];
 }
 
+/* ---- the axis of a tube ------------------------------------------------------------------------------------------ */
+
+/* A point of an axis at an arc length x from the start of section i; tangent t and curvature vector k there. */
+static void point_on_arc(const arcs *a, int i, double x, double *r, double *t, double *k)
+{
+    const double *from = a->position + 3 * i, *t0 = a->tangent + 3 * i, *k0 = a->curvature + 3 * i;
+    const double half = a->bend[i] * x / 2, sine = half != 0 ? sin(half) : 0, chord = half != 0 ? x * sine / half : x;
+    const double level = 1 - 2 * sine * sine, along = half != 0 ? chord * cos(half) : x, aside = chord * chord / 2;
+    const double bent = along * dot3(k0, k0);
+    for (int j = 0; j < 3; j++) {
+        r[j] = from[j] + along * t0[j] + aside * k0[j];
+        t[j] = level * t0[j] + along * k0[j], k[j] = level * k0[j] - bent * t0[j];
+    }
+}
+
+/* Arc length from the start of section i to the point of its circle that is closest to r, nearest to its middle. */
+static double projected(const arcs *a, int i, const double *r)
+{
+    const double *from = a->position + 3 * i, away[3] = {r[0] - from[0], r[1] - from[1], r[2] - from[2]};
+    const double along = dot3(away, a->tangent + 3 * i), bend = a->bend[i], middle = bend * a->length[i] / 2;
+    if (bend == 0) return along;
+    const double angle = atan2(bend * along, 1 - dot3(away, a->curvature + 3 * i));
+    return (middle + remainder(angle - middle, 2 * M_PI)) / bend;
+}
+
+static double within(const arcs *a, int i, double x)
+{
+    return x < 0 ? 0 : x > a->length[i] ? a->length[i] : x; /* NaN stays */
+}
+
+/* The points of an axis that are closest to points (count, 3): on the `whole` of it; or from depths md on, from section
+   to section in one direction, so that it ends: neighbours share the plane across their station. */
+void nearest_on_arcs(const arcs *a, int count, const double *points, int whole, double *md, double *position,
+                     double *tangent, double *curvature)
+{
+    const int last = a->sections - 1;
+    for (int n = 0; n < count; n++, points += 3, position += 3, tangent += 3, curvature += 3) {
+        double x = 0, least = INFINITY;
+        int i = 0;
+        for (int j = 0; whole && j <= last; j++) {
+            const double there = within(a, j, projected(a, j, points));
+            double away[3], t[3], k[3];
+            point_on_arc(a, j, there, away, t, k);
+            for (int l = 0; l < 3; l++) away[l] -= points[l];
+            if (dot3(away, away) < least) least = dot3(away, away), i = j, x = there;
+        }
+        if (!whole) {
+            for (int end = last; i < end;) {
+                const int middle = (i + end + 1) / 2;
+                if (a->start[middle] <= md[n]) i = middle;
+                else end = middle - 1;
+            }
+            x = projected(a, i, points);
+            const int way = (x > a->length[i]) - (x < 0);
+            while ((way < 0 && x < 0 && i > 0) || (way > 0 && x > a->length[i] && i < last))
+                i += way, x = projected(a, i, points);
+            x = within(a, i, x);
+        }
+        md[n] = a->start[i] + x;
+        point_on_arc(a, i, x, position, tangent, curvature);
+        if (md[n] <= 0 || (i == last && x >= a->length[last])) memset(curvature, 0, 3 * sizeof *curvature);
+    }
+}
+
 /* ---- rods that touch each other ---------------------------------------------------------------------------------- */
 
 /* Solve contact i with the forces of all others; returns the size of the change of its motion by its own. */

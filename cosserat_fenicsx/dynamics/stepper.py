@@ -106,10 +106,9 @@ class Stepper:
         if last is None:
             (h2, _, rates2, _), (h1, _, rates1, _), (h0, state, rates, _) = known
             last = _extrapolated(h0, state, rates[0], [h2, h1], [rates2[0], rates1[0]])
-        off = last - self._start
-        errors = np.array([change @ change for change in off])
+        errors = np.array([change @ change for change in last - self._start])
         order = np.argsort(self._comm.allreduce(errors) if self._comm.size > 1 else errors)
-        return guesses[order]
+        return [guesses[k] for k in order]
 
     def error(self, early=False):
         """Estimated local error of the last step, of positions (over the unit of length) and rotations (rad over 10).

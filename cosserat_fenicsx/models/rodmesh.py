@@ -386,13 +386,10 @@ class Numbering:
 
     def add_up(self, numbers, b):
         """Sum local contributions, of all ranks and joined nodes, into a solver's vector."""
-        if self._serial:
-            array = b.array_w
-            array[self.first_multiplier :] = 0.0
-            if self._shared:
-                array[:] = np.bincount(self.of_free, numbers[self.free], minlength=self.size)
-            else:
-                array[self.of_free] = numbers[self.free]
+        if self._serial and not self._shared:
+            self.from_local(numbers, b)
+        elif self._serial:
+            b.array_w[:] = np.bincount(self.of_free, numbers[self.free], minlength=self.size)
         else:
             b.set(0.0)
             self._local.array_w[:] = numbers[self.free]

@@ -16,6 +16,7 @@ from typing import Annotated
 import numpy as np
 from scipy.interpolate import CubicSpline
 
+from cosserat_fenicsx.algebra.building import module
 from cosserat_fenicsx.checks import File, Numbers, finite_array, instance, refuse, store, warn
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.actions.walls import TubeAxis
@@ -216,16 +217,10 @@ class WellPath(TubeAxis):
         points = finite_array("WellPath.closest", "points", points, "(..., 3) finite numbers (m)")
         if points.shape[-1:] != (3,):
             refuse("WellPath.closest", "points", points, "(..., 3) finite numbers (m)")
-        rows = points.reshape(-1, 3)
-        if near is None:
-            found = np.empty(len(rows))
-            many = max(1, (1 << 20) // len(self.sections.length))  # bounds the memory for pairs of point and arc
-            for a in range(0, len(rows), many):
-                found[a : a + many] = self._on_the_whole(rows[a : a + many])
-        else:
-            i, x = self._walked(rows, np.broadcast_to(np.asarray(near, dtype=float), points.shape[:-1]).ravel())
-            found = self.sections.start[i] + x
-        return found.reshape(points.shape[:-1])
+        if near is not None:
+            near = np.broadcast_to(np.asarray(near, dtype=float), points.shape[:-1]).ravel()
+            self._place(near)
+        return self._nearest(points.reshape(-1, 3), near).md.reshape(points.shape[:-1])
 
     def nearest(self, points: Numbers | None, near: Numbers) -> "Nearest":
         """The points of the axis that are closest to points, with tangent and curvature there.
@@ -238,14 +233,27 @@ class WellPath(TubeAxis):
             `Nearest`. Beyond its ends the axis is straight: a point there has the measured depth and the position
             of the end, and no curvature.
         """
+        if points is not None:
+            return self._nearest(points, near)
         at = np.clip(near, 0.0, self.length)
-        i, x = self._place(at) if points is None else self._walked(points, at)
-        md = self.sections.start[i] + x
-        position, tangent, curvature = self._at(i, x)
-        if points is None:
-            position += (near - at)[:, None] * tangent
-        curvature[(md <= 0.0) | (i == len(self.sections.start) - 1) & (x >= self.sections.length[-1])] = 0.0
-        return Nearest(md, position, tangent, curvature)
+        position, tangent, curvature = self._at(*self._place(at))
+        position += (near - at)[:, None] * tangent
+        curvature[(at <= 0.0) | (at >= self.length)] = 0.0
+        return Nearest(at, position, tangent, curvature)
+
+    def _nearest(self, points, near):
+        """`nearest`, in C; near: None for the whole axis."""
+        ffi, lib = module()
+        md = np.empty(len(points)) if near is None else np.array(near, dtype=float)
+        found = Nearest(md, *np.empty((3, len(points), 3)))
+        points, sections = np.ascontiguousarray(points, dtype=float), self.sections._asdict()
+        data = {name: ffi.from_buffer("double[]", array) for name, array in sections.items()}
+        arcs = ffi.new("arcs *", {"sections": len(self.sections.start), **data})
+        lib.nearest_on_arcs(
+            arcs, len(points), ffi.from_buffer("double[]", points), near is None,
+            *(ffi.from_buffer("double[]", array) for array in found),
+        )  # fmt: skip
+        return found
 
     def _at(self, i, x):
         """Position, tangent and curvature vector, (..., 3), at arc lengths x (m) from the starts of sections i."""
@@ -256,39 +264,6 @@ class WellPath(TubeAxis):
         cos, along, aside = (part[..., None] for part in _arc(s, i, x))
         bent = along * _dot(k, k)[..., None]
         return r + along * t + aside * k, cos * t + along * k, cos * k - bent * t
-
-    def _on_the_whole(self, points):
-        s, every = self.sections, np.arange(len(self.sections.length))
-        x = np.clip(self._projected(points[:, None], every), 0.0, s.length)
-        away = self._at(every, x)[0] - points[:, None]
-        best = np.argmin((away * away).sum(axis=-1), axis=1)
-        return s.start[best] + x[np.arange(len(points)), best]
-
-    def _walked(self, points, near):
-        """`_place` of the closest points: section by section in one direction, so that it ends; neighbours share the
-        plane across their station."""
-        s = self.sections
-        i, _ = self._place(near)
-        x, length = self._projected(points, i), s.length[i]
-        way = (x > length) * 1 - (x < 0)
-        while True:
-            moving = np.flatnonzero((way < 0) & (x < 0) & (i > 0) | (way > 0) & (x > length) & (i < len(s.start) - 1))
-            if not len(moving):
-                return i, np.minimum(np.maximum(x, 0.0), length)
-            i[moving] += way[moving]
-            x[moving], length[moving] = self._projected(points[moving], i[moving]), s.length[i[moving]]
-
-    def _projected(self, points, i):
-        """Arc length from the starts of sections i to the closest points on their circles, nearest to their middles."""
-        s = self.sections
-        away, k = points - s.position.take(i, axis=0), s.bend[i]
-        x = _dot(away, s.tangent.take(i, axis=0))
-        if not k.any():
-            return x
-        angle = np.arctan2(k * x, 1.0 - _dot(away, s.curvature.take(i, axis=0)))
-        middle = k * s.length[i] / 2
-        angle = (angle - middle + np.pi) % (2 * np.pi) - np.pi + middle
-        return np.where(k > 0, angle / np.where(k > 0, k, 1.0), x)
 
     def _place(self, md):
         """Index of the section and arc length from its start, for measured depths."""
