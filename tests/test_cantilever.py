@@ -432,6 +432,10 @@ def test_what_is_advised_helps(control):
 @pytest.mark.slow
 @pytest.mark.serial
 def test_loads_beyond_ea_are_asked_about():
-    _, scene = column()
+    rod, scene = column()
+    with pytest.raises(cf.SceneError, match="expected at most 0.5 EA = .*, beyond which no such material is elastic"):
+        cf.solve(scene, [1e9], elements=2)
+    unknown = cf.Rod(rod.curve, cf.Stiffness((2e9, 2e9), 6.6e9, (1.65e7, 1.65e7), 1.27e7), name="column")
+    scene = cf.Scene([unknown], [cf.Clamp(unknown.start)], [cf.Force(unknown.end, (1e3, 0, -1e5))])
     with pytest.raises(cf.NotConverged, match="times EA there, which no rod bears: are the units those of SI"):
         cf.solve(scene, [1e9], elements=2)
