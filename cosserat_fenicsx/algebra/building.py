@@ -295,7 +295,7 @@ class Packed(_Kernel):
         ends = mesh.geometry.x[compat.geometry_dofs(mesh)[: self.elements]].reshape(self.elements, 6)
         for to, numbers in ((lanes["w"], self._w), (lanes["x"], ends)):
             last = np.repeat(numbers[-1:], -len(numbers) % self._lib.LANES, axis=0)  # where no element is
-            to[:] = np.concatenate([numbers, last]).reshape(len(to), -1, to.shape[1]).transpose(0, 2, 1)
+            to[:] = np.concatenate([numbers, last]).reshape(len(to), self._lib.LANES, to.shape[1]).transpose(0, 2, 1)
         lanes["c"][:] = self._c[:, None]
 
     def add_to_vector(self, array):
