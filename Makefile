@@ -123,7 +123,7 @@ tables: setup
 	$(PYTHON) demos/evidence/steps.py
 	$(PYTHON) demos/evidence/wall_in_motion.py
 	$(PYTHON) demos/evidence/orders.py
-	$(PYTHON) demos/evidence/put_in_docs.py accuracy overhead cases first_runs rungs choice scaling many_rods million_cases ranks steps orders
+	$(PYTHON) demos/evidence/put_in_docs.py accuracy overhead cases first_runs rungs choice scaling many_rods million_cases ranks steps wall_in_motion orders
 
 # What an interrupted run has finished is kept: the same command goes on from there.
 figure3: setup

@@ -34,6 +34,7 @@ PAGES = {
     "million_cases": ("evidence/cost.md",),
     "ranks": ("evidence/cost.md",),
     "steps": ("evidence/cost.md",),
+    "wall_in_motion": ("evidence/motion.md",),
     "overhead": ("evidence/cost.md",),
     "cases": ("evidence/cost.md",),
     "first_runs": ("evidence/cost.md",),

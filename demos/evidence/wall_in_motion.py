@@ -29,7 +29,7 @@ ASKED, REPEATS = 3.0, 20  # processor seconds a simulated second; of parts
 
 def pipe(height, length=LENGTH):
     """The scene of the pipe at a height (m) above the wall on the low side."""
-    path = cf.well.WellPath.from_survey([0, length + 2 * BEGINS], [INCLINATION] * 2, [0, 0])
+    path = cf.well.WellPath.from_survey([0, length + 2 * BEGINS], [INCLINATION] * 2, [0, 0], length_unit="m")
     steel = cf.Material(E=206e9, nu=0.3, density=7850.0)
     section = cf.Tube(2 * RADIUS, BORE)
     along = path.tangent(BEGINS)
@@ -86,11 +86,10 @@ def main(runs=3, duration=0.3, length=LENGTH, elements=ELEMENTS, out="out"):
         f"{in_words()}. Medians of {runs} run(s) of {duration:g} s, steps of {1e3 * DT:g} ms, {elements} P{DEGREE} "
         f"elements on {length:g} m; processor seconds a simulated second.",
         "",
-        *table(f"pipe | iterations a step | energy balance over work | s | {HEADS}".replace("s | asked", "s, asked"),
-               rows),
+        *table(f"pipe | iterations a step | energy balance over work | s | {HEADS}", rows),
         "",
         *table("pipe | residual (us) | substitution | rest of an iteration | a fresh tangent", split),
-    ]  # fmt: skip
+    ]
     print(write("wall_in_motion", lines, out))
     return found
 
