@@ -159,7 +159,7 @@ def test_scaling_quick(tmp_path):
     tested."""
     import scaling
 
-    rows = scaling.main(sizes=(4, 16), out=tmp_path, runs=1)
+    rows = scaling.main(sizes=(4, 16), out=tmp_path, runs=1, of_modes=((4, 0.5),))
     assert rows[:, 0].tolist() == [112, 448] and (rows[:, 1:] > 0).all()
     seconds, moved = scaling.floor(steps=1)
     assert seconds > 0 and moved == pytest.approx(1e-6 * ((1 - 1 / (4 * scaling.FEW**2)) / 3 + 1 / 4e3), rel=1e-9)

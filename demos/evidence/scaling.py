@@ -6,7 +6,8 @@
 Each size runs in a separate process: a thick cantilever under a small transverse force, degree 4, one Newton step
 (residual, tangent, factorisation, solution, update of n) repeated from rest, and one count of negative modes; medians.
 
-A second table has a step at 8 elements beside that of the cheapest rod there is, in plain C (floor.c), and its parts.
+A second table has complex modes: six of a shaft that turns, with damping and a dashpot. A third has a step at 8
+elements beside that of the cheapest rod there is, in plain C (floor.c), and its parts.
 """
 
 import os
@@ -20,6 +21,7 @@ import numpy as np
 from cantilever import column
 from harness import HEADS, apart, command, judged, table, timed, write
 
+import cosserat_fenicsx as cf
 from cosserat_fenicsx import compat
 from cosserat_fenicsx.models.rodmesh import Layout
 from cosserat_fenicsx.statics.problem import solvers_of
@@ -29,7 +31,9 @@ QUICK = SIZES[:5]
 DEGREE = 4
 LOAD = 1e-6  # load factor
 EXPONENT, MILLION, FLOOR = 1.05, 0.5, 5.0  # asked at most: exponent; s; times the time of floor.c
-FEW = 8  # elements of the second table
+#: Elements of degree 4 for complex modes, and the processor time (s) asked at most.
+COMPLEX = ((360, 0.5), (3572, 8.0))
+FEW = 8  # elements of the third table
 KINDS = (("determinate", 1), ("planar", 1), ("spatial", 1), ("determinate", 4), ("planar", 4), ("spatial", 4))
 
 
@@ -86,6 +90,22 @@ def kernels(model, degree, runs):
     """Time (s) of FFCx's kernels alone for the tangents of FEW elements; of 16 times as many, since calls take time."""
     with loaded(16 * FEW, degree, model) as (problem, _, _):
         return float(np.median([timed(problem.tangent_form.matrices)[1] for _ in range(runs)])) / 16
+
+
+def complex_modes(elements):
+    """Processor time (s) of six complex modes of a shaft that turns."""
+    section = cf.Stiffness((1e3, 1e3), 1e3, (1.0, 1.3), 1.0, mass=1.0, inertia=(1e-4, 1e-4, 2e-4))
+    rod = cf.Rod(cf.Line((0, 0, 0), (1, 0, 0)), section, name="shaft", damping=cf.Damping(time=1e-3))
+    scene = cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Dashpot(rod.end, 2.0), cf.Centrifugal((2.0, 0, 0))])
+    return timed(lambda: cf.modes(scene, 6, elements=elements, degree=DEGREE))[1]
+
+
+def modes_table(sizes, runs=3):
+    """Lines of the table of complex modes; the first run of all compiles."""
+    complex_modes(FEW)
+    rows = [(f"{28 * elements}", judged(float(np.median([complex_modes(elements) for _ in range(runs)])), most, ".2f"))
+            for elements, most in sizes]  # fmt: skip
+    yield from table(f"unknowns of complex modes | s | {HEADS}", rows)
 
 
 def floor(steps, elements=FEW):
@@ -146,7 +166,7 @@ def floor_table(runs):
     yield from table(f"model | {heads} | {HEADS}", rows)
 
 
-def main(sizes=SIZES, out="out", runs=300):
+def main(sizes=SIZES, out="out", runs=300, of_modes=COMPLEX):
     """Print the tables, write them to out/scaling.md. Returns The rows (unknowns, step, count, memory) as an array."""
     rows = []
     for elements in sizes:
@@ -154,9 +174,10 @@ def main(sizes=SIZES, out="out", runs=300):
         print(f"{rows[-1][0]:8d} unknowns: step {1e3 * rows[-1][1]:9.3f} ms", flush=True)
     rows = np.array(rows)
     about = f"{compat.version()}; medians, processor time, one process. Memory is the process's largest, all loaded."
-    print(write("scaling", [about, "", *sizes_table(rows), "", *floor_table(runs)], out))
+    tables = [*sizes_table(rows), "", *modes_table(of_modes), "", *floor_table(runs)]
+    print(write("scaling", [about, "", *tables], out))
     return rows
 
 
 if __name__ == "__main__":
-    command(__doc__, main, {"sizes": QUICK}, one=measure)
+    command(__doc__, main, {"sizes": QUICK, "of_modes": COMPLEX[:1]}, one=measure)
