@@ -29,9 +29,6 @@ _SAMPLES, _NOTHING = 257, 1e-9
 # Angles around a cylinder or a sphere in a picture, rad.
 _CIRCLE = np.linspace(0, 2 * np.pi, 33)
 
-# `Traits` of the obstacles here, of which UFL takes up to three minutes to find those of a rough drum.
-_TRAITS = {"dead": False, "known_force": False, "rates": False, "turns": True, "flat": True}
-
 _Point = Annotated[Numbers, Several("length")]
 
 
@@ -270,7 +267,7 @@ class Plane(Obstacle):
     law: ContactLaw | None = None
     velocity: Annotated[Numbers, Several("speed")] | None = None
 
-    surface, motion, traits = staticmethod(contact.plane), staticmethod(contact.shifted), _TRAITS
+    surface, motion, traits = staticmethod(contact.plane), staticmethod(contact.shifted), action.IN_PLANE
 
     def _check_motion(self):
         if self.velocity is not None and any(self.velocity):
@@ -336,7 +333,7 @@ class Sphere(_Round):
     contact_radius: Annotated[Length, at_least(0)] | None = None
     law: ContactLaw | None = None
 
-    surface, inside, traits = staticmethod(contact.sphere), False, _TRAITS
+    surface, inside, traits = staticmethod(contact.sphere), False, action.IN_PLANE
 
     def shape(self):
         return action.vector(self.point, "m from origin"), action.scalar(self.radius, "m")
@@ -401,7 +398,7 @@ class Cylinder(_Cylindrical):
     law: ContactLaw | None = None
     spin: AngularVelocity = 0.0
 
-    _unit_of_axis, traits = "axis", _TRAITS
+    _unit_of_axis, traits = "axis", action.IN_PLANE
 
     def _check_motion(self):
         if self.spin:

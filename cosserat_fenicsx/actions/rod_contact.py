@@ -10,7 +10,7 @@ import numpy as np
 from cosserat_fenicsx.checks import refuse
 from cosserat_fenicsx.errors import SceneError, nearest
 from cosserat_fenicsx.parts import Friction, Length, Number, WallStiffness, at_least
-from cosserat_fenicsx.scene.action import LineAction
+from cosserat_fenicsx.scene.action import IN_SPACE, LineAction
 from cosserat_fenicsx.strands import Apart, closest_segments, overlap
 
 # Length of the sides of the polygons that are compared at rest, over the radius; most sides of a rod; depth over the
@@ -101,8 +101,7 @@ class RodContact(LineAction):
     friction: Friction = 0.0
 
     rod, work, scaled, rods_touch = None, None, False, True
-    #: It depends on the positions of rods, and drives them out of planes.
-    traits = {"dead": False, "known_force": False, "rates": False, "turns": True, "flat": False}
+    traits = IN_SPACE
 
     def validate(self):
         if self.radius == 0:

@@ -107,8 +107,7 @@ class Tendon(Load, LineAction):
     friction: Friction = 0.0
     pulled: Literal["start", "end"] = "start"
 
-    work, is_thread = "tendon", True
-    traits = dict(dead=False, known_force=False, rates=False, turns=True, flat=True)
+    work, is_thread, traits = "tendon", True, action.IN_PLANE
 
     def validate(self):
         if isinstance(self.offset, AlongPieces):

@@ -164,7 +164,7 @@ class _Confined(Pressing):
     """Shared by walls along rods and at stations."""
 
     scaled, wall_work = False, staticmethod(wall_work)
-    traits = {"dead": False, "known_force": False, "rates": False, "turns": True, "flat": False}
+    traits = action.IN_SPACE
 
     def data(self, rod, s):
         """See `Action`: as where the rod lies on the axis, to which the spring leads again."""

@@ -32,8 +32,6 @@ from cosserat_fenicsx.scene.rod import RodOrName
 
 # Most events that `print` names.
 _EVENTS = 6
-#: The begin of the sentence of `why` on negative modes out of the plane.
-SIDEWAYS = "Unstable out of its plane"
 _KINDS = {"limit": "Limit point", "bifurcation": "Bifurcation", "flutter": "Flutter"}
 # The state of a point by the sign of its number of negative modes.
 _STATES = {0: "stable", 1: "unstable", -1: "critical"}
@@ -89,6 +87,7 @@ class Path(RodResult):
         rounding: the error of positions and rotations that the rounding of the residual alone may cause, relative.
         events: every `Event` of the path in order: limit points and bifurcations, and flutter after `modes`.
         left: whether the path continues on a branch from its first bifurcation.
+        cautions: the sentences of `why` that `print` shows.
         control: "load", or "arc" where the path, or a part of it, was followed in arc length.
     """
 
@@ -105,6 +104,7 @@ class Path(RodResult):
         super().__init__(*args, **more)
         self.events: list[Event] = []
         self.control, self.left = "load", False
+        self.cautions: list[str] = []
         self.rounding, self.bounded, self.criteria = 0.0, NAMES, ()
         self._known_errors = self.by_mesh = None
 
@@ -180,7 +180,7 @@ class Path(RodResult):
             f"{_STATES[np.sign(self.negative_modes[-1])]}, "
             f"{station} is displaced by {self._moved_in_words(station, units)} and turned by {turned:.6g} rad."
         )
-        yield from self._sideways
+        yield from self.cautions
         for doubt in self.scene.doubts:
             yield f"First check: {doubt}"
         yield from errors_in_words(self)
@@ -194,10 +194,6 @@ class Path(RodResult):
                 "The path stays on its branch there; --branch 1 or -1 (branch= in Python) leaves it at the first "
                 "bifurcation."
             )
-
-    @property
-    def _sideways(self):
-        return [sentence for sentence in self.why if sentence.startswith(SIDEWAYS)]
 
     def _events_in_words(self):
         """Those that `print` names, limit points before others, and the other ones, each along the path."""
@@ -222,7 +218,7 @@ class Path(RodResult):
 
     @property
     def _reasons(self):
-        told = [*self.scene.doubts, *self._sideways]  # in the answer
+        told = [*self.scene.doubts, *self.cautions]  # in the answer
         return [sentence for sentence in self.why if sentence not in told]
 
     def _more(self, units):

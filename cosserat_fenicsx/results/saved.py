@@ -140,7 +140,7 @@ def _write_variables(place, variables):
 
 def _settings(result):
     names = ["model", "formulation", "degree", "unknowns", "why"]
-    names += ["scheme", "time_unit"] if result.axis == "time" else [*_OF_PATH, "bounded", "judged"]
+    names += ["scheme", "time_unit"] if result.axis == "time" else [*_OF_PATH, "bounded", "judged", "cautions"]
     scales = {name: getattr(result.scales, name) for name in ("length", "force", "moment")}
     return {name: getattr(result, name) for name in names} | {"elements": list(result.elements), "scales": scales}
 
@@ -284,6 +284,7 @@ def _completed(path, settings, numbers):
     path.criteria = stored_criteria(settings.get("judged", NAMES)[len(NAMES) :])
     path._known_errors, path.events = _errors(numbers, len(path.judged), len(path)), _events(numbers)
     path.bounded, path.why = tuple(settings.get("bounded", NAMES[:1])), settings["why"]
+    path.cautions = settings.get("cautions", [])
     return path
 
 

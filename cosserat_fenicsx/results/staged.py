@@ -35,19 +35,21 @@ class StagedPath(Path):
     def __init__(self, scene, parts: Mapping[int, Path]):
         first, *_ = found = list(parts.values())
         general = max(found, key=lambda part: _MODELS.index(part.model))
-        told = {}
-        for stage, part in parts.items():
-            for sentence in part.why:
-                told.setdefault(sentence, []).append(stage)
         labels = {leg.stage: leg.label for leg in scene.legs}
-        why = [sentence if len(of) == len(found) else f"{', '.join(labels[k] for k in of)}: {sentence}"
-               for sentence, of in told.items()]  # fmt: skip
+
+        def told(name):
+            of = {}
+            for stage, part in parts.items():
+                for sentence in getattr(part, name):
+                    of.setdefault(sentence, []).append(labels[stage])
+            return [x if len(at) == len(found) else f"{', '.join(at)}: {x}" for x, at in of.items()]
+
         super().__init__(
             scene, first.layout, first.scales, first.rule, comm=first.comm, model=general.model,
             formulation=general.formulation, degree=first.degree, unknowns=max(part.unknowns for part in found),
-            why=why, connections=None, expand=None,
+            why=told("why"), connections=None, expand=None,
         )  # fmt: skip
-        self.parts, self.galerkin = dict(parts), general.galerkin
+        self.parts, self.galerkin, self.cautions = dict(parts), general.galerkin, told("cautions")
         self.bounded, self.criteria = first.bounded, first.criteria
         self.rounding = max(part.rounding for part in found)
         self.control = "arc" if any(part.control == "arc" for part in found) else "load"

@@ -48,6 +48,10 @@ _UNITS = {
 }
 #: The units that data may have.
 UNITS = tuple(_UNITS)
+#: `Action.traits` of work that depends on positions and rotations, of which UFL takes up to three minutes to find them:
+#: of one whose force lies in the plane of its vectors, and of one whose force may leave it.
+IN_PLANE = {"dead": False, "known_force": False, "rates": False, "turns": True, "flat": True}
+IN_SPACE = IN_PLANE | {"flat": False}
 
 
 def vector(value, unit):
@@ -139,7 +143,7 @@ class Action(Part, family="load or action", homes=("cosserat_fenicsx.scene.loads
             it has the shares of the shortening that are done before and with the load factor, `wound`, its length in
             the state where it came in, `base` (m; None for the reference), and its tension at the begin, `begun` (N).
         traits: None; or a dict of the fields of `models.formulation.Traits`, where it takes long to find them from
-            `work`.
+            `work`, such as `IN_PLANE`.
     """
 
     at_nodes, scaled, permanent, follows, memory, evolve, traits = False, True, False, False, (), None, None

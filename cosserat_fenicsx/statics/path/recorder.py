@@ -18,7 +18,7 @@ from cosserat_fenicsx.ranks import communicator
 from cosserat_fenicsx.results.accuracy import on_mesh
 from cosserat_fenicsx.results.contacts import check_apart, check_passes
 from cosserat_fenicsx.results import saved
-from cosserat_fenicsx.results.path import SIDEWAYS, Path
+from cosserat_fenicsx.results.path import Path
 from cosserat_fenicsx.results.records import Event, Record, Records, lost_at
 from cosserat_fenicsx.results.staged import StagedPath
 from cosserat_fenicsx.scene.action import rubs
@@ -90,7 +90,7 @@ class Tracing:
         else:  # load control without events: of planar models, which the spatial one follows, and of rods that touch
             self._follower = Follower(*solvers, **{**follow, "control": "load"})
         self.track, self._start = self._follower.track, start
-        self._counted, self._until, self._stable_at, self._sideways = 0, None, 0.0, False
+        self._counted, self._until, self._stable_at = 0, None, 0.0
         bar.start(f"{self.path.model}, {self.model.unknowns} unknowns")
 
     def _meet(self, crossing):
@@ -123,13 +123,13 @@ class Tracing:
                 in_plane = " in its plane" if self.model.signature.flat else ""
                 reason = f"it loses its stability{in_plane} {where}, and the spatial model continues the path"
             raise Promoted(reason, None if self._resolved() else (self._stable_at, point.load_factor))
-        if point.negative_modes and self.stability.sideways and not self._sideways:
-            self._sideways = True
-            self.path.why.append(
-                f"{SIDEWAYS} at the load factor {point.load_factor:.4g}, the first one where this was seen after "
-                f"{self._stable_at:.4g}: the planar model counts it and does not follow it. A structure that is braced "
-                "across its plane needs supports there, such as Rollers."
+        if point.negative_modes and self.stability.sideways and not self.path.cautions:
+            self.path.cautions.append(
+                f"Unstable out of its plane at the load factor {point.load_factor:.4g}, the first one where this was "
+                f"seen after {self._stable_at:.4g}: the planar model counts it and does not follow it. A structure "
+                "that is braced across its plane needs supports there, such as Rollers."
             )
+            self.path.why += self.path.cautions
         self._stable_at = point.load_factor
 
     def _resolved(self):
