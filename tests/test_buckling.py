@@ -546,8 +546,10 @@ def test_a_moment_that_a_support_takes_buckles_nothing():
 
 
 @pytest.mark.serial
-def test_a_planar_model_says_what_it_counts_out_of_its_plane():
+def test_a_planar_model_says_what_it_counts_out_of_its_plane(tmp_path):
     rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, 1)), cf.Stiffness((1e6, 1e6), 1e6, (1.0, 100.0), 1.0), name="strip")
     scene = cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Force(rod.end, (0.1, 0, -5.0))])
     path = cf.solve(scene, [0.2, 1.0], model="planar", elements=4)
     assert path.negative_modes.tolist() == [0, 1] and "Unstable out of its plane at the load factor" in str(path)
+    path.save(tmp_path / "result.h5")
+    assert str(cf.read_path(tmp_path / "result.h5")) == str(path)

@@ -52,12 +52,12 @@ FULL = Settings(
 )
 QUICK = Settings(
     etas=tuple(np.union1d(_WHOLE[1::2], 0.9).tolist()),
-    coarse_etas=(0.5, 0.9, 1.0, 1.5, 2.0),
+    coarse_etas=(0.5, 0.7, 0.9),
     rungs=(16, 32, 64),
     mcre=(1, 2, 32),
-    along=16,
+    along=12,
     refinement=1,
-    finer=24,
+    finer=16,
     finer_etas=(0.9,),
     clamped_etas=(0.9,),
 )
