@@ -204,6 +204,16 @@ def test_what_looks_like_a_slip_is_asked_about():
     assert any("add Joint(one.end, two.start)" in why for why in path.why)
 
 
+def test_a_load_per_length_is_measured_on_its_own_rod_and_drag_is_no_load():
+    steel, line = cf.Material(210e9, 0.3), cf.Line((0, 0, 0), (0, 0, 5000))
+    long = cf.Rod(line, cf.Circle(0.1), steel, name="long")
+    short = cf.Rod(cf.Line((1, 0, 0), (1.1, 0, 0)), cf.Circle(0.1), steel, name="short")
+    loads = [cf.LineForce(short, (0, 0, 1e6)), cf.Drag(long, normal=61.0, current=(1.0, 0, 0))]
+    scene = cf.Scene([long, short], [cf.Clamp(long.start), cf.Clamp(short.start)], loads)
+    shares = [x.share for x in scene.magnitudes[:2]]
+    np.testing.assert_allclose(shares, [1e5 / (0.5 * 210e9 * np.pi * 0.1**2 / 4), 0.0], rtol=1e-12)
+
+
 DEMO = Path(__file__).parent.parent / "demos" / "eccentric_cantilever.toml"
 
 

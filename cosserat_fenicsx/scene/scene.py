@@ -68,7 +68,7 @@ def magnitudes(scene, doubts=True):
     found = []
     for load in scene.loads:
         if load.scaled or load.permanent:
-            size = max((_force(now, scene, length, lever) for now in _sampled(load, scene.horizon)), default=0.0)
+            size = max((_force(now, scene, lever) for now in _sampled(load, scene.horizon)), default=0.0)
             found.append(Magnitude(size / most, load.scaled, f"{describe(load)}: {size:.3g} N", limit))
     for support in scene.supports:
         for name, most, unit in (("displacement", _MOST_MOTION * length, "m"), ("rotation", _MOST_MOTION, "rad")):
@@ -103,16 +103,17 @@ def _sampled(item, until):
             yield at(item, t)
 
 
-def _force(load, scene, length, lever):
-    """The size of a load, N: moments are divided by the lever (m), loads per length multiplied by the longest one."""
+def _force(load, scene, lever):
+    """The size of a load, N: moments are divided by the lever (m), loads per length multiplied by that of the rod.
+    Coefficients of rates, as of drag, are no loads."""
     size = 0.0
     for rod in scene.rods_of(load):
         s = np.zeros(1) if load.station is not None else np.linspace(0.0, rod.length, _SAMPLES)
         for datum in load.data(rod, s):
-            force, lengths, _ = powers(datum.unit)
-            if force:
+            force, lengths, times = powers(datum.unit)
+            if force and not times:
                 values = np.linalg.norm(np.atleast_2d(datum.value), axis=-1)
-                size = max(size, float(values.max()) / (lever if lengths > 0 else length) ** lengths)
+                size = max(size, float(values.max()) / (lever if lengths > 0 else rod.length) ** lengths)
     return abs(load.amplitude) * size
 
 
