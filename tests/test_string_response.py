@@ -245,18 +245,18 @@ def test_the_wall_force_is_that_of_the_well():
                               drag=drilling.ViscousDrag(0.8))  # fmt: skip
     from cosserat_fenicsx.drilling.linear import characteristic as pieces
 
-    roots = drilling.stability(scene, [8.0], up_to=1.5).roots[0, 0]
+    roots = drilling.stability(scene, [8.0], up_to=0.7).roots[0, 0]
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(pieces, "_SAME", 5e-3)
         patch.setattr(pieces, "_CELLS", 600)
-        fine = drilling.stability(scene, [8.0], up_to=1.5).roots[0, 0]
-    assert np.abs(roots - fine).max() < 2e-4
+        fine = drilling.stability(scene, [8.0], up_to=0.7).roots[0, 0]
+    assert np.abs(roots - fine).max() < 4e-5
     constant = replace(scene, friction=drilling.WallFriction(0.2))
-    assert (fine.real > drilling.stability(constant, [8.0], up_to=1.5).growth[0, 0] + 0.05).all()
-    slow = drilling.stability(scene, [4.0], up_to=1.5)
+    assert (fine.real > drilling.stability(constant, [8.0], up_to=0.7).growth[0, 0] + 0.05).all()
+    slow = drilling.stability(scene, [4.0], up_to=0.7)
     assert len(slow.hfto()) == slow.unstable_modes[0, 0] > 0
-    weight = drilling.limit_weight(scene, 8.0, up_to=1.5)
-    at_limit = drilling.stability(scene, [8.0], [weight], up_to=1.5).growth
+    weight = drilling.limit_weight(scene, 8.0, up_to=0.7)
+    at_limit = drilling.stability(scene, [8.0], [weight], up_to=0.7).growth
     assert np.nanmax(at_limit) == pytest.approx(0.0, abs=1e-7)
 
 

@@ -8,6 +8,7 @@ frequencies, and one with two filters in a row, unless another filter or the los
 """
 
 import math
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -144,17 +145,21 @@ def limit_weight(scene: Drilling, speed: float, *, up_to: float = 10.0) -> float
     if not per_newton:
         return math.inf
 
+    @cache
     def excess(weight):  # of the critical slope over the bit's; it grows with the weight
         return critical_slope(scene.with_case(weight=weight), up_to, speed)[0] - per_newton * weight
 
+    first = abs(critical_slope(scene, up_to, speed)[0] / per_newton)
     if not _falls_at_wall(scene):
-        return abs(critical_slope(scene, up_to, speed)[0] / per_newton)
-    low, high = 1.0, 1e3
-    if excess(low) > 0:
-        return 0.0
+        return first
+    low = high = min(max(first, 1.0), _HEAVIEST)
+    while excess(low) > 0:
+        low, high = low / 4, low
+        if high < 1.0:
+            return 0.0
     while excess(high) < 0:
         low, high = high, 2 * high
-        if high > _HEAVIEST:
+        if low > _HEAVIEST:
             return math.inf
     return brentq(excess, low, high, rtol=1e-10)
 
