@@ -26,6 +26,8 @@ from cosserat_fenicsx.errors import NotConverged, SceneError
 
 # Degree of the polynomials on pieces of the imaginary axis; their largest relative error.
 _DEGREE, _RESOLVED = 24, 1e-11
+# Most times that a piece is halved; most pieces at a time over those at first.
+_HALVED, _MORE = 32, 16
 # Weight on bit (N) that is as good as infinite.
 _HEAVIEST = 1e8
 
@@ -57,12 +59,9 @@ def critical_slopes(scene: Drilling, up_to: float = 10.0, speed: float | None = 
         return B * np.conj(om), np.abs(om) ** 2
 
     width = 0.47 * math.pi / guide.travel  # no edge at a frequency of a uniform string
-    edges = np.linspace(0.0, top, 1 + max(1, math.ceil(top / width)))
-    found = []
-    for a, b in zip(edges[:-1], edges[1:], strict=True):
-        found += _real_roots(lambda w: parts(w)[0].imag, a, b)
+    found = _real_roots(lambda w: parts(w)[0].imag, np.linspace(0.0, top, 1 + max(1, math.ceil(top / width))))
     # at rest: both are 0 by symmetry; the slope is a limit unless the drive holds the string there
-    at = np.array([w for w in found if w > 1e-9 * width])
+    at = found[found > 1e-9 * width]
     ends, sizes = parts(np.append(0.0, at))
     keep = sizes > 1e-24 * np.abs(ends)
     return np.append(0.0, at)[keep], -(ends.real[keep] / sizes[keep])
@@ -76,28 +75,42 @@ def _torsion(scene, speed):
     return Steady(scene).guides(speed, scene.bit and scene.bit.weight)[0]
 
 
-def _real_roots(f, a, b, depth=0):
-    """All real roots of a smooth function in [a, b), by an interpolating polynomial."""
-    series = chebyshev.chebinterpolate(lambda x: f((a + b) / 2 + (b - a) / 2 * x), _DEGREE)
-    size = np.abs(series).max()
-    if size == 0.0:
-        return []
-    if np.abs(series[-3:]).max() > _RESOLVED * size:
-        if depth > 30:
-            raise NotConverged(f"the impedance from {a:.6g} to {b:.6g} rad/s could not be resolved")
-        middle = (a + b) / 2
-        return _real_roots(f, a, middle, depth + 1) + _real_roots(f, middle, b, depth + 1)
-    roots = chebyshev.chebroots(chebyshev.chebtrim(series, 1e-15 * size))
-    roots = np.sort(roots.real[(np.abs(roots.imag) < 1e-7) & (roots.real >= -1) & (roots.real < 1)])
-    found = []
-    for x in roots:
-        w, h = (a + b) / 2 + (b - a) / 2 * x, 1e-6 * (b - a)
-        low, high = f(np.array([w - h, w + h]))
-        if low * high < 0:
-            w = brentq(lambda z: float(f(np.array([z]))[0]), w - h, w + h, xtol=1e-15 * b, rtol=1e-15)
-        if not found or w - found[-1] > 1e-12 * b:
-            found.append(w)
-    return found
+def _real_roots(f, edges):
+    """All real roots of a smooth function from the first to the last of the edges, ascending, by interpolating
+    polynomials between these, all at once."""
+    nodes, near = chebyshev.chebpts1(_DEGREE + 1), []
+    to_series = chebyshev.chebvander(nodes, _DEGREE) * 2 / len(nodes)
+    to_series[:, 0] /= 2
+    low, high = edges[:-1], edges[1:]
+    for halved in range(_HALVED + 1):
+        middle, half = (low + high) / 2, (high - low) / 2
+        places = middle[:, None] + half[:, None] * nodes
+        series = f(places.ravel()).reshape(places.shape) @ to_series
+        size = np.abs(series).max(axis=1)
+        fine = np.abs(series[:, -3:]).max(axis=1) <= _RESOLVED * size
+        if halved == _HALVED and not fine.all() or np.count_nonzero(~fine) > _MORE * len(edges):
+            k = fine.argmin()
+            raise NotConverged(f"the impedance from {low[k]:.6g} to {high[k]:.6g} rad/s could not be resolved")
+        for k in np.flatnonzero(fine & (size > 0)):
+            roots = chebyshev.chebroots(chebyshev.chebtrim(series[k], 1e-15 * size[k]))
+            inside = (np.abs(roots.imag) < 1e-7) & (roots.real >= -1) & (roots.real < 1)
+            near += [(middle[k] + half[k] * x, 2e-6 * half[k]) for x in roots.real[inside]]
+        low, high, middle = low[~fine], high[~fine], middle[~fine]
+        low, high = np.concatenate([low, middle]), np.concatenate([middle, high])
+        if not len(low):
+            break
+    if not near:
+        return np.zeros(0)
+    w, h = np.array(sorted(near)).T
+    start, end = w - h, w + h
+    before, after = f(start), f(end)
+    changes = before * after < 0
+    # within these 1e-6 of a piece the function is a line, its curvature 1e-12 of the piece: two secants are exact
+    for _ in range(2):
+        share = np.divide(before, before - after, out=np.full_like(w, 0.5), where=before != after)
+        w = np.where(changes, start + share * (end - start), w)
+        start, end, before, after = end, w, after, f(w)
+    return w[np.diff(w, prepend=-1.0) > 1e-12 * edges[-1]]
 
 
 def critical_slope(scene: Drilling, up_to: float = 10.0, speed: float | None = None) -> tuple[float, float]:
