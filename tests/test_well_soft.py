@@ -92,6 +92,12 @@ def test_the_closest_point(name):
     beyond = [well.position(well.length) + 3 * well.tangent(well.length), [0, 0, -2.0]]
     assert well.closest(beyond).tolist() == well.closest(beyond, near=1000.0).tolist() == [well.length, 0.0]
     assert well.closest(points[0]).shape == () and well.closest(points[None]).shape == (1, 300)
+    near = well.nearest(points.reshape(2, 150, 3), 0.0)  # one depth for all points
+    assert near.md == pytest.approx(md.reshape(2, 150))
+    assert near.tangent.ravel() == pytest.approx(well.tangent(md).ravel())
+    for given in ((points, [0.0, 1.0]), (points[:, :2], 0.0)):
+        with pytest.raises(ValueError, match="shape"):
+            well.nearest(*given)
 
 
 def test_the_closest_point_of_a_wide_arc_far_away():

@@ -218,16 +218,16 @@ class WellPath(TubeAxis):
         if points.shape[-1:] != (3,):
             refuse("WellPath.closest", "points", points, "(..., 3) finite numbers (m)")
         if near is not None:
-            near = np.broadcast_to(np.asarray(near, dtype=float), points.shape[:-1]).ravel()
+            near = np.asarray(near, dtype=float)
             self._place(near)
-        return self._nearest(points.reshape(-1, 3), near).md.reshape(points.shape[:-1])
+        return self._nearest(points, near).md
 
     def nearest(self, points: Numbers | None, near: Numbers) -> "Nearest":
         """The points of the axis that are closest to points, with tangent and curvature there.
 
         Args:
-            points: (n, 3) m; None for the points of the axis at `near`.
-            near: (n,) measured depths (m) to start from, see `closest`; of any value.
+            points: (..., 3) m; None for the points of the axis at `near`.
+            near: (...) measured depths (m) to start from, see `closest`; of any value.
 
         Returns:
             `Nearest`. Beyond its ends the axis is straight: a point there has the measured depth and the position
@@ -237,20 +237,21 @@ class WellPath(TubeAxis):
             return self._nearest(points, near)
         at = np.clip(near, 0.0, self.length)
         position, tangent, curvature = self._at(*self._place(at))
-        position += (near - at)[:, None] * tangent
+        position += (near - at)[..., None] * tangent
         curvature[(at <= 0.0) | (at >= self.length)] = 0.0
         return Nearest(at, position, tangent, curvature)
 
     def _nearest(self, points, near):
         """`nearest`, in C; near: None for the whole axis."""
         ffi, lib = module()
-        md = np.empty(len(points)) if near is None else np.array(near, dtype=float)
-        found = Nearest(md, *np.empty((3, len(points), 3)))
-        points, sections = np.ascontiguousarray(points, dtype=float), self.sections._asdict()
+        shape = np.shape(points)[:-1]  # C relies on it
+        md = np.array(np.broadcast_to(0.0 if near is None else near, shape), dtype=float, order="C")
+        points, sections = np.ascontiguousarray(np.reshape(points, (*shape, 3)), dtype=float), self.sections._asdict()
+        found = Nearest(md, *np.empty((3, *points.shape)))
         data = {name: ffi.from_buffer("double[]", array) for name, array in sections.items()}
         arcs = ffi.new("arcs *", {"sections": len(self.sections.start), **data})
         lib.nearest_on_arcs(
-            arcs, len(points), ffi.from_buffer("double[]", points), near is None,
+            arcs, md.size, ffi.from_buffer("double[]", points), near is None,
             *(ffi.from_buffer("double[]", array) for array in found),
         )  # fmt: skip
         return found
