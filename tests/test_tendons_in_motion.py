@@ -119,13 +119,14 @@ def test_the_work_of_one_that_slides_and_sticks(pulled, tmp_path_all):
 
 
 def test_a_motion_starts_with_what_has_slid():
-    """Nothing moves."""
-    tendon = cf.Tendon(ROD, (E, 0), 8.0, friction=0.5, axial=300.0)
-    start = cf.solve(arm(tendon), [1.0], **FINE)
-    history = cf.simulate(arm(tendon), 0.05, dt=5e-3, start=start, **FINE)
+    """Nothing moves, with several in one place too."""
+    pair = [cf.Tendon(ROD, (E, 0), tension, friction=0.5, axial=300.0) for tension in (6.0, 2.0)]
+    start = cf.solve(arm(*pair), [1.0], **FINE)
+    history = cf.simulate(arm(*pair), 0.05, dt=5e-3, start=start, **FINE)
     moved = history.position(ROD.end) - start.position(ROD.end)[-1]
     assert np.abs(moved).max() < 1e-10
-    assert history.tendon(tendon).along[-1] == pytest.approx(start.tendon(tendon).along[-1], rel=1e-5)
+    for tendon in pair:
+        assert history.tendon(tendon).along[-1] == pytest.approx(start.tendon(tendon).along[-1], rel=1e-5)
     other = cf.Tendon(ROD, (E, 0), lambda t: 8.0, friction=0.4, axial=300.0)
     with pytest.raises(cf.SceneError, match="another friction or pulled end in the path"):
         cf.simulate(arm(other), 0.05, dt=5e-3, start=start, **FINE)

@@ -212,11 +212,13 @@ def _pulls(scene, start):
     before, found = [x for x in path.scene.loads if x.is_thread] if path else [], []
     for load in scene.actions:
         if load.rough:
-            known = [x for x in before if (x.rod, x.offset) == (load.rod, load.offset)]
-            if any((x.friction, x.pulled) != (load.friction, load.pulled) or x.shortens for x in known[:1]):
+            there = [x for x in before if (x.rod, x.offset) == (load.rod, load.offset)]
+            known = [x for x in there if (x.friction, x.pulled) == (load.friction, load.pulled) and not x.shortens]
+            if there and not known:
                 raise SceneError(f"simulate.start: {describe(load)} has another friction or pulled end in the path: "
                                  "expected the same ones")  # fmt: skip
             found.append(float(path.tendon(known[0]).tension[k]) if known else 0.0)
+            before = [x for x in before if x is not (known or [None])[0]]  # each once: several may have one offset
     return found
 
 
