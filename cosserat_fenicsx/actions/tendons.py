@@ -175,8 +175,8 @@ class Tendon(Load, LineAction):
         x, powers = ((s - middle) / step)[:, None], np.arange(1, len(PLACES))
         weights = (powers * x ** (powers - 1)) @ np.linalg.inv(np.vander(PLACES, increasing=True))[1:]
         # without the part that is constant: its rounding over the step would be no smooth function of the offset
-        arms = [self._arm(rod, middle + place * step) - self._arm(rod, middle) for place in PLACES]
-        return np.einsum("kp,pki->ki", weights, arms) / step[:, None]
+        arms = np.array([self._arm(rod, middle + place * step) for place in PLACES])
+        return np.einsum("kp,pki->ki", weights, arms - self._arm(rod, middle)) / step[:, None]
 
     @property
     def _winds(self):

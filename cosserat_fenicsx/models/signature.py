@@ -94,8 +94,9 @@ class Signature:
 
     @property
     def lives_along_rods(self):
-        """Whether a distributed action depends on the state."""
-        return any(kind.place != "point" and not kind.dead for kind in self.terms)
+        """Whether a distributed action, or the tension of a thread, depends on the state."""
+        given = (kind.dead or kind.thread and not (kind.finds_tension or kind.slides) for kind in self.terms)
+        return not all(known or kind.place == "point" for known, kind in zip(given, self.terms, strict=True))
 
     @cached_property
     def unknowns(self):

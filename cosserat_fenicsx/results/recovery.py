@@ -335,9 +335,7 @@ class Threads:
 
 def _along(thread, places, v, k):
     """p (elements, points, 3) and v + u x p + p' (n, elements, points, 3), material, dimensionless."""
-    frames, length = places.frames, places.length
-    _, arm, slope = (datum.value for datum in at(thread, 0.0).data(places.rod, places.s))
-    p, along = (np.einsum("kji,kj->ki", frames, a).reshape(*places.shape, 3) for a in (arm / length, slope))
+    p, along = places.beside(thread)
     return p, v + np.cross(k, p) + along
 
 
@@ -354,7 +352,15 @@ class _Places:
         self._basis, self._slopes = result.rule.basis(x), result.rule.slopes
         self._h, s = h[..., None] * rod.length / self.length, (self.breaks[:-1, None] + h * x) * rod.length
         self.shape, self.s, self._scene = s.shape, s.ravel(), result.scene
-        self.frames = rod.curve.frame(self.s)
+        self.frames, self._beside = rod.curve.frame(self.s), {}
+
+    def beside(self, thread):
+        """(elements, points, 3) p and p' of a thread along the rod, material, dimensionless."""
+        if id(thread) not in self._beside:
+            _, arm, slope = (datum.value for datum in at(thread, 0.0).data(self.rod, self.s))
+            found = (np.einsum("kji,kj->ki", self.frames, a) for a in (arm / self.length, slope))
+            self._beside[id(thread)] = tuple(a.reshape(*self.shape, 3) for a in found)
+        return self._beside[id(thread)]
 
     def turned(self, records):
         """(n, elements, points, 3, 3) directors and (n, elements, points, 3) u - u_R, material, dimensionless."""
