@@ -147,6 +147,8 @@ rods-in-wells: setup
 truths: setup
 	$(PYTHON) demos/evidence/truths.py
 	$(PYTHON) demos/evidence/put_in_docs.py truths
+	$(PYTHON) demos/evidence/targets.py
+	$(PYTHON) demos/evidence/put_in_docs.py targets
 
 tangles: setup
 	$(PYTHON) -m pytest tests/test_rod_contact.py tests/test_rods_in_motion.py -k passes_through --tangles 300

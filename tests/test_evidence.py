@@ -611,3 +611,15 @@ def test_truths_are_told_with_their_errors(tmp_path):
     assert "| obstacles | rod lifted from a plane, moment at its level end |" in (tmp_path / "truths.md").read_text()
     with pytest.raises(RuntimeError, match="the tests fail"):
         truths.compared("no test has this name", "test_obstacles.py")
+
+
+def test_targets_that_are_missed_are_told(tmp_path):
+    import targets
+
+    given = [target for target in targets.TARGETS if not callable(target.found)]
+    missed = targets.main(1, [*given, targets.Target("", "less", lambda runs: 3.0, 2.0, "too few")], tmp_path)
+    text = (tmp_path / "targets.md").read_text("utf-8")
+    assert "|  | less | 2 | **3.00, missed** | too few |" in text and missed[-1]
+    assert f"{len(missed)} targets, {sum(missed)} missed" in text and not all(missed)
+    with pytest.raises(LookupError, match="no row has"):
+        targets.largest("no such truth")

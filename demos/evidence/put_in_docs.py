@@ -46,6 +46,7 @@ PAGES = {
     "benchmarks": ("benchmarks.md",),
     "mutants": ("evidence/tests.md",),
     "truths": ("evidence/truths.md",),
+    "targets": ("evidence/truths.md",),
 }
 #: The tables with a page of their own: its title and pictures.
 ALONE = {
