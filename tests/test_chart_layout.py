@@ -22,9 +22,7 @@ LEGIBLE, MARGIN = 9.0, 1.0
 
 
 def texts_of(figure):
-    """[(words, box)] of all that is written in a Figure."""
-    figure.set_layout_engine("none")  # as it is written to a file
-    figure.draw_without_rendering()
+    """[(words, box)] of all that is written in a Figure, as `arrange` has drawn it at last."""
     found = [figure._suptitle]
     for panel in figure.axes:
         if not panel.get_visible():
