@@ -122,7 +122,7 @@ def test_the_energy_is_stationary_and_its_negative_modes_are_counted(name):
         problem = next(drawn for drawn in map(draw, range(4, 99, 5)) if not any(drawn.moment)).problem()
         found = bvp.equilibrium(problem)
     else:  # the nearly straight, unstable state of a column that is pressed a little off its axis
-        problem = column((1.0, 1.6, 0.8), (0.004, 0.003, -14.0), K=(400.0, 300.0, 1000.0))
+        problem = column((1.0, 1.6, 0.8), (0.04, 0.03, -14.0), K=(400.0, 300.0, 1000.0))
         stable = bvp.equilibrium(problem)
         found = bvp.at(problem, np.zeros(3))
         assert (stable.index, found.index, found.verdict) == (0, 2, "near a clamp moment")
