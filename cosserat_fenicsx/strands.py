@@ -256,11 +256,14 @@ class Strands:
         found = self._once(found)
         total = self.radii[found.element].sum(axis=1)
         closest = (found.distance / total).min(initial=np.inf)
-        crosses = ~self._side_by_side(x, found) | ~found.slides.all(axis=1)
-        parts = [found.of(crosses & (found.gap < reach))]
+        (narrow, flat), lines = self._side_by_side(x, found), self._none()
         bent = self.at(x, self._of, self._at, (1, 2)).swapaxes(0, 1)
-        if _side_by_side(points[j] - points[i], bent[:, i], bent[:, j]).any():
-            parts.append(self._lines(x, points, cut, reach))
+        if np.any(flat) or np.any(_side_by_side(points[j] - points[i], bent[:, i], bent[:, j])):
+            lines = self._lines(x, points, cut, reach)
+        # where they are flat next to no node, as in a narrow hook on few elements, they touch in a point after all
+        beside = np.abs(np.sort(found.element)[:, None] - np.sort(lines.element)).max(axis=2) <= 1
+        crosses = ~(narrow | flat & beside.any(axis=1)) | ~found.slides.all(axis=1)
+        parts = [found.of(crosses & (found.gap < reach)), lines]
         joined = Touches(*(np.concatenate([getattr(p, n) for p in parts]) for n in Touches.__dataclass_fields__))
         return joined, closest
 
@@ -335,7 +338,7 @@ class Strands:
         element = np.c_[self._slave[k], self._of[master]]
         node = self.cells[self._slave[k], self._slave_node[k]]
         found = self._made(x, element, np.c_[places[k], self._at[master]], node)
-        return found.of(self._side_by_side(x, found) & found.slides[:, 1] & (found.gap < reach))
+        return found.of(np.any(self._side_by_side(x, found), axis=0) & found.slides[:, 1] & (found.gap < reach))
 
     def _side_by_side(self, x, found):
         """See `_side_by_side`, at pairs of points."""
@@ -425,15 +428,15 @@ def across(direction, normal=None):
 
 
 def _side_by_side(w, first, second):
-    """(n,) whether strands touch along a line: at a small angle, or, as those that wind around each other, at any angle
-    where their distance hardly changes along them. w: (n, 3) from the first to the second points; first, second: (2, n,
-    3) first and second derivatives of positions by arc length there."""
+    """(n,) whether strands are at a small angle, and whether, as those that wind around each other, at any angle, their
+    distance hardly changes along them: both touch along a line. w: (n, 3) from the first to the second points; first,
+    second: (2, n, 3) first and second derivatives of positions by arc length there."""
     (t, tt), (u, uu) = first, second
     G, K, C = (np.sum(a * b, axis=1) for a, b in ((t, t), (u, u), (t, u)))
     cosine = np.abs(C) / np.sqrt(G * K)
     G, K = G - np.sum(w * tt, axis=1), K + np.sum(w * uu, axis=1)
     least = (G + K) / 2 - np.hypot((G - K) / 2, C)  # of half the square of the distance, by both places
-    return (1 - cosine**2 <= CROSSING**2) | (least <= _FLAT * (1 - cosine))
+    return 1 - cosine**2 <= CROSSING**2, least <= _FLAT * (1 - cosine)
 
 
 def closest_segments(points, rods, s, radii, apart, reach):

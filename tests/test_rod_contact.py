@@ -11,6 +11,8 @@ import pytest
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.files.read import schema_of_files
+from cosserat_fenicsx.numerics import ElementRule
+from cosserat_fenicsx.strands import Strands
 
 pytestmark = pytest.mark.serial
 RIGID = (math.inf, math.inf)
@@ -29,6 +31,25 @@ def crossing(lowered=0.15, **contact):
     ends = [cf.Prescribed(upper.start, **moved), cf.Prescribed(upper.end, **moved)]
     touch = cf.RodContact(**{"radius": radius, **contact})
     return cf.Scene([lower, upper], [cf.Clamp(lower.start), cf.Clamp(lower.end), *ends], [touch])
+
+
+@pytest.mark.parametrize(("elements", "begins", "node"), [(6, -0.06, 12), (7, -0.057, -1)])
+def test_a_narrow_hook_on_few_elements_touches(elements, begins, node):
+    """A catenary around a straight rod is as flat as a line in its middle alone: there, at a node or in a point."""
+    scene, length, radius, bend = crossing(radius=0.0097), 0.12, 0.0097, 0.01992
+    rule = ElementRule((1 + np.array([-1, -np.sqrt(3 / 7), 0, np.sqrt(3 / 7), 1])) / 2, np.array([0.5]), np.ones(1))
+    places = np.unique((np.arange(elements)[:, None] + rule.nodes).round(14)) / elements * length
+    across, none = bend * np.arcsinh((begins + places) / bend), 0 * places
+    hook = np.c_[across, none, bend * (np.cosh(across / bend) - 1)]
+    x = np.concatenate([hook, np.c_[none, places - length / 2, none + 1.99 * radius]])
+    rods, first = np.repeat([0, 1], elements), np.arange(2 * elements)
+    cells, starts = (4 * first + rods)[:, None] + np.arange(5), first % elements * length / elements
+    apart = scene.rod_contact.apart(scene)
+    sizes, radii = np.full((2, len(first)), [[length / elements], [radius]])
+    strands = Strands(cells, rods, sizes, starts, radii, rule, apart)
+    touches, closest = strands.near(x, radius / 2)
+    assert touches.node.tolist() == [node] and closest < 0.996
+    assert touches.gap == pytest.approx((closest - 1) * 2 * radius, rel=0.01)
 
 
 @pytest.mark.slow
