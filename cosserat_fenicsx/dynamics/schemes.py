@@ -119,12 +119,12 @@ class TripleJump(Momentum):
 
     def begin(self):
         """See `Stepper`. A SceneError for a rod with damping, which would make the motion grow without bound back in
-        time; an action with memory; or a wall that nodes touch."""
+        time; an action with memory; or a wall, a contact, a bit or a tendon whose law is not smooth."""
         model = self.problem.model
         for found, expected in (
             (model.damped, ": expected rods without damping"),
             (model.actions.memory or np.isfinite(model.delays.longest), ": expected actions without memory"),
-            (self.problem.touching, ", and needs smooth motions: expected no walls such as a HoleWall"),
+            (self.problem.touching, ", which needs smooth motions: expected no walls, RodContact, bits, axial="),
         ):
             if found:
                 raise SceneError(f"scheme = 'triple-jump' steps back in time{expected}, or another scheme")
