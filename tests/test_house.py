@@ -120,6 +120,13 @@ def test_solvers_know_the_protocol_of_models_alone():
                 assert rooms_known_in(file).isdisjoint({"scene", "models", "results", "storage"}), file
 
 
+def test_solvers_alone_know_the_algebra():
+    """All other rooms know of it how C is compiled and called, and the C structures of a mesh."""
+    for file in PACKAGE.rglob("*.py"):
+        if file.relative_to(PACKAGE).parts[0] not in ("algebra", "statics", "dynamics"):
+            assert all(name.startswith("algebra.building") for name in inside(file) if name.startswith("algebra")), file
+
+
 def test_no_module_takes_the_name_of_something_public():
     """Importing such a module would replace the public object of the same name."""
     modules = {file.stem for file in PACKAGE.glob("*.py")} | {file.name for file in PACKAGE.iterdir() if file.is_dir()}
