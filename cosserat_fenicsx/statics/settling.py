@@ -60,7 +60,8 @@ def stages_from(spring, way="fast"):
     return (*to_axis, *fading, (wall, 0.0, False), *stiffer, *DECADES)
 
 
-def settle(problem, walls, clearance, rounding, stages, careful=(), on_stage=None, hold=0.0, before_step=None):
+def settle(problem, walls, clearance, rounding, stages, careful=(), on_stage=None, hold=0.0, before_step=None,
+           astray=_MOST):  # fmt: skip
     """Bring a problem to equilibrium at its walls, from its state; returns the number of Newton steps. Raises
     NotConverged where a stage was not solved, or the result is no equilibrium.
 
@@ -69,7 +70,8 @@ def settle(problem, walls, clearance, rounding, stages, careful=(), on_stage=Non
     the model's unit; careful: indices of the stages to solve more precisely; on_stage: called with the index of each;
     hold: for a rod that is free, or almost free, to turn as a whole, such as a helix in a straight tube: stiffness,
     over the wall's own, of springs to the last position, which keep the tangent regular and vanish at rest;
-    before_step: called before every Newton step.
+    before_step: called before every Newton step; astray: number of steps in a stage too long to be taken whole, after
+    which it counts as not solved.
     """
     newton = LimitedNewton(problem, max(_LONGEST * clearance, _OF_LENGTH), _WIDEST, before_step)
     for k, (stiffness, spring, viscous) in enumerate(stages):
@@ -82,7 +84,7 @@ def settle(problem, walls, clearance, rounding, stages, careful=(), on_stage=Non
             _relax(newton, walls, spring, clearance, name)
         else:
             enough = share * clearance * (_FREE if hold else 1.0)
-            _solve_stage(newton, max(enough, _ROUNDING), name, walls, hold)
+            _solve_stage(newton, max(enough, _ROUNDING), name, walls, hold, astray)
         if on_stage:
             on_stage(k)
     off = newton.imbalance()
@@ -93,16 +95,16 @@ def settle(problem, walls, clearance, rounding, stages, careful=(), on_stage=Non
     return newton.iterations
 
 
-def _solve_stage(newton, enough, name, walls, hold):
-    failure = converge(newton, enough, (lambda: _fasten(newton, walls, hold)) if hold else None)
+def _solve_stage(newton, enough, name, walls, hold, astray):
+    failure = converge(newton, enough, (lambda: _fasten(newton, walls, hold)) if hold else None, astray)
     if failure:
         raise NotConverged(f"{failure} in {name}")
 
 
-def converge(newton, enough, before=None):
+def converge(newton, enough, before=None, astray=_MOST):
     """Take Newton steps, and shares of them where the contact alternates between two states; enough: size of a full
-    step that ends it, in the model's unit of length; before: called before every step. Returns why it failed, "" where
-    it converged."""
+    step that ends it, in the model's unit of length; before: called before every step; astray: see `settle`. Returns
+    why it failed, "" where it converged."""
     moved, stalled = math.inf, 0
     for _ in range(_MOST):
         obey()
@@ -114,6 +116,9 @@ def converge(newton, enough, before=None):
             return "the tangent is singular"
         if step.share == 1.0 and step.moved <= enough:
             return ""
+        astray -= step.share < share
+        if astray < 0:
+            return "Newton's steps are too long"
         stalled = stalled + 1 if step.moved > _SLOW * moved else 0
         moved = step.moved
     return f"Newton's method has not converged after {_MOST} steps"

@@ -5,7 +5,7 @@
 
 A uniform string in well P (turn and horizontal), Volve 15/9-F-12 and ISCWSA standard well 2, coefficient of friction
 0.25, in every operation; drilling and sliding once more with the bit centred in the hole. Each is solved at the default
-settings, on elements of 2 m, and on elements of about half a metre in a wall of 1e10 N/m^2, whose hook load and
+settings, on elements of 2 m, and on elements of about half a metre in a wall of 1e11 N/m^2, whose hook load and
 torque count as true. A broomstick is 40 depths of the bit by `depth_sweep`. Times are processor times on one thread,
 forms compiled. The ratio, which depends less on the machine, is the time on elements of 2 m over that of as many
 solutions with banded matrices of the same sizes (LAPACK's gbsv) as there were Newton steps.
@@ -47,7 +47,7 @@ CASES = (
     (cf.well.Sliding(ON_BIT), True),
     (cf.well.RotaryDrilling(ON_BIT, TORQUE), True),
 )
-FINE, STIFF, LENGTH = 8192, 1e10, 2.0  # elements and N/m^2, of what counts as true; m, of an element
+FINE, STIFF, LENGTH = 8192, 1e11, 2.0  # elements and N/m^2, of what counts as true; m, of an element
 BEFORE = 4  # elements over those of the mesh before, where their number is asked for
 DEPTHS, SHALLOWEST = 40, 0.2  # of a broomstick; over the deepest
 #: At most: Newton steps; s at default settings and on elements of 2 m; s of a broomstick; error of the hook load.

@@ -89,9 +89,16 @@ class InHole:
         }
         rounding = {name: self.balance * (arm if name == "surface_torque" else 1.0) for name in NAMES}
         counted = ("hook_load", "surface_torque") if string.turns else ("hook_load",)
-        coarser = self._mesh_before and self._mesh_before.estimates
-        self.estimates = found = RodErrors(values, scales, rounding, counted, coarser, string.stiffest_rings)
+        coarser, along = self._mesh_before and self._mesh_before.estimates, 0.0
+        if coarser:
+            along = max(self._apart(_ALONG_OF[name], self._mesh_before) / scales[name] for name in counted)
+        self.estimates = found = RodErrors(values, scales, rounding, counted, coarser, string.stiffest_rings, along)
         self.errors, self.error, self.of_stiffness = found.errors, found.error, found.of_stiffness
+
+    def _apart(self, name, other):
+        """The difference of a field from that of another `InHole` which most of the string's length is below."""
+        there = np.interp(self.s, other.s, getattr(other, name))
+        return apart_mostly(getattr(self, name), there, self.node_length)
 
     @cached_property
     def errors_along(self):
@@ -99,10 +106,7 @@ class InHole:
         other = self._mesh_before
         if other is None:
             return dict.fromkeys(_ALONG, np.inf)
-        return {
-            name: apart_mostly(getattr(self, name), np.interp(self.s, other.s, getattr(other, name)), self.node_length)
-            for name in _ALONG
-        }
+        return {name: self._apart(name, other) for name in _ALONG}
 
     @property
     def wall_stiffness(self):
@@ -406,8 +410,9 @@ class InHole:
 
 #: Quantities with error estimates: hook load, N; surface torque, N m; sum of the wall's forces, N.
 NAMES = ("hook_load", "surface_torque", "wall_force")
-# Errors of the finer mesh over changes from one mesh to the next, whose signs alternate: they cover 97 random wells,
-# except the wall force of one buckled string.
+# Of the quantities that the string has at its upper end, the field along it.
+_ALONG_OF = {"hook_load": "tension", "surface_torque": "torque"}
+# Errors of the finer mesh over changes from one mesh to the next, of what `error` does not count.
 _OF_CHANGE = {"hook_load": 3.0, "surface_torque": 4.0, "wall_force": 6.0}
 
 
@@ -423,6 +428,11 @@ class _Errors:
     # A change by the mesh below this share of the change before is taken as small by chance: changes fall to a
     # twentieth (the median, from equal elements to others) or a seventh (later).
     falls: float = 1 / 32
+    # Errors of the finer mesh over what changed of hook load and torque, where one change is known and where two are;
+    # and the share of the change along most of the string that counts beside it, as it is not small by chance.
+    by_one: float = 3.0
+    by_two: float = 0.8
+    along: float = 0.1
 
 
 _ERRORS = _Errors()
@@ -437,26 +447,31 @@ class RodErrors:
     one; errors: {name: error} in N and N m; error: the largest relative error of hook load and torque, of the torque
     only where the string turns; of_stiffness: its part from the wall's softness."""
 
-    def __init__(self, values, scales, rounding, counted, before=None, capped=np.inf):
+    def __init__(self, values, scales, rounding, counted, before=None, capped=np.inf, along=0.0):
         """
         Args:
             values: see there. scales: {name: size that an error is relative to}. rounding: {name: error}. counted:
                 names of those in `error`. before: the `RodErrors` on the mesh before. capped: factor above which rings
-                are not made stiffer, so that changes do not show their effect.
+                are not made stiffer, so that changes do not show their effect. along: relative change along most of the
+                string, from the mesh before.
         """
         self.values, self._capped = dict(sorted(values.items())), capped
         self._of_rings = before._of_rings if before else dict.fromkeys(NAMES, 0.0)
         self._by_stiffness, self.ratio = self._left_of_softness(scales, counted, before)
-        changes = dict.fromkeys(NAMES, np.inf)
+        changes, share = dict.fromkeys(NAMES, np.inf), _ERRORS.by_one
         common = set(self.values) & set(before.values if before else ())
         if common:
             factor = max(common)
-            changes = _changes(before.values[factor], self.values[factor], scales, counted)
+            changes = _changes(before.values[factor], self.values[factor], scales, (*counted, "wall_force"))
+            here = _changes(before.values[factor], self.values[factor], scales, counted)
+            changes |= {name: here[name] + _ERRORS.along * along for name in counted}
         if before is not None:
             known = {name: x for name, x in before.changes.items() if np.isfinite(x)}
             changes |= {name: max(changes[name], _ERRORS.falls * x) for name, x in known.items()}
+            share = _ERRORS.by_two if known else share
         self.changes = changes
-        of_mesh = {name: _OF_CHANGE[name] * changes[name] * scales[name] for name in NAMES}
+        shares = _OF_CHANGE | dict.fromkeys(counted, share)
+        of_mesh = {name: shares[name] * changes[name] * scales[name] for name in NAMES}
         self.errors = {name: of_mesh[name] + self._by_stiffness[name] + rounding[name] for name in NAMES}
         self.error = max(self.errors[name] / scales[name] for name in counted)
         self.of_stiffness = max(self._by_stiffness[name] / scales[name] for name in counted)
@@ -469,8 +484,11 @@ class RodErrors:
                 return dict.fromkeys(NAMES, np.inf), _ERRORS.unknown
             unseen = UNSEEN * min(1.0, walls[0]["wall_force"] / scales["wall_force"])  # none without contact
             return {name: max(x, unseen * scales[name]) for name, x in before._by_stiffness.items()}, before.ratio
+        counted = (*counted, "wall_force")
         changes = [_changes(a, b, scales, counted) for a, b in zip(walls, walls[1:], strict=False)]
         ratio = before.ratio if before else _ERRORS.unknown
+        if before and max(self.values) > max(before.values):  # beyond what the coarse mesh has shown
+            ratio = max(ratio, _ERRORS.unknown)
         if len(changes) > 1:
             sizes = [max(change.values()) for change in changes[-2:]]
             ratio = float(np.clip(sizes[1] / sizes[0], *_ERRORS.ratios)) if sizes[0] > 0 else _ERRORS.unknown
@@ -489,5 +507,5 @@ class RodErrors:
 def _changes(there, here, scales, counted):
     """{name: relative change}, at least the largest of those that count: one alone may change little by chance."""
     own = {name: abs(here[name] - there[name]) / scales[name] for name in NAMES}
-    largest = max(own[name] for name in {*counted, "wall_force"})
+    largest = max(own[name] for name in counted)
     return {name: max(largest, change) for name, change in own.items()}

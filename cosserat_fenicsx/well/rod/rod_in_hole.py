@@ -51,6 +51,7 @@ class _Walls:
     too_soft: float = 0.25
     hold: float = 1e-10  # springs that hold a helix, see `settle`
     rounding: float = 20.0  # residual of a node over the rounding of its position times its wall or ring stiffness
+    astray: int = 8  # too long Newton steps in a stage from the mesh before, see `settle`
     unbalanced: float = 1e-5  # largest imbalance of the reaction and all other forces, over the wall's forces
 
 
@@ -249,7 +250,7 @@ def _on_mesh(string, layout, stages, factor, start, before, job):
         _begin(problem, string, layout, start, job.helix)
         job.bar.start(f"rod in its hole, {problem.model.unknowns} unknowns")
         steps, values, answer = 0, {}, None
-        while answer is None or not (answer.of_stiffness <= _WALLS.too_soft * job.tol or factor >= job.stiffest):
+        while answer is None or (factor < job.stiffest and _soft(answer, values, before, job)):
             if answer is not None:
                 stages, factor = LAST, 10.0 * factor
             try:
@@ -262,9 +263,17 @@ def _on_mesh(string, layout, stages, factor, start, before, job):
             values |= {each.factor: {name: getattr(each, name) for name in NAMES} for each in (*softer, answer)}
             answer.estimate(values, before)
         # a mesh that others follow needs no number of modes
-        if before is None or job.accepts(answer) or len(layout.breaks[0]) > job.most:
+        if start is None or job.accepts(answer) or len(layout.breaks[0]) > job.most:
             _count_modes(string, problem, stability, answer)
         return answer
+
+
+def _soft(answer, values, before, job):
+    """Whether an `InHole` asks for a stiffer wall. On the last mesh also where a coarse one has shown what its wall
+    changes, and this one has not yet; but a wall that is much stiffer than that makes errors of its own there."""
+    if before is not None and answer.error <= job.tol:
+        return len(values) == 1 and answer.of_stiffness > 1.001 * UNSEEN
+    return answer.of_stiffness > _WALLS.too_soft * job.tol
 
 
 def _in_walls(string, problem, stages, factor, steps, job):
@@ -301,8 +310,10 @@ def _settled(string, problem, stages, factor=1.0, careful=(), on_stage=None, hol
     of_wall = string.wall.stiffness * float(model.layout.sizes(model.scene).max())
     stiffest = factor * max([of_wall, *(ring.stiffness for ring in string.rings)])
     rounding = _WALLS.rounding * np.finfo(float).eps * stiffest * model.scales.length / model.scales.force
+    from_axis = any(spring or viscous for _, spring, viscous in stages)
+    given = {} if from_axis else {"astray": _WALLS.astray}
     return settle(problem, string.stages, string.clearance / model.scales.length, rounding, stages, careful, on_stage,
-                  hold, spend)  # fmt: skip
+                  hold, spend, **given)  # fmt: skip
 
 
 def at_rest(string, elements, degree, comm=None):
