@@ -33,7 +33,8 @@ _PREFIXED = {
 # Numbers, also "a to b", with a unit in a sentence, and no longer unit after it.
 _NUMBER = r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?"
 _UNIT = r"(m|k?N m|N/m|k?N|kJ|deg/30m)"
-_WITH_UNIT = re.compile(rf"(?<![\w.])({_NUMBER})(?: (to|and) ({_NUMBER}))? {_UNIT}(?![\w/^]| m\b| s\b)")
+_NUMBERS = rf"{_NUMBER}(?: (?:to|and) {_NUMBER})?|\({_NUMBER}(?:, {_NUMBER})*\)"
+_WITH_UNIT = re.compile(rf"(?<![\w.])({_NUMBERS}) {_UNIT}(?![\w/^]| m\b| s\b)")
 _SI = {"kN m": ("N m", 1e3), "kN": ("N", 1e3), "kJ": ("J", 1e3), "deg/30m": ("rad/m", units.deg_per_30m)}
 # Numbers below this are written without an exponent.
 _PLAIN = 1e7
@@ -165,14 +166,16 @@ class Units:
         return text if self.si else _WITH_UNIT.sub(self._again, text)
 
     def _again(self, found):
-        first, word, second, unit = found.groups()
+        numbers, unit = found.groups()
         si, size = _SI.get(unit, (unit, 1.0))
         shown, other = self.of(Quantity("number", unit=si, dimension="force per length" if si == "N/m" else ""))
         if shown == si:  # none was chosen
             return found[0]
-        digits = [max(3, len(re.sub(r"e.*|\D", "", x).lstrip("0"))) for x in (first, second) if x]
-        told = [as_text(float(x) * size / other, n) for x, n in zip(filter(None, (first, second)), digits, strict=True)]
-        return f"{f' {word} '.join(told)} {shown}"
+
+        def again(x):
+            return as_text(float(x[0]) * size / other, max(3, len(re.sub(r"e.*|\D", "", x[0]).lstrip("0"))))
+
+        return f"{re.sub(_NUMBER, again, numbers)} {shown}"
 
     def on_screen(self, quantity: Quantity, values: Any = ()) -> tuple[str, float]:
         """The unit of a quantity in tables and charts, and its size in the result's unit: SI units have the prefix that

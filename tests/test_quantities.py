@@ -61,6 +61,7 @@ def test_prefixes_on_the_screen():
     ("5 N m s/rad, 3 m/s, 2 N/m^2, 4 mm, 7 modes", "5 N m s/rad, 3 m/s, 2 N/m^2, 4 mm, 7 modes"),
     ("side force to 2.92 N/m (clearance 1.63e+03 N)", "side force to 0.2 lbf/ft (clearance 0.366 klbf)"),
     ("to 0.14 N m", "to 0.103 ft-lbf"),
+    ("exerts (0, 0, 152609) N and (-1.5e+03, 0, 4.5) N m", "exerts (0, 0, 34.3079) klbf and (-1106, 0, 3.32) ft-lbf"),
     ("between -21 and 3 deg/30m, 30 m", "between -21.3 and 3.05 deg/100ft, 98.4 ft"),
 ])  # fmt: skip
 def test_sentences_in_field_units(text, told):
