@@ -100,12 +100,13 @@ def refuse_rod_contact(owner, scene, comm=None):
 def refuse_rough_threads(owner, scene, all_of_them=True):
     """Refuse (SceneError) tendons with friction where a function, the `owner` of the message, does not have them; or
     only those beside tendons of given length."""
+    way = "paths of `solve`, compared with each other" if all_of_them else "tensions in place of lengths"
     for load in scene.all_loads:
         if load.rough and (all_of_them or any(other.shortens for other in scene.all_loads)):
             raise SceneError(
                 f"{owner}: {describe(load)} has friction, which `solve`, derivatives of states, `modes` and `simulate` "
                 "alone know, the first three without tendons of given length and rods that touch each other: expected "
-                "friction=0"
+                f"friction=0, or {way}"
             )
 
 
