@@ -474,11 +474,27 @@ def test_cases_that_are_refused():
         ("friction", [0.1], "rows of 1 numbers: friction"),
         ("friction", [[-0.1]], r"batch.friction = .*: expected numbers from 0 to 5"),
         ("mass", [[10.0]], "'mass' of a string: known: friction"),
+        (3, [[0.1]], r"batch.over = 3: expected a list of names, such as \['friction'"),
+        ("friction", [[0.1], [0.2, 0.3]], r"batch.values = .*: expected \(cases, 1\) finite numbers"),
     ):
         with pytest.raises(cf.SceneError, match=words):
             here.batch(names, values)
     with pytest.raises(cf.SceneError, match="model = 'buckled': expected the answer of"):
         cf.well.torque_and_drag(here.hole, here.string, cf.well.TripIn(), model="buckled").batch("friction", [[0.1]])
+
+
+def test_doubts_of_many_cases_are_said_once(monkeypatch):
+    """As `Mud` and `HoleSection` doubt one; and the cases are solved in parts, whose arrays stay small."""
+    values = [[0.3, 1200.0], [0.3, 12.0], [1.5, 1150.0], [0.3, 1.2], [0.2, 1250.0]]
+    with pytest.warns(cf.SceneWarning) as told:
+        found = answer(cf.well.TripIn, "coulomb").batch(["friction", "mud.density"], values)
+    friction, density = (str(x.message) for x in told)
+    assert friction.startswith("batch: friction = 1.5, in 1 of 5 cases, is more than the wall of a well has")
+    assert density.startswith("batch: mud.density = 12, in 2 of 5 cases, is hardly that of a mud")
+    monkeypatch.setattr("cosserat_fenicsx.well.softstring._AT_ONCE", 2)
+    with pytest.warns(cf.SceneWarning):
+        parts = answer(cf.well.TripIn, "coulomb").batch(["friction", "mud.density"], values)
+    assert (parts.values == found.values).all() and (parts.errors == found.errors).all()
 
 
 def test_uncertainty_of_a_hook_load_with_a_fit():

@@ -25,6 +25,22 @@ from cosserat_fenicsx.well.survey import doubt_depth
 
 # Pa, standard.
 _ATMOSPHERE = 101325.0
+# {what: ([ranges of values that are doubted], what is said of them)}. Densities, kg/m^3: relative ones; neither a gas nor
+# a liquid; heavier than any mud.
+_DOUBTED = {
+    "density": ([(0.5, 3.0), (5.0, 300.0), (2700.0, math.inf)], "is hardly that of a mud: 1.2 g/cm^3 are 1200, 10 "
+                "pounds per US gallon 10 * units.ppg = 1198"),
+    "friction": ([(1.0, math.inf)], "is more than the wall of a well has (0.1 to 0.5)"),
+}  # fmt: skip
+
+
+def doubt_value(what, called, values):
+    """Warn once of a "density" of mud (kg/m^3) or a "friction" where any of `values`, an array, is doubtful: `called`,
+    with {value} for the first such value and {count} for their number."""
+    ranges, words = _DOUBTED[what]
+    odd = values[np.any([(low < values) & (values < high) for low, high in ranges], axis=0)]
+    if odd.size:
+        warn(f"{called.format(value=odd[0], count=odd.size)} {words}")
 
 
 @dataclass(frozen=True)
@@ -66,8 +82,7 @@ class HoleSection(Part):
         if self.diameter is None:
             refuse(self, "diameter", None, "a diameter (m), or the size of a casing, casing='9 5/8 in 47 lb/ft'")
         doubt_width(self, "diameter")
-        if self.friction > 1:
-            warn(f"HoleSection.friction = {self.friction:g} is more than the wall of a well has (0.1 to 0.5)")
+        doubt_value("friction", f"HoleSection.friction = {self.friction:g}", np.array([self.friction]))
 
 
 def _depth(i, depth, unit):
@@ -311,12 +326,7 @@ class Mud(InWords, Part):
         if self.inside is None:
             store(self, inside=self.density)
         for density in {x for rows in (self.density, self.inside) for _, x in _columns(rows)}:
-            # neither a gas nor a liquid; relative densities; heavier than any mud
-            if 5 < density < 300 or 0.5 < density < 3 or density > 2700:
-                warn(
-                    f"Mud.density = {density:g} kg/m^3 is hardly that of a mud: 1.2 g/cm^3 are 1200, 10 pounds per US "
-                    "gallon 10 * units.ppg = 1198"
-                )
+            doubt_value("density", f"Mud.density = {density:g} kg/m^3", np.array([density]))
         for field in ("flow_inside", "flow_outside"):
             flow = getattr(self, field)
             at_surface = flow[0][1] if isinstance(flow, tuple) else flow

@@ -42,6 +42,7 @@ from cosserat_fenicsx.errors import NotConverged, SceneError, nearest
 from cosserat_fenicsx.numerics import gauss
 from cosserat_fenicsx.results.queries import Sensitivity, Uncertainty
 from cosserat_fenicsx.statics.cases import Cases
+from cosserat_fenicsx.well.hole import doubt_value
 from cosserat_fenicsx.well.pieces import down_along
 from cosserat_fenicsx.well.tools import MudMotor
 
@@ -50,6 +51,7 @@ _POINTS = 8  # Gauss points a piece
 _ROUNDS = 60
 _SHORTEST = 1e-9  # m, of pieces that are still cut
 _EPS = np.finfo(float).eps
+_AT_ONCE = 1024  # cases of a batch whose arrays are in memory together
 
 
 class Chain(NamedTuple):
@@ -322,19 +324,45 @@ class Differentiated:
             raise SceneError(
                 f"batch: model = {self.model!r}: expected the answer of torque_and_drag(..., model='soft')"
             )
-        known, pieces, coulomb = self._known(over), self.pieces, self.torque_convention == "coulomb"
-        values = finite_array("batch", "values", values, "(cases, names) finite numbers")
+        known, pieces, coulomb = self._known(over, "batch.over"), self.pieces, self.torque_convention == "coulomb"
+        values = finite_array("batch", "values", values, f"(cases, {len(known)}) finite numbers")
         if values.ndim != 2 or values.shape[1] != len(known):
             refuse("batch", "values", values, f"rows of {len(known)} numbers: {', '.join(known)}")
-        weight, friction = (np.tile(x, (len(values), 1)) for x in (pieces.weight, pieces.friction))
-        tension, torque = (np.full(len(values), x) for x in (-self.operation.weight, self.operation.torque))
-        given = dict(zip(known, values.T, strict=True))
-        for name in sorted(known, key=lambda x: ("mud" not in x, "[" in x)):  # what is for a part of the string last
-            change, value, each = known[name][0], known[name][1], given[name]
+        for name, each in zip(known, values.T, strict=True):
             least = 0.0 if name.endswith("friction") or "mud" in name else -np.inf
             most = 5.0 if name.endswith("friction") else np.inf
             if each.min(initial=0.0) < least or each.max(initial=0.0) > most:
                 refuse("batch", name, each, f"numbers from {least:g} to {most:g}")
+            if least == 0:
+                told = f"batch: {name} = {{value:g}}, in {{count}} of {len(each)} cases,"
+                doubt_value("density" if "mud" in name else "friction", told, each)
+            for motor in self.string.components if name == "operation.torque" and len(each) else ():
+                if isinstance(motor, MudMotor) and not motor.stands(float(np.abs(each).max())):
+                    motor.running(type(self.operation).__name__, float(each.max()))
+        found = np.empty((len(values), 6))
+        for i in range(0, len(values), _AT_ONCE):
+            found[i : i + _AT_ONCE] = _many(pieces, coulomb, *self._strings(known, values[i : i + _AT_ONCE]))
+        sizes, rounding = np.abs(found[:, 2:4]), 2 * _EPS * len(pieces.top)
+        cut, failures = ~(found[:, :2] <= self.tol * sizes).all(axis=1), {}
+        loads, errors = found[:, 4:].copy(), found[:, :2] + rounding * sizes
+        for i in np.flatnonzero(cut).tolist():
+            weight, friction, *lower = (x[0] for x in self._strings(known, values[i : i + 1]))
+            try:
+                one = soft_string(chain_of(pieces._replace(weight=weight, friction=friction), coulomb), *lower, self.tol)
+            except NotConverged as problem:
+                loads[i] = errors[i] = np.nan
+                failures[i] = str(problem)
+            else:
+                loads[i], errors[i] = (one.tension[-1, -1], one.torque[-1, -1]), (one.error, one.torque_error)
+        return Cases(loads, errors, cut, failures)
+
+    def _strings(self, known, values):
+        """Weight and friction (cases, pieces), and tension and torque at the lower end (cases,), of cases of `batch`."""
+        weight, friction = (np.tile(x, (len(values), 1)) for x in (self.pieces.weight, self.pieces.friction))
+        tension, torque = (np.full(len(values), x) for x in (-self.operation.weight, self.operation.torque))
+        given = dict(zip(known, values.T, strict=True))
+        for name in sorted(known, key=lambda x: ("mud" not in x, "[" in x)):  # what is for a part of the string last
+            (change, value, _), each = known[name], given[name]
             if name.startswith("operation"):
                 tension, torque = (-each, torque) if name == "operation.weight" else (tension, each)
             elif "mud" in name:
@@ -342,23 +370,7 @@ class Differentiated:
             else:
                 weight += (each[:, None] - weight) * change.weight
                 friction += (each[:, None] - friction) * change.friction
-        for motor in self.string.components if "operation.torque" in known and len(values) else ():
-            if isinstance(motor, MudMotor) and not motor.stands(float(np.abs(torque).max())):
-                motor.running(type(self.operation).__name__, float(torque.max()))
-        found = _many(pieces, coulomb, weight, friction, tension, torque)
-        sizes, rounding = np.abs(found[:, 2:4]), 2 * _EPS * len(pieces.top)
-        cut, failures = ~(found[:, :2] <= self.tol * sizes).all(axis=1), {}
-        loads, errors = found[:, 4:].copy(), found[:, :2] + rounding * sizes
-        for i in np.flatnonzero(cut).tolist():
-            chain = chain_of(pieces._replace(weight=weight[i], friction=friction[i]), coulomb)
-            try:
-                one = soft_string(chain, tension[i], torque[i], self.tol)
-            except NotConverged as problem:
-                loads[i] = errors[i] = np.nan
-                failures[i] = str(problem)
-            else:
-                loads[i], errors[i] = (one.tension[-1, -1], one.torque[-1, -1]), (one.error, one.torque_error)
-        return Cases(loads, errors, cut, failures)
+        return weight, friction, tension, torque
 
     def uncertainty(
         self,
@@ -383,9 +395,11 @@ class Differentiated:
             return self._down(tension if query == "tension" else torque)
         return np.asarray((tension if query == "hook_load" else torque)[-1, -1])
 
-    def _known(self, parameters):
-        """{name: (`Change`, value, unit)} of parameters by their names."""
+    def _known(self, parameters, called="sensitivity.parameters"):
+        """{name: (`Change`, value, unit)} of parameters by their names; `called` in errors."""
         known = self._parameters()
+        if not isinstance(parameters, Iterable):
+            refuse(*called.split("."), parameters, "a list of names, such as ['friction', 'mud.density']")
         names = [parameters] if isinstance(parameters, str) else list(parameters)
         for name in names:
             if name in ("mud.density", "mud.inside") and isinstance(self.mud and self.mud.density, tuple):
