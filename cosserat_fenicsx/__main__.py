@@ -17,7 +17,9 @@ def main():
         ranks.leave()  # ranks that come here have the same code
         interrupts.ignore()
     except KeyboardInterrupt:  # while modules are imported
-        sys.stderr.write("cosserat: interrupted\n")
+        known = sys.modules.get("cosserat_fenicsx.interrupts")
+        if not (known and known.asked()):  # else it was said at the signal
+            sys.stderr.write("cosserat: interrupted\n")
         code = 130
     if code == 130:  # at once: Python would end by SIGINT itself where that came during an import in C
         for stream in (sys.stdout, sys.stderr):

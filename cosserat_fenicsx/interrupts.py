@@ -17,8 +17,8 @@ _asked = _waits = False
 
 
 def listen():
-    """Let SIGINT, SIGTERM and SIGHUP request a stop; a second signal ends the process at once. To be called before
-    dolfinx is imported, since PETSc would take SIGHUP for an error.
+    """Let SIGINT, SIGTERM and SIGHUP request a stop, which says so; a second signal ends the process at once. To be
+    called before dolfinx is imported, since PETSc would take SIGHUP for an error.
 
     Not under mpirun, which kills its ranks anyway, and where one rank must not stop without the others.
     """
@@ -54,6 +54,9 @@ def _ask(number, frame):
     _asked = True
     signal.signal(number, signal.SIG_DFL)
     _leave_closed_terminals()
+    # at once, since a second signal may end the process before anything else is said; below the line of the terminal
+    words = "; it ends after the step at work, Ctrl-C again ends it at once" if _waits else ""
+    os.write(2, f"{chr(10) * os.isatty(2)}cosserat: interrupted{words}\n".encode())
     if not _waits:
         raise KeyboardInterrupt
 

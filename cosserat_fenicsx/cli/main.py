@@ -166,11 +166,11 @@ def main(arguments=None):
         with warnings_in_words():
             return together(lambda: _DO.get(options.command, _of_a_scene)(options))
     except KeyboardInterrupt:  # of commands without partial results; `deliver` handles paths and motions
-        say("cosserat: interrupted")
+        if not interrupts.asked():  # else it was said at the signal
+            say("cosserat: interrupted")
         return INTERRUPTED
     except Exception as problem:
         if interrupts.asked():  # Ctrl-C also ends a compiler at work, and imports in C raise other exceptions then
-            say("cosserat: interrupted")
             return INTERRUPTED
         if isinstance(problem, MemoryError):
             say(f"cosserat: not enough memory ({in_words(problem)}): expected a smaller problem, or more memory")

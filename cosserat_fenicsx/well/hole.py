@@ -25,8 +25,8 @@ from cosserat_fenicsx.well.survey import doubt_depth
 
 # Pa, standard.
 _ATMOSPHERE = 101325.0
-# {what: ([ranges of values that are doubted], what is said of them)}. Densities, kg/m^3: relative ones; neither a gas nor
-# a liquid; heavier than any mud.
+# {what: ([ranges of values that are doubted], what is said of them)}. Densities, kg/m^3: relative ones; neither of a
+# gas nor of a liquid; heavier than any mud.
 _DOUBTED = {
     "density": ([(0.5, 3.0), (5.0, 300.0), (2700.0, math.inf)], "is hardly that of a mud: 1.2 g/cm^3 are 1200, 10 "
                 "pounds per US gallon 10 * units.ppg = 1198"),

@@ -347,8 +347,9 @@ class Differentiated:
         loads, errors = found[:, 4:].copy(), found[:, :2] + rounding * sizes
         for i in np.flatnonzero(cut).tolist():
             weight, friction, *lower = (x[0] for x in self._strings(known, values[i : i + 1]))
+            chain = chain_of(pieces._replace(weight=weight, friction=friction), coulomb)
             try:
-                one = soft_string(chain_of(pieces._replace(weight=weight, friction=friction), coulomb), *lower, self.tol)
+                one = soft_string(chain, *lower, self.tol)
             except NotConverged as problem:
                 loads[i] = errors[i] = np.nan
                 failures[i] = str(problem)
@@ -357,7 +358,7 @@ class Differentiated:
         return Cases(loads, errors, cut, failures)
 
     def _strings(self, known, values):
-        """Weight and friction (cases, pieces), and tension and torque at the lower end (cases,), of cases of `batch`."""
+        """Weight and friction (cases, pieces), tension and torque at the lower end (cases,), of cases of `batch`."""
         weight, friction = (np.tile(x, (len(values), 1)) for x in (self.pieces.weight, self.pieces.friction))
         tension, torque = (np.full(len(values), x) for x in (-self.operation.weight, self.operation.torque))
         given = dict(zip(known, values.T, strict=True))
