@@ -2,9 +2,11 @@
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 from torsion_scenes import string
 
 import cosserat_fenicsx as cf
+from cosserat_fenicsx.drilling.chain import passing_time, time_of_impact
 from cosserat_fenicsx.drilling.elements import AxialTorsional
 from cosserat_fenicsx.drilling.linear.roots import LumpedCutting
 
@@ -69,3 +71,33 @@ def test_no_bounce_by_elements_that_are_too_long(bits):
     assert not any("APPROXIMATE" in why for why in motion.why)
     found = AxialTorsional(scene, elements=250)
     assert "too long for the bit, which answers within 0.0088 s" in found.why[-1]
+
+
+@pytest.mark.parametrize(("lower", "mass"), [
+    ([], 0.0), ([(2.0, 0.127), (3.0, 0.127)], 0.0), ([(0.3, 0.2)], 0.0), ([(0.3, 0.2), (1.5, 0.16)], 20.0),
+    ([(0.3, 0.2)], 900.0), ([(0.05, 0.07)], 0.0),
+])  # fmt: skip
+def test_rock_stops_a_bit_as_the_string_behind_short_sections(lower, mass):
+    """Closed form: m x'' + Z (x' - v) + k x = 0 after an impact at the speed v, with the mass of short sections below
+    the pipe and the impedance of the pipe, until the speed is v/e; with Z of the lowest section a bit of 0.3 m answered
+    ten times as late. What is cut into parts is still one."""
+    parts = [cf.well.Collar(length, outer_diameter=d, inner_diameter=0.05) for length, d in lower]
+    pipe = cf.well.Collar(2000.0, outer_diameter=0.127, inner_diameter=0.10861)
+    alike = [(length, d) == (length, 0.127) for length, d in lower]
+    parts = [cf.well.Collar(part.length, outer_diameter=0.127, inner_diameter=0.10861) if same else part
+             for part, same in zip(parts, alike, strict=True)]  # fmt: skip
+    k = 1e8
+    bit = cf.drilling.BitOnRock(cf.drilling.Stribeck(0.0, 0.0), WEIGHT, mass=mass, rock_stiffness=k)
+    scene = cf.drilling.Drilling(cf.well.DrillString([*parts, pipe]), cf.drilling.TopDrive(10.0), bit)
+    Z = scene.segments[0].axial_impedance
+    m = mass + sum(x.rhoA * x.length for x, same in zip(scene.segments[:0:-1], alike, strict=True) if not same)
+    if m == 0:
+        assert time_of_impact(scene) == pytest.approx(Z / k, rel=1e-12)
+        return
+    roots = np.roots([m, Z, k])
+    amplitudes = np.linalg.solve([[1, 1], roots], [-Z / k, 1.0])  # of z = x - Z v/k, v = 1
+    stopped = brentq(lambda t: float((amplitudes * roots * np.exp(roots * t)).sum().real) - np.exp(-1), 0, 5 * Z / k)
+    assert 0.6 * stopped < time_of_impact(scene) < 1.1 * stopped
+    depths = np.array([0.0, 1000.0, *np.cumsum([x.length for x in scene.segments])])
+    met = passing_time(scene, depths, time_of_impact(scene))
+    assert met == pytest.approx(1000 / scene.segments[0].axial_speed)  # the pipe, not the short elements below it

@@ -237,42 +237,55 @@ def _cuts(scene):
     return scene.bit is not None and not scene.discs and scene.bit.law.axial_stiffness < math.inf
 
 
+def _from_the_bit(scene, depths):
+    """Of the parts of a string between depths (m), from the bit up: the `Segment` of each, the time (s) in which an
+    axial wave passes it, and that which it takes from the bit to its lower end."""
+    ends = np.cumsum([x.length for x in scene.segments])
+    of = np.minimum(np.searchsorted(ends, (depths[:-1] + depths[1:]) / 2), len(ends) - 1)[::-1]
+    parts = [scene.segments[i] for i in of]
+    passing = np.diff(depths)[::-1] / [x.axial_speed for x in parts]
+    return list(zip(parts, passing.tolist(), (np.cumsum(passing) - passing).tolist(), strict=True))
+
+
+def _resolution(scene):
+    """The longest time (s) in which a wave may pass an element beside the bit, over `time_of_impact`."""
+    return _SET.fed if _cuts(scene) else _SET.resolved
+
+
 def time_of_impact(scene) -> float:
     """Time (s) in which the rock of a `Drilling` stops the bit, or a bit that cuts answers: Z/k by the impedance Z
-    (N s/m) of the lowest section, above a bit that cuts also of what is above shorter ones than elements may be, or
-    sqrt(m/k) by the mass m (kg) of the bit, the longer one; infinite without rock of a stiffness k (N/m), or weight on
-    bit per depth of cut."""
+    (N s/m) beside the bit, or sqrt(m/k) by the mass m (kg) that moves with it, the longer one; infinite without rock of
+    a stiffness k (N/m), or weight on bit per depth of cut. Sections that a wave passes soon within that time count with
+    their mass, and Z is the smallest one up to the first that is reached later."""
     bit = scene.bit
     k = math.inf if bit is None else bit.law.axial_stiffness if _cuts(scene) else bit.rock_stiffness
     if math.isinf(k):
         return math.inf
     if scene.discs:
-        mass, impedance = bit.mass + (scene.discs.masses or (math.inf,))[-1], 0.0
-    else:
-        mass, impedance, passed = bit.mass, math.inf, 0.0
-        for part in reversed(scene.segments if _cuts(scene) else scene.segments[-1:]):
-            if passed > _SET.fed * impedance / k:
-                break
-            impedance, passed = min(impedance, part.axial_impedance), passed + part.length / part.axial_speed
-    return max(math.sqrt(mass / k), impedance / k)
+        return math.sqrt((bit.mass + (scene.discs.masses or (math.inf,))[-1]) / k)
+    mass, impedance, time = bit.mass, math.inf, math.inf
+    for part, _, reached in _from_the_bit(scene, np.cumsum([0.0, *(x.length for x in scene.segments)])):
+        if reached > _resolution(scene) * time:
+            break
+        impedance = min(impedance, part.axial_impedance)
+        time = max(math.sqrt(mass / k), impedance / k)
+        mass += part.rhoA * part.length
+    return time
 
 
-def passing_time(scene, depths, within: float = 0.0) -> float:
+def passing_time(scene, depths, within: float) -> float:
     """Longest time (s) that an axial wave takes along an element of a string whose nodes have these depths (m), of
-    those that it meets within a time (s) from the bit: by default along the lowest one."""
+    those that it meets within a time (s) from the bit."""
     if scene.discs:
         return 0.0
-    ends = np.cumsum([x.length for x in scene.segments])
-    of = np.minimum(np.searchsorted(ends, (depths[:-1] + depths[1:]) / 2), len(ends) - 1)
-    times = (np.diff(depths) / np.array([x.axial_speed for x in scene.segments])[of])[::-1]
-    return float(times[np.cumsum(times) - times <= within].max())
+    return max(passing for _, passing, reached in _from_the_bit(scene, depths) if reached <= within)
 
 
 def unresolved(scene, depths, dt) -> str:
     """A sentence where the steps (s) or the elements are too long for impacts, or for a bit that cuts, or ""."""
     impact, cuts = time_of_impact(scene), _cuts(scene)
-    longest, slowest = _SET.resolved * impact, (_SET.fed if cuts else _SET.resolved) * impact
-    passing = passing_time(scene, depths, slowest if cuts else 0.0)
+    longest, slowest = _SET.resolved * impact, _resolution(scene) * impact
+    passing = passing_time(scene, depths, slowest)
     if dt <= longest and passing <= slowest:
         return ""
     most = slowest * scene.segments[-1].axial_speed if passing > slowest else 0.0
