@@ -2,6 +2,7 @@
 another."""
 
 import math
+from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
@@ -32,6 +33,16 @@ def bars(d=(0.0, 0.0), speed=1.0, stiffness=STIFFNESS, bending=1e6, turning=1e-1
         rods.append(cf.Rod(curve, section, name=name))
     touch = cf.RodContact(radius=RADIUS, stiffness=stiffness, **contact)
     return cf.Scene(rods, [], [touch], velocities=[cf.InitialVelocity(rods[0], linear=(0, 0, -speed))])
+
+
+def test_a_motion_does_not_begin_where_rods_press_each_other():
+    """The elastic surfaces of a motion would have no force where the hard ones of an equilibrium do not overlap."""
+    from test_rod_contact import crossing
+
+    path = cf.solve(crossing(), [1e-4, 0.1], elements=4)
+    moving = replace(path.scene, loads=[cf.RodContact(radius=0.01, stiffness=1e7, friction=0.2)])
+    with pytest.raises(cf.SceneError, match=r"rods press each other there by .* N on hard surfaces, and a motion on"):
+        cf.simulate(moving, 1e-3, dt=1e-4, start=path, elements=4)
 
 
 def middles(history, quantity):

@@ -113,6 +113,14 @@ def test_depths_of_columns_that_do_not_fit_the_hole_are_doubted(ends, words):
         cf.drilling.Drilling(string, cf.drilling.TopDrive(8.0), hole=hole, mud=mud)
 
 
+def test_depths_of_columns_are_doubted_in_the_unit_of_the_survey():
+    path = W.WellPath.from_survey([0, 9000], [0, 0], [0, 0], True, length_unit="ft")
+    hole = W.Borehole(path, [W.HoleSection("9000 ft", "12.25 in", 0.2)])
+    mud = W.Mud([("5000 ft", "9 ppg"), ("8000 ft", "13 ppg")])
+    with pytest.warns(cf.SceneWarning, match="Mud.density: the last row ends at md = 8000 ft, above the lower end"):
+        W.torque_and_drag(hole, W.DrillString([PIPE]), W.Static(), mud=mud, model="soft")
+
+
 @pytest.mark.parametrize("flow", [{"flow_inside": -5e5}, {"flow_outside": [(0.0, "-30 psi"), (900.0, 0.0)]}])
 def test_pressures_below_a_vacuum_are_refused(flow):
     with pytest.raises(cf.SceneError, match=f"Mud.{next(iter(flow))} = .*vacuum"):

@@ -182,7 +182,7 @@ class Drilling(InWords, Part):
                    "for air")  # fmt: skip
         _ = self.segments
         if self.hole is not None and self.mud is not None:
-            self.mud.doubt_depths(self.hole.length, self.bit_depth)
+            self.mud.doubt_depths(self.hole, self.bit_depth)
         if self.motor is not None and self.bit is None:
             refuse(self, "bit", None, f"a BitOnRock below {self.motor.name}, which turns it")
         check_flows(self.motors)

@@ -33,6 +33,7 @@ def put_start(model, start):
     model.set_motion(model.unknowns_of(rq), np.zeros((sum(layout.counts), model.signature.points, 3)))
     if start is not None:
         _check_overlap(scene, *point_of(start))
+        _check_pressed(scene, *point_of(start))
         model.actions.begin_friction()
     held = rq[model.tied_slots]
     if model.ties:
@@ -104,6 +105,19 @@ def _check_overlap(scene, path, k):
                     f"simulate.start: rod '{rod.name}' overlaps {describe(obstacle)} by {-gap[worst]:.3g} m at s = "
                     f"{x[worst] * rod.length:.6g} m: expected a path of a scene with this obstacle, or a start outside"
                 )
+
+
+def _check_pressed(scene, path, k):
+    """Refuse a start in which rods press each other: hard surfaces do not overlap, so that elastic ones have no force
+    there, and neither has friction."""
+    both = scene.rod_contact and path.scene.rod_contact
+    pressed = path[k].contacts(both).force if both else ()
+    if len(pressed):
+        raise SceneError(
+            f"simulate.start: rods press each other there by {sum(pressed):.3g} N on hard surfaces, and a motion on "
+            "elastic ones would begin without these forces: expected a point of the path before they touch, and a "
+            "motion that presses them together slowly"
+        )
 
 
 def _at_rest(model):

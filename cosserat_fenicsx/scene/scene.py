@@ -59,17 +59,23 @@ def magnitudes(scene, doubts=True):
     most, k = max((size * strain, k) for k, (size, (_, strain)) in enumerate(zip(K, limits, strict=True)))
     doubt, strain = limits[k]
     why = f"{f'where {doubt}' if doubt else 'beyond which no such material is elastic'}{_WAY_OUT}"
-    limit = f"{strain:g} EA = {most:.3g} N, {why if strain < _MOST_STRAIN else _ROUNDING}"
+    limit, why = f"{strain:g} EA", why if strain < _MOST_STRAIN else _ROUNDING
     # the arm by which a moment strains a section as much as a force does, where strains are bounded
     lever = np.sqrt(J[k] / K[k]) if strain <= _MOST_OF_STIFF and np.isfinite(most) else length
     if np.isinf(most):
         most = _MOST_BENDING * max(J) / length**2
-        limit = f"{_MOST_BENDING:g} EI/L^2 = {most:.3g} N, {_ROUNDING}"
+        limit, why = f"{_MOST_BENDING:g} EI/L^2", _ROUNDING
     found = []
     for load in scene.loads:
         if load.scaled or load.permanent:
-            size = max((_force(now, scene, lever) for now in _sampled(load, scene.horizon)), default=0.0)
-            found.append(Magnitude(size / most, load.scaled, f"{describe(load)}: {size:.3g} N", limit))
+            sizes = [(0.0, 0.0), *(_sizes(now, scene) for now in _sampled(load, scene.horizon))]
+            force, moment = np.max(sizes, axis=0)
+            if moment / lever > force:
+                size, arm, times, unit = moment, lever, f" times {lever:.3g} m", "N m"
+            else:
+                size, arm, times, unit = force, 1.0, "", "N"
+            told = f"{limit}{times} = {most * arm:.3g} {unit}, {why}"
+            found.append(Magnitude(size / (most * arm), load.scaled, f"{describe(load)}: {size:.3g} {unit}", told))
     for support in scene.supports:
         for name, most, unit in (("displacement", _MOST_MOTION * length, "m"), ("rotation", _MOST_MOTION, "rad")):
             moves = [getattr(now, name, None) for now in _sampled(support, scene.horizon)]
@@ -103,18 +109,21 @@ def _sampled(item, until):
             yield at(item, t)
 
 
-def _force(load, scene, lever):
-    """The size of a load, N: moments are divided by the lever (m), loads per length multiplied by that of the rod.
+def _sizes(load, scene):
+    """The largest force (N) and the largest moment (N m) of a load; loads per length are multiplied by that of the rod.
     Coefficients of rates, as of drag, are no loads."""
-    size = 0.0
+    force, moment = 0.0, 0.0
     for rod in scene.rods_of(load):
         s = np.zeros(1) if load.station is not None else np.linspace(0.0, rod.length, _SAMPLES)
         for datum in load.data(rod, s):
-            force, lengths, times = powers(datum.unit)
-            if force and not times:
-                values = np.linalg.norm(np.atleast_2d(datum.value), axis=-1)
-                size = max(size, float(values.max()) / (lever if lengths > 0 else rod.length) ** lengths)
-    return abs(load.amplitude) * size
+            is_force, lengths, times = powers(datum.unit)
+            if is_force and not times:
+                size = abs(load.amplitude) * float(np.linalg.norm(np.atleast_2d(datum.value), axis=-1).max())
+                if lengths > 0:
+                    moment = max(moment, size * rod.length ** (1 - lengths))
+                else:
+                    force = max(force, size / rod.length**lengths)
+    return force, moment
 
 
 def check_magnitudes(scene, load_factor, doubts=True):

@@ -334,27 +334,30 @@ class Mud(InWords, Part):
                 refuse(self, field, flow, f"at least -{_ATMOSPHERE:g} Pa at the surface, a vacuum; what flow loses on "
                        "its way down the string is a positive number that falls with depth")  # fmt: skip
 
-    def doubt_depths(self, bottom: float, depth: float) -> None:
+    def doubt_depths(self, hole: "Borehole", depth: float) -> None:
         """Warn of columns that hardly fit a hole and a string in it, such as of depths in another unit.
 
         Args:
-            bottom: measured depth of the bottom of the hole, m. depth: that of the lower end of the string, m.
+            hole: the `Borehole`. depth: of the lower end of the string, m.
         """
+        bottom = hole.length
         for field in ("density", "inside") if self.inside != self.density else ("density",):
             rows = getattr(self, field)
             if not isinstance(rows, tuple):
                 continue
             (begins, _), (ends, last) = rows[-2:]
             if begins >= bottom:
-                warn(f"Mud.{field}: the fluid of {last:g} kg/m^3 begins at md = {begins:.6g} m, below the bottom of "
-                     f"the hole at {bottom:.6g} m, and counts nowhere: expected depths in m, or text such as "
-                     "'4000 ft'")  # fmt: skip
+                text = (f"the fluid of {last:g} kg/m^3 begins at md = {begins:.6g} m, below the bottom of the hole at "
+                        f"{bottom:.6g} m, and counts nowhere: expected depths in m, or text such as '4000 ft'")
             elif abs(ends * constants.foot / bottom - 1) < 0.02:
-                warn(f"Mud.{field}: the last row ends at md = {ends:.6g} m, 3.28 times as deep as the hole, as feet "
-                     "are that are taken for metres: expected depths in m, or text such as '4000 ft'")  # fmt: skip
+                text = (f"the last row ends at md = {ends:.6g} m, 3.28 times as deep as the hole, as feet are that are "
+                        "taken for metres: expected depths in m, or text such as '4000 ft'")
             elif ends < depth - 1e-3 * bottom:
-                warn(f"Mud.{field}: the last row ends at md = {ends:.6g} m, above the lower end of the string; its "
-                     "fluid is taken to reach to the bottom: expected the depth of the bottom there")  # fmt: skip
+                text = (f"the last row ends at md = {ends:.6g} m, above the lower end of the string; its fluid is "
+                        "taken to reach to the bottom: expected the depth of the bottom there")
+            else:
+                continue
+            warn(hole.path.told(f"Mud.{field}: {text}"))
 
     @property
     def interfaces(self) -> np.ndarray:

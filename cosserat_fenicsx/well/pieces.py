@@ -175,7 +175,7 @@ def pieces_of(hole, string, operation, mud, depth):
     SceneError: a string that does not fit the hole: too long, too short, too wide, or a hole that ends above it."""
     pieces, laid, floats = _in_place(hole, string, mud, depth)
     if mud is not None:
-        mud.doubt_depths(hole.length, depth)
+        mud.doubt_depths(hole, depth)
     for sentence in floats:
         warn(sentence)
     slip = np.array([operation.direction(place.component.contact_radius) for place in laid])[pieces.component]
