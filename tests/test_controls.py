@@ -184,6 +184,28 @@ def test_small_motions_leave_an_autodriller_out():
     assert "the autodriller is left out" in caution
 
 
+@dataclass(frozen=True)
+class Broken(Held):
+    """Returns something else from 0.1 s on."""
+
+    found: object = None
+
+    def torque(self, state, now):
+        return (0.0, state) if now.time < 0.09 else self.found
+
+
+@pytest.mark.parametrize(("found", "words"), [
+    ((float("nan"), (0.0,)), "Broken.torque = nan: expected a finite number at t = 0.1 s"),
+    (3e3, "Broken.torque = 3000.0: expected the torque and the new state at t = 0.1 s"),
+    ((3e3, (0.0, 1.0)), "expected a state of 1 numbers at t = 0.1 s, as begin returned"),
+    ((3e3, (float("inf"),)), "Broken.torque = .*: expected a state of finite numbers"),
+])  # fmt: skip
+def test_a_control_that_breaks_is_refused_where_it_does(found, words):
+    scene = steady(pipe(1000.0), TopDrive(6.0, 2900.0, Broken(1e3, 1e3, found=found)), 0.0)
+    with pytest.raises(cf.SceneError, match=words):
+        cf.drilling.simulate(replace(scene, start="rest"), 1.0, dt=0.01)
+
+
 def test_torque_over_time():
     """On an inertia alone the speed is the integral of the torque."""
     control = TorqueOverTime(cf.signals.Ramp((2e3,), end=2.0))

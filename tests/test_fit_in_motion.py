@@ -119,6 +119,17 @@ def test_unknowns_that_are_refused(unknowns, words):
         cf.drilling.fit(scene(), readings, unknowns, dt=1e-2)
 
 
+@pytest.mark.parametrize(("readings", "words"), [
+    ({"hook_load": np.full(20, 1e6)}, "readings of hook_load: the torsion model has none: expected model='axial and torsional'"),
+    ({"drive_speed": np.append(1.0, np.full(19, np.nan))}, "1 readings for 1 unknowns: expected more"),
+])  # fmt: skip
+def test_readings_that_a_run_has_not_are_refused(readings, words):
+    t = np.linspace(0.1, 2.0, 20)
+    given = cf.drilling.Readings(t, readings, dict.fromkeys(readings, 1.0))
+    with pytest.raises(cf.SceneError, match=words):
+        cf.drilling.fit(scene(), given, {"bit.law.static": (4e3, 9e3)}, dt=1e-2)
+
+
 FILE = """
 title = "The law of a bit"
 [discs]
