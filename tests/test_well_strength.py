@@ -323,6 +323,23 @@ def test_the_most_weight_on_bit_says_that_strength_leaves_out_compressed_pipe():
         assert most.weight > 6e4 and most.incomplete == incomplete == ("NOT KNOWN" in str(most))
 
 
+@pytest.mark.parametrize("most", [0.4, 0.97, 1.6])
+def test_few_rods_are_solved_for_the_most_weight_on_bit(well, most, monkeypatch):
+    """Of a margin that vanishes at a share of the weight of the soft string, and is nearly a line; each one begins from
+    the rod of the last weight within its limits."""
+    answer, tried = solved(well, W.RotaryDrilling(10e3, 5e3)), []
+    weight = most * answer.most_weight_on_bit("S135").weight
+
+    def limits(answer, w, strengths, safety, buckling, near):
+        assert near == (max((x for x in tried if x < weight), default=tried[0]) if tried else None)
+        tried.append(w)
+        return {"strength": (0.6 * (1 - (w / weight) ** 1.2), 1000.0)}, w
+
+    monkeypatch.setattr("cosserat_fenicsx.well.reserves._limits_of_rod", limits)
+    found = answer.most_weight_on_bit("S135", model="rod", progress=False).weight
+    assert weight * (1 - 4e-3) <= found < weight and len(tried) <= 6, tried
+
+
 @pytest.mark.slow
 def test_the_most_weight_on_bit_of_the_rod():
     """A pipe above its bit in a straight hole without friction: it buckles at Dawson and Paslay's load; or yields where

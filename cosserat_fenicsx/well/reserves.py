@@ -246,16 +246,18 @@ def most_weight_of(answer, grade, wear, safety, buckling, model, progress=None):
 def _by_rod(answer, start, strengths, safety, buckling, progress):
     """The `MostWeightOnBit` of the rod in contact, looked for from a weight (N) on; NotConverged by too many solves."""
     whole = float(answer.pieces.weight @ (answer.pieces.bottom - answer.pieces.top))
-    low, high, weight = (0.0, None), (np.inf, None), min(start, whole)
+    low, high, weight, near = (0.0, None), (np.inf, None), min(start, whole), None
     with StageProgress("most weight on bit", progress, world()) as bar:
         for k in range(_MOST_SOLVED):
             bar.at(f"rod in contact {k + 1} of at most {_MOST_SOLVED}, {weight / 1e3:.4g} kN on bit")
-            limits = _limits_of_rod(answer, weight, strengths, safety, buckling)
+            limits, found = _limits_of_rod(answer, weight, strengths, safety, buckling, near)
             name = min(limits, key=lambda x: limits[x][0])
             inside = limits[name][0] > 0
+            before = low if inside else high
             low, high = ((weight, limits), high) if inside else (low, (weight, limits))
+            near = found if inside or near is None else near
             if high[1] is None or low[1] is None:
-                weight = min(weight * _AWAY, whole) if inside else weight / _AWAY
+                weight = min(_outwards(before, weight, limits, inside), whole)
             elif high[0] - low[0] <= (_NEAR_UNSOLVED if _UNSOLVED in high[1] else _NEAR) * high[0]:
                 break
             else:
@@ -283,6 +285,20 @@ def _told(answer, strengths, most):
     return replace(most, incomplete=bool((use.contact_mode == MODES[UNKNOWN]).any()))
 
 
+def _outwards(before, weight, limits, inside):
+    """The weight to try next where all that are known are within their limits, or all beyond: a little farther than
+    where the first margin vanishes on a line through the one before, or through that of 1 without weight."""
+    name = min(limits, key=lambda x: limits[x][0])
+    share, (other, known) = limits[name][0], before
+    other, there = (other, known[name][0]) if known and name in known else (0.0, 1.0)
+    zero = weight - share * (weight - other) / (share - there) if np.isfinite(share - there) else np.nan
+    if not np.isfinite(zero) or name == _UNSTABLE:
+        return weight * _AWAY if inside else weight / _AWAY
+    if inside:
+        return float(np.clip(zero * (1 + _NEAR / 3), weight * (1 + _NEAR / 2), weight * _AWAY**2))
+    return float(np.clip(zero * (1 - _NEAR / 3), weight / _AWAY**2, weight * (1 - _NEAR / 2)))
+
+
 def _between(low, high, above):
     """The weight to try next: where the margin vanishes on a line and a little beyond; else in the middle."""
     name = min(high[1], key=lambda x: high[1][x][0])
@@ -295,16 +311,17 @@ def _between(low, high, above):
     return float(np.clip(zero, low[0] + width / 20, high[0] - width / 20))
 
 
-def _limits_of_rod(answer, weight, strengths, safety, buckling):
-    """{limit: (what is left of it, a share, below 0 beyond it; measured depth, m)} of the rod with a weight on bit."""
+def _limits_of_rod(answer, weight, strengths, safety, buckling, near):
+    """{limit: (what is left of it, a share, below 0 beyond it; measured depth, m)} of the rod with a weight on bit, and
+    its `InHole`; None without an equilibrium. near: the `InHole` of another weight."""
     start = _solved(answer, "soft", weight)
     most = float(np.abs(start.tension).max())
     # the rod's tolerance is relative to the hook load, which may be small
     tol = min(0.5, _ROD_TOL * most / max(abs(start.hook_load), 1e-3 * most))
     try:
-        rod = answer.by_rod(replace(start, tol=tol), (), False, helix=buckling == "helical")
+        rod = answer.by_rod(replace(start, tol=tol), (), False, helix=buckling == "helical", start=near)
     except NotConverged:
-        return {_UNSOLVED: (-np.inf, np.nan)}
+        return {_UNSOLVED: (-np.inf, np.nan)}, None
     found = {"weight of the string": (rod.hook_load / most, 0.0)}
     shares = {"helical buckling": _to_load(rod, 1), "strength": 1 - safety * Utilisation(rod, strengths).von_mises}
     if buckling == "sinusoidal":
@@ -315,7 +332,7 @@ def _limits_of_rod(answer, weight, strengths, safety, buckling):
         if np.isfinite(share).any():
             at = int(np.nanargmin(share))
             found[name] = float(share[at]), float(rod.md[at])
-    return found
+    return found, rod.solved
 
 
 def _solved(answer, model, weight):

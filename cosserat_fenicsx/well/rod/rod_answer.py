@@ -196,12 +196,13 @@ def longest(tol):
     return _LONGEST * max(1.0, (_USUAL / tol) ** 0.25)
 
 
-def rod_in_contact(flexible, decided, progress=None, exact=True, helix=True):
+def rod_in_contact(flexible, decided, progress=None, exact=True, helix=True, start=None):
     """The `RodInContact` of the same string in the same hole as a soft one.
 
     Args:
         decided: sentences on why the soft string is not enough. exact: False for an answer that may be less accurate
             than asked, and says so. helix: whether to begin again as a helix where the equilibrium would buckle.
+        start: the `InHole` of the same string under other loads, near it.
 
     Raises:
         SceneError: a component without stiffness, or as wide as the hole; a weight in mud that is not positive;
@@ -240,6 +241,7 @@ def rod_in_contact(flexible, decided, progress=None, exact=True, helix=True):
                 tol=flexible.tol,
                 progress=progress,
                 work=work,
+                start=None if helix else start,
             ), None
         except NotAccurate as short:
             if exact:

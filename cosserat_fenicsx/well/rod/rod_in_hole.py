@@ -65,7 +65,8 @@ _STEPS = 6e4
 
 
 def solve_in_hole(path, lengths, stiffness, weight, contact_radius, *, wall_stiffness=None, helix=False, tol=1e-4,
-                  elements=None, degree=_MESHES.degree, progress=None, comm=None, work=None, **given):  # fmt: skip
+                  elements=None, degree=_MESHES.degree, progress=None, comm=None, work=None, start=None,
+                  **given):  # fmt: skip
     """The equilibrium of a string in a hole, as an exact rod in contact with the hole's wall.
 
     The string hangs from a clamp at the start of the path, on its axis, and ends at the sum of its lengths. Its weight
@@ -87,6 +88,8 @@ def solve_in_hole(path, lengths, stiffness, weight, contact_radius, *, wall_stif
         degree: of the elements, 2 to 4.
         progress, comm: as `solve` takes them.
         work: the `Work` that it may do; None for any.
+        start: the `InHole` of the same string under other loads, from which the first mesh begins, if that leads to an
+            equilibrium which is stable.
 
     Returns:
         `InHole`.
@@ -102,7 +105,7 @@ def solve_in_hole(path, lengths, stiffness, weight, contact_radius, *, wall_stif
     comm, counts = communicator(comm), _counts(elements, len(Layout.of(string.scene, 1).breaks[0]) - 1)
     with Progress([float(len(stages_from(string.spring)))], progress, comm, "stage") as bar:
         stiffest = _WALLS.stiffest if wall_stiffness is None else 1.0
-        job = _Job(degree, bool(helix), tol, counts[-1], stiffest, bar, work, comm)
+        job = _Job(degree, bool(helix), tol, counts[-1], stiffest, bar, work, comm, start)
         answer = None
         for count in counts:
             try:
@@ -172,7 +175,7 @@ def _counts(elements, pieces):
 
 class _Job(NamedTuple):
     """Settings that all meshes share: degree, start, tolerance, elements of the last one, stiffest wall over the first,
-    progress, work, ranks."""
+    progress, work, ranks, `InHole` under other loads."""
 
     degree: int
     helix: bool
@@ -182,6 +185,7 @@ class _Job(NamedTuple):
     bar: Progress
     work: Work
     comm: MPI.Comm
+    start: InHole | None = None
 
     def accepts(self, answer):
         """Whether an `InHole` is accurate enough: finer meshes do not reduce the effect of the wall's softness."""
@@ -198,6 +202,12 @@ def _finer(string, count, before, job):
         for stages, factor in ((near, before.factor), (BACK, before.factor), (BACK, 1.0)):
             with contextlib.suppress(NotConverged):
                 return _on_mesh(string, layout, stages, factor, before, before, job)
+    if job.start is not None:
+        layout = _divided(string, job.start.path.layout, _wanted(job.start), count)
+        with contextlib.suppress(NotConverged):
+            answer = _on_mesh(string, layout, DECADES, job.start.factor, job.start, None, job)
+            if answer.negative_modes == 0:
+                return answer
     pieces = Layout.of(string.scene, 1)
     layout = _divided(string, pieces, np.diff(pieces.breaks[0]), count)
     found = []
