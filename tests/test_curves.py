@@ -180,6 +180,16 @@ def test_the_frame_of_a_spline_does_not_twist(name):
     np.testing.assert_allclose(twist, 0, atol=1e-9)
 
 
+
+@pytest.mark.parametrize("top", [(0, 0, 5), (0.1, 0, 5), (3, 1, 2)])
+def test_a_bow_does_not_turn_the_axes_by_default(top):
+    s = np.linspace(0, 1, 21)[:, None]
+    bow = 1e-3 * np.sin(np.pi * s) * np.cross(top, (1, 2, 0.3))
+    bowed = cf.Spline(s * np.array(top, dtype=float) + bow)
+    (straight, turned) = (curve.frame(np.array([0.0]))[0] for curve in (cf.Line((0, 0, 0), top), bowed))
+    assert np.abs(straight - turned).max() < 0.05
+
+
 def test_the_frame_of_a_spline_against_bishops_equation():
     """d1' = -(d1 . t') t, integrated by DOP853 from knot to knot."""
     spline = CURVES["spline"]

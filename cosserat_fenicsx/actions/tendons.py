@@ -388,7 +388,9 @@ class Pretension(InLaw):
         if self.force and not np.all(stretch):
             refuse(self, "force", self.force, f"rest_length, since rod '{rod.name}' cannot stretch")
         if np.min(stretch) <= -1:
-            refuse(self, "force", self.force, f"a tension below EA of rod '{rod.name}', at which no length is left")
+            most = -self.force / np.min(stretch)
+            words = f"a tension below EA = {most:.4g} N of rod '{rod.name}', at which no length is left; is its E in Pa"
+            refuse(self, "force", self.force, words)
 
     def without_stress(self, rod, s):
         if self.force is None:

@@ -230,11 +230,13 @@ def _finish(plotter, pyvista, everywhere, symbols, lines, title, label, most=6):
 
 def _small(path, shown, size, magnify):
     """A note where displacements are too small to be seen, with a factor that shows them; else empty."""
-    largest = path.largest_displacement()[shown].max()
+    all_of_them = path.largest_displacement()
+    largest = all_of_them[shown].max()
     if magnify * largest > VISIBLE * size or largest < 1e-12 * size:
         return ""
-    decade = 10.0 ** math.floor(math.log10(0.1 * size / largest))
-    return f"displacements are at most {largest:.2g} m: magnify={decade:g}"
+    decade, k = 10.0 ** math.floor(math.log10(0.1 * size / largest)), int(all_of_them.argmax())
+    others = f" here, {all_of_them[k]:.2g} m at {path.axis} {path.label(k)}" if all_of_them[k] > 2 * largest else ""
+    return f"displacements are at most {largest:.2g} m{others}: magnify={decade:g}"
 
 
 def _title(path, shown, magnify, small, apart, factors):

@@ -199,6 +199,8 @@ _GAUSS = gauss(20)
 #: halvings of a span, and mean number of panels per span, beyond which the curve has a cusp
 _MOST_HALVINGS, _MOST_PANELS = 24, 200
 
+# The default of d1 is that of the line between the ends where the start is nearly along it, rad.
+_NEARLY_ALONG = math.radians(30)
 
 Point = Annotated[Numbers, Several("length")]
 Direction = Annotated[Numbers, Several(unit="direction")]
@@ -234,7 +236,7 @@ class Spline(Curve):
         points: (n, 3), m, or the path of a file: a .csv with three columns (m), or any file with line cells that meshio
             reads; a relative path in a scene file starts at the scene file.
         d1: a vector whose component normal to the tangent at the start gives the direction of d_1R there; None as for
-            `Line`.
+            the `Line` between the ends where the curve starts within 30 degrees of it, else as for one along the start.
         closed: whether the curve returns to its first point, smoothly.
 
     Raises:
@@ -325,10 +327,18 @@ class Spline(Curve):
         )
         return resolved, start, _GAUSS.integral @ rates[0], _GAUSS.integral @ rates[1]
 
+    def _upright(self):
+        """The direction that the default of d1 is level to: that from end to end where the curve starts nearly along
+        it, since a bow of a vertical line turns its horizontal direction by any angle; else that of the start."""
+        straight = np.subtract(self.points[-1], self.points[0])
+        length = np.linalg.norm(straight)
+        near = not self.closed and np.dot(straight, self._tangents[0]) > math.cos(_NEARLY_ALONG) * length
+        return straight / length if near else self._tangents[0]
+
     def _carry_frame(self):
         """Store d_1R at the start of every panel, and the angle that the frame of a closed curve fails to close by."""
         ends = np.vstack([self._tangents[1:], self._tangent(self._span[-1:], self._middle[-1:] + self._half[-1:])])
-        d1 = start_frame(self, self._tangents[0], level_axis(self._tangents[0]))[:, 0]
+        d1 = start_frame(self, self._tangents[0], level_axis(self._upright()))[:, 0]
         starts = [d1]
         for a, t, angle in zip(self._tangents, ends, self._turn.sum(axis=0), strict=True):
             d1 = _moved(d1, a, t, angle)

@@ -16,7 +16,7 @@ from cosserat_fenicsx.checks import instance, store, warn
 from cosserat_fenicsx.errors import SceneError, nearest
 from cosserat_fenicsx.parts import Items, Object, Part, concerning
 from cosserat_fenicsx.scene.action import Action, describe, powers, some_of
-from cosserat_fenicsx.scene.curves import Line
+from cosserat_fenicsx.scene.curves import Line, Spline
 from cosserat_fenicsx.scene.planes import bent_weakly, find_plane
 from cosserat_fenicsx.scene.profiles import Stiffnesses
 from cosserat_fenicsx.scene.rod import Rod, Station, StationOrName, station_named, with_names
@@ -407,9 +407,9 @@ class Scene(Part):
         bending = self.extremes[1].J
         unlike = np.abs(bending[:, 0] - bending[:, 1]) > _ALIKE * bending[:, 0]
         rods = [self.rods[i] for i in np.flatnonzero(unlike)]
-        names = [f"'{rod.name}'" for rod in rods if isinstance(rod.curve, Line) and rod.curve.d1 is None]
+        names = [f"'{rod.name}'" for rod in rods if isinstance(rod.curve, (Line, Spline)) and rod.curve.d1 is None]
         told = "sections that are not round stand upright by default, with d1 level (of vertical rods along x) and d2, "
-        told += f"along heights and webs, across it: {some_of(names)}; `d1=` of Line or frame turns them"
+        told += f"along heights and webs, across it: {some_of(names)}; `d1=` of the curve or of frame turns them"
         return [told] if names else []
 
     @cached_property
