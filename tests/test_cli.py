@@ -481,3 +481,19 @@ sys.exit(main())"""
     unhidden = lambda: signal.signal(number, signal.SIG_DFL)  # noqa: E731 - these tests may run under nohup
     done = python("-c", code, "explain", DEMO, preexec_fn=unhidden)
     assert (done.returncode, done.stdout, done.stderr) == (130, "", "cosserat: interrupted\n")
+
+
+@pytest.mark.serial
+def test_units_by_name(tmp_path, capsys):
+    """In what is printed and in .csv files, of a string in a well."""
+    from cosserat_fenicsx.cli.main import main
+
+    file = ROOT / "demos" / "wells" / "volve_f12.toml"
+    words = ["run", str(file), "-o", str(tmp_path), "--no-picture", "--model", "soft", "--units", "kN,mm"]
+    assert main(words) == 0
+    told, scene = capsys.readouterr().out, cf.read(file)
+    hook = scene.answer(scene.operations[0]).hook_load
+    assert f"hook load {hook / 1e3:.6g} kN" in told and "trip out, bit at 3.438e+06 mm" in told
+    names, *_, last = (tmp_path / "trip_out.csv").read_text(encoding="utf-8").splitlines()
+    assert names.startswith("measured depth (mm),north (mm)") and "effective tension (kN)" in names
+    assert float(last.split(",")[0]) == pytest.approx(3438e3)

@@ -75,7 +75,7 @@ def test_no_bounce_by_elements_that_are_too_long(bits):
 
 @pytest.mark.parametrize(("lower", "mass"), [
     ([], 0.0), ([(2.0, 0.127), (3.0, 0.127)], 0.0), ([(0.3, 0.2)], 0.0), ([(0.3, 0.2), (1.5, 0.16)], 20.0),
-    ([(0.3, 0.2)], 900.0),
+    ([(0.3, 0.2)], 900.0), ([(0.05, 0.07)], 0.0),
 ])  # fmt: skip
 def test_rock_stops_a_bit_as_the_string_behind_short_sections(lower, mass):
     """Closed form: m x'' + Z (x' - v) + k x = 0 after an impact at the speed v, with the mass of short sections below

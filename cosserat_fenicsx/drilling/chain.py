@@ -256,7 +256,8 @@ def time_of_impact(scene) -> float:
     """Time (s) in which the rock of a `Drilling` stops the bit, or a bit that cuts answers: Z/k by the impedance Z
     (N s/m) beside the bit, or sqrt(m/k) by the mass m (kg) that moves with it, the longer one; infinite without rock of
     a stiffness k (N/m), or weight on bit per depth of cut. Sections that a wave passes soon within that time count with
-    their mass, and Z is the smallest one up to the first that is reached later."""
+    their mass, and Z is that of the last one before the first which is reached later; above a bit that cuts, with waves
+    as short as elements, the smallest one up to there."""
     bit = scene.bit
     k = math.inf if bit is None else bit.law.axial_stiffness if _cuts(scene) else bit.rock_stiffness
     if math.isinf(k):
@@ -267,7 +268,7 @@ def time_of_impact(scene) -> float:
     for part, _, reached in _from_the_bit(scene, np.cumsum([0.0, *(x.length for x in scene.segments)])):
         if reached > _resolution(scene) * time:
             break
-        impedance = min(impedance, part.axial_impedance)
+        impedance = min(impedance, part.axial_impedance) if _cuts(scene) else part.axial_impedance
         time = max(math.sqrt(mass / k), impedance / k)
         mass += part.rhoA * part.length
     return time
