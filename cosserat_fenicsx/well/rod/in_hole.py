@@ -437,7 +437,8 @@ class _Errors:
 
 _ERRORS = _Errors()
 #: Least effect of the wall's softness, relative, on a finer mesh where it was found on a coarser one, which may not
-#: resolve the layer in the wall: the largest one of 195 strings is 1.3e-5 where the coarse mesh shows less.
+#: resolve the layer in the wall: the largest one of 157 operations in random wells is 1.3e-5 where the coarse mesh
+#: shows less.
 UNSEEN = 1.5e-5
 
 
