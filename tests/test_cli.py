@@ -144,7 +144,7 @@ def test_the_table_shows_a_station_and_the_reaction(here):
 
 def test_pictures_are_asked_for(tmp_path, here):
     """Options for points and magnification; the picture suggests a magnification where displacements are invisible."""
-    from cosserat_fenicsx.pictures import plot
+    from cosserat_fenicsx.pictures import charts, plot
 
     look = ("--at", "0.01,0.03", "--magnify", "500")
     code, _, trouble = here("run", DEMO, "--load-factors", "0.01,0.02,0.03", "-o", tmp_path, *look)
@@ -152,6 +152,9 @@ def test_pictures_are_asked_for(tmp_path, here):
     path = cf.solve(cf.read(DEMO).scene, [0.01, 0.02, 0.03])
     assert plot._small(path, [0, 2], 20.0, 1.0) == "displacements are at most 0.0076 m: magnify=100"
     assert plot._small(path, [0, 2], 20.0, 100.0) == ""
+    assert " m here, 0.0076 m at load factor 0.03" in plot._small(path, [0], 20.0, 1.0)
+    with charts.asked(units={"length": "mm"}):
+        assert plot._small(path, [0, 2], 20.0, 1.0) == "displacements are at most 7.6 mm: magnify=100"
 
 
 def test_explain(here):

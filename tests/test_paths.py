@@ -79,6 +79,7 @@ def test_limit_points_in_closed_form(control):
     assert len(path.events) == 2 and path.control == "arc"
     lie_between_their_points(path)
     assert path.load_factors[0] == 0 and path.load_factors[-1] == 20.0
+    assert f"load factor 20, stable beyond the limit point at {pendulum_limits(load)[0]:.6g}, " in str(path)
     limits = [event.after for event in path.events]
     between = np.arange(len(path))
     expected = (between > limits[0]) & (between <= limits[1])

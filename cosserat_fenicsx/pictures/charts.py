@@ -114,6 +114,11 @@ def chosen_unit(unit):
     return Units(_units.get()).of(Quantity("number", unit=unit))
 
 
+def in_chosen_units(text):
+    """A sentence in the units that are requested, see `Units.sentence`."""
+    return Units(_units.get()).sentence(text)
+
+
 def scale(quantity, *values):
     """(heading, size): the label of a `Quantity` with a unit, see `unit_of`."""
     unit, size = unit_of(quantity, *values)

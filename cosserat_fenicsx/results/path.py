@@ -177,7 +177,7 @@ class Path(RodResult):
         turned = np.where((angle := self.rotation_angle(station)) > 1e-12, angle, 0.0)[-1]
         yield (
             f"{title} the load factor {self.load_factors[-1]:.6g}{self._of_stage(self.stage[-1])}, "
-            f"{_STATES[np.sign(self.negative_modes[-1])]}, "
+            f"{_STATES[np.sign(self.negative_modes[-1])]}{self._beyond_limits()}, "
             f"{station} is displaced by {self._moved_in_words(station, units)} and turned by {turned:.6g} rad."
         )
         yield from self.cautions
@@ -203,6 +203,11 @@ class Path(RodResult):
         ]
         order = sorted(range(len(words)), key=lambda k: (self.events[k].kind == "bifurcation", k))
         return [[words[k] for k in sorted(part)] for part in (order[:_EVENTS], order[_EVENTS:])]
+
+    def _beyond_limits(self):
+        """Words for a last state that comes after a limit point of its stage: the load cannot grow through it."""
+        limits = [x.load_factor for x in self.events if x.kind == "limit" and x.stage == self.stage[-1]]
+        return f" beyond the limit point at {limits[0]:.6g}" if limits else ""
 
     def _of_stage(self, stage):
         """The name of a stage after one of its load factors, in sentences."""
