@@ -32,7 +32,7 @@ _PREFIXED = {
 }
 # Numbers, also "a to b", with a unit in a sentence, and no longer unit after it.
 _NUMBER = r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?"
-_UNIT = r"(m|k?N m|N/m|k?N|kJ|deg/30m)"
+_UNIT = r"(m|k?N m|N/m|k?N|kJ|Pa|deg/30m)"
 _NUMBERS = rf"{_NUMBER}(?: (?:to|and) {_NUMBER})?|\({_NUMBER}(?:, {_NUMBER})*\)"
 _WITH_UNIT = re.compile(rf"(?<![\w.])({_NUMBERS}) {_UNIT}(?![\w/^]| m\b| s\b)")
 _SI = {"kN m": ("N m", 1e3), "kN": ("N", 1e3), "kJ": ("J", 1e3), "deg/30m": ("rad/m", units.deg_per_30m)}
@@ -123,8 +123,9 @@ class Units:
     """The units that quantities are shown in: those of the result ("SI"), of the oil field, or chosen ones.
 
     Args:
-        units: "SI"; "field" (ft, in, klbf, ft-lbf, ppg, rpm, psi); or {dimension or unit: unit}, such as
-            {"force": "klbf", "[length]": "ft", "N m": "kN m"}, with SI for all others.
+        units: "SI"; "field" (ft, in, klbf, ft-lbf, ppg, rpm, psi); {dimension or unit: unit}, such as
+            {"force": "klbf", "[length]": "ft", "N m": "kN m"}, or units with commas between, "kN,mm", with SI for all
+            others: but moments and forces per length follow a force in N or kN, as kN m and kN/m.
 
     Raises:
         SceneError: unknown units; a unit of another dimension.
@@ -141,18 +142,31 @@ class Units:
         elif units == "field":
             self._chosen = {name: dimension.field for name, dimension in DIMENSIONS.items()}
         elif not self.si:
-            raise SceneError(
-                f"units = {units!r}: expected 'SI', 'field' or a dict of units by dimensions, such as "
-                "{'force': 'klbf', 'length': 'ft'}"
-            )
+            for unit in map(str.strip, str(units).split(",")):
+                known = {name: unit for name, x in DIMENSIONS.items() if unit in x.units}
+                if not known:
+                    raise SceneError(
+                        f"units = {units!r}: expected 'SI', 'field' or a dict of units by dimensions, such as "
+                        "{'force': 'klbf', 'length': 'ft'}, or units with commas between, such as 'kN,mm': "
+                        f"'{unit}' is none"
+                    )
+                self._chosen |= known
+        force = self._chosen.get("force")
+        for name, unit in (("moment", f"{force} m"), ("force per length", f"{force}/m")):
+            if unit in DIMENSIONS[name].units:
+                self._chosen.setdefault(name, unit)
 
-    def of(self, quantity: Quantity) -> tuple[str, float]:
-        """The unit of a quantity in files and data frames, and its size in the result's unit."""
+    def chosen(self, quantity: Quantity) -> tuple[str, float] | None:
+        """The unit that was chosen for a quantity, and its size in the result's unit; None where none was."""
         for name in _dimensions(quantity.unit, quantity.dimension):
             if name in self._chosen:
                 known = DIMENSIONS[name].units
                 return self._chosen[name], known[self._chosen[name]] / known[quantity.unit]
-        return quantity.unit, 1.0
+        return None
+
+    def of(self, quantity: Quantity) -> tuple[str, float]:
+        """The unit of a quantity in files and data frames, and its size in the result's unit."""
+        return self.chosen(quantity) or (quantity.unit, 1.0)
 
     def told(self, value: float, unit: str, dimension: str = "", form: str = "g", shown: str = "") -> str:
         """A number with its unit: one in an SI unit, of a dimension where several have that unit, as text; `shown`:
@@ -161,15 +175,16 @@ class Units:
         return f"{value / size:{form}} {shown}"
 
     def sentence(self, text: str) -> str:
-        """A sentence with its lengths, forces, forces per length, moments and energies in these units, with as many
-        digits as it has, at least three."""
+        """A sentence with its lengths, forces, forces per length, moments, stresses and energies in these units, with
+        as many digits as it has, at least three."""
         return text if self.si else _WITH_UNIT.sub(self._again, text)
 
     def _again(self, found):
         numbers, unit = found.groups()
         si, size = _SI.get(unit, (unit, 1.0))
-        shown, other = self.of(Quantity("number", unit=si, dimension="force per length" if si == "N/m" else ""))
-        if shown == si:  # none was chosen
+        number = Quantity("number", unit=si, dimension={"N/m": "force per length", "Pa": "pressure"}.get(si, ""))
+        shown, other = self.chosen(number) or (unit, size)
+        if shown == unit:
             return found[0]
 
         def again(x):
@@ -180,9 +195,9 @@ class Units:
     def on_screen(self, quantity: Quantity, values: Any = ()) -> tuple[str, float]:
         """The unit of a quantity in tables and charts, and its size in the result's unit: SI units have the prefix that
         suits the values."""
-        unit, size = self.of(quantity)
-        if any(name in self._chosen for name in _dimensions(quantity.unit, quantity.dimension)):
-            return unit, size
+        if found := self.chosen(quantity):
+            return found
+        unit = quantity.unit
         if quantity.shown:
             known = next(x.units for x in DIMENSIONS.values() if {unit, quantity.shown} <= x.units.keys())
             return quantity.shown, known[quantity.shown] / known[unit]

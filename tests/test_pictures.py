@@ -18,7 +18,7 @@ from cosserat_fenicsx import interrupts, progress
 from cosserat_fenicsx.cli import main as cli
 from cosserat_fenicsx.pictures.charts import asked
 from cosserat_fenicsx.pictures.drawing import colour_of, default_colour, known, peak_of, quantity, seen, thickening
-from cosserat_fenicsx.pictures.plot import tangled
+from cosserat_fenicsx.pictures.plot import _small, tangled
 from cosserat_fenicsx.pictures.shapes import Drawn
 from cosserat_fenicsx.pictures.signs import Resting, has_sign, loads_of, signs_of, without_sign
 from cosserat_fenicsx.pictures.view import Labels, View, axes_of, seen_moving, view_of
@@ -128,6 +128,10 @@ def test_ticks_are_round_and_free_of_rounding():
         assert texts(0.0, 30.48) == ("x (ft)", ["0", "20", "40", "60", "80", "100"])
         assert axes_of(np.array([[0.0, 0, 0], [30.48, 0, 1.0]]))[0].ticks[-1][0] == pytest.approx(30.48)
         assert quantity(4448.2216, "N") == "1 klbf" and quantity(0.02, "1/m") == "0.0061 1/ft"
+    with asked(units="N,mm"):
+        assert quantity(4448.2216, "N") == "4448 N" and quantity(2e4, "N m") == "20000 N m"
+        moved = SimpleNamespace(largest_displacement=lambda: np.array([0.0, 0.19]), axis="load factor", label=str)
+        assert _small(moved, [1], 100.0, 1.0) == "displacements are at most 190 mm: magnify=10"
 
 
 VIEW = View.of(np.array([[0.0, 0, 0], [10, 0, 5]]), np.array([10.0, 0, 5]), (700, 500))

@@ -69,6 +69,20 @@ def test_sentences_in_field_units(text, told):
     assert Units({"length": "m"}).sentence("3.1 m") == "3.1 m" and Units({"m": "ft"}).sentence("1 kN") == "1 kN"
 
 
+@pytest.mark.parametrize("chosen", ["kN, mm,MPa", {"force": "kN", "length": "mm", "pressure": "MPa"}])
+def test_moments_follow_a_chosen_force(chosen):
+    """kN m and kN/m, wherever a unit is shown, unless they are chosen as well."""
+    text = "moment 2.262e+04 N m, shear 3 kN, (-2955.76, 0, 55169.6) N, stress 2.35e+08 Pa, 120 N/m, 0.19 m"
+    told = "moment 22.62 kN m, shear 3 kN, (-2.95576, 0, 55.1696) kN, stress 235 MPa, 0.12 kN/m, 190 mm"
+    assert Units(chosen).sentence(text) == told
+    moment = Quantity("moment", unit="N m")
+    assert Units(chosen).of(moment) == Units(chosen).on_screen(moment, [3.0]) == ("kN m", 1e3)
+    assert Units({"force": "kN", "moment": "N m"}).of(moment) == ("N m", 1.0) == Units("klbf").of(moment)
+    assert Units("N,mm").sentence("2 kN, 5 kN m") == "2000 N, 5000 N m" and Units(chosen).chosen(LOAD) == ("kN", 1e3)
+    with pytest.raises(SceneError, match="'ell' is none"):
+        Units("kN,ell")
+
+
 def test_sentences_follow_the_units():
     t = np.linspace(0, 10, 101)
     rows = np.zeros((101, 1 + len(SERIES) + len(LEDGER)))

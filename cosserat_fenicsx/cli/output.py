@@ -42,20 +42,12 @@ def given(options, names):
 
 
 def units_of(options):
-    """The value of --units: "SI", which is the default, "field", or {dimension: unit} of the units that it names."""
-    asked = getattr(options, "units", None)
-    if asked in (None, "SI", "field"):
-        return asked or "SI"
-    from cosserat_fenicsx.quantities import DIMENSIONS  # loads numpy, which --help does without
+    """The value of --units, by default "SI"; a SceneError where `Units` does not take it."""
+    from cosserat_fenicsx.quantities import Units  # loads numpy, which --help does without
 
-    units = [unit.strip() for unit in asked.split(",")]
-    chosen = [{name: unit for name, x in DIMENSIONS.items() if unit in x.units} for unit in units]
-    if not all(chosen):
-        raise SceneError(
-            f"--units {asked}: expected SI, field (ft, in, klbf, ft-lbf, ppg, rpm, psi) or units with commas between, "
-            f"such as kN,mm: '{units[chosen.index({})]}' is none"
-        )
-    return {name: unit for known in chosen for name, unit in known.items()}
+    asked = getattr(options, "units", None) or "SI"
+    Units(asked)
+    return asked
 
 
 def refuse_of_rods(options, kind):

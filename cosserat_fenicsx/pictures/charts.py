@@ -110,12 +110,12 @@ def unit_of(quantity, *values):
 
 
 def chosen_unit(unit):
-    """(unit, size) requested for numbers of an SI unit, size in the SI unit; by default the SI unit itself."""
-    return Units(_units.get()).of(Quantity("number", unit=unit))
+    """(unit, size) requested for numbers of an SI unit, size in the SI unit; None where none was."""
+    return Units(_units.get()).chosen(Quantity("number", unit=unit))
 
 
-def in_chosen_units(text):
-    """A sentence in the units that are requested, see `Units.sentence`."""
+def sentence(text):
+    """A sentence in the units of the current chart or picture, see `Units.sentence`."""
     return Units(_units.get()).sentence(text)
 
 

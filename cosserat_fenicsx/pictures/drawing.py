@@ -12,6 +12,7 @@ import numpy as np
 from cosserat_fenicsx.errors import LibraryMissing, SceneError, nearest
 from cosserat_fenicsx.pictures.charts import chosen_unit
 from cosserat_fenicsx.pictures.view import Labels, View, axes_of, draw_axes, round_step
+from cosserat_fenicsx.quantities import as_text
 from cosserat_fenicsx.scene.sections import Circle, Material
 
 
@@ -59,9 +60,10 @@ def load_pyvista():
 
 def suited(value, unit="N m"):
     """(size, name) of the unit for a value in an SI unit: the requested unit, or the SI unit with a suitable prefix."""
-    chosen, size = chosen_unit(unit)
-    if chosen != unit or not unit.startswith(_PREFIXED):
-        return size, chosen
+    if chosen := chosen_unit(unit):
+        return chosen[::-1]
+    if not unit.startswith(_PREFIXED):
+        return 1.0, unit
     size, letter = next(((s, p) for s, p in _PREFIXES if abs(value) >= s * (1 - 1e-9)), (1.0, ""))
     return size, f"{letter}{unit}"
 
@@ -69,7 +71,7 @@ def suited(value, unit="N m"):
 def quantity(value, unit):
     """A value as text, to three digits, with its unit."""
     size, name = suited(value, unit)
-    return f"{value / size:.3g} {name}"
+    return f"{as_text(float(value / size), 3)} {name}"
 
 
 def stage(pyvista, size, smooth="msaa", **panels):

@@ -12,7 +12,7 @@ import numpy as np
 from cosserat_fenicsx.checks import positive
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.new_files import replaced
-from cosserat_fenicsx.pictures.charts import asked, in_chosen_units
+from cosserat_fenicsx.pictures.charts import asked, sentence
 from cosserat_fenicsx.pictures.drawing import (
     VISIBLE,
     add_bodies,
@@ -213,7 +213,7 @@ def _finish(plotter, pyvista, everywhere, symbols, lines, title, label, most=6):
                          title=over + _ABOVE * font, most=most, heights=_HEIGHTS)  # fmt: skip
     label(labels)
     for text, point, towards, colour in symbols.grouped_texts():
-        labels.near(in_chosen_units(text), point, towards, size=font, colour=colour)
+        labels.near(text, point, towards, size=font, colour=colour)
     labels.draw(plotter, pyvista)
     if labels.left_out:
         left_out = f"(no room for {len(labels.left_out)} labels: "
@@ -236,7 +236,7 @@ def _small(path, shown, size, magnify):
         return ""
     decade, k = 10.0 ** math.floor(math.log10(0.1 * size / largest)), int(all_of_them.argmax())
     others = f" here, {all_of_them[k]:.2g} m at {path.axis} {path.label(k)}" if all_of_them[k] > 2 * largest else ""
-    return in_chosen_units(f"displacements are at most {largest:.2g} m{others}: magnify={decade:g}")
+    return sentence(f"displacements are at most {largest:.2g} m{others}: magnify={decade:g}")
 
 
 def _title(path, shown, magnify, small, apart, factors):

@@ -335,9 +335,7 @@ def axes_of(points, most=_INTERVALS):
     """The three `Axis` of a drawing of points (n, 3), m, with at most `most` intervals on the longest one."""
     low, high = points.min(axis=0), points.max(axis=0)
     size = float((high - low).max())
-    unit, scale = chosen_unit("m")
-    if unit == "m":
-        scale, unit = next((scale, unit) for least, scale, unit in _UNITS if size >= least)
+    unit, scale = chosen_unit("m") or next((unit, scale) for least, scale, unit in _UNITS if size >= least)
     step = scale * round_step(size / scale, most)
     first, last = (x.astype(int).tolist() for x in (np.floor(low / step + 1e-9), np.ceil(high / step - 1e-9)))
     axes = []

@@ -99,7 +99,7 @@ class History(RodResult):
         if largest:
             worst = np.abs(self.balance).max()
             yield f"The energy balance is off by at most {worst:.1e} J, {worst / largest:.1e} of the largest energy."
-        yield from contacts_in_words(self)
+        yield from map(units.sentence, contacts_in_words(self))
         yield f"{self.steps[-1]} steps of the scheme {self.scheme}, {self.model} model."
 
     def _table(self, units, rows, station=None):

@@ -182,9 +182,9 @@ class Path(RodResult):
         )
         yield from self.cautions
         for doubt in self.scene.doubts:
-            yield f"First check: {doubt}"
+            yield units.sentence(f"First check: {doubt}")
         yield from errors_in_words(self)
-        yield from contacts_in_words(self)
+        yield from map(units.sentence, contacts_in_words(self))
         told, others = self._events_in_words()
         yield from told
         if others:
