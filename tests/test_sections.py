@@ -9,7 +9,7 @@ from scipy.optimize import brentq
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.cli.explain import explain
-from cosserat_fenicsx.results.queries import largest_in_words
+from cosserat_fenicsx.results.queries import Largest, _beyond_metals, largest_in_words
 from cosserat_fenicsx.scene import stresses
 from cosserat_fenicsx.scene.rolled import _table
 from cosserat_fenicsx.scene.stresses import rectangle_fibres
@@ -530,3 +530,10 @@ def test_what_the_largest_values_do_not_cover_is_told():
     path = cf.solve(cf.Scene(rods, [cf.Clamp(rod.start) for rod in rods], loads), [1.0], elements=2)
     told = largest_in_words(path).splitlines()[1:]
     assert [line.partition(" are ")[0] for line in told] == ["Stresses of bare", "Von Mises stresses of beam"]
+
+
+@pytest.mark.parametrize(("E", "size", "cautions"), [(210e9, 26e9, 1), (210e9, 1e9, 0), (1e9, 0.5e9, 0)])
+def test_stresses_beyond_what_metals_bear_are_told(E, size, cautions):
+    """E/8 of steel, but neither 1 GPa of steel nor E/2 of a plastic."""
+    rod = cf.Rod(cf.Line((0, 0, 0), (1, 0, 0)), cf.Circle(0.1), cf.Material(E=E, nu=0.3))
+    assert len([*_beyond_metals({"normal stress": Largest(size, rod.end, 0, "Pa")})]) == cautions

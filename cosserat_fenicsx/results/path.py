@@ -169,15 +169,20 @@ class Path(RodResult):
         return f"<Path: {points}, {reach}, {self.model}, {self.unknowns} unknowns>"
 
     def _answer(self, units):
-        title = f"{self.scene.title}: at" if self.scene.title else "At"
         if not len(self):
             yield "No point of the path was computed."
             return
+        at, the = (f"{title}: at", f"{title}: the") if (title := self.scene.title) else ("At", "The")
+        limit = next((x for x in self.events if x.kind == "limit" and x.after < len(self) - 1), None)
+        if limit is not None:
+            told = f"limit load factor is {limit.load_factor:.6g}{self._of_stage(limit.stage)}"
+            yield f"{the} {told}: what follows is after the snap."
+            at = "At"
         station = self._most_displaced()
         turned = np.where((angle := self.rotation_angle(station)) > 1e-12, angle, 0.0)[-1]
         yield (
-            f"{title} the load factor {self.load_factors[-1]:.6g}{self._of_stage(self.stage[-1])}, "
-            f"{_STATES[np.sign(self.negative_modes[-1])]}{self._beyond_limits()}, "
+            f"{at} the load factor {self.load_factors[-1]:.6g}{self._of_stage(self.stage[-1])}, "
+            f"{_STATES[np.sign(self.negative_modes[-1])]}, "
             f"{station} is displaced by {self._moved_in_words(station, units)} and turned by {turned:.6g} rad."
         )
         yield from self.cautions
@@ -203,11 +208,6 @@ class Path(RodResult):
         ]
         order = sorted(range(len(words)), key=lambda k: (self.events[k].kind == "bifurcation", k))
         return [[words[k] for k in sorted(part)] for part in (order[:_EVENTS], order[_EVENTS:])]
-
-    def _beyond_limits(self):
-        """Words for a last state that comes after a limit point of its stage: the load cannot grow through it."""
-        limits = [x.load_factor for x in self.events if x.kind == "limit" and x.stage == self.stage[-1]]
-        return f" beyond the limit point at {limits[0]:.6g}" if limits else ""
 
     def _of_stage(self, stage):
         """The name of a stage after one of its load factors, in sentences."""

@@ -16,6 +16,7 @@ from cosserat_fenicsx.results.result import OnNodes
 from cosserat_fenicsx.scene.action import describe, some_of
 from cosserat_fenicsx.scene.parameters import Parameter
 from cosserat_fenicsx.scene.rod import Station, StationOrName
+from cosserat_fenicsx.scene.scene import METAL
 from cosserat_fenicsx.scene.stresses import Stress
 from cosserat_fenicsx.scene.supports import Support
 
@@ -32,6 +33,8 @@ _UNITS = {
     "normal stress": "Pa",
     "von Mises stress": "Pa",
 }
+# The strain beyond which no metal is elastic.
+_ELASTIC = 0.02
 # Share of a motion that is its start.
 _EARLY = 0.02
 # States that are computed at once.
@@ -133,7 +136,16 @@ def largest_in_words(path):
     told = [f"{what} {x} ({x.station}, {path.when(x.point, '.4g')})" for what, x in largest.items()]
     limits = " (tol limits errors of positions only)" if path.axis == "time" else ""
     line = f"Largest on this mesh{limits}: {'; '.join(told) or 'no force or moment'}."
-    return "\n".join([line, *_early_in_words(path, largest), *_unknown_in_words(path)])
+    return "\n".join([line, *_beyond_metals(largest), *_early_in_words(path, largest), *_unknown_in_words(path)])
+
+
+def _beyond_metals(largest):
+    """A sentence where a normal stress strains a metal more than it stays elastic."""
+    stress = largest.get("normal stress")
+    material = stress and stress.station.rod.material
+    if material and METAL[0] <= material.E <= METAL[1] and stress.size > _ELASTIC * material.E:
+        share = f"{stress.size / material.E:.2g} of Young's modulus"
+        yield f"Caution: the largest normal stress is {share}: metals have yielded by then, and these rods are elastic."
 
 
 def _early_in_words(path, largest):

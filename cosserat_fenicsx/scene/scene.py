@@ -41,7 +41,7 @@ _SAMPLES = 9
 # Young's moduli below this, Pa, are probably mistakes in units; of materials of these densities, kg/m^3, below this.
 _SOFTEST, _RUBBER, _SOFTEST_RUBBER = 1e6, (900.0, 1500.0), 1e4
 # Densities, kg/m^3, and moduli, Pa, of steel and cast iron; rolled profiles are of these.
-_STEEL, _METAL = (7000.0, 8200.0), (5e10, 5e11)
+_STEEL, METAL = (7000.0, 8200.0), (5e10, 5e11)
 _WAY_OUT = " (a Stiffness in its place is not doubted)"
 _ROUNDING = "beyond which rounding errors dominate"
 _UNITS = 'are the units SI (N, m, Pa; steel has 210e9, or "210 GPa")'
@@ -93,8 +93,8 @@ def _doubted(rod):
     metal = f"of a material of {density:g} kg/m^3" if _STEEL[0] <= (density or 0) <= _STEEL[1] else ""
     if isinstance(rod.section_at(0.0), Profile):
         metal = metal or "of a rolled profile"
-    if metal and not _METAL[0] <= E <= _METAL[1]:
-        low = E < _METAL[0]
+    if metal and not METAL[0] <= E <= METAL[1]:
+        low = E < METAL[0]
         told = f"E = {E:g} Pa {metal} is {'less' if low else 'more'} than that of steel or cast iron"
         return told, _MOST_OF_STIFF if low else _MOST_STRAIN
     if E < (_SOFTEST_RUBBER if _RUBBER[0] <= (density or 0) <= _RUBBER[1] else _SOFTEST):
@@ -472,7 +472,7 @@ class Scene(Part):
             if across >= rod.length:
                 yield f"{size.format(rod.name, across, rod.length)}: are all lengths in m?"
             elif across > _THICKEST and isinstance(section, Circle | Rectangle):
-                if rod.material is not None and _METAL[0] <= rod.material.E <= _METAL[1]:
+                if rod.material is not None and METAL[0] <= rod.material.E <= METAL[1]:
                     size = size.format(rod.name, across, rod.length)
                     yield f'{size}, of solid metal: are all lengths in m (or texts, such as "20 mm")?'
 
