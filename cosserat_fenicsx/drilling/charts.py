@@ -115,7 +115,7 @@ def title_of(history):
     block = velocity_of_block(history, _some(history.times))
     if is_axial(history) and block.any():
         steady = np.ptp(block) < 1e-9 * np.abs(block).max()
-        unit, size = chosen_unit("m/s")
+        unit, size = chosen_unit("m/s") or ("m/s", 1.0)
         way, fastest = "down" if block[0] > 0 else "up", f"{np.abs(block).max() / size:.4g} {unit}"
         words.append(f"block {way} at {fastest}" if steady else f"block moves at up to {fastest}")
     words.append("off bottom" if bit is None else f"{type(bit.law).__name__} bit")
