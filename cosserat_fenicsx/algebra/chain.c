@@ -11,8 +11,6 @@
 static const double SMALLEST_PIVOT = 1e-2;
 /* Relative to the diagonal before elimination, smaller pivots of a symmetric matrix are zero to rounding. */
 static const double ZERO_PIVOT = 2e-15;
-/* Larger ones are surely positive, in whatever order unknowns are eliminated. */
-static const double POSITIVE_PIVOT = 1e-10;
 
 #if KERNEL_ARGUMENTS == 6
 typedef void tabulator(double *, const double *, const double *, const double *, const int *, const uint8_t *);
@@ -21,8 +19,6 @@ typedef void tabulator(double *, const double *, const double *, const double *,
 typedef void tabulator(double *, const double *, const double *, const double *, const int *, const uint8_t *, void *);
 #define LAST , 0
 #endif
-
-enum { BESIDE = LANES }; /* numbers of a front that are taken together */
 
 /* Numbers next to each other in the processor, and where they are in memory. */
 typedef double vector __attribute__((vector_size(LANES * sizeof(double))));
@@ -36,16 +32,6 @@ static inline vector load(const double *from)
 static inline void keep(vector a, double *to)
 {
     *(place_of_vector *)to = a;
-}
-
-static inline int round_down(int i)
-{
-    return i & -BESIDE;
-}
-
-static inline int round_up(int i)
-{
-    return round_down(i + BESIDE - 1);
 }
 
 /* ---- elements ---------------------------------------------------------------------------------------------------- */
@@ -265,42 +251,6 @@ static double signs(double *F, int n, int m, double *whole, int *negative, int *
     return log(fabs(product)) + power * log(2);
 }
 
-/* Reduce a symmetric F (n, n), of which the upper half is read, by its first m pivots if these are surely positive: in
-   turn, without the exchanges of `signs`. Returns whether they are, with the logarithm of their product; whole: (m,)
-   work space. */
-static int reduce_definite(double *F, int n, int m, double *restrict whole, double *logarithm)
-{
-    double product = 1, by[BESIDE], inverse[BESIDE];
-    int power = 0, exponent;
-    for (int i = 0; i < m; i++) whole[i] = fabs(F[(size_t)i * n + i]);
-    for (int first = 0, end; first < m; first = end) {
-        const double *u = F + (size_t)first * n;
-        end = first + BESIDE < m ? first + BESIDE : m;
-        for (int i = first; i < n; i++) {
-            double *restrict row = F + (size_t)i * n;
-            const int known = (i < end ? i : end) - first;
-            for (int l = 0; l < known; l++) by[l] = u[(size_t)l * n + i] * inverse[l];
-            int j = i;
-            if (known == BESIDE) /* what is left of the diagonal does not matter */
-                for (j = n - round_up(n - i); j < n; j += BESIDE) {
-                    vector v = load(row + j);
-                    for (int l = 0; l < BESIDE; l++) v -= load(u + (size_t)l * n + j) * by[l];
-                    keep(v, row + j);
-                }
-            for (int l = 0; l < known; l++)
-                for (int c = j; c < n; c++) row[c] -= u[(size_t)l * n + c] * by[l];
-            if (i >= end) continue;
-            if (!(row[i] > POSITIVE_PIVOT * whole[i])) return 0;
-            inverse[i - first] = 1 / row[i];
-            product = frexp(product * row[i], &exponent), power += exponent;
-        }
-    }
-    for (int i = m; i < n; i++)
-        for (int j = m; j < i; j++) F[(size_t)i * n + j] = F[(size_t)j * n + i];
-    *logarithm = log(product) + power * log(2);
-    return 1;
-}
-
 static inline double dot(const double *restrict a, const double *restrict b, int n)
 {
     double sum = 0;
@@ -310,6 +260,18 @@ static inline double dot(const double *restrict a, const double *restrict b, int
 }
 
 /* ---- along the rods ---------------------------------------------------------------------------------------------- */
+
+enum { BESIDE = LANES }; /* numbers of a front that are taken together */
+
+static inline int round_down(int i)
+{
+    return i & -BESIDE;
+}
+
+static inline int round_up(int i)
+{
+    return round_down(i + BESIDE - 1);
+}
 
 /* Where the i-th of the numbers carried from the element before is in the front; `ahead`: how many are in front of the
    element's own. */
@@ -498,13 +460,8 @@ void count(chain *s, kernel *k)
     for (int t = 0; t < s->elements; t++) {
         const int *shape = s->shape + 4 * t, m = shape[0] + shape[1], n = m + shape[2] + shape[3];
         double *F = s->front + (size_t)(t % 2) * s->room * s->room; /* of earlier ones nothing is needed */
-        double logarithm;
         assemble(s, k, 0, F, t, 0, before, n_before, k_before, s->diagonal);
-        if (!reduce_definite(F, n, m, s->work, &logarithm)) {
-            assemble(s, k, 0, F, t, 0, before, n_before, k_before, 0);
-            logarithm = signs(F, n, m, s->work, &s->negative, &s->zero);
-        }
-        s->logarithm += logarithm;
+        s->logarithm += signs(F, n, m, s->work, &s->negative, &s->zero);
         before = F, n_before = n, k_before = m;
         if (s->ends[t] != -1) condense(s, t, F, n, m, 0), before = 0;
     }

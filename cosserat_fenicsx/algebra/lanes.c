@@ -14,8 +14,9 @@ typedef void lane_tabulator(vector *, const vector *, const vector *, const vect
                             void *);
 #endif
 
-/* Share of the largest number in a column that a pivot must have which is the largest in the first lane. */
-static const double ACCEPTABLE_PIVOT = 0.1;
+/* Share of the largest number in a column that a pivot must have which is the largest in the first lane; share of the
+   diagonal before elimination that the pivots of a positive matrix must have. */
+static const double ACCEPTABLE_PIVOT = 0.1, POSITIVE_PIVOT = 1e-10;
 
 static vector magnitude(vector a)
 {
