@@ -213,12 +213,13 @@ def _pulls(scene, start):
     for load in scene.actions:
         if load.rough:
             there = [x for x in before if (x.rod, x.offset) == (load.rod, load.offset)]
-            known = [x for x in there if (x.friction, x.pulled) == (load.friction, load.pulled) and not x.shortens]
-            if there and not known:
+            alike = (x for x in there if (x.friction, x.pulled) == (load.friction, load.pulled) and not x.shortens)
+            known = next(alike, None)
+            if there and known is None:
                 raise SceneError(f"simulate.start: {describe(load)} has another friction or pulled end in the path: "
                                  "expected the same ones")  # fmt: skip
-            found.append(float(path.tendon(known[0]).tension[k]) if known else 0.0)
-            before = [x for x in before if x is not (known or [None])[0]]  # each once: several may have one offset
+            found.append(0.0 if known is None else float(path.tendon(known).tension[k]))
+            before = [x for x in before if x is not known]  # each once: several may have one offset
     return found
 
 
