@@ -162,8 +162,8 @@ def test_a_path_through_limit_points_meets_its_tolerance():
     listed = cf.solve(scene, [30.0, 40.0], tol=1e-6)
     assert (listed.error <= 1e-6).all() and listed.stable.all() and len(loads(listed, "limit")) == 2
     for snapped in (path, listed):
-        told = f"limit load factor is {loads(snapped, 'limit')[0]:.6g}: what follows is after the snap."
-        assert told in str(snapped).splitlines()[0] and "after the snap" not in str(snapped.at_points([0]))
+        told = f"limit load factor is {loads(snapped, 'limit')[0]:.6g}: what follows lies beyond it."
+        assert told in str(snapped).splitlines()[0] and "lies beyond it" not in str(snapped.at_points([0]))
 
 
 @pytest.mark.parametrize("control", ["auto", pytest.param("arc", marks=pytest.mark.serial)])

@@ -176,7 +176,7 @@ class Path(RodResult):
         limit = next((x for x in self.events if x.kind == "limit" and x.after < len(self) - 1), None)
         if limit is not None:
             told = f"limit load factor is {limit.load_factor:.6g}{self._of_stage(limit.stage)}"
-            yield f"{the} {told}: what follows is after the snap."
+            yield f"{the} {told}: what follows lies beyond it."
             at = "At"
         station = self._most_displaced()
         turned = np.where((angle := self.rotation_angle(station)) > 1e-12, angle, 0.0)[-1]

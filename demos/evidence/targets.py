@@ -1,7 +1,7 @@
 """What was asked of contact, stages, complex modes and rods that act, beside what is found.
 
     python demos/evidence/targets.py           all (some minutes)
-    python demos/evidence/targets.py --quick   one run of each cost, no friction
+    python demos/evidence/targets.py --quick   measures one cost alone, that of a changed curvature, once
 
 Errors are the largest of rows of the table of `make truths`, as it stands in the documentation. Costs are measured
 here: ratios of processor times of runs that take turns in one process, medians. Targets whose numbers are made by other
