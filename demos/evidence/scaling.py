@@ -48,6 +48,7 @@ def from_rest(problem, newton, clock=time.process_time, meet=lambda: None):
     a clock; meet: called before it is taken, where several ranks take part."""
     newton.allow(1)
     start, ffi, lib = problem.numbers(), newton._ffi, newton._lib
+    # `alone` holds addresses only: the function below keeps the sweep
     sweep = ffi.new("sweep *", {"newton": newton.c, "x": newton.doubles(problem.x.array_w)})
     alone, takes_part = ffi.new("group *", {"count": 1, "sweep": [sweep]}), ffi.new("int *")
 
@@ -58,7 +59,7 @@ def from_rest(problem, newton, clock=time.process_time, meet=lambda: None):
         meet()
         took = timed(lambda: lib.equilibrate(alone, takes_part), clock)[1]
         problem.raise_failure()
-        assert takes_part[0] and newton.c.iterations == 1, "no step was taken"
+        assert sweep.newton == newton.c and takes_part[0] and newton.c.iterations == 1, "no step was taken"
         return took
 
     return step
