@@ -304,14 +304,15 @@ class Strands:
 
     def _once(self, found):
         """Each pair of points once."""
+        from scipy.spatial import cKDTree
+
         s = np.column_stack([self.s(found.element[:, k], found.place[:, k]) for k in (0, 1)])
-        close, kept = 1e-6 * self.radii.max(), []
-        for k in np.argsort(found.distance, kind="stable"):
-            same = [n for n in kept if (self.rods[found.element[n]] == self.rods[found.element[k]]).all()
-                    and np.abs(s[n] - s[k]).max() < close]  # fmt: skip
-            if not same:
-                kept.append(k)
-        return found.of(np.array(sorted(kept), dtype=int))
+        order, close = np.argsort(found.distance, kind="stable"), 1e-6 * self.radii.max()
+        places = np.c_[s, 2 * (1 + s.max(initial=0.0)) * self.rods[found.element]][order]
+        kept = np.ones(len(order), dtype=bool)
+        for nearer, other in sorted(cKDTree(places).query_pairs(close, p=np.inf)):
+            kept[other] &= not kept[nearer]
+        return found.of(np.sort(order[kept]))
 
     def _lines(self, x, points, cut, reach):
         """Nodes of strands next to others that run along them."""

@@ -36,8 +36,8 @@ _CLOSEST = 0.5
 _SETTLED, _ROUNDING = 1e-11, 2e-7
 # Iterations allowed, and full steps; full steps after which shares of steps are taken in turn.
 _MOST, _MOST_FULL, _PATIENCE, _SHARES = 300, 40, 20, (1.0, 0.5, 0.7)
-# Residual force of a node at equilibrium, over the largest force.
-_BALANCED = 1e-7
+# Residual force of a node at equilibrium, over the largest force; the one that rounding leaves where no load acts.
+_BALANCED, _UNLOADED = 1e-7, 1e-12
 # Distance from an element's end, in elements, that is at it.
 _AT_END = 1e-6
 # A contact of the iteration before is the same up to this sliding, over the radius; added to the diagonal of the
@@ -252,7 +252,7 @@ class RodContacts:
         problem, (A, removed), (normal, *friction) = self._problem, self._last, self._forces.T
         held = np.linalg.norm(friction, axis=0) < (1 - AT_BOUND) * self._friction * normal if friction else ()
         active = np.stack([normal > 0, *[held for _ in friction]], axis=1).ravel()
-        allowed = _BALANCED * (problem.load_norm + normal.max(initial=0.0)) + self._model.round_off
+        allowed = _BALANCED * (problem.load_norm + normal.max(initial=0.0)) + max(self._model.round_off, _UNLOADED)
         if not self._newton.imbalance() <= allowed:
             return Solved(False, iterations, f"forces are left over at a node, {self._in_words(self._touches)}")
         if self._broken > _LAWS_MET:
