@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import column, refuses
+from conftest import column, refused, refuses
 
 import cosserat_fenicsx as cf
 
@@ -347,6 +347,18 @@ def test_what_is_no_toml_is_refused_with_its_place(text, line, column, tmp_path)
     with pytest.raises(cf.SceneError) as refusal:
         cf.read(file)
     assert str(refusal.value).startswith(f"{file}, line {line}, column {column}: ")
+
+
+@pytest.mark.serial
+@pytest.mark.parametrize(("text", "quoted"), [
+    ("force = [0, 0, -20 kN]", "-20 kN"), ("force = -20 kN # down", "-20 kN"), ("a = { d = 1.5e2mm }", "1.5e2mm"),
+    ("load_factors = 0.5:1", "0.5:1"), ("a = [1,\n 8 1/2 in,\n 3]", "8 1/2 in"), ("# kN \u2028\na = 5 m", "5 m"),
+])  # fmt: skip
+def test_numbers_with_units_are_quoted(text, quoted, tmp_path):
+    file = tmp_path / "scene.toml"
+    file.write_text(text, encoding="utf-8")
+    with refused(f'not valid TOML: expected quotes, "{quoted}"; text, and a number with its unit, stand in quotes'):
+        cf.read(file)
 
 
 @pytest.mark.serial

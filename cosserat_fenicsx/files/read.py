@@ -105,6 +105,8 @@ _BLANK = re.compile(r"(?:\s|#[^\n]*)*")
 _KEY = re.compile(r"""[ \t]*("(?:[^"\\\n]|\\.)*"|'[^'\n]*'|[A-Za-z0-9_-]+)[ \t]*(\.?)""")
 _TEXT = re.compile(r'''"""(?:[^\\]|\\.)*?"{3,5}|\'\'\'.*?\'{3,5}|"(?:[^"\\\n]|\\.)*"|'[^'\n]*\'''', re.S)
 _OTHER = re.compile(r"[^,\]}\n#]*")
+_DIGITS = re.compile(r"[-+]?\d[\w.+-]*\s*$")
+_QUOTED = "; text, and a number with its unit, stand in quotes"
 _AT = re.compile(r" \(at line (\d+), column (\d+)\)$")
 
 
@@ -136,10 +138,15 @@ def _refused(text, problem):
             return f"{_at(text, offset)}: {name} is given twice, first at{_at(text, first)[1:]}: expected it once"
         except (AttributeError, IndexError, ValueError):  # the text is no TOML further down
             pass
-    at = _AT.search(problem)
-    hint = "; text, and a number with its unit, stand in quotes" if "Invalid value" in problem else ""
+    at, why = _AT.search(problem), _AT.sub("", problem)
     where = f", line {at[1]}, column {at[2]}" if at else ""
-    return f"{where}: not valid TOML: {_AT.sub('', problem)}{hint}"
+    if "Invalid value" in problem:
+        why += _QUOTED
+    elif at:  # after a number that more follows, as its unit
+        line, column = text.split("\n")[int(at[1]) - 1], int(at[2]) - 1
+        number, more = _DIGITS.search(line[:column]), _OTHER.match(line, column)[0].rstrip()
+        why = f'expected quotes, "{number[0]}{more}"{_QUOTED}' if number and more else why
+    return f"{where}: not valid TOML: {why}"
 
 
 def _at(text, offset):
