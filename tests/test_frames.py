@@ -233,11 +233,45 @@ def test_a_scene_file_takes_the_rods_of_a_mesh_and_its_names(tmp_path):
     ({"clamped": [0.5]}, "expected numbers of points"),
     ({"clamped": [9]}, "frame.clamped has 9: expected numbers of points from 0 to 4"),
     ({"hinged": [-1]}, "frame.hinged has -1: expected"),
+    ({"hinge_axis": (0, 1, 0)}, r"frame.hinge_axis = \(0.0, 1.0, 0.0\): expected points that are pinned or hinged"),
+    ({"hinged": [1], "hinge_axis": (0, 0, 0)}, "frame.hinge_axis = .*: expected a direction"),
     ({"hinged": [0]}, "1 rods meet point 0: expected points where two or more do"),
 ])  # fmt: skip
 def test_refusals(changed, words):
     with pytest.raises(cf.SceneError, match=words):
         cf.frame(**{"points": PORTAL, "edges": LEGS, "section": THICK, "material": STEEL} | changed)
+
+
+@pytest.mark.parametrize(("hinged", "balls"), [([1, 2], "rod0.end, rod1.end"), ([1], None)])
+def test_hinges_of_a_portal_turn_about_one_axis(hinged, balls):
+    """In its plane a portal with hinges sways as two cantilevers; balls let its beam spin, or its pinned frame fall."""
+    options = {"clamped": [0, 3]} if balls else {"pinned": [0, 3]}
+    portal = cf.frame(PORTAL, LEGS, THICK, STEEL, hinged=hinged, **options)
+    words = f"release = .0, 1, 0. of the Joint at {balls}" if balls else "Hinge with axis = .0, 1, 0. .* Pin at rod0"
+    with pytest.raises(cf.SceneError, match=f"{words}.*hinge_axis of a frame"):
+        cf.solve(portal.scene([cf.Force(portal.at(1), (100.0, 0, 0))]), [1.0])
+    portal = cf.frame(PORTAL, LEGS, THICK, STEEL, hinged=hinged, hinge_axis=(0, 2, 0), **options)
+    assert {joint.release for joint in portal.joints} == ({(0, 1, 0)} if balls else {(0, 1, 0), None})
+    bending = portal.rods[0].stiffness.bending[0]
+    # H h^3/(3 EI) of each of two cantilevers; of three hinges and a corner H h^2 (h + L)/(3 EI)
+    moved = 50.0 * 27 / (3 * bending) if balls else 100.0 * 9 * 7 / (3 * bending)
+    loads = [cf.Force(portal.at(1), (100.0, 0, 0))]
+    assert tip(portal.scene(loads), portal.at(1))[0] == pytest.approx(moved, rel=5e-3)
+    if not balls:
+        assert repr(portal).endswith("2 on hinges>")
+
+
+def test_points_of_a_mesh_without_names_have_numbers():
+    given = meshio.Mesh(PORTAL, LINES, point_sets={"FOOT": np.array([3])})
+    for clamped in ([0, 3], [0, "FOOT"], np.array([0, 3])):
+        assert [x.station.full_name for x in cf.frame_from(given, THICK, STEEL, clamped=clamped).supports] == [
+            "rod0.start", "rod2.end"
+        ]  # fmt: skip
+    assert len(cf.frame_from(given, THICK, STEEL, pinned=3).supports) == 1
+    with pytest.raises(cf.SceneError, match="frame.clamped has 5: expected numbers of points from 0 to 4"):
+        cf.frame_from(given, THICK, STEEL, clamped=[0, 5])
+    with pytest.raises(cf.SceneError, match=r"the mesh names none; expected numbers of points, such as \[0, 3\]"):
+        cf.frame_from(meshio.Mesh(PORTAL, LINES), THICK, STEEL, clamped="FOOT")
 
 
 LINES = [("line", np.array(LEGS))]

@@ -290,7 +290,7 @@ def test_refusals():
 
     cases = {
         "rod 'other' can turn about its own axis: expected a Hinge with axis = (0, 1, 0) in the place of the "
-        "Pin at other.start, other.end, if all acts in the x-z plane: in space a Pin":
+        "Pin at other.start, other.end (hinge_axis of a frame), if all acts in the x-z plane: in space a Pin":
             lambda: free(cf.Pin(other.start), cf.Pin(other.end)),
         "rod 'other' can turn about its own axis, and rod 'other' can turn about the axis (0, 0, 1) through (0, 0, 0) "
         "m: expected a Hinge with axis": lambda: free(cf.Pin(other.start), cf.Roller(other.end, (0, 0, 1))),

@@ -5,14 +5,14 @@ import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from os import PathLike
 from pathlib import Path
 from typing import Annotated
 
 import numpy as np
 
-from cosserat_fenicsx.checks import File, Numbers, Rows, finite_array, refuse, store
+from cosserat_fenicsx.checks import File, Numbers, Rows, direction, finite_array, refuse, store
 from cosserat_fenicsx.errors import SceneError, nearest
 from cosserat_fenicsx.parts import FileName, Part, Several, positive
 from cosserat_fenicsx.scene.curves import Line
@@ -20,8 +20,10 @@ from cosserat_fenicsx.scene.profiles import Section
 from cosserat_fenicsx.scene.rod import Rod, Station
 from cosserat_fenicsx.scene.scene import Scene
 from cosserat_fenicsx.scene.sections import Material, Stiffness
-from cosserat_fenicsx.scene.supports import Clamp, Joint, Pin
+from cosserat_fenicsx.scene.supports import Clamp, Hinge, Joint, Pin
 
+#: Points of a mesh by their names or numbers, one or several.
+Points = str | int | Sequence[str | int]
 # Arrays of a mesh that may number the groups of its lines, in the order in which they are looked for.
 _GROUPS = ("section", "gmsh:physical", "medit:ref", "cell_tags")
 
@@ -34,11 +36,11 @@ class Frame:
         edges: (rods, 2) numbers of the points at the start and at the end of each rod.
         rods: the rods, "rod0", "rod1" and so on where they have no other names.
         joints: of the rods that meet at a point, each to the first one there.
-        supports: a `Clamp` at each clamped point, then a `Pin` at each pinned one.
+        supports: a `Clamp` at each clamped point, then a `Pin` (with `hinge_axis` a `Hinge`) at each pinned one.
     """
 
-    def __init__(self, points, edges, rods, held, hinged):
-        self.points, self.edges, self.rods, self._hinged = points, edges, rods, frozenset(hinged)
+    def __init__(self, points, edges, rods, held, hinged, release):
+        self.points, self.edges, self.rods, self._releases = points, edges, rods, dict.fromkeys(hinged, release)
         self.supports = tuple(kind(self.at(point)) for kind, numbers in held.items() for point in numbers)
         self._points_of, self._rods_of = {}, {}  # {name or number in a mesh: numbers of points; (rods,) of bool}
 
@@ -70,7 +72,7 @@ class Frame:
         Raises:
             SceneError: no points have it; names those that are known.
         """
-        return _points_named("Frame.points_in", name, self._points_of).tolist()
+        return sorted(_points_named("Frame.points_in", name, self._points_of))
 
     def rods_in(self, group: str | int) -> tuple[Rod, ...]:
         """The rods of a group of a mesh, by its name or number, as in `section` of `frame_from`.
@@ -105,8 +107,7 @@ class Frame:
     def joints(self) -> tuple[Joint, ...]:
         found = []
         for point, (first, *others) in self._ends.items():
-            release = "all" if point in self._hinged else None
-            found += [Joint(first, other, release=release) for other in others]
+            found += [Joint(first, other, release=self._releases.get(point)) for other in others]
         return tuple(found)
 
     def scene(self, loads: Sequence = (), supports: Sequence = (), **more) -> Scene:
@@ -125,7 +126,8 @@ class Frame:
 
     def __repr__(self):
         counts = Counter(type(support) for support in self.supports)
-        words = [f"{counts[kind]} {word}" for kind, word in ((Clamp, "clamped"), (Pin, "pinned")) if counts[kind]]
+        known = (Clamp, "clamped"), (Pin, "pinned"), (Hinge, "on hinges")
+        words = [f"{counts[kind]} {word}" for kind, word in known if counts[kind]]
         held = " and ".join(words) or "none clamped"
         return f"<Frame: {len(self.rods)} rods between {len(self.points)} points, {held}>"
 
@@ -139,6 +141,7 @@ def frame(
     clamped: Sequence[int] = (),
     pinned: Sequence[int] = (),
     hinged: Sequence[int] = (),
+    hinge_axis: Numbers | None = None,
     d1: Numbers | None = None,
     names: Sequence[str] | None = None,
 ) -> Frame:
@@ -149,7 +152,9 @@ def frame(
         edges: (rods, 2) numbers of the points that each rod connects, from 0.
         section, material: of all rods; or one for every edge. Without a material each section is a `Stiffness`.
         clamped, pinned: numbers of points that are clamped, or held by a `Pin`.
-        hinged: numbers of points at which rods meet in ball joints.
+        hinged: numbers of points at which rods meet in hinges.
+        hinge_axis: about which rods turn at hinged and pinned points, a direction in space: (0, 1, 0) of a portal in
+            the x-z plane. None for balls, which let rods turn about every axis, so that a portal falls over sideways.
         d1: see `Line`, of all rods.
         names: of the rods.
 
@@ -157,8 +162,8 @@ def frame(
         A `Frame`; `frame.scene(loads)` is what `solve`, `buckling` and `modes` take.
 
     Raises:
-        SceneError: a number of a point that is not there, an edge without length or that occurs twice, or not as many
-            sections, materials or names as edges.
+        SceneError: a number of a point that is not there, an edge without length or that occurs twice, not as many
+            sections, materials or names as edges, or an axis that is no direction, or without hinges.
     """
     points = finite_array("frame", "points", points, "rows of three numbers, m")
     if points.ndim != 2 or points.shape[1] != 3 or not len(points):
@@ -190,7 +195,13 @@ def frame(
     alone = next((k for k in loose if meet[k] < 2), None)
     if alone is not None:
         raise SceneError(f"frame.hinged: {meet[alone]} rods meet point {alone}: expected points where two or more do")
-    return Frame(points, ends, tuple(rods), {Clamp: held, Pin: pins}, loose)
+    on_pin, release = Pin, "all"
+    if hinge_axis is not None:
+        release = direction("frame", "hinge_axis", hinge_axis)
+        on_pin = partial(Hinge, axis=release)
+        if not (pins or loose):
+            raise SceneError(f"frame.hinge_axis = {release}: expected points that are pinned or hinged beside it")
+    return Frame(points, ends, tuple(rods), {Clamp: held, on_pin: pins}, loose, release)
 
 
 def _one_each(field, value, count):
@@ -218,9 +229,10 @@ def frame_from(
     section: Section | Stiffness | Mapping,
     material: Material | Mapping | None = None,
     *,
-    clamped: str | Sequence[str] = (),
-    pinned: str | Sequence[str] = (),
-    hinged: str | Sequence[str] = (),
+    clamped: Points = (),
+    pinned: Points = (),
+    hinged: Points = (),
+    hinge_axis: Numbers | None = None,
     scale: float = 1.0,
     d1: Numbers | None = None,
 ) -> Frame:
@@ -230,11 +242,11 @@ def frame_from(
         mesh: a file that meshio reads, or a `meshio.Mesh`.
         section, material: of all rods; or {group: section}, a group being the name or the number that the mesh gives
             to its lines: an element set (Abaqus), a physical group (gmsh), or the integers of the cell data "section".
-        clamped, pinned, hinged: names of the points that are clamped, held by a `Pin`, or at which rods meet in ball
-            joints: node sets (Abaqus), physical groups of points (gmsh), or point data that are 1 there and 0
-            elsewhere (VTK).
+        clamped, pinned, hinged: the points that are clamped, held by a `Pin`, or at which rods meet in hinges, by their
+            numbers in the mesh or by names: node sets (Abaqus), physical groups of points (gmsh), or point data that
+            are 1 there and 0 elsewhere (VTK).
         scale: m per unit of the mesh.
-        d1: see `frame`.
+        hinge_axis, d1: see `frame`.
 
     Returns:
         A `Frame`, whose points have the numbers of the mesh; `Frame.points_in` and `Frame.rods_in` know the names of
@@ -269,7 +281,7 @@ def frame_from(
     sets = _point_sets(mesh)
     given = {"clamped": clamped, "pinned": pinned, "hinged": hinged}
     held = {field: _points_named(f"frame_from.{field}", names, sets) for field, names in given.items()}
-    found = frame(points, edges, *chosen, **held, d1=d1)
+    found = frame(points, edges, *chosen, **held, hinge_axis=hinge_axis, d1=d1)
     found._points_of, found._rods_of = sets, groups
     return found
 
@@ -336,13 +348,13 @@ def _point_sets(mesh):
 
 
 def _points_named(where, names, sets):
-    """Numbers of the points of these names; `where`: what asks for them, in messages."""
-    names = [names] if isinstance(names, str) else list(names)
+    """Numbers of the points of these names, or numbers; `where`: what asks for them, in messages."""
+    names = [names] if np.ndim(names) == 0 else list(names)
     for name in names:
-        if name not in sets:
-            more = "" if sets else "; frame(mesh.points, edges, ...) takes numbers of points"
+        if isinstance(name, str) and name not in sets:
+            more = "" if sets else "; expected numbers of points, such as [0, 3]"
             raise SceneError(f"{where}: no points are named {name!r}: {_known(name, sets)}{more}")
-    return np.unique(np.concatenate([*(sets[name] for name in names), np.empty(0, dtype=int)])).astype(int)
+    return [k for name in names for k in (sets[name].tolist() if isinstance(name, str) else [name])]
 
 
 def _known(name, known):
@@ -370,7 +382,7 @@ class Mesh(Part):
         file: the mesh, beside the scene file.
         section, material: of all rods, or of the groups that name none.
         groups: a section for each group of lines, instead of one `section`.
-        clamped, pinned, hinged: names of points, a text or a list. scale, d1: as for `frame_from`.
+        clamped, pinned, hinged: points by names or numbers, one or a list. hinge_axis, scale, d1: as for `frame_from`.
 
     Attributes:
         frame: the `Frame`.
@@ -383,9 +395,10 @@ class Mesh(Part):
     section: Section | None = None
     material: Material | None = None
     groups: Sequence[MeshGroup] = ()
-    clamped: str | Sequence[str] = ()
-    pinned: str | Sequence[str] = ()
-    hinged: str | Sequence[str] = ()
+    clamped: Points = ()
+    pinned: Points = ()
+    hinged: Points = ()
+    hinge_axis: Annotated[tuple, Several()] | None = None
     scale: Annotated[float, positive()] = 1.0
     d1: Annotated[tuple, Several()] | None = None
 
@@ -400,7 +413,7 @@ class Mesh(Part):
         store(self, file=str(Path(self.file).absolute()))
         section = {group.name: group.section for group in self.groups} or self.section
         material = {group.name: group.material or self.material for group in self.groups} or self.material
-        held = {name: getattr(self, name) for name in ("clamped", "pinned", "hinged", "scale", "d1")}
+        held = {name: getattr(self, name) for name in ("clamped", "pinned", "hinged", "hinge_axis", "scale", "d1")}
         store(self, frame=frame_from(self.file, section, material, **held))
 
     def everywhere(self, field, items, others):

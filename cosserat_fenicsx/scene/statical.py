@@ -240,25 +240,31 @@ def check_no_mechanism(scene):
         )
     if len(rest) > most:
         told.append(f"{'' if complete else 'at least '}{len(rest) - most} more motion(s) are free")
-    expected = _hinges_for_pins(scene) or "; and ".join(remedies)
+    expected = _hinges_for_balls(scene) or "; and ".join(remedies)
     raise SceneError(f"Scene is a mechanism: {', and '.join(told)}: expected {expected}")
 
 
-def _hinges_for_pins(scene):
-    """What to do where rods in a coordinate plane are held once their pins are hinges about its normal; else ""."""
-    pinned = [x for x in scene.supports if isinstance(x, Pin)]
-    tangents = [rod.curve.frame(np.linspace(0.0, rod.length, _ALONG))[:, :, 2] for rod in scene.rods if pinned]
+def _hinges_for_balls(scene):
+    """What to do where rods in a coordinate plane are held once pins and ball joints are hinges about its normal; else
+    ""."""
+    pinned = [x.station for x in scene.supports if isinstance(x, Pin)]
+    balls = [x.first for x in scene.joints if x.release == "all"]
+    tangents = [rod.curve.frame(np.linspace(0.0, rod.length, _ALONG))[:, :, 2] for rod in scene.rods if pinned or balls]
     for i, plane in ((1, "x-z"), (0, "y-z"), (2, "x-y")):
-        if not pinned or np.abs(np.concatenate(tangents)[:, i]).max() > _FREE:
+        if not tangents or np.abs(np.concatenate(tangents)[:, i]).max() > _FREE:
             continue
         axis = np.eye(3)[i]
         supports = [Hinge(x.station, axis) if isinstance(x, Pin) else x for x in scene.supports]
+        joints = [Joint(x.first, x.second, axis) if x.release == "all" else x for x in scene.joints]
         with contextlib.suppress(SceneError):  # some of them may hold a motion twice
-            if not len(free_motions(dataclasses.replace(scene, supports=supports))[0]):
+            if not len(free_motions(dataclasses.replace(scene, supports=supports, joints=joints))[0]):
+                along = f"({_numbers(axis)})"
+                remedies = [(pinned, f"a Hinge with axis = {along} in the place of the Pin"),
+                            (balls, f"release = {along} of the Joint")]  # fmt: skip
+                told = [f"{remedy} at {some_of(map(str, places))}" for places, remedy in remedies if places]
                 return (
-                    f"a Hinge with axis = ({_numbers(axis)}) in the place of the Pin at "
-                    f"{some_of(str(x.station) for x in pinned)}, if all acts in the {plane} plane: in space a Pin "
-                    "lets a rod turn about every axis"
+                    f"{' and '.join(told)} (hinge_axis of a frame), if all acts in the {plane} plane: in space a Pin "
+                    "or a ball joint lets a rod turn about every axis"
                 )
     return ""
 
