@@ -2,6 +2,7 @@
 
 import contextlib
 import dataclasses
+import warnings
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -209,6 +210,31 @@ def test_branch_of_the_perfect_column(section, branch):
     for found in (path, accurate):
         assert found.stable.all() and found.left
         assert loads(found, "bifurcation") == pytest.approx([critical(rod)], rel=2e-8)
+
+
+@pytest.mark.serial
+def test_an_unstable_end_is_warned_of_once_where_nobody_asked_for_it():
+    rod, scene = perfect_column(cf.Circle(0.2))
+
+    def warned(load_factors, **more):
+        with warnings.catch_warnings(record=True) as said:
+            warnings.simplefilter("always")
+            cf.solve(scene, load_factors, elements=4, **more)
+        return [str(x.message) for x in said if x.category is cf.SceneWarning and x.filename == __file__]
+
+    (words,) = warned([0.5, 1.1])
+    assert words.startswith("the last state of the path is unstable") and "branch=1" in words and "Ball" not in words
+    assert warned([0.5, 1.1], model="determinate")[0].startswith("Unstable out of its plane at the load factor 1.1")
+    assert warned([1.1, 1.2]) == [words]
+    assert not warned([1.1, 0.9]) and not warned([0.5, 1.1], branch=1) and not warned([1.1], control="arc")
+    assert not warned((0.0, 1.1), until=lambda path: path.load_factors[-1] == 1.1)
+    scene = cf.Scene([rod], scene.supports, [cf.FollowerForce(rod.end, (0, 0, -2 * cf.euler_load(rod)))])
+    assert not warned([1.0])
+    arms = [cf.Rod(cf.Line((0, 0, 0), (x, 0, 0)), cf.Circle(0.01), STEEL, name=f"x{x}") for x in (1, -1)]
+    force = cf.Force(arms[0].start, (80 * arms[0].stiffness.bending[0], 0, 0))
+    ball = cf.Joint(arms[0].start, arms[1].start, "all")
+    scene = cf.Scene(arms, [cf.Clamp(x.end) for x in arms], [force], [ball])
+    assert "frame? Ball joints let rods turn about every axis: release=axis of a Joint" in warned([1.0])[0]
 
 
 @pytest.mark.serial

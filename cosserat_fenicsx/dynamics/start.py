@@ -2,11 +2,12 @@
 
 import math
 import sys
+import warnings
 
 import numpy as np
 
 from cosserat_fenicsx.checks import instance, number, refuse
-from cosserat_fenicsx.errors import SceneError
+from cosserat_fenicsx.errors import SceneError, SceneWarning
 from cosserat_fenicsx.models.signature import not_flat
 from cosserat_fenicsx.results.path import Path
 from cosserat_fenicsx.scene.action import describe, has_permanent
@@ -251,4 +252,6 @@ def equilibrium(scene, load_factor, *, model, elements, degree, comm):
         expected = "a load factor that is finite and not 0"
         number("simulate", "start", load_factor, expected, lambda x: math.isfinite(x) and x)
     model = "planar" if model != "spatial" and not not_flat(standing) else "spatial"
-    return solve(standing, [load_factor], model=model, elements=elements, degree=degree, comm=comm, progress=False)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SceneWarning)  # the motion itself tells of an unstable start, and of doubts
+        return solve(standing, [load_factor], model=model, elements=elements, degree=degree, comm=comm, progress=False)

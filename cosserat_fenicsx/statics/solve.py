@@ -180,6 +180,13 @@ class Legs:
         return self._joined(parts)
 
 
+# Warnings of an unstable end; without numbers, which would give one for each of many cases.
+_UNSTABLE = (
+    "the last state of the path is unstable: the structure would have left it (path.stable and path.events say from "
+    "where on). buckling(scene) finds critical loads and their shapes, branch=1 follows the path that leaves at the "
+    "first bifurcation. Is a support missing, such as one across the plane of a frame?"
+)
+_BALLS = " Ball joints let rods turn about every axis: release=axis of a Joint, or hinge_axis of a frame, makes hinges."
 # Rods of a frame from which on the BLAS decides on the time that the equations where rods meet take.
 _MANY = 1000
 # What `tol` bounds where contact forces oscillate.
@@ -357,6 +364,9 @@ def solve(
         path.why.extend(told)
         for words in told if comm.rank == 0 else ():
             warn(words)
+    if comm.rank == 0 and path.negative_modes[-1] > 0 and not (scene.follows or branch or until or control == "arc"):
+        balls = any(joint.release == "all" for joint in scene.joints)
+        warn("; ".join(path.cautions) or f"{_UNSTABLE}{_BALLS if balls else ''}")
     if scene.rod_contact and scene.rod_contact.friction:
         path.why.append(
             "friction of rods that touch depends on the path: slip is counted from step to step, and stability takes "
