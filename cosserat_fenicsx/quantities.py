@@ -128,7 +128,7 @@ class Units:
             others: but moments and forces per length follow a force in N or kN, as kN m and kN/m.
 
     Raises:
-        SceneError: unknown units; a unit of another dimension.
+        SceneError: unknown units; a unit of another dimension; several of one.
     """
 
     def __init__(self, units: "str | Mapping | Units" = "SI"):
@@ -151,6 +151,11 @@ class Units:
                         f"'{unit}' is none"
                     )
                 self._chosen |= known
+            if lost := [unit for unit in map(str.strip, str(units).split(",")) if unit not in self._chosen.values()]:
+                raise SceneError(
+                    f"units = {units!r}: '{lost[0]}' and a later one are units of the same kind: expected one of them "
+                    "(a dict of units by dimensions, or 'field', has lengths apart from diameters)"
+                )
         force = self._chosen.get("force")
         for name, unit in (("moment", f"{force} m"), ("force per length", f"{force}/m")):
             if unit in DIMENSIONS[name].units:

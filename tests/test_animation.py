@@ -50,6 +50,13 @@ def test_saved_too_seldom_is_straight_and_says_so(tmp_path):
     history.animate(tmp_path / "spin.gif", **{**SMALL, "fps": 2})
 
 
+def test_films_are_in_the_chosen_units(flight, tmp_path, monkeypatch):
+    titles = []
+    monkeypatch.setattr(animation, "record", lambda make, *given: titles.extend(make()._plotter.scalar_bars.keys()))
+    flight.animate(tmp_path / "a.gif", color="displacement", units="ft", **SMALL)
+    assert "(ft)" in titles[0]
+
+
 @pytest.mark.slow
 def test_gif_and_mp4(flight, tmp_path):
     from PIL import Image

@@ -144,17 +144,18 @@ def test_the_table_shows_a_station_and_the_reaction(here):
 
 def test_pictures_are_asked_for(tmp_path, here):
     """Options for points and magnification; the picture suggests a magnification where displacements are invisible."""
-    from cosserat_fenicsx.pictures import charts, plot
+    from cosserat_fenicsx.pictures.charts import asked
+    from cosserat_fenicsx.pictures.drawing import too_small
 
     look = ("--at", "0.01,0.03", "--magnify", "500")
     code, _, trouble = here("run", DEMO, "--load-factors", "0.01,0.02,0.03", "-o", tmp_path, *look)
     assert code == 0 and (tmp_path / "rods.png").stat().st_size > 10_000, trouble
     path = cf.solve(cf.read(DEMO).scene, [0.01, 0.02, 0.03])
-    assert plot._small(path, [0, 2], 20.0, 1.0) == "displacements are at most 0.0076 m: magnify=100"
-    assert plot._small(path, [0, 2], 20.0, 100.0) == ""
-    assert " m here, 0.0076 m at load factor 0.03" in plot._small(path, [0], 20.0, 1.0)
-    with charts.asked(units={"length": "mm"}):
-        assert plot._small(path, [0, 2], 20.0, 1.0) == "displacements are at most 7.6 mm: magnify=100"
+    assert too_small(path, [0, 2], 20.0, 1.0) == ["displacements are at most 0.0076 m: magnify=100"]
+    assert too_small(path, [0, 2], 20.0, 100.0) == []
+    assert " m here, 0.0076 m at load factor 0.03" in too_small(path, [0], 20.0, 1.0)[0]
+    with asked(units={"length": "mm"}):
+        assert too_small(path, [0, 2], 20.0, 1.0) == ["displacements are at most 7.6 mm: magnify=100"]
 
 
 def test_explain(here):
@@ -303,6 +304,20 @@ def test_modes(here):
     for row in rows:
         along = [float(x) for x in row[-4:-1]]
         assert "column.end" in row[-5] and along[2] == 0 and np.hypot(*along[:2]) == pytest.approx(1, abs=0.01)
+
+
+@pytest.mark.parametrize("command", ["buckling", "modes"])
+def test_pictures_of_shapes_are_in_the_chosen_units(command, tmp_path, here, monkeypatch):
+    from cosserat_fenicsx.pictures import drawing
+
+    names, draw = set(), drawing.draw_axes
+    monkeypatch.setattr(drawing, "draw_axes", lambda *given: names.update(x.name for x in given[2]) or draw(*given))
+    code, _, said = here(command, DEMO, "--count", "1", "--elements", "2", "--units", "kN,mm", "-o", tmp_path)
+    assert code == 0 and names == {"x (mm)", "y (mm)", "z (mm)"}, said
+    assert here(command, DEMO, "--units", "mm,m")[::2] == (
+        2, "cosserat: units = 'mm,m': 'mm' and a later one are units of the same kind: expected one of them (a dict of "
+        "units by dimensions, or 'field', has lengths apart from diameters)\n"
+    )  # fmt: skip
 
 
 TITLE = "a [/red] title [bold] :smile: \u00e9"

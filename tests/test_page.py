@@ -62,6 +62,15 @@ def test_many_states_are_thinned_and_the_file_says_so(viewed, monkeypatch):
     assert data["axis"]["values"] == [0.3, 1.5] and "2 of 3 load factors shown, evenly chosen" in data["notes"][0]
 
 
+@pytest.mark.serial
+def test_the_file_is_in_the_chosen_units(viewed):
+    assert data_of(viewer.page(viewed))["units"] == {}
+    data = data_of(viewer.page(viewed, units="klbf,ft"))
+    assert [axis["name"] for axis in data["axes"]] == ["x (ft)", "y (ft)", "z (ft)"]
+    assert data["units"]["N"] == [pytest.approx(4448.2216), "klbf"] and data["units"]["m"] == [0.3048, "ft"]
+    assert "Pa" not in data["units"]
+
+
 STEEL = cf.Material(E=210e9, nu=0.3, density=7850.0)
 
 

@@ -17,8 +17,17 @@ import cosserat_fenicsx as cf
 from cosserat_fenicsx import interrupts, progress
 from cosserat_fenicsx.cli import main as cli
 from cosserat_fenicsx.pictures.charts import asked
-from cosserat_fenicsx.pictures.drawing import colour_of, default_colour, known, peak_of, quantity, seen, thickening
-from cosserat_fenicsx.pictures.plot import _small, tangled
+from cosserat_fenicsx.pictures.drawing import (
+    colour_of,
+    default_colour,
+    known,
+    peak_of,
+    quantity,
+    seen,
+    thickening,
+    too_small,
+)
+from cosserat_fenicsx.pictures.plot import _spread, tangled
 from cosserat_fenicsx.pictures.shapes import Drawn
 from cosserat_fenicsx.pictures.signs import Resting, has_sign, loads_of, signs_of, without_sign
 from cosserat_fenicsx.pictures.view import Labels, View, axes_of, seen_moving, view_of
@@ -109,6 +118,30 @@ def test_tangled_shapes_stand_side_by_side():
 
 
 @pytest.mark.serial
+def test_few_points_are_all_drawn_and_the_end_of_every_stage():
+    rod, scene = column()
+    assert _spread(cf.solve(scene, [0.5, 0.9, 1.0, 1.5], elements=2), 5) == [0, 1, 2, 3]
+    snow, wind = cf.Force(rod.end, (0, 0, -1.0)), cf.Force(rod.end, (1e3, 0, 0))
+    scene = cf.Scene([rod], scene.supports, [cf.Weight()], stages=[cf.Stage([snow]), cf.Stage([wind], name="wind")])
+    path = cf.solve(scene, elements=2)
+    ends = [k for k in range(len(path)) if path.load_factors[k] == 1]
+    assert len(path) > 9 and {*ends} < {*_spread(path, 5)} and len(_spread(path, 5)) <= 5
+    assert _spread(path, 2) == [ends[0], ends[2]] and _spread(path, 1) == ends[2:]
+
+
+@pytest.mark.serial
+def test_signs_of_a_flat_section_have_its_mean_width():
+    deck = [cf.Rod(cf.Line((x, 0, 0), (x + 10, 0, 0)), cf.Rectangle(1.2, 0.1), STEEL, name=f"x{x}") for x in (0, 10)]
+    joint = cf.Joint(deck[0].end, deck[1].start, (0, 1, 0))
+    scene = cf.Scene(deck, [cf.Clamp(deck[0].start), cf.Hinge(deck[1].end, (0, 1, 0))], [], [joint])
+    shape, everywhere = Resting(dict.fromkeys(deck, np.hypot(0.6, 0.05))), np.array([[0.0, 0, 0], [20, 0, 0]])
+    symbols = signs_of(pytest.importorskip("pyvista"), scene, [shape], everywhere, np.array([20.0, 20, 20]))
+    across = np.ptp(np.concatenate([mesh.points for mesh in symbols._meshes["released joints"]]), axis=0)
+    mean = np.sqrt(1.2 * 0.1)
+    assert across == pytest.approx([1.7 * mean, 0.9 * 0.048 * 20, 1.7 * mean], rel=0.01)
+
+
+@pytest.mark.serial
 def test_ticks_are_round_and_free_of_rounding():
     """In the units that are asked for."""
 
@@ -131,7 +164,7 @@ def test_ticks_are_round_and_free_of_rounding():
     with asked(units="N,mm"):
         assert quantity(4448.2216, "N") == "4448 N" and quantity(2e4, "N m") == "20000 N m"
         moved = SimpleNamespace(largest_displacement=lambda: np.array([0.0, 0.19]), axis="load factor", label=str)
-        assert _small(moved, [1], 100.0, 1.0) == "displacements are at most 190 mm: magnify=10"
+        assert too_small(moved, [1], 100.0, 1.0) == ["displacements are at most 190 mm: magnify=10"]
 
 
 VIEW = View.of(np.array([[0.0, 0, 0], [10, 0, 5]]), np.array([10.0, 0, 5]), (700, 500))

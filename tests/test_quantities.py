@@ -39,6 +39,8 @@ def test_field_units():
 @pytest.mark.parametrize(("chosen", "words"), [
     ({"forse": "kN"}, "units.'forse'.: did you mean 'force'"),
     ({"force": "ft"}, "units.'force'. = 'ft': "),
+    ("mm,m", "units = 'mm,m': 'mm' and a later one are units of the same kind: expected one of them"),
+    ("kN, ft,in", "'ft' and a later one"),
     ("imperial", "units = 'imperial': expected 'SI', 'field' or a dict"),
 ])  # fmt: skip
 def test_other_units_are_refused(chosen, words):

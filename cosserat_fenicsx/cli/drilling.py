@@ -72,7 +72,7 @@ def deliver_motion(computed, options, tables=None):
             and partial(history.plot_energy, **asked),
             "phase.png": picture_in_time and turns(history) and partial(history.plot_phase, **asked),
             "map.png": picture_in_time and in_depth and partial(history.plot_map, **asked),
-            film: film and in_depth and partial(history.animate, speed=options.speed),
+            film: film and in_depth and partial(history.animate, speed=options.speed, **asked),
         }
 
     return deliver(computed, options, _NAMES, files, tables, moving=True)

@@ -78,6 +78,7 @@ def _eigenvalues(parser, name, count, tol):
     _of_scene(parser, f"estimated relative error of the eigenvalues [{tol}]")
     parser.add_argument("--count", type=int, default=count, help=f"how many [{count}]")
     parser.add_argument("--load-factor", type=float, default=0.0, help="of the equilibrium [0: the unloaded rods]")
+    _units(parser)
     _output(parser, f"{name}.csv, {name}.xdmf, {name}.h5 and {name}.png")
 
 
@@ -111,7 +112,7 @@ def _outputs(parser):
 
 def _units(parser):
     parser.add_argument("--units", metavar="SI | field | kN,mm,...",
-                        help="of tables, charts and .csv files; field: ft, in, klbf, ft-lbf, ppg, rpm, psi; or some, "
+                        help="of tables, pictures and .csv files; field: ft, in, klbf, ft-lbf, ppg, rpm, psi; or some, "
                         "with SI for all others [SI]")  # fmt: skip
 
 

@@ -80,12 +80,14 @@ def eigenvalues(options, found, tables):
     name, more = options.command, ("damped", "near") if options.command == "modes" else ()
     settings = given(options, ("tol", "elements", "degree", *more))
 
+    units = units_of(options)
+
     def files(result):
         return {
-            f"{name}.csv": result.write,
+            f"{name}.csv": partial(result.write, units=units),
             f"{name}.xdmf": len(result) and result.write,
             f"{name}.h5": bool(len(result)),
-            f"{name}.png": len(result) and not options.no_picture and result.plot,
+            f"{name}.png": len(result) and not options.no_picture and partial(result.plot, units=units),
         }
 
     names = [f"{name}.{ending}" for ending in ("csv", "xdmf", "h5", "png")]
@@ -115,9 +117,10 @@ def deliver_rods(computed, options, moving, tables=None):
             f"{name}.h5": True,
             "result.h5": path.save,
             "rods.png": picture and (lambda file: path.plot(file, shown, magnify=magnify, color=color, units=units)),
-            "rods.html": picture and partial(path.write, magnify=magnify),
+            "rods.html": picture and partial(path.write, magnify=magnify, units=units),
             "energy.png": picture and several and partial(path.plot_energy, units=units),
-            film: film and several and partial(path.animate, speed=options.speed, magnify=magnify, color=color),
+            film: film and several
+            and partial(path.animate, speed=options.speed, magnify=magnify, color=color, units=units),
         }
 
     names = [f"{name}.csv", f"{name}.xdmf", f"{name}.h5", "result.h5", "rods.png", "rods.html"]

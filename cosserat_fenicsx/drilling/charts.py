@@ -14,6 +14,7 @@ from cosserat_fenicsx.pictures.animation import MOST_FRAMES, check_name, frame_r
 from cosserat_fenicsx.pictures.charts import (
     COLOURS,
     STYLES,
+    asked,
     chosen_unit,
     draw_chart,
     empty_figure,
@@ -520,7 +521,7 @@ def hfto_figure(answer):
 _LONGEST, _ACROSS, _ALONG, _DPI, _IN_BANDS = 10.0, 60, 400, 100, 20
 
 
-def film(history, file, speed=None, fps=25, progress=None):
+def film(history, file, speed=None, fps=25, progress=None, units="SI"):
     """See `DrillingHistory.animate`."""
     file = check_name(file)
     times_between("animate", history.profile_times, None)
@@ -533,17 +534,22 @@ def film(history, file, speed=None, fps=25, progress=None):
             f"animate.speed = {speed:g}: expected one that needs at most {MOST_FRAMES} frames, not {count}"
         )
     times = np.linspace(first, last, count)
-    on_first(world(), lambda: record(lambda: Stage(history, speed), file, times, fps, progress))
+
+    def drawn():
+        with asked(units=units):  # titles change from frame to frame
+            record(lambda: Stage(history, speed, units), file, times, fps, progress)
+
+    on_first(world(), drawn)
 
 
 class Stage:
     """The picture at a time; the constant parts are drawn once. The string is seen from the side: its nearer half has a
     bright stripe along it; where it moves along the axis, its bands move with it."""
 
-    def __init__(self, history, speed):
+    def __init__(self, history, speed, units="SI"):
         self._history, self._speed = history, speed
         self._along = moves_along(history)
-        self._figure = draw_chart(lambda: self._constant_parts(history))
+        self._figure = draw_chart(lambda: self._constant_parts(history), units=units)
         self._figure.set_layout_engine("none")  # found once: it would take half of the time of each frame
 
     def _constant_parts(self, history):
@@ -557,17 +563,18 @@ class Stage:
             self._band = (bottom - top) / _IN_BANDS
             largest = max(float(np.nanmax(np.abs(history.displacement))), 1e-9)
             self._enlarge = float(f"{max(1.0, 2 * self._band / largest):.1g}")
-        blank, box = np.zeros((_ALONG, _ACROSS)), (0, 1, bottom, top)
+        depth, self._length = scale(_DEPTH)
+        blank, box = np.zeros((_ALONG, _ACROSS)), (0, 1, bottom / self._length, top / self._length)
         self._stripes = string.imshow(blank, extent=box, aspect="auto", cmap="gray", vmin=-0.4, vmax=1.2)
-        string.set(xticks=[], ylabel="measured depth (m)", title="string")
+        string.set(xticks=[], ylabel=depth, title="string")
         quantity = MAPPED["velocity" if self._along else "speed"][0]
         heading, self._size = scale(quantity)
         values = self._shown() / self._size
-        (self._line,) = along.plot(values[0], history.depths, color="tab:purple")
+        (self._line,) = along.plot(values[0], history.depths / self._length, color="tab:purple")
         (self._held,) = along.plot([], [], ".", color="0.6", markersize=4, label="held by friction")
         low, high = float(min(np.nanmin(values), 0.0)), float(np.nanmax(values))
         room = 0.05 * max(high - low, 1.0 if not self._along else 1e-3)
-        along.set(xlim=(low - room, high + room), ylim=(bottom, top), xlabel=heading, yticklabels=[])
+        along.set(xlim=(low - room, high + room), ylim=box[2:], xlabel=heading, yticklabels=[])
         if history.sticking.any():
             legend(along)
         for at_ends, label, colour in self._over_time():
@@ -607,7 +614,7 @@ class Stage:
         self._stripes.set_data(np.cos(self._across) * np.where(bright > 0.0, 1.0, 0.25))
         self._line.set_xdata(values)
         held = history.sticking[k + round(share)]
-        self._held.set_data(values[held], history.depths[held])
+        self._held.set_data(values[held], history.depths[held] / self._length)
         self._now.set_xdata([t, t])
         self._figure.suptitle(self._title(t))
         self._figure.canvas.draw()

@@ -407,21 +407,22 @@ class DrillingHistory(ChartedBetween):
         """Draw the ledger of energy and its residual over time; for the arguments see `plot`."""
         return self._drawn("drilling.charts.energy_figure", file, units, width)
 
-    def animate(self, file: File, *, speed: float | None = None, fps: float = 25, progress: bool | None = None) -> None:
+    def animate(self, file: File, *, speed: float | None = None, fps: float = 25, progress: bool | None = None,
+                units: Any = "SI") -> None:  # fmt: skip
         """Write a film of the string: twist and speed of rotation along it, or displacement and velocity along the axis
         where nothing turns or the block moves up and down.
 
         Args:
             file: .gif, or .mp4, which needs ffmpeg (rank 0 writes).
             speed: seconds of the motion in a second of the film; None for one of at most ten seconds.
-            fps: frames per second, 1 to 100. progress: see `drilling.simulate`.
+            fps: frames per second, 1 to 100. progress: see `drilling.simulate`. units: see `plot`.
 
         Raises:
             SceneError: matplotlib, Pillow or ffmpeg is missing, another ending, or fewer than two profiles.
         """
         from cosserat_fenicsx.drilling.charts import film
 
-        film(self, file, speed, fps, progress)
+        film(self, file, speed, fps, progress, units)
 
     def __repr__(self):
         last = f" up to t = {self.times[-1]:g} s" if len(self) else ""

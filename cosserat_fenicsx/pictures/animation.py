@@ -19,6 +19,7 @@ from cosserat_fenicsx.interrupts import obey
 from cosserat_fenicsx.progress import Progress
 from cosserat_fenicsx.new_files import replaced
 from cosserat_fenicsx.numerics import spun
+from cosserat_fenicsx.pictures.charts import asked
 from cosserat_fenicsx.pictures.drawing import (
     add_bodies,
     add_lines,
@@ -52,7 +53,8 @@ _WHITE = 244
 _PIECES, _LETTER = 100, 16
 
 
-def film(history, file, *, fps=FPS, speed=None, magnify=1.0, enlarge=1.0, size=SIZE, color=None, progress=None):
+def film(history, file, *, fps=FPS, speed=None, magnify=1.0, enlarge=1.0, size=SIZE, color=None, progress=None,
+         units="SI"):  # fmt: skip
     """See `History.animate`."""
     file = check_name(file)
     if len(history) < 2:
@@ -67,7 +69,8 @@ def film(history, file, *, fps=FPS, speed=None, magnify=1.0, enlarge=1.0, size=S
     pace = _pace_in_words(speed)
 
     def prepared():
-        return _Stage(history, times, magnify, enlarged, size, pace, colour)
+        with asked(units=units):
+            return _Stage(history, times, magnify, enlarged, size, pace, colour)
 
     on_first(history.comm, lambda: record(prepared, file, times, fps, progress))
 

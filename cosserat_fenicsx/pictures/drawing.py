@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from cosserat_fenicsx.errors import LibraryMissing, SceneError, nearest
-from cosserat_fenicsx.pictures.charts import chosen_unit
+from cosserat_fenicsx.pictures.charts import chosen_unit, sentence
 from cosserat_fenicsx.pictures.view import Labels, View, axes_of, draw_axes, round_step
 from cosserat_fenicsx.quantities import as_text
 from cosserat_fenicsx.scene.sections import Circle, Material
@@ -96,6 +96,18 @@ def thicker(factors):
     return [f"sections drawn {' and '.join(told)} times their size"] if told else []
 
 
+def too_small(path, shown, size, magnify):
+    """A list of one note where the displacements at some points of a result could not be seen in a drawing of extent
+    `size`, m, with a factor that shows them; empty where they can."""
+    all_of_them = path.largest_displacement()
+    largest = all_of_them[shown].max()
+    if magnify * largest > VISIBLE * size or largest < 1e-12 * size:
+        return []
+    decade, k = 10.0 ** math.floor(math.log10(0.1 * size / largest)), int(all_of_them.argmax())
+    others = f" here, {all_of_them[k]:.2g} m at {path.axis} {path.label(k)}" if all_of_them[k] > 2 * largest else ""
+    return [sentence(f"displacements are at most {largest:.2g} m{others}: magnify={decade:g}")]
+
+
 @dataclass(frozen=True)
 class Body:
     """A deformed rod, in SI: centreline (n, 3), directors (n, 3, 3), outline (n, corners, 2), radius, values (n,)."""
@@ -144,6 +156,12 @@ def outlines(rod, s):
     drawn = [np.array(x or Circle(0.02 * rod.length).stiffness(Material(E=1.0)).outline) for x in given]
     most = max(map(len, drawn))
     return np.array([outline if len(outline) == most else _resampled(outline, most) for outline in drawn])
+
+
+def girth(station):
+    """Half the mean width of a section over its largest radius: 1 of a round one, less of a flat one."""
+    (outline,) = outlines(station.rod, np.array([station.s]))
+    return float(np.sqrt(np.ptp(outline, axis=0).prod()) / np.linalg.norm(outline, axis=1).max() / 2)
 
 
 def _resampled(outline, corners):

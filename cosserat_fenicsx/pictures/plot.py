@@ -2,7 +2,6 @@
 tangled in one place are drawn beside each other."""
 
 import itertools
-import math
 import textwrap
 from dataclasses import replace
 from pathlib import Path
@@ -12,9 +11,8 @@ import numpy as np
 from cosserat_fenicsx.checks import positive
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.new_files import replaced
-from cosserat_fenicsx.pictures.charts import asked, sentence
+from cosserat_fenicsx.pictures.charts import asked
 from cosserat_fenicsx.pictures.drawing import (
-    VISIBLE,
     add_bodies,
     add_lines,
     add_tubes,
@@ -35,6 +33,7 @@ from cosserat_fenicsx.pictures.drawing import (
     thickening,
     thicker,
     together,
+    too_small,
 )
 from cosserat_fenicsx.pictures.signs import Deformed, Resting, signs_of, span_of, without_sign
 from cosserat_fenicsx.pictures.view import Labels, axes_of, plain, seen_moving, view_of
@@ -115,11 +114,12 @@ def _draw(path, points, magnify, color, side_by_side):
     if points is None and _coincide(bodies, shown, factors):  # they would hide each other's colours
         shown = shown[-1:]
         bodies, factors = ({key: of[key] for key in of if key[0] == shown[0]} for of in (bodies, factors))
+        everywhere = np.concatenate([*resting, *(body.line for body in bodies.values())])
     span = span_of(path.scene, [Deformed(path, k, {}, magnify, 0.0) for k in shown], everywhere)
     still = dict(zip(path.scene.rods, resting, strict=True))
     span = seen_moving(span, np.concatenate([body.line - still[rod] for (_, rod), body in bodies.items()]))
     moved, apart = dict.fromkeys(shown, np.zeros(3)), _apart(path.scene, shown, bodies, everywhere, span, side_by_side)
-    small = _small(path, shown, size, magnify)
+    small = too_small(path, shown, size, magnify)
     if apart:
         moved, (*_, up) = apart, view_of(span)
         everywhere = around([bodies[shown[0], rod].line for rod in path.scene.rods], everywhere, up)
@@ -221,22 +221,11 @@ def _finish(plotter, pyvista, everywhere, symbols, lines, title, label, most=6):
     for bar in plotter.scalar_bars.values():  # above the key
         low = max(_BAR[0], _LINE * font * (len(symbols.groups) + 0.7) / view.window[1])
         bar.SetPosition(bar.GetPosition()[0], low)
-        bar.SetHeight(_BAR[1] - low)
+        bar.SetHeight(min(_BAR[1], 1 - over / view.window[1]) - low)
     for i, (words, colour) in enumerate(reversed(symbols.groups.items())):
         place = 0.79 * view.window[0], _LINE * font * (i + 0.2)
         plotter.add_text(words, position=place, color=colour, font_size=font / 2)
     plotter.add_text(plain("\n".join(lettered)), position="upper_edge", color="black", font_size=font / 2)
-
-
-def _small(path, shown, size, magnify):
-    """A note where displacements are too small to be seen, with a factor that shows them; else empty."""
-    all_of_them = path.largest_displacement()
-    largest = all_of_them[shown].max()
-    if magnify * largest > VISIBLE * size or largest < 1e-12 * size:
-        return ""
-    decade, k = 10.0 ** math.floor(math.log10(0.1 * size / largest)), int(all_of_them.argmax())
-    others = f" here, {all_of_them[k]:.2g} m at {path.axis} {path.label(k)}" if all_of_them[k] > 2 * largest else ""
-    return sentence(f"displacements are at most {largest:.2g} m{others}: magnify={decade:g}")
 
 
 def _title(path, shown, magnify, small, apart, factors):
@@ -249,7 +238,7 @@ def _title(path, shown, magnify, small, apart, factors):
     lines = [f"{title} {shapes}"] if len(title) + len(shapes) < _TITLE_WIDTH else [title, shapes]
     magnified = f"displacements magnified {magnify:g} times" if magnify != 1 else ""
     beside = "shapes side by side, the axes beside the first" if apart else ""
-    return [*lines, *_noted(magnified, small, beside, *thicker(factors), _undrawn(path.scene, magnify == 1))]
+    return [*lines, *_noted(magnified, *small, beside, *thicker(factors), _undrawn(path.scene, magnify == 1))]
 
 
 def _noted(*notes):
@@ -264,15 +253,23 @@ def _undrawn(scene, tubes):
 
 
 def _spread(path, most):
-    """Indices of up to `most` points of a path, evenly spaced by how far the rods' ends moved; of one, the last."""
-    if most == 1:
-        return [len(path) - 1]
+    """Indices of up to `most` points of a path: the last one of each stage, and others evenly spaced by how far the
+    rods' ends moved; of one, the last."""
+    if len(path) <= most or most == 1:
+        return [*range(len(path))][-most:]
+    last = [*np.flatnonzero(np.diff(getattr(path, "stage", [0]))).tolist(), len(path) - 1]
+    if len(last) >= most:
+        return [last[i] for i in np.linspace(0, len(last) - 1, most).round().astype(int)]
     ends = np.hstack([path.position(rod.end) for rod in path.scene.rods])
     # a small fictitious motion spaces the points evenly by index where the ends do not move
     ends = np.hstack([ends, 1e-6 * path.scales.length * np.arange(len(path))[:, None]])
     way = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(ends, axis=0), axis=1)))
     wanted = np.linspace(0, way[-1], most)
-    return sorted({int(np.argmin(np.abs(way - w))) for w in wanted})
+    found = {int(np.argmin(np.abs(way - w))) for w in wanted}
+    for k in {*last} - found:
+        found.remove(min(found - {*last}, key=lambda i: abs(way[i] - way[k])))
+        found.add(k)
+    return sorted(found)
 
 
 def _coincide(bodies, shown, factors):

@@ -27,8 +27,8 @@ from cosserat_fenicsx.ranks import on_first
 
 # Panels of a picture, and in a row of it.
 _MOST_PANELS, _IN_A_ROW = 6, 3
-# Width of a panel, its least and largest height, least height of the title, height of one of its lines, pixels.
-_WIDTH, _HEIGHTS, _TITLE, _LINE = 640, (560, 680), 90, 38
+# Width of a panel, its least and largest height, height of the bar of colours, of a line of the title, pixels.
+_WIDTH, _HEIGHTS, _BAR_ROW, _LINE = 640, (560, 680), 60, 38
 # Largest rotation that is drawn, as the tangent of its angle.
 _STEEPEST = 1.0
 # Largest displacement in a picture, over the structure's size, that could not be seen; least share of it that moves.
@@ -45,7 +45,7 @@ _COLOURS = ["#86a0bd", "#d9b29c", "#f08a4b", "#d63a2a", "#8c0c1e"]
 _LETTER = 15
 
 
-def draw(found, file, which, amplitude):
+def draw(found, file, which, amplitude, units):
     """Picture of some shapes, a panel each; see `Shapes.plot`."""
     found.require_modes(file)
     positive("plot", "amplitude", amplitude, "-")
@@ -53,7 +53,7 @@ def draw(found, file, which, amplitude):
     if not isinstance(which, Collection) or not 1 <= len(which) <= _MOST_PANELS:
         refuse("plot", "which", which, f"a list of the numbers of one to {_MOST_PANELS} modes")
     shown = [found.number(k) for k in which]
-    return deliver(found.comm, file, lambda: _panels(found, shown, amplitude))
+    return deliver(found.comm, file, lambda: _panels(found, shown, amplitude), units)
 
 
 def film(found, file, k, *, fps, seconds, cycles, amplitude, size, progress):
@@ -156,7 +156,7 @@ def _panels(found, shown, amplitude):
     panel = _height(everywhere, span)
     width = across * _WIDTH
     head = _head(found, width)
-    top = max(_TITLE, _LINE * (head.count("\n") + 1))
+    top = _LINE * (head.count("\n") + 1) + _BAR_ROW
     height = down * panel + top
     plotter = stage(  # not with supersampling, which leaves all panels but one black
         pyvista, (width, height), border=False, shape=(down + 1, across),
@@ -168,11 +168,16 @@ def _panels(found, shown, amplitude):
         plotter.subplot(1 + i // across, i % across)
         seen = shape.shown(everywhere)
         bodies = shape.bodies()
-        _add(plotter, pyvista, shape, bodies, seen)
+        mapper = _add(plotter, pyvista, shape, bodies, seen)[2]
         text = f"{_filled(f'k = {k}: {found.label(k)}{_most_at(found, k, shape)}', _WIDTH)}\n"
         text += _below(shape, bodies, seen, _WIDTH)
         plotter.add_text(text, position="upper_edge", color="black", font_size=11)
         frame(plotter, seen, panel=True, span=span)
+    plotter.subplot(0, 0)
+    low, size = (_BAR_ROW - _LINE) / top, {"width": 0.2, "height": _LINE / top}
+    plotter.add_scalar_bar("", mapper=mapper, n_labels=0, vertical=False, position_x=0.4, position_y=low, **size)
+    for words, x in (("no motion", 0.4 - 140 / width), ("largest", 0.6 + 20 / width)):
+        plotter.add_text(words, position=(x, low), color="black", font_size=11, viewport=True)
     return plotter
 
 
@@ -200,8 +205,7 @@ def _height(everywhere, span):
 def _head(found, width):
     at = f" about the equilibrium at the load factor {found.load_factor:g}" if found.load_factor else ""
     what = f"{found.scene.title}: {found.title.lower()}" if found.scene.title else found.title
-    colours = "coloured by the size of the motion: none is pale blue, the largest dark red"
-    return "\n".join(textwrap.fill(text, width // _LETTER) for text in (f"{what}{at}", colours))
+    return textwrap.fill(f"{what}{at}", width // _LETTER)
 
 
 def _below(shape, bodies, everywhere, width):
@@ -223,16 +227,17 @@ def _filled(text, width):
 
 
 def _add(plotter, pyvista, shape, bodies, everywhere):
-    """Draw the equilibrium as grey lines, and rods; returns the mesh of the rods and what enlarges each of them."""
+    """Draw the equilibrium as grey lines, and rods; returns the mesh of the rods, what enlarges each of them, and the
+    mapper of their colours."""
     from matplotlib.colors import LinearSegmentedColormap
 
     extent = float(np.ptp(everywhere, axis=0).max())
     factors = _factors(bodies, extent)
     surface = coloured(pyvista, bodies, factors)
     colours = LinearSegmentedColormap.from_list("", _COLOURS)
-    plotter.add_mesh(surface, scalars="value", cmap=colours, clim=(0, 1), show_scalar_bar=False)
+    actor = plotter.add_mesh(surface, scalars="value", cmap=colours, clim=(0, 1), show_scalar_bar=False)
     add_lines(plotter, pyvista, shape.lines)
-    return surface, factors
+    return surface, factors, actor.mapper
 
 
 class _Stage:
@@ -244,9 +249,10 @@ class _Stage:
         self._everywhere = self._shape.shown(self._shape.everywhere())
         bodies = self._shape.bodies()
         self._plotter = stage(pyvista, size)
-        self._surface, self._factors = _add(self._plotter, pyvista, self._shape, bodies, self._everywhere)
-        below = _below(self._shape, bodies, self._everywhere, size[0])
-        text = f"{_head(found, size[0])}\nk = {k}: {found.label(k)}{_most_at(found, k, self._shape)}\n{below}"
+        self._surface, self._factors, _ = _add(self._plotter, pyvista, self._shape, bodies, self._everywhere)
+        colours = textwrap.fill("no motion is pale blue, the largest dark red", size[0] // _LETTER)
+        text = f"{_head(found, size[0])}\n{colours}\nk = {k}: {found.label(k)}{_most_at(found, k, self._shape)}\n"
+        text += _below(self._shape, bodies, self._everywhere, size[0])
         self._plotter.add_text(text, position="upper_edge", color="black", font_size=10)
         frame(self._plotter, self._everywhere, panel=True, span=_span(found, [k], self._everywhere))
         self.at = lru_cache(maxsize=max(1, _MEMORY // (3 * size[0] * size[1])))(self._draw)

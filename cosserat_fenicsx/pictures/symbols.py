@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cosserat_fenicsx.pictures.drawing import girth
 from cosserat_fenicsx.pictures.view import view_of
 
 COLOURS = {
@@ -105,11 +106,12 @@ class Symbols:
             return
         down = self._below(mark, pose)
         leaves = pose.inwards is not None and down @ pose.inwards < -1e-6  # beyond the end there is no rod
-        height, top = 0.75 * a, pose.place + (0.0 if leaves else 0.7) * pose.radius * down
+        radius = pose.radius * girth(mark.station)
+        height, top = 0.75 * a, pose.place + (0.0 if leaves else 0.7) * radius * down
         self._cone(mark, top, -down, height, 0.42 * a)
         foot = top + height * down
         if mark.kind == "hinge":
-            self._cylinder(mark, pose.place, mark.vector, max(a, 4 * pose.radius), 1.5 * pose.radius + 0.08 * a)
+            self._cylinder(mark, pose.place, mark.vector, max(a, 4 * radius), 1.5 * radius + 0.08 * a)
         if mark.kind == "roller":
             across = self._across(down)
             for side in (-0.25, 0.25):
@@ -120,12 +122,11 @@ class Symbols:
 
     def joint(self, mark, pose):
         """A dark ball for a rigid joint, a light one for a released one, with the axis of a hinge."""
-        released = mark.kind != "joint"
-        radius = (1.7 if released else 1.25) * pose.radius
-        self._ball(mark, pose.place, radius)
+        radius = pose.radius * girth(mark.station)
+        self._ball(mark, pose.place, (1.25 if mark.kind == "joint" else 1.7) * radius)
         if mark.kind == "hinge joint":
             axis = pose.rotation @ mark.vector
-            self._cylinder(mark, pose.place, axis, max(0.9 * self._size, 5 * pose.radius), 0.9 * pose.radius)
+            self._cylinder(mark, pose.place, axis, max(0.9 * self._size, 5 * radius), 0.9 * radius)
 
     # -- loads -------------------------------------------------------------------------------------------------------
 

@@ -11,17 +11,19 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from cosserat_fenicsx.new_files import replaced
+from cosserat_fenicsx.pictures.charts import asked, chosen_unit
 from cosserat_fenicsx.pictures.drawing import (
     MAPS,
-    VISIBLE,
     at_rest,
     default_colour,
+    girth,
     known,
     outlines,
     peak_of,
     seen,
     thickening,
     thicker,
+    too_small,
 )
 from cosserat_fenicsx.pictures.signs import (
     Deformed,
@@ -34,6 +36,7 @@ from cosserat_fenicsx.pictures.signs import (
 )
 from cosserat_fenicsx.pictures.symbols import COLOURS, GROUPS, arrows_along
 from cosserat_fenicsx.pictures.view import axes_of, seen_moving, view_of
+from cosserat_fenicsx.quantities import BY_UNIT
 from cosserat_fenicsx.scene.signals import at, signals_of
 
 #: Fields that can be chosen in the file, where the result has them, beside that of `default_colour`, which is first.
@@ -49,21 +52,23 @@ _PLAY, _REAL_TIME = 8.0, (4.0, 20.0)
 _PARTS = ("rods.js", "signs.js", "camera.js", "axes.js", "app.js")
 
 
-def write(result, file, magnify=1.0):
+def write(result, file, magnify=1.0, units="SI"):
     """Write a path or a motion to an interactive .html file (a `pathlib.Path`), on one rank: a slider over the states,
     turning, zooming and moving by mouse and touch, a play button, and choices of the field that colours the rods and of
-    the factor of displacements, which is `magnify` at first.
+    the factor of displacements, which is `magnify` at first; numbers are in some `Units`.
 
     States beyond some hundreds are left out evenly, which the file says.
     """
     with replaced(file) as fresh:
-        fresh.write_text(page(result, magnify), encoding="utf-8")
+        fresh.write_text(page(result, magnify, units), encoding="utf-8")
 
 
-def page(result, magnify=1.0):
+def page(result, magnify=1.0, units="SI"):
     """The text of the file, see `write`."""
     place = resources.files(__package__) / "page"
-    data = json.dumps(_data(result, magnify), allow_nan=False, ensure_ascii=False).replace("<", "\\u003c")
+    with asked(units=units):
+        found = _data(result, magnify)
+    data = json.dumps(found, allow_nan=False, ensure_ascii=False).replace("<", "\\u003c")
     return string.Template((place / "page.html").read_text("utf-8")).substitute(
         title=html.escape(_title(result)),
         style=(place / "style.css").read_text("utf-8"),
@@ -101,7 +106,7 @@ def _data(result, magnify):
     largest = float(max(np.linalg.norm(shape.positions - shape.rest, axis=-1).max() for shape in shapes))
     return {
         "title": _title(result),
-        "notes": _notes(result, shown, factors) + _small(largest, extent) + undrawn,
+        "notes": _notes(result, shown, factors) + too_small(result, shown, extent, magnify) + undrawn,
         "magnify": {"start": magnify, "choices": _choices(largest, extent, magnify)},
         "axis": _along(result, shown),
         "axes": [
@@ -119,6 +124,7 @@ def _data(result, magnify):
             _field(result, i, colour, [shape.values[i] for shape in shapes]) for i, colour in enumerate(colours)
         ],
         "maps": MAPS,
+        "units": {unit: chosen[::-1] for unit in BY_UNIT if (chosen := chosen_unit(unit))},
         **drawn,
         "rods": [shape.packed(middle, size, factor) for shape, factor in zip(shapes, factors, strict=True)],
     }
@@ -158,12 +164,6 @@ class _Shapes:
             "rest": floats((self.rest - middle) / size),
             "states": floats(states),
         }
-
-
-def _small(largest, extent):
-    """A note where displacements are too small to be seen."""
-    small = 1e-12 * extent < largest < VISIBLE * extent
-    return [f"displacements are at most {largest:.2g} m, a factor of them shows them"] if small else []
 
 
 def _choices(largest, extent, start):
@@ -254,9 +254,9 @@ def signs(result, shown, shapes, span, place):
         station = mark.station
         rod, s = station.rod, station.s
         end = -1 if s == 0 else 1 if s == rod.length else 0
-        nodes = shapes[rods[rod]].nodes
-        return {"kind": mark.kind, "rod": rods[rod], "at": [s / rod.length * (nodes - 1)], "end": end,
-                "colour": COLOURS[GROUPS[mark.kind]]}  # fmt: skip
+        shape = shapes[rods[rod]]
+        return {"kind": mark.kind, "rod": rods[rod], "at": [s / rod.length * (shape.nodes - 1)], "end": end,
+                "colour": COLOURS[GROUPS[mark.kind]], "girth": girth(station) * unit * shape.radius}  # fmt: skip
 
     found = []
     for mark in marks_of_supports(result.supports_at(shown[-1])):

@@ -13,7 +13,7 @@ from cosserat_fenicsx.results import screen
 from cosserat_fenicsx.results.contacts import ROD_FORCE, RodContacts, contacts_in_words, rod_contacts_of
 from cosserat_fenicsx.results.recovery import viscous_contact
 from cosserat_fenicsx.results.result import by_name
-from cosserat_fenicsx.results.rods import RodResult
+from cosserat_fenicsx.results.rods import MOVES_MOST, RodResult
 from cosserat_fenicsx.results.whirl import Orbit, WallForces, Whirl, orbit_of, wall_forces, whirl
 from cosserat_fenicsx.scene.action import Action
 from cosserat_fenicsx.scene.rod import RodOrName, StationOrName
@@ -90,6 +90,7 @@ class History(RodResult):
         if not len(self):
             yield "No time of the motion was computed."
             return
+        yield from self._doubts(units)
         station = self._most_displaced()
         yield (
             f"{title} t = {self.times[-1]:.6g} s {station} is displaced by {self._moved_in_words(station, units)}; "
@@ -106,7 +107,8 @@ class History(RodResult):
         if not len(self):
             return None
         rows = min(rows, _TIMES)
-        known, station = self.quantities, self.station(station or self._most_displaced())
+        chosen, station = "" if station else MOVES_MOST, self.station(station or self._most_displaced())
+        known = self.quantities
         title = f"{self.scene.title}\n" if self.scene.title else ""
         some = f"{rows} of " if rows < len(self) else ""
         speed = np.linalg.norm(self.velocity(station), axis=1)
@@ -124,8 +126,9 @@ class History(RodResult):
             rows,
             f"{title}{self.model} model, scheme {self.scheme}, {self._mesh_in_words()}, {self.steps[-1]} steps, "
             f"{some}{len(self)} times",
-            f"dx, dy, dz, speed: of {station}. work: of loads and prescribed motions. balance: kinetic + strain - "
-            "work + dissipated, minus its value at the start; zero for an exact solution.",
+            f"dx, dy, dz, speed: of {station}{chosen}. "
+            "work: of loads and prescribed motions. balance: kinetic + strain - work + dissipated, minus its value at "
+            "the start; zero for an exact solution.",
         )
 
     def _more(self, units):
@@ -231,7 +234,7 @@ class History(RodResult):
         return self._drawn("pictures.motion_charts.energy_figure", file, units, width)
 
     def animate(self, file, *, fps=25, speed=None, magnify=1.0, enlarge=1.0, size=(960, 720), color=None,
-                progress=None):  # fmt: skip
+                progress=None, units="SI"):  # fmt: skip
         """Film of the rods, coloured as those of `plot`; the camera is fixed and shows the whole motion.
 
         Frames come at a constant rate, interpolated between the saved times.
@@ -246,6 +249,7 @@ class History(RodResult):
             size: (width, height), pixels, even.
             color: as of `plot`.
             progress: whether to show a progress bar; None: only if it takes long.
+            units: "SI", "field", or a dict of units by dimensions, such as {"force": "klbf"}.
 
         Raises:
             SceneError: fewer than two times, another ending, an argument outside its range, or pyvista, Pillow or
@@ -256,7 +260,7 @@ class History(RodResult):
         from cosserat_fenicsx.pictures import animation
 
         animation.film(self, file, fps=fps, speed=speed, magnify=magnify, enlarge=enlarge, size=size, color=color,
-                       progress=progress)  # fmt: skip
+                       progress=progress, units=units)  # fmt: skip
 
     @property
     def _all_rates(self):

@@ -24,7 +24,7 @@ from cosserat_fenicsx.results.modes import ModesAlong
 from cosserat_fenicsx.results.records import Event, Records
 from cosserat_fenicsx.results.recovery import Threads, element_contact
 from cosserat_fenicsx.results.result import by_name
-from cosserat_fenicsx.results.rods import RodResult
+from cosserat_fenicsx.results.rods import MOVES_MOST, RodResult
 from cosserat_fenicsx.results.queries import Sensitivity, Uncertainty
 from cosserat_fenicsx.scene.action import Action, actions_in_words
 from cosserat_fenicsx.scene.parameters import Parameter, check_once
@@ -172,6 +172,7 @@ class Path(RodResult):
         if not len(self):
             yield "No point of the path was computed."
             return
+        yield from self._doubts(units)
         at, the = (f"{title}: at", f"{title}: the") if (title := self.scene.title) else ("At", "The")
         limit = next((x for x in self.events if x.kind == "limit" and x.after < len(self) - 1), None)
         if limit is not None:
@@ -186,8 +187,6 @@ class Path(RodResult):
             f"{station} is displaced by {self._moved_in_words(station, units)} and turned by {turned:.6g} rad."
         )
         yield from self.cautions
-        for doubt in self.scene.doubts:
-            yield units.sentence(f"First check: {doubt}")
         yield from errors_in_words(self)
         yield from map(units.sentence, contacts_in_words(self))
         told, others = self._events_in_words()
@@ -221,11 +220,6 @@ class Path(RodResult):
         """The name of a stage, or its number, in tables and pictures; empty of a scene without stages."""
         return ""
 
-    @property
-    def _reasons(self):
-        told = [*self.scene.doubts, *self.cautions]  # in the answer
-        return [sentence for sentence in self.why if sentence not in told]
-
     def _more(self, units):
         yield from self._events_in_words()[1]
         yield from super()._more(units)
@@ -233,7 +227,7 @@ class Path(RodResult):
     def _table(self, units, rows, station=None):
         if not len(self):
             return None
-        station = self.station(station or self._most_displaced())
+        chosen, station = "" if station else MOVES_MOST, self.station(station or self._most_displaced())
         known, stable = self.quantities, [stability(count) for count in self.negative_modes]
         title = f"{self.scene.title}\n" if self.scene.title else ""
         which, digits = None, 9 if rows == screen.ROWS else 6
@@ -260,7 +254,8 @@ class Path(RodResult):
             units,
             rows,
             f"{title}{self.model} model, {self.formulation} formulation, {self._mesh_in_words()}",
-            f"{left_out}dx, dy, dz, size of the rotation: of {station}. stable: 'no (2)' has two negative modes. "
+            f"{left_out}dx, dy, dz, size of the rotation: of {station}{chosen}. "
+            "stable: 'no (2)' has two negative modes. "
             f"iterations: Newton's, since the row above. est. error: the largest of {_bounded(self)}. "
             f"{actions_in_words(self.scene)}",
             which,

@@ -85,6 +85,8 @@ _QUANTITIES = by_name(
     Quantity("axial_max", "largest axial stress", "Pa", axes=_ALONG),
     Quantity("axial_min", "smallest axial stress", "Pa", axes=_ALONG),
 )  # fmt: skip
+#: Of the station of a table that nobody asked for.
+MOVES_MOST = ", which moves most (another by --station, station=)"
 # A named station is shown in tables if its displacement is at least this share of the largest one.
 _WORTH_SHOWING = 0.2
 
@@ -109,6 +111,7 @@ class RodResult(Result, Extremes, Reactions, Stresses, States):
     """
 
     _quantities = _QUANTITIES
+    cautions: Sequence[str] = ()
     # Name in files; attributes in the heads of files; queries of stations in tables.
     _kind = ""
     _more_about: tuple[str, ...] = ()
@@ -514,10 +517,15 @@ class RodResult(Result, Extremes, Reactions, Stresses, States):
             yield from map(units.sentence, reactions_in_words(self))
         yield units.sentence(f"{self.model} model: {'; '.join(self._reasons)}.")
 
+    def _doubts(self, units):
+        for doubt in self.scene.doubts:
+            yield units.sentence(f"First check: {doubt}")
+
     @property
     def _reasons(self):
-        """The sentences of `why` that `details` prints."""
-        return self.why
+        """The sentences of `why` that are not in the answer."""
+        told = [*self.scene.doubts, *self.cautions]
+        return [sentence for sentence in self.why if sentence not in told]
 
     # -- files and pictures ------------------------------------------------------------------------------------------
 
@@ -561,7 +569,7 @@ class RodResult(Result, Extremes, Reactions, Stresses, States):
             rod: for .csv: the `Rod`, or its name, along which fields are written; None for all.
             station: for .csv: a station of the table beside the ends of rods and the places of loads and supports;
                 default the one that moves most.
-            units: of a .csv; all other files are in SI.
+            units: of a .csv or .html; all other files are in SI.
             magnify: of a .html: the factor of the displacements when it is opened; it can be changed there.
 
         Raises:
@@ -578,19 +586,19 @@ class RodResult(Result, Extremes, Reactions, Stresses, States):
                 self._index(k, f"{file}: k = {k!r}")
             except IndexError as problem:
                 raise SceneError(str(problem)) from None
-        if file.suffix != ".csv":
-            given = {"rod": rod, "station": station, "units": None if units == "SI" else units}
-            for name in (name for name, value in given.items() if value is not None):
-                raise SceneError(f"{file}: {name} is not for the ending '{file.suffix}': expected a file .csv")
-        if magnify != 1 and file.suffix != ".html":
-            raise SceneError(f"{file}: magnify is not for the ending '{file.suffix}': expected a file .html")
+        for name, value, usual, endings in (
+            ("rod", rod, None, ".csv"), ("station", station, None, ".csv"),
+            ("units", units, "SI", ".csv or .html"), ("magnify", magnify, 1, ".html"),
+        ):  # fmt: skip
+            if value != usual and file.suffix not in endings.split(" or "):
+                raise SceneError(f"{file}: {name} is not for the ending '{file.suffix}': expected a file {endings}")
         if file.suffix == ".csv":
             on_first(self.comm, lambda: write_columns(file, self._columns(k, rod, station, units)))
         elif file.suffix == ".html":
             from cosserat_fenicsx.pictures import viewer
 
             positive("write", "magnify", magnify, "-")
-            on_first(self.comm, lambda: viewer.write(self, file, magnify))
+            on_first(self.comm, lambda: viewer.write(self, file, magnify, units))
         else:
             written = xdmf.write_series if file.suffix == ".xdmf" else xdmf.write_state
             on_first(self.comm, lambda: written(self, file, k))

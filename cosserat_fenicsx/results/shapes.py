@@ -227,7 +227,7 @@ class Shapes(Result, OnNodes):
         else:
             xdmf.write_shapes(self, file, k)
 
-    def plot(self, file=None, which=None, *, amplitude=0.1):
+    def plot(self, file=None, which=None, *, amplitude=0.1, units="SI"):
         """Picture of the shapes, a panel each, with the equilibrium as a grey line.
 
         Args:
@@ -235,6 +235,7 @@ class Shapes(Result, OnNodes):
             which: numbers of the modes; None for the first six.
             amplitude: largest displacement in the picture as a share of the structure's size. Shapes with large
                 rotations are drawn smaller, and the picture says how large.
+            units: "SI", "field", or a dict of units by dimensions, such as {"length": "ft"}.
 
         Raises:
             SceneError: no mode, an unknown one, another ending, or pyvista is missing.
@@ -242,7 +243,7 @@ class Shapes(Result, OnNodes):
         """
         from cosserat_fenicsx.pictures import shapes
 
-        return shapes.draw(self, file, which, amplitude)
+        return shapes.draw(self, file, which, amplitude, units)
 
     def animate(self, file, k=0, *, fps=25, seconds=2.0, cycles=None, amplitude=0.1, size=(960, 720), progress=None):
         """Film of mode k that swings to both sides of the equilibrium.

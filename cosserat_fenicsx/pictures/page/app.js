@@ -27,9 +27,15 @@ function ticks(low, high) {  // round numbers between two limits
   return [...Array(count).keys()].map((k) => [(first + k) * step, ((first + k) * step).toFixed(digits).replace(/^-(0\.?0*)$/, "$1")]);
 }
 
+// Size and name of the unit for a value in an SI unit: the one that was asked for, or with a prefix that suits the value.
+function suited(value, unit) {
+  const [size, prefix] = (unit.match(/^(N|m|Pa)/) && PREFIXES.find(([s]) => value >= s * (1 - 1e-9))) || [1, ""];
+  return data.units[unit] || [size, unit == "1" ? "" : prefix + unit];
+}
+
 function bar(field) {
-  const scaled = field.unit.match(/^(N|m|Pa)/) && field.peak > 0, [scale, prefix] = (scaled && PREFIXES.find(([s]) => field.peak >= s)) || [1, ""];
-  $("unit").textContent = `at most ${+(field.peak / scale).toPrecision(3)} ${field.unit == "1" ? "" : prefix + field.unit}`;
+  const [scale, unit] = suited(field.peak, field.unit);
+  $("unit").textContent = `at most ${+(field.peak / scale).toPrecision(3)} ${unit}`;
   $("map").style.background = `linear-gradient(to top, ${data.maps[field.map]})`;
   $("numbers").replaceChildren(...(field.peak > 0 ? ticks(field.low / scale, field.high / scale) : [[0, "0"]]).map(([value, text]) => {
     const span = document.createElement("span");

@@ -116,9 +116,9 @@ class Signs {
       return solids.box(inwards ? plus(place, inwards, -.17 * a) : place, axes, [half, half, .17 * a]);
     }
     if (kind.endsWith("joint")) {
-      solids.ball(place, (kind == "joint" ? 1.25 : 1.7) * radius);
-      const reach = Math.max(.45 * a, 2.5 * radius);
-      if (kind == "hinge joint") solids.tube(plus(place, turn(q, sign.axis), -reach), plus(place, turn(q, sign.axis), reach), .9 * radius);
+      solids.ball(place, (kind == "joint" ? 1.25 : 1.7) * sign.girth);
+      const reach = Math.max(.45 * a, 2.5 * sign.girth);
+      if (kind == "hinge joint") solids.tube(plus(place, turn(q, sign.axis), -reach), plus(place, turn(q, sign.axis), reach), .9 * sign.girth);
       return;
     }
     if (kind == "mass") return solids.ball(place, Math.max(.3 * a, 2 * radius));
@@ -129,10 +129,10 @@ class Signs {
     }
     const down = this.below(sign, tangent, inwards);
     if (kind == "pin" || kind == "hinge" || kind == "roller") {
-      const top = plus(place, down, inwards && dot(down, inwards) < -1e-6 ? 0 : .7 * radius), foot = plus(top, down, .75 * a);
+      const top = plus(place, down, inwards && dot(down, inwards) < -1e-6 ? 0 : .7 * sign.girth), foot = plus(top, down, .75 * a);
       solids.cone(top, times(-1, down), .75 * a, .42 * a);
-      const across = unit(cross(down, Math.abs(dot(down, tangent)) < .9 ? tangent : this.data.right)), reach = Math.max(.5 * a, 2 * radius);
-      if (kind == "hinge") solids.tube(plus(place, sign.axis, -reach), plus(place, sign.axis, reach), 1.5 * radius + .08 * a);
+      const across = unit(cross(down, Math.abs(dot(down, tangent)) < .9 ? tangent : this.data.right)), reach = Math.max(.5 * a, 2 * sign.girth);
+      if (kind == "hinge") solids.tube(plus(place, sign.axis, -reach), plus(place, sign.axis, reach), 1.5 * sign.girth + .08 * a);
       if (kind == "roller") for (const side of [-.25, .25]) solids.ball(plus(plus(foot, down, .12 * a), across, side * a), .12 * a);
       return solids.plate(plus(foot, down, (kind == "roller" ? .29 : .05) * a), down, a);
     }
@@ -206,7 +206,7 @@ class Signs {
   }
 
   words(sign, share) {
-    const value = share * sign.top, [scale, prefix] = PREFIXES.find(([s]) => value >= s * (1 - 1e-9)) || [1, ""];
-    return `${+(value / scale).toPrecision(3)} ${prefix}${sign.unit}${sign.turns ? " (follows)" : ""}`;
+    const value = share * sign.top, [scale, unit] = suited(value, sign.unit);
+    return `${+(value / scale).toPrecision(3)} ${unit}${sign.turns ? " (follows)" : ""}`;
   }
 }
