@@ -56,6 +56,12 @@ def test_packed_forms_are_the_forms(formulation, degree):
                         whole.axpy(-1.0, assembled(part, my.add_to_matrix))
                         assert whole.norm() == 0
                     assert total.norm() < 1e-14 * size
+                    half = Packed(parts, moving, factors, symmetric=True)
+                    whole = assembled(parts[0], together.add_to_matrix)
+                    whole.axpy(1.0, whole.copy().transpose())
+                    whole.axpy(-2.0, assembled(parts[0], half.add_to_matrix))
+                    assert whole.norm() < 1e-14 * size
+                    np.testing.assert_array_equal(half.matrices(), half.matrices().swapaxes(1, 2))
 
 
 def test_several_elements_at_once_are_each_alone():

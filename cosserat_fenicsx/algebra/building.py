@@ -25,7 +25,7 @@ import numpy as np
 
 from cosserat_fenicsx import code_cache, compat  # before dolfinx, whose import it guards
 from cosserat_fenicsx.code_cache import instructions
-from cosserat_fenicsx.compat import compiling, cpp
+from cosserat_fenicsx.compat import PETSc, compiling, cpp
 from cosserat_fenicsx.errors import InstallationError
 
 SOURCES = tuple(
@@ -212,19 +212,20 @@ class _Kernel(Pointers):
 
 class Packed(_Kernel):
     """A compiled form, linear or bilinear, integrated over this rank's elements; or several as a tuple, for their sum;
-    moving, constants: the Functions and Constants whose values change; all others are read by `refresh`. dofs_c: C's
-    pointer to the local degrees of freedom (elements, size) of the vector, of a linear form."""
+    moving, constants: the Functions and Constants whose values change; all others are read by `refresh`; symmetric:
+    whether the symmetric part of the matrices is taken. dofs_c: C's pointer to the local degrees of freedom (elements,
+    size) of the vector, of a linear form."""
 
-    def __init__(self, form, moving, constants):
+    def __init__(self, form, moving, constants, *, symmetric=False):
         form, *others = form if isinstance(form, tuple) else (form,)
         self._others = Packed(tuple(others), moving, constants) if others else None
         self._form = compat.kernel(form)
         spaces, elements = self._form.function_spaces, self._form.mesh.topology.index_map(1).size_local
         of_spaces = [compat.cell_dofs(space)[:elements] for space in spaces]
-        self._shape = [dofs.shape[1] for dofs in of_spaces]
+        self._shape, self._dofs = [dofs.shape[1] for dofs in of_spaces], of_spaces[0]
         size = int(np.prod(self._shape))
         super().__init__(form, compat.kernel_address(form), self._form.mesh, elements, size)
-        self.dofs_c = self.integers(of_spaces[0])
+        self.dofs_c = self.integers(self._dofs)
         packed = self._pack()
         self._key = next(iter(packed), None)
         self._w = packed[self._key] if packed else np.zeros((elements, 0))
@@ -233,6 +234,8 @@ class Packed(_Kernel):
         self._set(self._w, self._c, sources, [slot for constant in constants for slot in self._slots(constant.value)])
         if self._others:
             self.c.next = self._others.c
+        if symmetric:
+            self.c.symmetric = self._shape[0]
 
     def parts(self):
         """This form and those that are added to it."""
@@ -310,6 +313,11 @@ class Packed(_Kernel):
 
     def add_to_matrix(self, A):
         """Add a bilinear form to a PETSc matrix by the matrix's local-to-global map; -1 there means to skip."""
+        if self.c.symmetric:
+            rows, n = self._dofs.astype(PETSc.IntType), self.c.symmetric
+            starts = np.arange(0, n * rows.size + 1, n, dtype=PETSc.IntType)
+            A.setValuesLocalIJV(starts, np.repeat(rows, n, axis=0), self.matrices(), True, rows)
+            return
         self._lib.pack(self.c)
         for part in self.parts():
             cpp.fem.petsc.assemble_matrix(A, part._form, part._c, {part._key: part._w} if part._key else {}, [])

@@ -68,9 +68,12 @@ void pack(kernel *k)
 static const double *element(kernel *k, int e, double *A)
 {
     double x[6];
+    const int n = k->symmetric;
     for (int i = 0; i < 2; i++) memcpy(x + 3 * i, k->x + 3 * (size_t)k->corners[2 * e + i], 3 * sizeof *x);
     memset(A, 0, k->size * sizeof *A);
     for (; k; k = k->next) ((tabulator *)k->tabulate)(A, coefficients(k, e), k->c, x, 0, 0 LAST);
+    for (int i = 0; i < n; i++)
+        for (int j = 0; j < i; j++) A[i * n + j] = A[j * n + i] = 0.5 * (A[i * n + j] + A[j * n + i]);
     return A;
 }
 

@@ -28,6 +28,7 @@ typedef struct kernel {
     void *together;                /* FFCx's function for LANES elements at once, of a vector; or 0 */
     double *lanes_w, *lanes_c, *lanes_x, *lanes_A; /* for it: (groups, width, LANES), (constants, LANES), (groups, 6,
                                       LANES) ends of elements, (size, LANES) work space */
+    int symmetric;                 /* n where the symmetric part of its matrices (n, n) is taken; or 0 */
     struct kernel *next;           /* another part of the same form, which is added; or 0 */
 } kernel;
 

@@ -84,6 +84,7 @@ static void tabulate_lanes(const lane_kernel *v, kernel *const *of, const int *i
                            vector *A)
 {
     const kernel *parts[LANES], *k = of[first];
+    const int n = k->symmetric;
     vector x[6], zero = {0};
     for (int i = 0; i < 6; i++) x[i] = zero + k->x[3 * (size_t)k->corners[2 * e + i / 3] + i % 3];
     memset(A, 0, k->size * sizeof *A);
@@ -100,6 +101,8 @@ static void tabulate_lanes(const lane_kernel *v, kernel *const *of, const int *i
         }
         ((lane_tabulator *)v->tabulate)(A, (const vector *)w, (const vector *)v->c, x, 0, 0 LAST);
     }
+    for (int i = 0; i < n; i++)
+        for (int j = 0; j < i; j++) A[i * n + j] = A[j * n + i] = 0.5 * (A[i * n + j] + A[j * n + i]);
 }
 
 /* ---- fronts ------------------------------------------------------------------------------------------------------ */

@@ -46,8 +46,8 @@ class CompiledForms:
         residual, tangent: of the unknowns, live loads included; tuples.
         dead, permanent: virtual work of what does not depend on the motion, per unit of load factor and of the
             permanent factor; tuples, empty where there is none.
-        second_variations: symmetric forms in small displacements and rotations, tuples; stable if none has negative
-            eigenvalues.
+        second_variations: forms in small displacements and rotations, tuples; stable if the symmetric part of none has
+            negative eigenvalues.
         fields, fields_size: the components of n, m and r' at the Gauss points, and their number; None and 0 without.
         advance: the next carried n at the Gauss points; or None.
         force, permanent_force: virtual work of the dead forces on displacements, for the determinate models; tuples.
@@ -249,7 +249,7 @@ def _compile_static(model, spaces):
         else:
             pair = small_motion(ufl.TestFunction(space)), small_motion(ufl.TrialFunction(space))
             second = ds(force.second_variation(n, motion, data, section, *pair, model.stiffness))
-        seconds.append(_symmetric(second))
+        seconds.append(second)
         variations.append(pair)
     strains = model.fields_of(n, equilibrium.contact_moment(n, motion, section), motion.r_s)
     contact = model.components_of(equilibrium.contact(motion, section)[0]) if model.carried else None
@@ -298,10 +298,6 @@ def compile_parts(model, core, terms, fields, *, advance=None, densities=None, *
     )  # fmt: skip
 
 
-def _symmetric(form):
-    return 0.5 * (form + ufl.adjoint(form))
-
-
 def live_parts(live, derivative, variations=()):
     """Contributions of a `Live` to residual, tangent and second variations (by number): {name: UFL form or None};
     variations: pairs of test and trial `VirtualMotion`, None for the tangent."""
@@ -312,7 +308,7 @@ def live_parts(live, derivative, variations=()):
         if pair is not None:
             change = variation(live.work, live.point, *pair)
             second = None if _is_zero(change) else nonzero(-live.factor * change * live.measure)
-        parts[i] = None if second is None else _symmetric(second)
+        parts[i] = second
     return parts
 
 

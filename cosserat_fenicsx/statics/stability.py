@@ -107,7 +107,7 @@ class Part(Pointers):
         super().__init__()
         self.problem, self.model, self._index = problem, problem.model, index
         self.variation = variation = self.model.second_variations[index]
-        self.form = Packed(variation.form, self.model.changing, self.model.constants)
+        self.form = Packed(variation.form, self.model.changing, self.model.constants, symmetric=True)
         self.elimination, self.interface = condensed(
             self.model, variation.numbering, variation.cell_dofs, variation.tied, factors=False
         )
