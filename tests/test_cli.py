@@ -306,6 +306,22 @@ def test_modes(here):
         assert "column.end" in row[-5] and along[2] == 0 and np.hypot(*along[:2]) == pytest.approx(1, abs=0.01)
 
 
+@pytest.mark.parametrize("command", ["buckling", "modes", "run"])
+def test_doubts_come_once_and_first(command, tmp_path, here):
+    text = DEMO.read_text(encoding="utf-8").replace("diameter = 0.2", "diameter = 16")
+    (tmp_path / "thick.toml").write_text(text, encoding="utf-8")
+    scene, words = cf.read(tmp_path / "thick.toml").scene, "rod 'column' is 16 m across and 20 m long"
+    code, told, said = here(command, tmp_path / "thick.toml", "--elements", "2")
+    assert code == 0 and said.count(words) == 1 and said.startswith(f"cosserat: warning: {words}")
+    compute = {"buckling": cf.buckling, "modes": cf.modes, "run": cf.solve}[command]
+    with pytest.warns(cf.SceneWarning, match=words):
+        path = compute(scene, elements=2)
+    if command == "run":
+        assert str(path).startswith(f"First check: {words}") and f"First check: {words}" in told
+        motion = cf.simulate(scene, 1e-5, dt=1e-5, elements=1, degree=2)
+        assert str(motion).startswith("First check:") and motion.details().count(words) == 1
+
+
 @pytest.mark.parametrize("command", ["buckling", "modes"])
 def test_pictures_of_shapes_are_in_the_chosen_units(command, tmp_path, here, monkeypatch):
     from cosserat_fenicsx.pictures import drawing

@@ -75,8 +75,6 @@ def eigenvalues(options, found, tables):
         from cosserat_fenicsx.statics.linear_buckling import buckling as compute
     else:
         from cosserat_fenicsx.statics.natural_modes import modes as compute
-    for caution in found.scene.doubts:
-        say(f"cosserat: warning: {caution}")
     name, more = options.command, ("damped", "near") if options.command == "modes" else ()
     settings = given(options, ("tol", "elements", "degree", *more))
 

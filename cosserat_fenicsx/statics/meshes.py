@@ -417,6 +417,8 @@ def until_two_meshes_agree(owner, scene, on_mesh, tol, *, most, elements, degree
     of 2. least: of what `on_mesh` returned, relative errors (n,) that two meshes may not show; places: the edges of
     contact, see `with_edges`. Raises NotConverged.
     """
+    if comm.rank == 0:
+        scene.warn()
     layout = turning_in_law(scene, Layout.of(scene, elements or FIRST_ELEMENTS), [1.0], elements)
     coarse, best, worse, moves = None, math.inf, 0, 0
     failed = False  # whether the last mesh could not be solved
