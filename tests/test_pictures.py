@@ -30,7 +30,7 @@ from cosserat_fenicsx.pictures.drawing import (
 from cosserat_fenicsx.pictures.plot import _spread, tangled
 from cosserat_fenicsx.pictures.shapes import Drawn
 from cosserat_fenicsx.pictures.signs import Resting, has_sign, loads_of, signs_of, without_sign
-from cosserat_fenicsx.pictures.view import Labels, View, axes_of, seen_moving, view_of
+from cosserat_fenicsx.pictures.view import Labels, View, _width, axes_of, seen_moving, view_of
 
 STEEL = cf.Material(E=210e9, nu=0.3, density=7850.0)
 
@@ -139,6 +139,22 @@ def test_signs_of_a_flat_section_have_its_mean_width():
     across = np.ptp(np.concatenate([mesh.points for mesh in symbols._meshes["released joints"]]), axis=0)
     mean = np.sqrt(1.2 * 0.1)
     assert across == pytest.approx([1.7 * mean, 0.9 * 0.048 * 20, 1.7 * mean], rel=0.01)
+
+
+@pytest.mark.serial
+def test_labels_have_room_for_their_letters():
+    """A stage that has ended is called by its name alone."""
+    vtk = pytest.importorskip("vtk")
+    font, box = vtk.vtkTextProperty(), [0, 0, 0, 0]
+    font.SetFontSize(100)
+    font.SetFontFamilyToArial()
+    for text in ("erection", "snow on one side", "maintenance crane", "wind: 0.65", "150 N/m", "WIND QUICK JIB (10)"):
+        vtk.vtkTextRenderer.GetInstance().GetBoundingBox(font, text, box, 72)
+        assert 0.85 < (box[1] - box[0]) / (100 * _width(text)) < 1.0, text
+    rod = column()[0]
+    scene = cf.Scene([rod], [cf.Clamp(rod.start)], [], stages=[cf.Stage([cf.Weight()], name="snow")])
+    path = cf.solve(scene, elements=2)
+    assert [path.label(k) for k in (-3, -1)] == ["snow: 0.3", "snow"]
 
 
 @pytest.mark.serial

@@ -113,10 +113,10 @@ class View:
         plotter.reset_camera_clipping_range()
 
 
-# Widths of letters, at least those of Arial, and height of a line over the font's size; pixels between labels, and to
-# the picture's edge.
-_LETTERS = {**dict.fromkeys(" .,:;'|!()[]-/Iijltfr", 0.34), **dict.fromkeys("mwMW@%", 0.95)}
-_LETTER, _CAPITAL, _LINE, _GAP, _EDGE = 0.56, 0.73, 1.15, 5, 4
+# Widths of letters, at least those that VTK draws, and height of a line over the size of a font; pixels between labels,
+# and to the edge of the picture.
+_LETTERS = {**dict.fromkeys(" .,:;'|-/IJijl", 0.34), **dict.fromkeys("tfr!()[]", 0.41), **dict.fromkeys("mwMW@%", 0.99)}
+_LETTER, _CAPITAL, _LINE, _GAP, _EDGE = 0.63, 0.78, 1.15, 5, 4
 # Distance of numbers of two axes over the size of letters.
 _ASUNDER = 0.6
 # Distances (pixels) of a label from its point, and turns (deg) of its direction, in the order of preference; distance

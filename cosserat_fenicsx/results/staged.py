@@ -77,7 +77,9 @@ class StagedPath(Path):
         return self._stage + self.load_factors / np.array([ends[stage] for stage in self._stage.tolist()])
 
     def label(self, k):
-        return f"{self.stage_label(self._stage[k])}: {super().label(k)}"
+        leg = self._legs[self._stage[k]]
+        ended = self.load_factors[k] == (leg.last or 1.0)
+        return leg.label if ended else f"{leg.label}: {super().label(k)}"
 
     def stage_label(self, stage):
         """See `Path`."""
