@@ -261,8 +261,8 @@ class Strands:
         if np.any(flat) or np.any(_side_by_side(points[j] - points[i], bent[:, i], bent[:, j])):
             lines = self._lines(x, points, cut, reach)
         # where they are flat next to no node, as in a narrow hook on few elements, they touch in a point after all
-        beside = np.abs(np.sort(found.element)[:, None] - np.sort(lines.element)).max(axis=2) <= 1
-        crosses = ~(narrow | flat & beside.any(axis=1)) | ~found.slides.all(axis=1)
+        beside = cKDTree(np.sort(lines.element)).query(np.sort(found.element), p=np.inf)[0] <= 1
+        crosses = ~(narrow | flat & beside) | ~found.slides.all(axis=1)
         parts = [found.of(crosses & (found.gap < reach)), lines]
         joined = Touches(*(np.concatenate([getattr(p, n) for p in parts]) for n in Touches.__dataclass_fields__))
         return joined, closest

@@ -8,6 +8,8 @@ import warnings
 import numpy as np
 import pytest
 from extensions.hardening import Hardening
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq, fsolve, newton
 
 import cosserat_fenicsx as cf
 
@@ -135,7 +137,8 @@ def test_the_estimate_covers_a_release():
 def test_a_bar_is_pulled_and_released(truth):
     """An elastic bar on a rough plane under F, then 0: it slides over F/(mu w), its end moves by F^2/(2 EA mu w), and
     half of that remains. The edge of slip is at an end of an element under F; on its way back it is inside elements,
-    and pushes what is at its bound before it, unless it goes back in one step, to an end of an element."""
+    and pushes what is at its bound before it, unless it goes back in one step, to an end of an element, or elements are
+    linear, in which nothing overshoots: then it has to be at an end of an element in the last state alone."""
     scene, floor, w, mu, EA, F = pulled_bar()
     rod = scene.rods[0]
     path = cf.solve(scene, [0.5, 1.0, 0.0], elements=40, model="planar")
@@ -145,6 +148,9 @@ def test_a_bar_is_pulled_and_released(truth):
     truth("bar pulled over a rough plane and released, end", ends[2], moved / 2, 1e-6, of=moved, most=4e-4,
           why="the edge of slip goes back through elements")  # fmt: skip
     assert path[2].iterations < 3000
+    steps, how = [1.0, *np.linspace(1, 0, 8)[1:]], {"steps": cf.StepControl(adaptive=False), "model": "planar"}
+    by_lines = cf.solve(scene, steps, elements=160, degree=1, **how).displacement(rod.end)[-1, 0]
+    truth("bar pulled over a rough plane and released, linear elements", by_lines, moved / 2, 1e-6, of=moved)
     at_once = cf.solve(scene, [1.0, 0.0], elements=40, model="planar", steps=cf.StepControl(adaptive=False))
     left = at_once.displacement(rod.end)[1, 0]
     truth("bar pulled over a rough plane and released in one step, end", left, moved / 2, 1e-6, of=moved)
@@ -173,6 +179,102 @@ def test_a_stiff_rope_on_a_bollard(truth):
     assert told.value.path.contacts(bollard).force[held, 2] == pytest.approx([ratio * (1 - 1e-3) + 1], rel=1e-6)
     slips = (told.value.path.load_factors.max() + 1 + ratio * (1 + 1e-3)) / 2  # between the last one and that refused
     truth("stiff capstan, ratio of tensions at which it slips", slips, ratio, 1e-3)
+
+
+def slipping(w, mu, R, EI, pulled, ends):
+    """The force at the second end of a heavy rope on a cylinder with which it slips, by the one at the first; ends:
+    heights of both, m. Friction acts at the rope's axis, where what touches has no shear and the cylinder's curvature;
+    beyond it are elasticas, and where they begin the cylinder presses with the shear force there."""
+
+    def tail(force, height):
+        """Where it lifts off, rad above the cylinder's axis, and the vertical force there: shot up from its end."""
+
+        def climbed(size):
+            def bends(u, y):
+                return y[1], (force + w * u) * math.sin(y[0]) / EI, math.cos(y[0])
+
+            def touches(u, y):
+                return y[1] - 1 / R
+
+            touches.terminal = True
+            start = math.exp(size), 0.0, height
+            found = solve_ivp(bends, (0, 9), start, "DOP853", events=touches, rtol=1e-9, atol=1e-30)
+            return found.y[0, -1], force + w * found.t[-1], found.y[2, -1] - R * math.sin(found.y[0, -1])
+
+        return climbed(brentq(lambda size: climbed(size)[2], -200, -1, xtol=1e-9))[:2]
+
+    def left(force):
+        (one, first), (two, last) = tail(pulled, ends[0]), tail(force, ends[1])
+        start, around = first * (math.cos(one) + mu * math.sin(one)), (one, math.pi - two)
+
+        def grows(angle, T):
+            return R * w * np.cos(angle) + mu * (T + R * w * np.sin(angle))
+
+        T = solve_ivp(grows, around, [start], "DOP853", rtol=1e-10, atol=1e-10).y[0, -1]
+        return last * (math.cos(two) - mu * math.sin(two)) - T
+
+    return newton(left, pulled * math.exp(math.pi * mu), tol=1e-8)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("elements", "nodes", "asked"), [(50, 200, 1e-3), (200, 800, 1e-4)])
+def test_a_heavy_rope_on_a_bollard(truth, elements, nodes, asked):
+    """Euler and Eytelwein's problem with weight and some stiffness: half a turn, and tails of which the second is
+    pulled, against a spring that takes what friction does not hold."""
+    w, mu, R, EI, tail, k, most = 10.0, 0.2, 0.5, 2.5e-3, 0.4, 1e4, 18.0
+    string = solve_ivp(lambda a, h: R * np.cos(a) + mu * (h + R * np.sin(a)), (0, math.pi), [1.0], rtol=1e-10)
+    limp = slipping(w, mu, R, EI / 10, w * (1 - tail), (-tail, -tail)) / w + tail
+    assert [string.y[0, -1], limp] == pytest.approx([2.4272361044286725] * 2, rel=5e-5)  # of another program
+    ends = [np.array((side * R, 0, 0)) for side in (-1, 1)]
+    down = np.array((0, 0, -tail))
+    arc = cf.Rod(cf.Arc((0, 0, 0), ends[0], math.pi, (0, 1, 0)), rope(EI))
+    one, two = cf.Rod(cf.Line(ends[0] + down, ends[0]), rope(EI)), cf.Rod(cf.Line(ends[1], ends[1] + down), rope(EI))
+    straight = cf.Actuation(arc, curvature=arc.curve.frame(0.0).T @ (0, -1 / R, 0), permanent=True)
+    pulled = w * (1 - tail)
+    bollard = cf.Cylinder((0, 0, 0), (0, 1, 0), R, friction=mu, contact_radius=0.0)
+    loads = [bollard, straight, *(cf.LineForce(rod, (0, 0, -w), permanent=True) for rod in (one, arc, two)),
+             *(cf.Force(at, (0, 0, -pulled), permanent=True) for at in (one.start, two.end)),
+             cf.Spring(two.end, k, direction=(0, 0, 1)), cf.Force(two.end, (0, 0, -most))]  # fmt: skip
+    joints = [cf.Joint(one.end, arc.start), cf.Joint(arc.end, two.start)]
+    path = cf.solve(cf.Scene([one, arc, two], [], loads, joints), 1.0, elements=elements, model="planar")
+    touch, heights = path.contacts(bollard), [path.position(at)[-1, 2] for at in (one.start, two.end)]
+    on_arc = touch.rod == arc.name
+    assert np.count_nonzero(touch.pressure[-1, on_arc]) > 0.95 * nodes and not touch.sticks[-1].any()
+    found = pulled + most + k * path.displacement(two.end)[-1, 2] - w * heights[1]
+    exact = slipping(w, mu, R, EI, pulled, heights) - w * heights[1]
+    truth(f"heavy capstan, {nodes} nodes, tension at which it slips", found, exact, asked)
+
+
+def test_a_ring_stands_on_a_plane(truth):
+    """A heavy elastic ring, flat where it touches: shooting in the height, half the contact and the tension there."""
+    w, EI, L = 1.0, 0.005, 1.0
+    R = L / (2 * math.pi)
+
+    def lifted(half, tension):
+        rise = L / 2 - half  # from where it lifts off to the top
+
+        def bends(s, y):
+            cos, sin = math.cos(y[0]), math.sin(y[0])
+            return y[1], (sin * tension + cos * w * (rise - s)) / EI, cos, sin
+
+        return solve_ivp(bends, (0, rise), (0.0, 0.0, half, 0.0), "DOP853", rtol=1e-11, atol=1e-12).y[:, -1]
+
+    half, tension = fsolve(lambda z: lifted(*z)[[0, 2]] - (math.pi, 0.0), (0.03, -0.1), xtol=1e-12)
+    _, curvature, _, height = lifted(half, tension)
+    assert (2 * half, height) == pytest.approx((0.05684271639005901, 0.2398117590074941), rel=1e-7)  # another program
+    one, two = (cf.Rod(cf.Arc((0, 0, R), (0, 0, 0), turn, (0, 1, 0)), rope(EI)) for turn in (-math.pi, math.pi))
+    floor = cf.Plane((0, 0, 0), (0, 0, 1), contact_radius=0.0)
+    held = [cf.Prescribed(one.start, rotation=(0, 0, 0)), *(cf.Roller(one.start, x) for x in ((1, 0, 0), (0, 1, 0)))]
+    joints = [cf.Joint(one.start, two.start), cf.Joint(one.end, two.end)]
+    loads = [floor, *(cf.LineForce(rod, (0, 0, -w)) for rod in (one, two))]
+    path = cf.solve(cf.Scene([one, two], held, loads, joints), 1.0, tol=1e-4, model="planar")
+    truth("ring that stands on a plane, height", path.position(one.end)[-1, 2], height, 1e-5)
+    bends = abs(path.moment(one.end)[-1, 1])
+    truth("ring that stands on a plane, moment at the top", bends, EI * (1 / R - curvature), 1e-4)
+    touch = path.contacts(floor)
+    np.testing.assert_allclose(touch.force[-1], (0, 0, w * L), atol=1e-8)
+    s, pressure = (x[..., touch.rod == one.name] for x in (touch.s, touch.pressure[-1]))
+    assert s[np.argmax(pressure)] == pytest.approx(half, abs=np.diff(s).max())  # a force is concentrated there
 
 
 def test_a_rod_on_two_rough_posts():

@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.files.read import schema_of_files
@@ -88,6 +89,66 @@ def test_a_ring_is_pulled_until_it_touches_itself(truth):
     np.testing.assert_allclose(apart, (0.46295178732099795, 0.47801546152226415), rtol=1e-6)
     assert not len(path[0].contacts(touch))
     truth("pulled ring that touches itself, force", path.contacts(touch).force.sum(), 0.12063607907258804, 1e-5)
+
+
+def beam_on_another(A, B, k, F):
+    """A beam under F in its middle, on another one in a bed k: half the length of contact, and (deflection of order n
+    at x) -> number. Both bend as one, w'' = 0 where they part, and the lower one goes on as exp(-o x) cos(o x)."""
+    b, o = ((k / (4 * EI)) ** 0.25 for EI in (A + B, B))
+    roots = b * np.array([1 + 1j, -1 - 1j])
+
+    def of(x, n):
+        found = roots**n * np.exp(roots * x)
+        return np.append(found.real, found.imag)
+
+    def parting(c):
+        """The balance of shear forces at the end of contact, and coefficients for all else."""
+        rows = of(0, 1), of(0, 3), of(c, 2), of(c, 1) + o * of(c, 0)
+        found = np.linalg.solve(rows, (0, F / 2 / (A + B), 0, 0))
+        return (A + B) * of(c, 3) @ found - 2 * B * o**3 * of(c, 0) @ found, found
+
+    c = brentq(lambda c: parting(c)[0], 0.3 / b, 1.5 / b, xtol=1e-15)
+    return c, lambda x, n: float(of(x, n) @ parting(c)[1])
+
+
+def test_two_beams_one_on_a_bed(truth):
+    """They touch along a part that does not depend on the force, with forces that are concentrated under it and at the
+    ends of contact: those with the moments of the true pressure and of the beam, since forces of nodes alternate."""
+    A, B, k, F, r, half, far = 10.0, 20.0, 1e4, 0.5, 0.01, 0.45, 2.5
+    c, w = beam_on_another(A, B, k, F)
+    assert (c, w(0, 0)) == pytest.approx((0.2766934320814265, 0.0769854348171996e-3), rel=1e-9)  # another program
+    section = [cf.Stiffness(RIGID, math.inf, (EI, EI), EI) for EI in (A, B)]
+    upper = cf.Rod(cf.Line((-half, 0, 2 * r), (half, 0, 2 * r)), section[0], name="upper")
+    lower = cf.Rod(cf.Line((-0.5, 0, 0), (0.5, 0, 0)), section[1], name="lower")
+    outer = [cf.Rod(cf.Line((s * 0.5, 0, 0), (s * far, 0, 0)), section[1]) for s in (-1, 1)]
+    pressed, middle = upper.at(half), lower.at(0.5)
+    supports = [cf.Prescribed(pressed, displacement=(0, 0, -w(0, 0)), rotation=(0, 0, 0)),
+                cf.Prescribed(middle, rotation=(0, 0, 0)), *(cf.Roller(middle, x) for x in ((1, 0, 0), (0, 1, 0)))]
+    touch = cf.RodContact(radius=r, pairs=(("upper", "lower"),))
+    loads = [touch, *(cf.Foundation(rod, k, direction=(0, 0, 1)) for rod in (lower, *outer))]
+    joints = [cf.Joint(end, rod.start) for end, rod in zip((lower.start, lower.end), outer, strict=True)]
+    scene = cf.Scene([upper, lower, *outer], supports, loads, joints)
+    path = cf.solve(scene, 1.0, elements=20, steps=cf.StepControl(first=1.0))
+    force = -path.reaction(supports[0])[0][-1, 2]
+    truth("two beams, one on a bed, force for a deflection", force, F, 1e-4)
+    found = path.contacts(touch)
+    truth("two beams, sum of contact forces", np.abs(found.force @ found.normal)[2], force, 1e-10, most=1e-9)
+    reach = max(abs(found.s - half).max(), abs(found.other_s - 0.5).max())
+    assert reach == pytest.approx(c, abs=2 * half / 20 / 4 * 1.4)  # the widest distance of nodes
+
+    def moment(x):
+        return abs(path.moment(upper.at(half + x))[-1, 1])
+
+    def pressure(a, b, about):
+        """The moment of the true pressure from a to b about a place."""
+        x, weights = np.polynomial.legendre.leggauss(12)
+        x = (a + b) / 2 + (b - a) / 2 * x
+        return (b - a) / 2 * sum(v * A * abs(w(y, 4)) * abs(y - about) for y, v in zip(x, weights, strict=True))
+
+    inner, beside = 0.1, 0.2
+    end = (moment(beside) - pressure(beside, c, beside)) / (c - beside)
+    shear = (moment(0) - moment(inner) + pressure(0, inner, inner)) / inner
+    truth("two beams, concentrated forces", (force - 2 * shear, end), (F * B / (A + B), A * w(c, 3)), 1e-2)
 
 
 @pytest.mark.parametrize(
