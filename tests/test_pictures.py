@@ -240,6 +240,11 @@ def test_numbers_of_an_axis_are_even():
         before = len(labels.boxes)
         labels.evenly(ticks, size=size, away=(0, 0))
         assert [text for text, *_ in labels._texts[before:]] == kept
+    last = VIEW.pixels(ticks[-1][1])  # beside a key of signs there is room for the last one
+    labels = Labels(VIEW)
+    labels.reserve((last[0] + 25, 0), VIEW.window)
+    labels.evenly(ticks, size=10, away=(0, 0))
+    assert len(labels._texts) == len(ticks)
 
 
 @pytest.mark.serial

@@ -134,6 +134,7 @@ class Labels:
 
     def __init__(self, view, lines=()):
         self._view, self._placed, self._texts, self._leaders, self._ends = view, [], [], [], []
+        self._reserved = []
         self._covered = _RODS * self._cells(lines)
         #: texts for which there was no room
         self.left_out = []
@@ -159,6 +160,7 @@ class Labels:
 
     def reserve(self, low, high):
         """Keep a rectangle free of labels: its lower left and upper right corners, pixels."""
+        self._reserved.append((*low, *high))
         self._placed.append((*low, *high))
 
     def near(self, text, point, towards, *, size, colour="black"):
@@ -199,7 +201,7 @@ class Labels:
             for n, first in ((n, first) for n in range(1, len(texts) + 1) for first in range(n)):
                 some = range(first, len(texts), n)
                 apart = not any(_overlap(boxes[i], boxes[j]) for i, j in itertools.pairwise(some))
-                kept = [i for i in some if self._free(boxes[i] + np.array((-spare, 0, spare, 0)))] if apart else []
+                kept = [i for i in some if self._free(boxes[i], spare)] if apart else []
                 best = max(best, kept, key=len)  # the first of equal ones
             if len(best) > 1:
                 break
@@ -230,12 +232,13 @@ class Labels:
         away = np.array([box[0] + box[2], box[1] + box[3]]) / 2 - self._view.pixels(point)
         self._texts.append((text, point + self._view.offset(*away), size, colour))
 
-    def _free(self, box):
-        """Whether a rectangle lies in the picture and overlaps no label."""
+    def _free(self, box, spare=0.0):
+        """Whether a rectangle lies in the picture and overlaps no reserved area and, wider by `spare`, no label."""
         low, high = np.array(box[:2]), np.array(box[2:])
         if (low < _EDGE).any() or (high > np.array(self._view.window) - _EDGE).any():
             return False
-        return not any(_overlap(box, other) for other in self._placed)
+        wide = box[0] - spare, box[1], box[2] + spare, box[3]
+        return not any(_overlap(box if other in self._reserved else wide, other) for other in self._placed)
 
     def _crosses(self, line, box):
         """How many labels and lines from labels to their points a label in a rectangle, with its line, would cross."""

@@ -610,7 +610,7 @@ class RodResult(Result, Extremes, Reactions, Stresses, States):
 
         Args:
             file: a .png, which rank 0 writes; None returns the pyvista plotter.
-            points: indices of points of a path, or of times; None for up to five, evenly spread.
+            points: indices of points of a path, or of times; None for up to five, with the end of each stage.
             magnify: factor of the displacements in the picture.
             color: what colours the rods: bending_moment, twisting_moment, tension, shear_force, n, m, displacement,
                 strain, curvature, of a motion velocity and angular_velocity too; n.x, n.y, n.z for an inertial
