@@ -5,7 +5,7 @@ import pytest
 from conftest import COMM, column
 from dolfinx.fem import petsc as fem_petsc
 
-from cosserat_fenicsx.algebra.building import Packed, functions_in_lanes
+from cosserat_fenicsx.algebra.building import Packed, functions_in_lanes, take_together
 from cosserat_fenicsx.models.rodmesh import Layout
 from cosserat_fenicsx.statics.problem import solvers_of
 
@@ -88,6 +88,31 @@ def test_several_elements_at_once_are_each_alone():
                 form.add_to_vector(found[-1])
                 model.state.x.array[:] -= 0.1
             np.testing.assert_allclose(*found, rtol=0, atol=1e-14 * np.abs(found[0]).max(initial=0))
+
+
+@pytest.mark.parametrize("elements", [7, 8])
+def test_tangents_of_several_elements_at_once(elements):
+    """The motion by a tangent and the negative modes are those of elements one by one."""
+    random, (_, scene) = np.random.default_rng(0), column(arm=True)
+    with solvers_of(scene, Layout.of(scene, elements), degree=2) as (problem, _, stability):
+        forms = [problem._residual, problem.tangent_form, stability.whole.form]
+        b, x = problem.numbering.vector(), problem.numbering.vector()
+        problem.x.array_w[:] += 1e-3 * random.normal(size=problem.numbering.size)
+        problem.set_load_factor(0.3)
+        found = []
+        for many in (False, True):
+            if many:
+                take_together(*forms)
+            for form in forms:
+                form.refresh()
+            problem.function(problem.x, b)
+            problem.factor()
+            assert problem.solve(b, x)
+            found.append((x.array_r.copy(), stability.count(), stability.logarithm))
+        for form in forms:
+            form.c.together = form._ffi.NULL
+        np.testing.assert_allclose(found[0][0], found[1][0], rtol=0, atol=1e-10 * np.abs(found[0][0]).max(initial=0))
+        assert found[0][1] == found[1][1] and found[0][2] == pytest.approx(found[1][2], abs=1e-8)
 
 
 def assembled(form, add):

@@ -424,6 +424,14 @@ def functions_in_lanes(addresses, lanes):
     return {address: places[name] for address, (name, _) in sources.items()}
 
 
+def take_together(*forms):
+    """Let C compute LANES elements of `Packed` forms at once, where there is code for it."""
+    addresses = tuple(part.address for form in forms for part in form.parts())
+    functions = functions_in_lanes(addresses, forms[0]._lib.LANES)
+    for form in forms if functions else ():
+        form.take_together(functions)
+
+
 def allowed(problem, variations):
     """Whether problems such as this one may be solved in lock step: nothing is left to an interface or to Python."""
     chains = [problem.c.chain, *(variations.c.chain[k] for k in range(variations.c.parts))]

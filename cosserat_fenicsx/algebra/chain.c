@@ -34,6 +34,18 @@ static inline void keep(vector a, double *to)
     *(place_of_vector *)to = a;
 }
 
+enum { BESIDE = LANES }; /* numbers of a front that are taken together */
+
+static inline int round_down(int i)
+{
+    return i & -BESIDE;
+}
+
+static inline int round_up(int i)
+{
+    return round_down(i + BESIDE - 1);
+}
+
 /* ---- elements ---------------------------------------------------------------------------------------------------- */
 
 static void take_constants(kernel *k)
@@ -82,6 +94,7 @@ static const double *elements_together(kernel *k, int e, int count)
 {
     double *A = k->lanes_A;
     const double *x = k->lanes_x + 6 * (size_t)e;
+    const int n = k->symmetric;
     memset(A, 0, LANES * k->size * sizeof *A);
     for (; k; k = k->next) {
         double *w = k->lanes_w + (size_t)e * k->width;
@@ -93,7 +106,23 @@ static const double *elements_together(kernel *k, int e, int count)
                 }
         ((tabulator *)k->together)(A, w, k->lanes_c, x, 0, 0 LAST);
     }
+    for (int i = 0; i < n; i++)
+        for (int j = 0; j < i; j++) {
+            double *a = A + LANES * (i * n + j), *b = A + LANES * (j * n + i);
+            const vector mean = 0.5 * (load(a) + load(b));
+            keep(mean, a), keep(mean, b);
+        }
     return A;
+}
+
+/* The numbers of an element in turn, `step` apart from each other: those computed together with the first of LANES
+   elements, which comes before the others. */
+static const double *element_in_turn(kernel *k, int e, int *step)
+{
+    *step = k->together ? LANES : 1;
+    if (!k->together) return element(k, e, k->A);
+    if (e % LANES == 0) elements_together(k, e, k->elements - e < LANES ? k->elements - e : LANES);
+    return k->lanes_A + e % LANES;
 }
 
 /* Add a vector's elements to values (local degrees of freedom); dofs: (elements, size). */
@@ -131,11 +160,21 @@ void tabulate_all(kernel *k, double *values)
 
 /* ---- one front --------------------------------------------------------------------------------------------------- */
 
+/* Matrices F of n rows and columns have rows of `wide` numbers, a multiple of BESIDE; those from n on are zeros. */
+
 static void swap(double *a, double *b, int n, int step)
 {
     for (int i = 0; i < n; i++, a += step, b += step) {
         double c = *a;
         *a = *b, *b = c;
+    }
+}
+
+static void swap_rows(double *restrict a, double *restrict b, int n)
+{
+    for (int i = 0; i < n; i += BESIDE) {
+        const vector c = load(a + i);
+        keep(load(b + i), a + i), keep(c, b + i);
     }
 }
 
@@ -145,56 +184,122 @@ static void swap_numbers(int *a, int *b)
     *a = *b, *b = c;
 }
 
-static inline void subtract_pivot(double *F, int n, int k)
+static inline void subtract_pivot(double *F, int n, int wide, int k)
 {
-    const double *restrict pivot = F + (size_t)k * n;
+    const double *restrict pivot = F + (size_t)k * wide;
     const double inverse = 1 / pivot[k];
     for (int i = k + 1; i < n; i++) {
-        double *restrict row = F + (size_t)i * n;
+        double *restrict row = F + (size_t)i * wide;
         const double l = row[k] *= inverse;
         if (l != 0)
             for (int j = k + 1; j < n; j++) row[j] -= l * pivot[j];
     }
 }
 
-/* whole: (m,) the largest numbers in the columns of F (n, n). */
-static void find_largest(const double *restrict F, int n, int m, double *restrict whole)
+/* whole: (m,) the largest numbers in the columns of F. */
+static void find_largest(const double *restrict F, int n, int wide, int m, double *restrict whole)
 {
     for (int j = 0; j < m; j++) whole[j] = 0;
     for (int i = 0; i < n; i++)
         for (int j = 0; j < m; j++) {
-            const double size = fabs(F[(size_t)i * n + j]);
+            const double size = fabs(F[(size_t)i * wide + j]);
             whole[j] = size > whole[j] ? size : whole[j]; /* fmax is four times slower */
         }
 }
 
 /* The same where each row is multiplied by its scale, one over the sum of its numbers; scale: (n,). */
-static void find_scales(const double *F, int n, int m, double *scale, double *whole)
+static void find_scales(const double *F, int n, int wide, int m, double *scale, double *whole)
 {
     for (int j = 0; j < m; j++) whole[j] = 0;
     for (int i = 0; i < n; i++) {
         double sum = 0;
-        for (int j = 0; j < n; j++) sum += fabs(F[(size_t)i * n + j]);
+        for (int j = 0; j < n; j++) sum += fabs(F[(size_t)i * wide + j]);
         scale[i] = sum > 0 ? 1 / sum : 1;
-        for (int j = 0; j < m; j++) whole[j] = fmax(whole[j], scale[i] * fabs(F[(size_t)i * n + j]));
+        for (int j = 0; j < m; j++) whole[j] = fmax(whole[j], scale[i] * fabs(F[(size_t)i * wide + j]));
     }
 }
 
-/* LU factors of the first m rows and columns of F (n, n) with row exchanges among them, and the rest reduced. Columns
+/* Subtract pivot k, at `c` among the BESIDE columns that are taken together, in these columns alone. */
+static inline void subtract_beside(double *F, int n, int wide, int k, const int c)
+{
+    double *row = F + (size_t)k * wide + k - c;
+    vector pivot = load(row), scale = (vector){0} + 1;
+    scale[c] = 1 / pivot[c];
+    for (int j = 0; j <= c; j++) pivot[j] = 0;
+    for (int i = k + 1; i < n; i++) {
+        const vector v = load(row += wide) * scale;
+        keep(v - pivot * ((vector){0} + v[c]), row);
+    }
+}
+
+/* Subtract `count` pivots from k on, which are in their columns, in `rows` rows, the first of them `row`, and in the
+   columns from `first` on, a multiple of BESIDE. */
+static inline __attribute__((always_inline)) void subtract_from(double *row, const int rows, const double *F, int n,
+                                                                int wide, int k, int first, const int count)
+{
+    vector l[2][BESIDE], v[2];
+    for (int i = 0; i < rows; i++)
+        for (int p = 0; p < count; p++) l[i][p] = (vector){0} + row[i * wide + k + p];
+    for (int j = first; j < n; j += BESIDE) {
+        for (int i = 0; i < rows; i++) v[i] = load(row + i * wide + j);
+        for (int p = 0; p < count; p++)
+            for (int i = 0; i < rows; i++) v[i] -= load(F + (size_t)(k + p) * wide + j) * l[i][p];
+        for (int i = 0; i < rows; i++) keep(v[i], row + i * wide + j);
+    }
+}
+
+/* The same in all rows below the first pivot's. */
+static void subtract_pivots(double *F, int n, int wide, int k, int first, int count)
+{
+    int i = k + 1;
+    for (; first < n && i < k + count; i++) subtract_from(F + (size_t)i * wide, 1, F, n, wide, k, first, i - k);
+    for (; first < n && count == BESIDE && i + 1 < n; i += 2)
+        subtract_from(F + (size_t)i * wide, 2, F, n, wide, k, first, BESIDE);
+    for (; first < n && count > 0 && i < n; i++) subtract_from(F + (size_t)i * wide, 1, F, n, wide, k, first, count);
+}
+
+/* The largest of the absolute values of column k of F from row k to m, and `at` which it is the first time; `below`: of
+   those from row m on; size: (n + BESIDE,) work space. Without branches, which the processor would not foresee. */
+static inline double largest_in_column(const double *F, int n, int wide, int k, int m, double *restrict size, int *at,
+                                       double *below)
+{
+    double best[BESIDE] = {0}, place[BESIDE], most = 0, first = m;
+    const int end = k + round_up(m - k);
+    *below = 0;
+    for (int i = m; i < n; i++) size[0] = fabs(F[(size_t)i * wide + k]), *below = size[0] > *below ? size[0] : *below;
+    for (int i = k; i < m; i++) size[i] = fabs(F[(size_t)i * wide + k]);
+    for (int i = m; i < end; i++) size[i] = 0;
+    for (int i = k; i < end; i += BESIDE)
+        for (int j = 0; j < BESIDE; j++) best[j] = size[i + j] > best[j] ? size[i + j] : best[j];
+    for (int j = 0; j < BESIDE; j++) most = best[j] > most ? best[j] : most, place[j] = m;
+    for (int i = end - BESIDE; i >= k; i -= BESIDE)
+        for (int j = 0; j < BESIDE; j++) place[j] = size[i + j] == most ? i + j : place[j];
+    for (int j = 0; j < BESIDE; j++) first = place[j] < first ? place[j] : first;
+    *at = first < m ? first : k;
+    return most;
+}
+
+/* LU factors of the first m rows and columns of F with row exchanges among them, and the rest reduced. Columns
    without an acceptable pivot are tried again after the others; at most `most` may be left over. Returns how many were
    eliminated, -1 if F is singular: pivots are zero that are smaller than `zero` times the largest number in the column
    before elimination, where `scale` is given with all rows scaled by their sums. scale: (n,) work space for these, or
-   0; whole: (m,) work space. */
-static int reduce(double *restrict F, int n, int m, int most, int *row, int *column, double zero,
-                  double *restrict scale, double *restrict whole)
+   0; whole: (m,), size: (n,) work space.
+
+   A pivot is subtracted at once in the columns beside it alone, and with the others of these in all columns that
+   follow. */
+static int reduce(double *F, int n, int wide, int m, int most, int *row, int *column, double zero,
+                  double *restrict scale, double *restrict whole, double *restrict size)
 {
     int k = 0, last = m, before = 0; /* the columns from `last` on were refused since `before` were eliminated */
+    int from = 0, end = 0; /* the pivots from `from` on are subtracted in the columns up to `end` alone */
     double share = most ? SMALLEST_PIVOT : 0;
     if (scale)
-        find_scales(F, n, m, scale, whole);
+        find_scales(F, n, wide, m, scale, whole);
     else
-        find_largest(F, n, m, whole);
+        find_largest(F, n, wide, m, whole);
     while (k < m) {
+        int at;
+        double largest;
         if (k == last) {
             if (k == before) {
                 if (m - k <= most) break;
@@ -203,78 +308,66 @@ static int reduce(double *restrict F, int n, int m, int most, int *row, int *col
             }
             last = m, before = k;
         }
-        int at = k;
-        double best = 0, largest = 0;
-        for (int i = k; i < m; i++) {
-            const double size = fabs(F[(size_t)i * n + k]);
-            if (size > best) best = size, at = i;
+        if (k >= end) {
+            subtract_pivots(F, n, wide, from, end, k - from);
+            from = k, end = round_down(k) + BESIDE;
         }
-        for (int i = m; share > 0 && i < n; i++) largest = fmax(largest, fabs(F[(size_t)i * n + k]));
+        const double best = largest_in_column(F, n, wide, k, m, size, &at, &largest);
         if (!((scale ? scale[at] : 1) * best > zero * whole[k]) || best < share * largest) {
-            last--;
-            swap(F + k, F + last, n, n);
+            subtract_pivots(F, n, wide, from, end, k - from);
+            from = k, last--;
+            swap(F + k, F + last, n, wide);
             swap(whole + k, whole + last, 1, 1);
             swap_numbers(column + k, column + last);
             continue;
         }
         if (at != k) {
-            swap(F + (size_t)k * n, F + (size_t)at * n, n, 1);
+            swap_rows(F + (size_t)k * wide, F + (size_t)at * wide, n);
             if (scale) swap(scale + k, scale + at, 1, 1);
             swap_numbers(row + k, row + at);
         }
-        subtract_pivot(F, n, k++);
+        switch (k % BESIDE) {
+        case 0: subtract_beside(F, n, wide, k, 0); break;
+        case 1: subtract_beside(F, n, wide, k, 1); break;
+        case 2: subtract_beside(F, n, wide, k, 2); break;
+        default: subtract_beside(F, n, wide, k, 3);
+        }
+        k++;
     }
+    subtract_pivots(F, n, wide, from, end, k - from);
     return k;
 }
 
-/* Signs of the pivots of the first m rows and columns of a symmetric F (n, n), the largest on the diagonal first;
+/* Signs of the pivots of the first m rows and columns of a symmetric F, the largest on the diagonal first;
    whole: their diagonal before, against which zero is judged, whatever the scale of an unknown. Returns the logarithm
    of the product of their absolute values. */
-static double signs(double *F, int n, int m, double *whole, int *negative, int *zero)
+static double signs(double *F, int n, int wide, int m, double *whole, int *negative, int *zero)
 {
     double product = 1;
     int power = 0, exponent;
-    for (int i = 0; i < m; i++) whole[i] = fabs(F[(size_t)i * n + i]);
+    for (int i = 0; i < m; i++) whole[i] = fabs(F[(size_t)i * wide + i]);
     for (int k = 0; k < m; k++) {
         int at = k;
         for (int i = k + 1; i < m; i++)
-            if (fabs(F[(size_t)i * n + i]) > fabs(F[(size_t)at * n + at])) at = i;
-        swap(F + (size_t)k * n, F + (size_t)at * n, n, 1);
-        swap(F + k, F + at, n, n);
-        swap(whole + k, whole + at, 1, 1);
-        const double pivot = F[(size_t)k * n + k];
+            if (fabs(F[(size_t)i * wide + i]) > fabs(F[(size_t)at * wide + at])) at = i;
+        if (at != k) {
+            swap_rows(F + (size_t)k * wide, F + (size_t)at * wide, n);
+            swap(F + k, F + at, n, wide);
+            swap(whole + k, whole + at, 1, 1);
+        }
+        const double pivot = F[(size_t)k * wide + k];
         if (!(fabs(pivot) > ZERO_PIVOT * whole[k])) {
             ++*zero;
             continue;
         }
         *negative += pivot < 0;
         product = frexp(product * pivot, &exponent), power += exponent;
-        subtract_pivot(F, n, k);
+        subtract_pivot(F, n, wide, k);
     }
     return log(fabs(product)) + power * log(2);
 }
 
-static inline double dot(const double *restrict a, const double *restrict b, int n)
-{
-    double sum = 0;
-#pragma omp simd reduction(+ : sum)
-    for (int i = 0; i < n; i++) sum += a[i] * b[i];
-    return sum;
-}
-
 /* ---- along the rods ---------------------------------------------------------------------------------------------- */
-
-enum { BESIDE = LANES }; /* numbers of a front that are taken together */
-
-static inline int round_down(int i)
-{
-    return i & -BESIDE;
-}
-
-static inline int round_up(int i)
-{
-    return round_down(i + BESIDE - 1);
-}
 
 /* Where the i-th of the numbers carried from the element before is in the front; `ahead`: how many are in front of the
    element's own. */
@@ -283,27 +376,42 @@ static inline int carried_to(int i, int ahead, const int *shape)
     return i < ahead ? i : i + shape[1] + shape[2];
 }
 
+/* How many of the numbers from j on, of w, follow each other in the front, too. */
+static inline int in_a_row(const int *place, int j, int w)
+{
+    int end = j + 1;
+    while (end < w && place[end] == place[end - 1] + 1) end++;
+    return end - j;
+}
+
 /* The front F of the element in turn, with `d` delayed unknowns and what is carried from the front of the one before.
    diagonal: 0, or where to sum the diagonal of the interface. */
 static void assemble(chain *s, kernel *k, const double *matrices, double *F, int t, int d, const double *before,
                      int n_before, int k_before, double *diagonal)
 {
     const int *shape = s->shape + 4 * t, *place = s->place + (size_t)t * s->width, w = s->width, e = s->order[t];
-    const int n = d + shape[0] + shape[1] + shape[2] + shape[3], ahead = d + shape[0];
-    memset(F, 0, (size_t)n * n * sizeof *F);
-    const double *A = matrices ? matrices + (size_t)e * w * w : element(k, e, k->A);
+    const int n = d + shape[0] + shape[1] + shape[2] + shape[3], ahead = d + shape[0], wide = s->wide;
+    int runs = 0, length[w], begin[w], step = 1;
+    for (int j = 0; j < w; j += place[j] < 0 ? 1 : length[runs++])
+        if (place[j] >= 0) begin[runs] = j, length[runs] = in_a_row(place, j, w);
+    memset(F, 0, (size_t)round_up(n) * wide * sizeof *F);
+    const double *A = matrices ? matrices + (size_t)e * w * w : element_in_turn(k, e, &step);
     for (int i = 0; i < w; i++) {
         if (place[i] < 0) continue;
-        double *row = F + (size_t)(place[i] + d) * n + d;
-        for (int j = 0; j < w; j++)
-            if (place[j] >= 0) row[place[j]] += A[i * w + j];
+        double *row = F + (size_t)(place[i] + d) * wide + d;
+        for (int r = 0; r < runs; r++) {
+            double *restrict to = row + place[begin[r]];
+            const double *restrict a = A + step * (i * w + begin[r]);
+            for (int j = 0; step == 1 && j < length[r]; j++) to[j] += a[j];
+            for (int j = 0; step == LANES && j < length[r]; j++) to[j] += a[LANES * j];
+        }
         const int number = s->rows[(size_t)t * s->room + place[i]];
-        if (diagonal && number >= s->size) diagonal[number - s->size] += A[i * w + i];
+        if (diagonal && number >= s->size) diagonal[number - s->size] += A[step * i * (w + 1)];
     }
     for (int i = k_before; before && i < n_before; i++) {
-        double *row = F + (size_t)carried_to(i - k_before, ahead, shape) * n;
+        double *row = F + (size_t)carried_to(i - k_before, ahead, shape) * wide;
         for (int j = k_before; j < n_before; j++)
-            row[carried_to(j - k_before, ahead, shape)] += before[(size_t)i * n_before + j];
+            row[carried_to(j - k_before, ahead, shape)] += before[(size_t)i * wide + j];
     }
 }
 
@@ -317,8 +425,17 @@ static void condense(chain *s, int t, const double *F, int n, int k, int d)
     for (int i = 0; i < d + kept; i++)
         for (int j = 0; j < d + kept; j++)
             block[(size_t)(i < d ? i : i - d + slots) * all + (j < d ? j : j - d + slots)] =
-                F[(size_t)(k + i) * n + k + j];
+                F[(size_t)(k + i) * s->wide + k + j];
     for (int i = d; i < slots; i++) block[(size_t)i * all + i] = 1;
+}
+
+/* Rows `first` to `end` of `count` columns of F from j on, both multiples of BESIDE, to one place for each column. */
+static inline void turn_columns(const double *restrict F, int wide, int first, int end, int j, const int count,
+                                double *const *to)
+{
+    for (int i = first; i < end; i += BESIDE)
+        for (int c = 0; c < count; c++)
+            for (int r = 0; r < BESIDE; r++) to[c][i - first + r] = F[(size_t)(i + r) * wide + j + c];
 }
 
 /* The factors of a front F (n, n) with k pivots by columns, for `subtract_column`: those of L from the first on, those
@@ -327,17 +444,27 @@ static void condense(chain *s, int t, const double *F, int n, int k, int d)
 static void keep_factors(chain *s, int t, const double *F, int n, int k)
 {
     double *to = s->factor + (size_t)s->start[t] * BESIDE, *inverse = s->inverse + (size_t)t * s->room;
-    for (int j = 0; j < k; j++) {
-        const int first = round_down(j + 1), end = round_up(n);
-        for (int i = first; i <= j; i++) *to++ = 0;
-        for (int i = j + 1; i < n; i++) *to++ = F[(size_t)i * n + j];
-        for (int i = n; i < end; i++) *to++ = 0;
-        inverse[j] = 1 / F[(size_t)j * n + j];
+    double *at[BESIDE];
+    const int wide = s->wide, end = round_up(n);
+    for (int j = 0; j < k; j += BESIDE) {
+        const int count = k - j < BESIDE ? k - j : BESIDE, below = j + BESIDE;
+        for (int c = 0; c < count; c++) {
+            for (int r = 0; r < BESIDE && c + 1 < BESIDE; r++) *to++ = r > c ? F[(size_t)(j + r) * wide + j + c] : 0;
+            at[c] = to, to += end - below;
+            inverse[j + c] = 1 / F[(size_t)(j + c) * (wide + 1)];
+        }
+        if (count == BESIDE) turn_columns(F, wide, below, end, j, BESIDE, at);
+        else turn_columns(F, wide, below, end, j, count, at);
     }
-    for (int j = n - 1; j >= 0; j--) {
-        const int above = j < k ? j : k;
-        for (int i = 0; i < above; i++) *to++ = F[(size_t)i * n + j];
-        for (int i = above; i < round_up(above); i++) *to++ = 0;
+    for (int j = round_down(n - 1); j >= 0; j -= BESIDE) {
+        const int count = n - j < BESIDE ? n - j : BESIDE, full = round_down(j < k ? j : k);
+        for (int c = count - 1; c >= 0; c--) {
+            const int above = j + c < k ? j + c : k;
+            at[c] = to, to += full;
+            for (int i = full; i < round_up(above); i++) *to++ = i < above ? F[(size_t)i * wide + j + c] : 0;
+        }
+        if (count == BESIDE) turn_columns(F, wide, 0, full, j, BESIDE, at);
+        else turn_columns(F, wide, 0, full, j, count, at);
     }
 }
 
@@ -430,7 +557,7 @@ int eliminate(chain *s, kernel *k, const double *matrices)
         const int *shape = s->shape + 4 * t, m = d + shape[0] + shape[1], n = m + shape[2] + shape[3];
         int *row = s->row + (size_t)t * s->room, *column = s->column + (size_t)t * s->room;
         const int last = s->ends[t] != -1;
-        double *F = s->front + (size_t)(t % 2) * s->room * s->room; /* of earlier ones the factors are kept */
+        double *F = s->front + (size_t)(t % 2) * s->wide * s->wide; /* of earlier ones the factors are kept */
         int eliminated = -1;
         /* A pivot that seems to be zero is judged again with rows scaled: in the column of a rotation the forces
            against shear of a slender rod exceed all moments, and the more the shorter the element. */
@@ -439,8 +566,8 @@ int eliminate(chain *s, kernel *k, const double *matrices)
             for (int i = 0; i < n; i++) row[i] = i;
             for (int i = 0; i < d; i++) column[i] = s->column[(size_t)(t - 1) * s->room + k_before + i];
             memcpy(column + d, s->rows + (size_t)t * s->room, (n - d) * sizeof *column);
-            eliminated = reduce(F, n, m, last && s->ends[t] < 0 ? 0 : s->delays, row, column, s->zero_pivot,
-                                scaled ? s->carry : 0, s->work);
+            eliminated = reduce(F, n, s->wide, m, last && s->ends[t] < 0 ? 0 : s->delays, row, column, s->zero_pivot,
+                                scaled ? s->carry : 0, s->work, s->work + s->room);
         }
         k_before = eliminated;
         s->done[2 * t] = n, s->done[2 * t + 1] = k_before;
@@ -462,9 +589,9 @@ void count(chain *s, kernel *k)
     take_constants(k);
     for (int t = 0; t < s->elements; t++) {
         const int *shape = s->shape + 4 * t, m = shape[0] + shape[1], n = m + shape[2] + shape[3];
-        double *F = s->front + (size_t)(t % 2) * s->room * s->room; /* of earlier ones nothing is needed */
+        double *F = s->front + (size_t)(t % 2) * s->wide * s->wide; /* of earlier ones nothing is needed */
         assemble(s, k, 0, F, t, 0, before, n_before, k_before, s->diagonal);
-        s->logarithm += signs(F, n, m, s->work, &s->negative, &s->zero);
+        s->logarithm += signs(F, n, s->wide, m, s->work, &s->negative, &s->zero);
         before = F, n_before = n, k_before = m;
         if (s->ends[t] != -1) condense(s, t, F, n, m, 0), before = 0;
     }
@@ -546,82 +673,4 @@ void substitute(const chain *s, const double *b, double *x, double *work)
     double *carry = work + (size_t)AT_ONCE * s->elements * s->wide, *y = carry + AT_ONCE * s->room;
     forward_of(s, b, 0, work, carry, y, AT_ONCE);
     backward_of(s, 0, x, work, AT_ONCE);
-}
-
-/* ---- a sparse system ------------------------------------------------------------------------------------------ */
-
-/* Rows and columns of the entries of square matrices one after another; sizes: (count,); where: their unknowns. */
-void spread(int count, const int *sizes, const int *where, int *rows, int *columns)
-{
-    for (int k = 0; k < count; where += sizes[k++])
-        for (int i = 0; i < sizes[k]; i++)
-            for (int j = 0; j < sizes[k]; j++) *rows++ = where[i], *columns++ = where[j];
-}
-
-/* Sort numbers by keys below `size`, where these are equal as they are in `from` (or ascending, without it). starts:
-   (size + 1,) work space. */
-static void sort_by(const int *key, int size, int count, const int *from, int *to, int *starts)
-{
-    memset(starts, 0, (size + 1) * sizeof *starts);
-    for (int i = 0; i < count; i++) starts[key[i]]++;
-    for (int i = 0, sum = 0; i <= size; i++) {
-        const int own = starts[i];
-        starts[i] = sum;
-        sum += own;
-    }
-    for (int i = 0; i < count; i++) {
-        const int k = from ? from[i] : i;
-        to[starts[key[k]]++] = k;
-    }
-}
-
-/* Number the distinct entries of a matrix row by row, columns ascending: starts (size + 1,) of the rows, the `distinct`
-   columns, and of every entry its number; order: (count,) work space, as is `distinct`, of that size. Returns how many
-   there are. */
-int number_entries(int size, int count, const int *rows, const int *columns, int *starts, int *distinct, int *entry,
-                   int *order)
-{
-    int found = 0;
-    sort_by(columns, size, count, 0, distinct, starts);
-    sort_by(rows, size, count, distinct, order, starts);
-    memset(starts, 0, (size + 1) * sizeof *starts);
-    for (int i = 0; i < count; i++) {
-        const int k = order[i], before = i ? order[i - 1] : -1;
-        if (before < 0 || rows[k] != rows[before] || columns[k] != columns[before]) {
-            distinct[found++] = columns[k];
-            starts[rows[k] + 1]++;
-        }
-        entry[k] = found - 1;
-    }
-    for (int i = 0; i < size; i++) starts[i + 1] += starts[i];
-    return found;
-}
-
-/* ---- a small system as a whole ----------------------------------------------------------------------------------- */
-
-/* LU factors of F (n, n), whose rows are scaled first: those of thick and of thin rods and of constraint equations then
-   compete as pivots whatever their units. scale: (n,) of the rows, powers of two. Returns 0, or 1 if it is singular. */
-int factor_dense(double *F, int n, int *row, int *column, double zero, double *scale, double *work)
-{
-    for (int i = 0; i < n; i++) {
-        double *f = F + (size_t)i * n, largest = 0;
-        int power = 0;
-        for (int j = 0; j < n; j++) largest = fmax(largest, fabs(f[j]));
-        if (largest > 0 && isfinite(largest)) frexp(largest, &power);
-        scale[i] = ldexp(1, -power);
-        for (int j = 0; j < n; j++) f[j] *= scale[i];
-        row[i] = column[i] = i;
-    }
-    return reduce(F, n, n, 0, row, column, zero, 0, work) < n;
-}
-
-/* Replace b by the solution, by the factors. */
-void solve_dense(const double *F, int n, const int *row, const int *column, const double *scale, double *b,
-                 double *work)
-{
-    for (int i = 0; i < n; i++) work[i] = scale[row[i]] * b[row[i]];
-    for (int i = 1; i < n; i++) work[i] -= dot(F + (size_t)i * n, work, i);
-    for (int i = n - 1; i >= 0; i--)
-        work[i] = (work[i] - dot(F + (size_t)i * n + i + 1, work + i + 1, n - i - 1)) / F[(size_t)i * n + i];
-    for (int i = 0; i < n; i++) b[column[i]] = work[i];
 }

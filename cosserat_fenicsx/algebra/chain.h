@@ -48,8 +48,8 @@ typedef struct {
     const int *ends;               /* (elements,) -1; at the end of a segment the first of its `delays` numbers in the
                                       interface for delayed unknowns, or -2 where it has none */
     const int *block;              /* (elements,) at the end of a segment where its matrix is in condensed; else -1 */
-    double *front;                 /* (2, room, room) of the element in turn and of the one before */
     int wide;                      /* room, rounded up to a multiple of 4 */
+    double *front;                 /* (2, wide, wide) of the element in turn and of the one before */
     double *factor, *inverse;      /* factors by columns, of the elements one after another; (elements, room) of the
                                       pivots */
     const int *start;              /* (elements + 1,) where those of an element begin, over 4 */
@@ -57,7 +57,7 @@ typedef struct {
                                       front, eliminated */
     double *forward, *condensed;   /* (elements, wide); matrices of the segments on the interface */
     double *diagonal;              /* (interface,) sum of the elements' diagonals there */
-    double *carry, *work;          /* (room,) each */
+    double *carry, *work;          /* (room,), (2 room + LANES,) */
     int negative, zero;            /* pivots, after `count` */
     double logarithm;              /* of the product of their absolute values, after `count` */
     double zero_pivot;             /* of `eliminate`, relative to the largest number in the column; less is zero */
@@ -67,7 +67,8 @@ typedef struct {
 typedef struct {
     int size, entries, condensed;   /* entries that are added, those of segments first */
     const int *entry;               /* (entries,) places in the matrix; -1: left out */
-    double *matrix, *factors, *scale, *work; /* (size, size) each, (size,) each */
+    double *matrix, *factors, *scale, *work; /* (size, size), with rows of a multiple of LANES numbers, (size,),
+                                       (2 size + LANES,) */
     int *row, *column;              /* (size,) */
 } dense;
 
@@ -373,12 +374,9 @@ void count(chain *s, kernel *k);
 void forward(chain *s, const double *b, double *interface);
 void backward(chain *s, const double *interface, double *x);
 void substitute(const chain *s, const double *b, double *x, double *work);
-int factor_dense(double *F, int n, int *row, int *column, double zero, double *scale, double *work);
 void spread(int count, const int *sizes, const int *where, int *rows, int *columns);
 int number_entries(int size, int count, const int *rows, const int *columns, int *starts, int *distinct, int *entry,
                    int *order);
-void solve_dense(const double *F, int n, const int *row, const int *column, const double *scale, double *b,
-                 double *work);
 
 void see_ties(ties *t, const double *x);
 void find_ties(ties *t, double load_factor);

@@ -19,6 +19,8 @@ ZERO_PIVOT = 2e-15
 _DELAYS = 3
 # Numbers of a front that C takes together.
 _BESIDE = 4
+# Elements from which several are computed at once in equilibria: the code for it takes two seconds to compile.
+_MANY_ELEMENTS = 1000
 
 
 def _round_up(number):
@@ -30,10 +32,12 @@ class Elimination(Pointers):
 
     cell_dofs: (elements, width) local degrees of freedom in the order of the kernel; order: (elements,) in turn along
     the rods; tied: numbers of the unknowns in constraint equations, the same on all ranks; delays: whether some pivots
-    may be zero; factors: whether they are kept, for solutions; without them only pivots can be counted. interface:
-    (interfaces,) numbers of its unknowns; places: (entries,) rows and columns, in it, of the entries of all ranks'
-    condensed matrices.
+    may be zero; factors: whether they are kept, for solutions; without them only pivots can be counted. many: whether
+    several elements are to be computed at once, which must be in turn. interface: (interfaces,) numbers of its
+    unknowns; places: (entries,) rows and columns, in it, of the entries of all ranks' condensed matrices.
     """
+
+    many = False
 
     def __init__(self, numbering, cell_dofs, order, tied, *, delays=False, factors=True):
         super().__init__()
@@ -126,9 +130,9 @@ class Elimination(Pointers):
         self._factors["factor"] = np.zeros(int(start[-1]) * _BESIDE if fronts == elements else 0)
         self._factors["inverse"] = np.zeros((fronts, room))
         for name, array in (
-            ("front", np.zeros((2, room, room))), ("factor", self._factors["factor"]),
+            ("front", np.zeros((2, wide, wide))), ("factor", self._factors["factor"]),
             ("inverse", self._factors["inverse"]), ("forward", np.zeros((fronts, wide))), ("condensed", self.condensed),
-            ("diagonal", self.diagonal), ("carry", np.zeros(room)), ("work", np.zeros(room)),
+            ("diagonal", self.diagonal), ("carry", np.zeros(room)), ("work", np.zeros(2 * room + _BESIDE)),
         ):  # fmt: skip
             setattr(chain, name, self.doubles(array))
 
@@ -190,6 +194,7 @@ def condensed(model, numbering, cell_dofs, tied, **options):
     tied: (tied nodes, block) numbers of the unknowns in constraint equations, -1 where clamped."""
     order = np.argsort(model.rods.cells[: len(cell_dofs)])
     elimination = Elimination(numbering, cell_dofs, order, tied.ravel(), **options)
+    elimination.many = sum(model.signature.counts) >= _MANY_ELEMENTS and bool((np.diff(order) == 1).all())
     if not elimination.unknowns and numbering.comm.size == 1:
         return elimination, None
     links = model.signature.connections
@@ -284,7 +289,7 @@ class _Dense(Pointers):
         self._size, self.room = size, size * size
         self.c, self.kept = self._ffi.new("dense *"), np.zeros(size * size)
         self.c.size, self.c.matrix = size, self.doubles(self.kept)
-        for name, count in (("factors", size * size), ("scale", size), ("work", size)):
+        for name, count in (("factors", size * _round_up(size)), ("scale", size), ("work", 2 * size + _BESIDE)):
             setattr(self.c, name, self.doubles(np.zeros(count)))
         self.c.row, self.c.column = (self.integers(np.zeros(size, dtype=np.int32)) for _ in range(2))
 

@@ -258,16 +258,60 @@ void assemble_dense(dense *d, const double *condensed, const double *others)
     }
 }
 
+static inline double dot(const double *restrict a, const double *restrict b, int n)
+{
+    double sum = 0;
+#pragma omp simd reduction(+ : sum)
+    for (int i = 0; i < n; i++) sum += a[i] * b[i];
+    return sum;
+}
+
+/* LU factors of F, whose rows are scaled first: those of thick and of thin rods and of constraint equations then
+   compete as pivots whatever their units. scale: (n,) of the rows, powers of two; work: (2 n + BESIDE,).
+   Returns 0, or 1 if it is singular. */
+static int factor_dense(double *F, int n, int wide, int *row, int *column, double zero, double *scale,
+                        double *work)
+{
+    for (int i = 0; i < n; i++) {
+        double *f = F + (size_t)i * wide, largest = 0;
+        int power = 0;
+        for (int j = 0; j < n; j++) largest = fmax(largest, fabs(f[j]));
+        if (largest > 0 && isfinite(largest)) frexp(largest, &power);
+        scale[i] = ldexp(1, -power);
+        for (int j = 0; j < n; j++) f[j] *= scale[i];
+        row[i] = column[i] = i;
+    }
+    return reduce(F, n, wide, n, 0, row, column, zero, 0, work, work + n) < n;
+}
+
+/* Replace b by the solution, by the factors. */
+static void solve_dense(const double *F, int n, int wide, const int *row, const int *column, const double *scale,
+                        double *b, double *work)
+{
+    for (int i = 0; i < n; i++) work[i] = scale[row[i]] * b[row[i]];
+    for (int i = 1; i < n; i++) work[i] -= dot(F + (size_t)i * wide, work, i);
+    for (int i = n - 1; i >= 0; i--) {
+        const double *f = F + (size_t)i * wide;
+        work[i] = (work[i] - dot(f + i + 1, work + i + 1, n - i - 1)) / f[i];
+    }
+    for (int i = 0; i < n; i++) b[column[i]] = work[i];
+}
+
 /* Factors of the matrix, which stays. Returns 0, or 1 if it is singular. */
 int factor_matrix(dense *d, double zero)
 {
-    memcpy(d->factors, d->matrix, (size_t)d->size * d->size * sizeof *d->matrix);
-    return factor_dense(d->factors, d->size, d->row, d->column, zero, d->scale, d->work);
+    const int n = d->size, wide = round_up(n);
+    for (int i = 0; i < n; i++) {
+        double *row = d->factors + (size_t)i * wide;
+        memcpy(row, d->matrix + (size_t)i * n, n * sizeof *row);
+        memset(row + n, 0, (wide - n) * sizeof *row);
+    }
+    return factor_dense(d->factors, n, wide, d->row, d->column, zero, d->scale, d->work);
 }
 
 void solve_matrix(const dense *d, double *b)
 {
-    solve_dense(d->factors, d->size, d->row, d->column, d->scale, b, d->work);
+    solve_dense(d->factors, d->size, round_up(d->size), d->row, d->column, d->scale, b, d->work);
 }
 
 /* Whether the symmetric matrix is positive definite, by Cholesky's factors of it scaled to a diagonal of ones, which is
@@ -291,4 +335,53 @@ int is_positive(dense *d, double *logarithm)
             else F[(size_t)i * n + i] = sqrt(sum), *logarithm += log(sum);
         }
     return 1;
+}
+
+/* ---- a sparse system ------------------------------------------------------------------------------------------ */
+
+/* Rows and columns of the entries of square matrices one after another; sizes: (count,); where: their unknowns. */
+void spread(int count, const int *sizes, const int *where, int *rows, int *columns)
+{
+    for (int k = 0; k < count; where += sizes[k++])
+        for (int i = 0; i < sizes[k]; i++)
+            for (int j = 0; j < sizes[k]; j++) *rows++ = where[i], *columns++ = where[j];
+}
+
+/* Sort numbers by keys below `size`, where these are equal as they are in `from` (or ascending, without it). starts:
+   (size + 1,) work space. */
+static void sort_by(const int *key, int size, int count, const int *from, int *to, int *starts)
+{
+    memset(starts, 0, (size + 1) * sizeof *starts);
+    for (int i = 0; i < count; i++) starts[key[i]]++;
+    for (int i = 0, sum = 0; i <= size; i++) {
+        const int own = starts[i];
+        starts[i] = sum;
+        sum += own;
+    }
+    for (int i = 0; i < count; i++) {
+        const int k = from ? from[i] : i;
+        to[starts[key[k]]++] = k;
+    }
+}
+
+/* Number the distinct entries of a matrix row by row, columns ascending: starts (size + 1,) of the rows, the `distinct`
+   columns, and of every entry its number; order: (count,) work space, as is `distinct`, of that size. Returns how many
+   there are. */
+int number_entries(int size, int count, const int *rows, const int *columns, int *starts, int *distinct, int *entry,
+                   int *order)
+{
+    int found = 0;
+    sort_by(columns, size, count, 0, distinct, starts);
+    sort_by(rows, size, count, distinct, order, starts);
+    memset(starts, 0, (size + 1) * sizeof *starts);
+    for (int i = 0; i < count; i++) {
+        const int k = order[i], before = i ? order[i - 1] : -1;
+        if (before < 0 || rows[k] != rows[before] || columns[k] != columns[before]) {
+            distinct[found++] = columns[k];
+            starts[rows[k] + 1]++;
+        }
+        entry[k] = found - 1;
+    }
+    for (int i = 0; i < size; i++) starts[i + 1] += starts[i];
+    return found;
 }

@@ -16,7 +16,7 @@ takes of the kinetic energy counts as dissipated.
 import numpy as np
 from dolfinx import fem
 
-from cosserat_fenicsx.algebra.building import Packed, functions_in_lanes
+from cosserat_fenicsx.algebra.building import Packed, take_together
 from cosserat_fenicsx.algebra.equations import CONTACT, NODES, RESIDUAL, STATE, Equations
 from cosserat_fenicsx.algebra.tie_rows import TieRows
 from cosserat_fenicsx.dynamics.contact import NodalContact, TouchingNodes, motion_between
@@ -306,11 +306,7 @@ class StepProblem(Equations):
             self._pack_form(form) for form in (forms.live, forms.momentum, forms.dead, forms.permanent)
         )
         if sum(self.model.signature.counts) >= _MANY_ELEMENTS:
-            forms = self._residual, self._momentum
-            addresses = tuple(part.address for form in forms for part in form.parts())
-            functions = functions_in_lanes(addresses, self._lib.LANES)
-            for form in forms if functions else ():
-                form.take_together(functions)
+            take_together(self._residual, self._momentum)
 
     def _pack_form(self, form):
         """A form, or the sum of a tuple of forms, for assembly, with data that may change in time; None for None."""

@@ -332,6 +332,8 @@ class Loaded(Mesh):
         sweep = self.c.sweep = self._sweep.c
         sweep.control, sweep.patience, sweep.every = self._control, np.inf, False
         sweep.load_factors, sweep.count = self.doubles(self._load_factor), 1
+        for form in self._packed():  # cases write coefficients, of which there are copies for several elements at once
+            form.c.together = self._ffi.NULL
         self._describe()
 
     def _describe(self):

@@ -8,7 +8,7 @@ import numpy as np
 from cosserat_fenicsx.algebra.elimination import ZERO_PIVOT
 from cosserat_fenicsx.algebra.equations import RESIDUAL, STATE, Equations
 from cosserat_fenicsx.algebra.newton import Newton
-from cosserat_fenicsx.algebra.building import Packed, PackedExpression
+from cosserat_fenicsx.algebra.building import Packed, PackedExpression, take_together
 from cosserat_fenicsx.algebra.pool import PROBLEMS
 from cosserat_fenicsx.algebra.tie_rows import TieRows
 from cosserat_fenicsx.checks import tolerance, whole
@@ -155,6 +155,8 @@ class Problem(Equations):
             elements, size = model.carried_dofs.shape
             advance = PackedExpression(forms.advance, model.mesh, elements, size)
         self.take_forms(Packed(forms.residual, moving, constants), Packed(forms.tangent, moving, constants), advance)
+        if self.elimination.many:
+            take_together(self._residual, self.tangent_form)
         self._dead, self._permanent, *self._difference = (self.numbering.vector() for _ in range(4))
         self._loads, self._permanent_loads = (
             Packed(form, (), ()) if form else None for form in (forms.dead, forms.permanent)
