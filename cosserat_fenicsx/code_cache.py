@@ -21,7 +21,9 @@ import shutil
 import stat
 import tempfile
 import time
+from dataclasses import fields, is_dataclass
 from pathlib import Path
+from types import FunctionType
 
 from cosserat_fenicsx.checks import warn
 from cosserat_fenicsx.errors import CacheWarning, InstallationError
@@ -34,6 +36,8 @@ _DIGEST_SIZE = _DIGEST().digest_size
 _PATIENCE = 300
 _OTHERS_MAY_WRITE = stat.S_IWGRP | stat.S_IWOTH
 _WRITABLE = "can be written to by others"
+# When this process began to import the package.
+_BEGAN = time.time()
 
 
 def folder():
@@ -143,18 +147,89 @@ def install(made, *beside):
 
 def load(name):
     """The compiled module of this name, or None: it must be complete, the user's own, and of this system."""
-    file = folder() / (name + SUFFIX)
-    if why_unsafe(file) is not None:
-        return None
-    # Loading a truncated file would end the process: hence a digest at the end of each file.
-    with contextlib.suppress(FileNotFoundError, ImportError):
-        content = file.read_bytes()
-        if _DIGEST(content[:-_DIGEST_SIZE]).digest() == content[-_DIGEST_SIZE:]:
-            spec = importlib.util.spec_from_file_location(name, file)
+    with contextlib.suppress(ImportError):
+        if read(name + SUFFIX) is not None:
+            spec = importlib.util.spec_from_file_location(name, folder() / (name + SUFFIX))
             made = importlib.util.module_from_spec(spec)
             spec.loader.exec_module(made)
             return made
     return None
+
+
+def read(name):
+    """The content of a file of the folder that `install` has put there, or None: it must be complete and the user's
+    own. Loading a truncated module would end the process: hence a digest at the end of each file."""
+    file = folder() / name
+    if why_unsafe(file) is None:
+        with contextlib.suppress(FileNotFoundError):
+            content = file.read_bytes()
+            if _DIGEST(content[:-_DIGEST_SIZE]).digest() == content[-_DIGEST_SIZE:]:
+                return content[:-_DIGEST_SIZE]
+    return None
+
+
+def kept(name):
+    """What `keep` has put in the folder by a name of `name_of`, or None."""
+    with contextlib.suppress(OSError):
+        return name and read(name)
+
+
+def keep(name, content):
+    """Put a file with this content in the folder; where that cannot be done, it is left."""
+    with contextlib.suppress(OSError):
+        make(folder())
+        with tempfile.TemporaryDirectory(dir=folder(), prefix=f"{name}.part-", ignore_cleanup_errors=True) as part:
+            made = Path(part, name)
+            made.write_bytes(content)
+            install(made)
+
+
+def name_of(what, *given):
+    """A name for `keep` of what follows from values and from the package's code, which is the same in every process;
+    None where it cannot be known whether that has changed: classes or functions of others are among the values, or
+    files were changed meanwhile."""
+    try:
+        key = repr((_own_code(), *map(_words, given)))
+    except (LookupError, OSError, ValueError, RecursionError):
+        return None
+    return f"cosserat_{what}_{_DIGEST(key.encode()).hexdigest()[:32]}"
+
+
+def _words(value):
+    if value is None or isinstance(value, str | int | float):
+        return repr(value)
+    if isinstance(value, tuple):
+        return [_words(type(value)) if type(value) is not tuple else "", *map(_words, value)]
+    if isinstance(value, FunctionType):  # its names may have been changed
+        code, held = value.__code__, [cell.cell_contents for cell in value.__closure__ or ()]
+        parts = value.__globals__.get("__name__", ""), code.co_name, code.co_firstlineno
+        return [_own(*parts), *map(_words, (*held, value.__defaults__, *(value.__kwdefaults__ or {}).values()))]
+    if isinstance(value, type):
+        return _own(value.__module__, value.__qualname__)
+    if is_dataclass(value):
+        return [_words(type(value)), *(_words(getattr(value, field.name)) for field in fields(value))]
+    raise LookupError(value)
+
+
+def _own(module, name, line=""):
+    if module.split(".")[0] != __package__ or "<" in name:
+        raise LookupError(name)
+    return f"{module}.{name} {line}"
+
+
+def _own_code():
+    """A digest of the package's files of Python. Raises LookupError: one is newer than what may have been imported."""
+    files, digest = _own_files()
+    if any(file.stat().st_mtime > _BEGAN for file in files):
+        raise LookupError
+    return digest
+
+
+@functools.cache
+def _own_files():
+    places = Path(__file__).parent, *importlib.util.find_spec(f"{__package__}.forms").submodule_search_locations
+    files = sorted({file for place in places for file in Path(place).rglob("*.py")})
+    return files, _DIGEST(b"".join(_DIGEST(file.read_bytes()).digest() for file in files)).hexdigest()
 
 
 # The instructions of the level x86-64-v3 (most processors since 2013), as Linux names them.

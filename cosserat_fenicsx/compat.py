@@ -27,6 +27,7 @@ _show_warnings = warnings.showwarning
 try:
     import _cffi_backend
     import dolfinx
+    import ffcx
     import ffcx.codegeneration.jit as ffcx_compiler
     import ffcx.naming as ffcx_names
     import ufl
@@ -274,6 +275,46 @@ def _names_of(given, module_name):
     return [ffcx_names.expression_name(pair, module_name) for pair in given]
 
 
+_FLAGS = "-g0", "-w"
+
+
+def name_of(what, *given):
+    """See `code_cache.name_of`, for what follows from the code of dolfinx, UFL and FFCx, and from flags, too."""
+    programs = version(), ufl.__version__, ffcx.__version__
+    return code_cache.name_of(what, programs, _FLAGS, instructions(), tuple(code_cache.more_flags()), given)
+
+
+# {address of a compiled form or expression: names of its module and its own}, and modules by their names.
+_NAMES, _MODULES = {}, {}
+
+
+def _note(module):
+    _MODULES[module.__name__] = module
+    for name in dir(module.lib):
+        if name.startswith(("form_", "expression_")):
+            _NAMES[_address_of(getattr(module.lib, name))] = module.__name__, name
+
+
+def _address_of(compiled):
+    return int(_cffi_backend.FFI().cast("uintptr_t", _cffi_backend.FFI().addressof(compiled)))
+
+
+def to_names(code):
+    """What `pieces` gives as code, as names, which other processes understand."""
+    kind, compiled = code
+    return kind, *_NAMES[_address_of(compiled)]
+
+
+def from_names(kind, module, name):
+    """The code that `to_names` has named. Raises LookupError: it is not in the cache."""
+    if module not in _MODULES:
+        made = code_cache.load(module)
+        if made is None:
+            raise LookupError(module)
+        _note(made)
+    return kind, getattr(_MODULES[module].lib, name)
+
+
 def _compiled(kind, objects, level="-O3", beside=()):
     """FFCx's (compiled objects, module, code) of a list of UFL's ("forms", "expressions" or "elements"), all in one
     module, from the cache or compiled; beside: (UFL expression, points) that are compiled with forms; they come last.
@@ -283,13 +324,14 @@ def _compiled(kind, objects, level="-O3", beside=()):
     FFCx's C has variables that it does not use.
     """
     mark = "=" + ffcx_names.compute_signature(beside, "") if beside else ""
-    flags = [level, "-g0", "-w", *instructions(), f"-DCOSSERAT_FENICSX{mark}", *code_cache.more_flags()]
+    flags = [level, *_FLAGS, *instructions(), f"-DCOSSERAT_FENICSX{mark}", *code_cache.more_flags()]
 
     def found(folder):
         with _with_expressions(beside):
             compiled, module, code = getattr(ffcx_compiler, f"compile_{kind}")(
                 objects, cache_dir=folder, cffi_extra_compile_args=flags
             )
+        _note(module)
         return [*compiled, *(getattr(module.lib, name) for name in _names_of(beside, module.__name__))], module, code
 
     def cached():

@@ -8,6 +8,7 @@ import subprocess
 import sys
 import threading
 import time
+from functools import partial, wraps
 from pathlib import Path
 
 import numpy as np
@@ -17,9 +18,13 @@ from conftest import column
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx import code_cache, compat
+from cosserat_fenicsx.actions.obstacles import _work_of
 from cosserat_fenicsx.algebra import building
 from cosserat_fenicsx.code_cache import folder
 from cosserat_fenicsx.compat import compiling
+from cosserat_fenicsx.forms import loads
+from cosserat_fenicsx.forms.contact import linear, plane, sphere
+from cosserat_fenicsx.models.formulation import Mixed, Multiplier
 
 pytestmark = pytest.mark.serial
 HEADER = """#ifndef SMALL_H
@@ -310,3 +315,30 @@ def _in_dev_null(given=None):
 
     known = getattr(jit, "DOLFINX_DEFAULT_JIT_PARAMETERS", None) or jit.DOLFINX_DEFAULT_JIT_OPTIONS
     return {name: value for name, (value, _) in known.items()} | {"cache_dir": "/dev/null/fenics"} | (given or {})
+
+
+def test_what_is_kept_has_a_name_that_tells_what_it_follows_from(monkeypatch, tmp_path):
+    """None where a class or a function is not the package's, or its files are newer than the process."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+
+    class Own(Mixed):
+        pass
+
+    kinds = [(Mixed(), 1), (Mixed(), 2), (Multiplier(), 1), (cf.Force, 1), (loads.force, "a"), (loads.moment, "a")]
+    names = [compat.name_of("kind", *kind) for kind in kinds]
+    assert len({*names}) == len(kinds) and None not in names
+    assert names == [compat.name_of("kind", *kind) for kind in kinds]
+    def disguised(surface):
+        return _work_of(surface, 2, False, linear, None)  # has a name of the package's
+
+    assert None not in [compat.name_of("kind", disguised(shape)) for shape in (plane, sphere)]
+    wrapped = wraps(loads.force)(lambda *x: 0)
+    others = [Own, Own(), lambda: 1, column, np.float64, np.zeros(1), partial(loads.force), [1], {}, wrapped]
+    for other in (*others, disguised(column)):
+        assert compat.name_of("kind", ("a", other)) is None
+    code_cache.keep(names[0], b"content")
+    assert code_cache.kept(names[0]) == b"content" and code_cache.kept(names[1]) is None
+    (folder() / names[0]).write_bytes(b"content, changed by something that knows of no digest at the end")
+    assert code_cache.kept(names[0]) is None
+    monkeypatch.setattr(code_cache, "_BEGAN", 0.0)
+    assert compat.name_of("kind", *kinds[0]) is None

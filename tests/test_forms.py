@@ -383,9 +383,19 @@ def test_models_that_differ_in_their_meshes_share_the_work_of_ufl(kind, monkeypa
 
     monkeypatch.setattr(compiled.Pattern, "on", lambda self, model, *x: shared.add(type(model)) or on(self, model, *x))
     monkeypatch.setattr(compiled, "_PATTERNS", {})
+    stored = compiled.Pattern.stored
+    monkeypatch.setattr(compiled.Pattern, "stored", lambda kind: None)
     first = solved(6)
     assert not shared
     second = solved(4)
     assert shared == {of for of, *_ in compiled._PATTERNS}
     compiled._PATTERNS.clear()
     assert np.array_equal(solved(4), second) and np.array_equal(solved(6), first)
+    kinds = list(compiled._PATTERNS)
+    for clear in (compiled._PATTERNS, shared, compat._MODULES, compat._NAMES):
+        clear.clear()
+    monkeypatch.setattr(compiled.Pattern, "stored", stored)  # as of another process
+    assert np.array_equal(solved(6), first) and shared == {of for of, *_ in kinds}
+    monkeypatch.setattr(compiled.code_cache, "load", lambda name: None)  # the code is lost
+    compat._MODULES.clear()
+    assert None in [stored(kind) for kind in kinds]

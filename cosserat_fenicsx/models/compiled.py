@@ -5,6 +5,7 @@ FFCx 0.5 modifies the metadata of the integrals that it compiles, which other fo
 that would differ and miss the code cache, which costs a second.
 """
 
+import pickle
 from collections import defaultdict, namedtuple
 from dataclasses import dataclass, fields, replace
 from functools import partial
@@ -14,7 +15,7 @@ import numpy as np
 import ufl
 from dolfinx import fem
 
-from cosserat_fenicsx import compat
+from cosserat_fenicsx import code_cache, compat
 from cosserat_fenicsx.compat import compiling
 from cosserat_fenicsx.forms import equilibrium
 from cosserat_fenicsx.forms.equilibrium import VirtualMotion
@@ -92,19 +93,28 @@ def shared(model, spaces, by_ufl):
         replace(signature, counts=(), connections=None, slender=False),
         bool(signature.connections.clamped),
     )
-    pattern = _PATTERNS.get(kind) if model.comm.size == 1 else None
+    serial = model.comm.size == 1
+    if serial and kind not in _PATTERNS and (stored := Pattern.stored(kind)):
+        _keep(kind, stored)
+    pattern = _PATTERNS.get(kind) if serial else None
     if pattern is not None:
         return pattern.on(model, spaces)
     before, model.given = {*vars(model), "given"}, {}
     found = by_ufl()
     compile_evolutions(model)
-    if model.comm.size == 1 and kind not in _PATTERNS:
+    if serial and kind not in _PATTERNS:
         pattern = Pattern.of(model, spaces, found) if before == set(vars(model)) else None
-        while len(_PATTERNS) >= _MOST_PATTERNS:
-            _PATTERNS.pop(next(iter(_PATTERNS)), None)  # another thread may have done it
-        _PATTERNS[kind] = pattern
+        _keep(kind, pattern)
+        if pattern is not None:
+            pattern.store(kind)
     del model.given
     return found
+
+
+def _keep(kind, pattern):
+    while len(_PATTERNS) >= _MOST_PATTERNS:
+        _PATTERNS.pop(next(iter(_PATTERNS)), None)  # another thread may have done it
+    _PATTERNS[kind] = pattern
 
 
 def compile_static(model, spaces):
@@ -170,6 +180,24 @@ class Pattern(namedtuple("Pattern", "made_on_demand kind numbers evolutions leav
         for term, evolution in zip(model.actions.terms, self.evolutions, strict=True):
             term.compiled_evolution = with_mesh(evolution)
         return self.kind(**{name: with_mesh(value) for name, value in self.numbers.items()})
+
+    def store(self, kind):
+        """Keep the pattern of a kind for other processes, beside its code; not what classes of others take part in."""
+        if (name := compat.name_of("pattern", kind)) and compat.name_of("pattern", self.kind):
+            leaves = [(compat.to_names(code), *places) for code, *places in self.leaves]
+            code_cache.keep(name, pickle.dumps(tuple(self._replace(leaves=leaves))))
+
+    @classmethod
+    def stored(cls, kind):
+        """The pattern of a kind that another process has kept, or None."""
+        content = code_cache.kept(compat.name_of("pattern", kind))
+        if not content:
+            return None
+        pattern = cls(*pickle.loads(content))
+        try:
+            return pattern._replace(leaves=[(compat.from_names(*code), *places) for code, *places in pattern.leaves])
+        except LookupError:  # somebody has removed the code
+            return None
 
 
 @dataclass(frozen=True)

@@ -3,14 +3,15 @@
 And properties of an action's virtual work, found from its UFL: what it depends on, and whether it preserves a plane.
 """
 
+import json
 from collections import namedtuple
-from dataclasses import dataclass, replace
+from dataclasses import astuple, dataclass, replace
 from functools import lru_cache
 
 import numpy as np
 import ufl
 
-from cosserat_fenicsx import compat
+from cosserat_fenicsx import code_cache, compat
 from cosserat_fenicsx.errors import SceneError, nearest
 from cosserat_fenicsx.forms import determinate, equilibrium, loads as virtual_work, spatial
 from cosserat_fenicsx.forms.point import Point, resultants
@@ -360,6 +361,15 @@ def resultant_at_rest(action, scene, t):
 
 @lru_cache(maxsize=256)
 def _traits(work, kinds):
+    name = compat.name_of("traits", work, kinds)  # UFL takes up to seconds
+    content = code_cache.kept(name)
+    found = Traits(*json.loads(content)) if content else _traits_by_ufl(work, kinds)
+    if name and not content:
+        code_cache.keep(name, json.dumps(astuple(found)).encode())
+    return found
+
+
+def _traits_by_ufl(work, kinds):
     resultant = _resultant(work, tuple(size for size, _ in kinds))
     force, moment, symbols, _ = resultant
     state = {symbol for name, symbol in symbols.items() if name not in ("rest", "frame")}
