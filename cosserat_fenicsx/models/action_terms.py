@@ -163,6 +163,11 @@ class ActionTerms:
         for term in self.terms:
             term.soften(share)
 
+    def withdraw(self, gap):
+        """Move the surfaces of all obstacles away from rods by a gap, dimensionless; 0 restores them."""
+        for term in self.terms:
+            term.withdraw(gap)
+
     @property
     def memory_functions(self):
         """The Functions of the actions' memory (history variables)."""
@@ -385,6 +390,14 @@ class Term:
         if action.presses and not self.kind.refreshed:
             data = action.data(rod, np.zeros(1))
             self._multiply([k for k, datum in enumerate(data) if datum.unit == "N/m^2"], share)
+
+    def withdraw(self, gap):
+        """See `ActionTerms`: by less of what is the radius of rods."""
+        action = self._where[0][0]
+        if action.gaps is not None:
+            self._multiply([], 1.0)
+            for _, _, rows, *_ in self._where:
+                self._arrays[len(action.shape())][rows] -= gap
 
     def _multiply(self, which, share):
         """Multiply some of the data by a share, where actions act: `put` fills in no others again."""

@@ -216,9 +216,11 @@ def _slanted(obstacle, rods, expected):
 
 
 def lifting(path):
-    """Sentences on rods that touch an obstacle at last without pressing on it: stability does not see them lift off."""
+    """Sentences on rods that touch an obstacle at last without pressing on it, where stability depends on that."""
     obstacles = [action for action in path.scene.actions if action.gaps is not None]
     for obstacle in obstacles if len(path) and path.counts_modes else ():
+        if path.negative_modes[-1] >= 0 and not obstacle.friction:
+            continue
         last = path[len(path) - 1]
         for rod, x in zip(path.scene.rods, path.layout.node_s(path.rule.nodes), strict=True):
             if obstacle.acts_on(rod):
@@ -227,15 +229,34 @@ def lifting(path):
                     break
 
 
-_LIFTS = "without pressing on it: stability counts it as held there both ways, and does not see that it may lift off"
+_LIFTS = (
+    "without pressing on it: stability, which counts it as held there both ways or not at all, does not see that it "
+    "may lift off on one side"
+)
+
+
+def _grazes(scene, rod, s, gap):
+    """(..., n) whether nodes touch without pressing, at gaps (..., n), m, and no support holds them."""
+    held = [x.station.s for x in scene.all_supports if x.station is not None and x.station.rod is rod]
+    free = ~np.isclose(s[:, None], held, rtol=0, atol=1e-9 * rod.length).any(axis=1)
+    return free & (np.abs(gap) <= _GRAZES * rod.length)
 
 
 def _grazing(scene, rod, s, gap):
     """The words of where a rod touches without pressing, "" where it does not, or only where a support holds it."""
-    held = [x.station.s for x in scene.all_supports if x.station is not None and x.station.rod is rod]
-    free = ~np.isclose(s[:, None], held, rtol=0, atol=1e-9 * rod.length).any(axis=1)
-    where = np.flatnonzero(free & (np.abs(gap) <= _GRAZES * rod.length))
+    where = np.flatnonzero(_grazes(scene, rod, s, gap))
     return f"Rod '{rod.name}' touches, at s = {s[where[0]]:.6g} m," if len(where) else ""
+
+
+def grazing(path):
+    """(states,) whether a rod touches an obstacle without pressing on it."""
+    found, obstacles = np.zeros(len(path), dtype=bool), [x for x in path.scene.actions if x.gaps is not None]
+    for rod, x in zip(path.scene.rods, path.layout.node_s(path.rule.nodes), strict=True) if len(path) else ():
+        for obstacle in obstacles:
+            if obstacle.acts_on(rod):
+                s = x * rod.length
+                found |= _grazes(path.scene, rod, s, _gaps(path, obstacle, rod, x)[0]).any(axis=1)
+    return found
 
 
 def gaps_at(state):

@@ -34,7 +34,7 @@ from cosserat_fenicsx.scene.rod import RodOrName
 _EVENTS = 6
 _KINDS = {"limit": "Limit point", "bifurcation": "Bifurcation", "flutter": "Flutter"}
 # The state of a point by the sign of its number of negative modes.
-_STATES = {0: "stable", 1: "unstable", -1: "critical"}
+_STATES = {0: "stable", 1: "unstable", -1: "undecided"}
 
 
 def _of_events(name):
@@ -77,7 +77,8 @@ class Path(RodResult):
         steps: (n,) number of steps of the continuation since the start, on the mesh of the path: those to points in
             between, which are not kept, count; where the points were corrected from a coarser mesh each is one step.
         negative_modes: (n,) number of negative eigenvalues of the second variation; 0 at a stable point, -1 where it is
-            singular. Where the loads have no potential (see `conservative`) its symmetric part is used, which does not
+            singular, and where it differs with and without the nodes that touch a smooth obstacle and do not press on
+            it. Where the loads have no potential (see `conservative`) its symmetric part is used, which does not
             detect flutter.
         stable: (n,) bool.
         errors: the estimated errors of position, rotation, force and moment, and of further criteria that `tol` bounds,
@@ -520,7 +521,7 @@ def _bounded(path):
 
 
 def stability(negative_modes):
-    """'yes', 'no (2)' with the number of negative modes, or 'critical'."""
+    """'yes', 'no (2)' with the number of negative modes, or 'undecided'."""
     if negative_modes < 0:
-        return "critical"
+        return "undecided"
     return "yes" if negative_modes == 0 else f"no ({negative_modes})"

@@ -89,6 +89,8 @@ class Legs:
             self._prepare(tracer.path)
             try:
                 yield tracer
+                if scene.has_obstacles:
+                    tracer.doubt()
                 self._inertia = [part.interface and part.interface.inertia for part in solvers[2].parts]
             except (NotConverged, Interrupted) as failure:
                 if leg.leg is not None:

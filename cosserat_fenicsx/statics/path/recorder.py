@@ -16,7 +16,7 @@ from cosserat_fenicsx.models.connections import Connections
 from cosserat_fenicsx.models.rodmesh import Layout
 from cosserat_fenicsx.ranks import communicator
 from cosserat_fenicsx.results.accuracy import on_mesh
-from cosserat_fenicsx.results.contacts import check_apart, check_passes
+from cosserat_fenicsx.results.contacts import check_apart, check_passes, grazing
 from cosserat_fenicsx.results import saved
 from cosserat_fenicsx.results.path import Path
 from cosserat_fenicsx.results.records import Event, Record, Records, lost_at
@@ -38,6 +38,8 @@ _RESOLVED = 100.0
 CORRECTIONS = 6
 # Times that the way between two points is halved to find the events there.
 _HALVINGS = 5
+# Gap, dimensionless, by which obstacles are moved so that what does not press on them touches, or does not.
+_BESIDE = 1e-12
 # Largest distance of a point from the same one on a coarser mesh, over the distance of the latter's neighbours.
 _ASIDE = 0.3
 
@@ -236,6 +238,28 @@ class Tracing:
             "rod_forces": None,
         }
         self.path.extend(Records(Record, columns))
+
+    def doubt(self):
+        """Take the number of negative modes for unknown (-1) where it is another one with and without the nodes that
+        touch an obstacle and do not press on it: for what may lift off there, it is between both."""
+        which = np.flatnonzero(grazing(self.path) & (self.path.negative_modes >= 0))
+        if not len(which) or rubs(self.model.scene):  # friction of states before the last one is not known
+            return
+        for k, (point, values, n) in zip(which, self._starts(self.path.at_points(which)), strict=True):
+            self.problem.begin_at(values, n, point.reactions)
+            self.problem.set_load_factor(point.load_factor)
+            counts = [self._count_beside(gap) for gap in (_BESIDE, -_BESIDE)]
+            if counts[0] != counts[1]:
+                self.path._all["negative_modes"][k] = -1
+        self._count_beside(0.0)
+        self.path._forget()
+
+    def _count_beside(self, gap):
+        """The number of negative modes, with obstacles farther from rods by a gap."""
+        self.model.actions.withdraw(gap)
+        for part in self.stability.parts:
+            part.form.refresh()
+        return self.stability.count()
 
     def _advice(self, here, load_factor):
         if not self._options["steps"].adaptive:
