@@ -28,6 +28,7 @@ from cosserat_fenicsx.algebra.pool import PROBLEMS, ProblemPool
 from cosserat_fenicsx.results import compared
 from cosserat_fenicsx.results.records import find_again, keep_confirmed
 from cosserat_fenicsx.statics import refinement
+from cosserat_fenicsx.statics.path.events import Locator
 from cosserat_fenicsx.statics.path.recorder import Tracing
 
 STEEL = cf.Material(E=210e9, nu=0.3, density=7850.0)
@@ -254,6 +255,23 @@ def test_a_ring_sways_and_tips():
     assert there.stable.all() and back.stable.all()
     assert (there.displacement(top)[:, 2] > 0.5).all()
     np.testing.assert_allclose(there.displacement(top), back.displacement(top) * [1, 1, -1], atol=1e-8)
+
+
+def test_a_bifurcation_is_found_once(monkeypatch):
+    """Rounding decides how many modes are negative at the bifurcation itself, from which the branch sets out."""
+    located = Locator._singular
+
+    def unsure(*given):
+        found = located(*given)
+        for crossing in found:
+            crossing.point.negative_modes += 1
+        return found
+
+    monkeypatch.setattr(Locator, "_singular", unsure)
+    rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, 1)), cf.Stiffness((1e4, 1e4), 1e5, (1.0, 2.0), 1.0))
+    scene = cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Force(rod.end, (0, 0, -cf.euler_load(rod)))])
+    path = cf.solve(scene, (0.5, 1.1), elements=4, model="spatial", branch=1)
+    assert path.left and len(path.events) == 1 and path.stable.all()
 
 
 @pytest.mark.serial

@@ -297,7 +297,8 @@ class Locator:
         weight: of the load factor in the metric; probe: whether to check for negative modes that appear and vanish
         between them; explained: whether their number must change as the critical points require; short: whether the
         step is too short to lead to another path unnoticed. Raises Lost where one of these checks fails, or the point
-        to land on was not found.
+        to land on was not found. Without `probe` a is the bifurcation where the path was left: rounding decides the
+        number of negative modes there, and no bifurcation is looked for, which would be the same one.
         """
         chord = Chord(self.track, a, b, weight, short=short)
         place = chord.comes_and_goes() if probe else None
@@ -311,7 +312,7 @@ class Locator:
             if lands or (before.load_factor - load_factor) * (after.load_factor - load_factor) < 0:
                 place, landing = self._land(chord, low, high, before, after, load_factor)
                 break
-        crossings = self.crossings(chord, limits)
+        crossings = self.crossings(chord, limits) if probe else limits
         if probe and explained and not self._explained(a, b, crossings):
             raise Lost(0.5, UNEXPLAINED)
         located = sum(crossing.kind == "bifurcation" for crossing in crossings)
