@@ -16,13 +16,13 @@ LAST = ((1.0, 0.0, False),)
 LAST_TWO = ((0.1, 0.0, False), *LAST)
 #: The last stages of a start, which show how the solution depends on the wall's stiffness.
 DECADES = ((1e-2, 0.0, False), *LAST_TWO)
-#: Stages from such a state where these fail.
-BACK = ((1e-3, 0.0, False), *DECADES)
 _TAKES_OVER = 10.0  # stiffness of the first wall over that of the spring
 _SOFTEST = 1e-12  # smallest stiffness of the spring, over the wall's
 # Powers of ten by which the spring fades before it is removed; factors of its steps and of those of the wall, usual and
 # small ones. (A spring that fades by ten at once lets a string with weight on bit buckle.)
 _FADED, _STEPS, _SMALL_STEPS = 2, (10.0 ** (2 / 3), 10.0), (2.0, 2.0)
+# First viscosity from a state close to the solution, over that spring; walls from there to the last one.
+_HOLDS, _BETWEEN = 100.0, (0.05, 0.25)
 # Steps of the viscous motion: largest number, intended movement over the clearance, bounds of the change of the
 # viscosity after a step, and bounds of the viscosity over the first one.
 _VISCOUS, _WANTED, _CHANGE, _BOUNDS = 300, 0.3, (0.5, 4.0), (1e-4, 30.0)
@@ -58,6 +58,15 @@ def stages_from(spring, way="fast"):
         fading = [(wall, spring / fades**k, False) for k in range(1, 1 + math.ceil(_FADED / math.log10(fades) - 1e-9))]
     to_axis = () if way == "helix" else ((0.0, spring, False),)
     return (*to_axis, *fading, (wall, 0.0, False), *stiffer, *DECADES)
+
+
+def stages_back(spring, last=DECADES):
+    """The stages from a state close to the solution where Newton's method fails, such as of a string that only the wall
+    keeps from buckling and that leaves it: before the `last` ones it moves as in a viscous fluid. spring: see
+    `stages_from`."""
+    least = DECADES[0][0]
+    stiffer = [(wall, 0.0, False) for wall in _BETWEEN] if last == LAST else []
+    return (least, min(_HOLDS * spring, least), True), *stiffer, *last
 
 
 def settle(problem, walls, clearance, rounding, stages, careful=(), on_stage=None, hold=0.0, before_step=None,

@@ -38,7 +38,7 @@ class InHole:
             fine mesh's than by the polynomials through the nodes.
         side_force: of the wall on the rod, per length, N/m: of each element its mean, which is accurate, and the slope
             between the means of its neighbours. Within an element the wall's forces at the nodes alternate about it on
-            coarse meshes, 15 to 60 times farther from a fine mesh's. node_force: the wall's forces at the nodes, N,
+            coarse meshes, 6 to 60 times farther from a fine mesh's. node_force: the wall's forces at the nodes, N,
             exact in the balance of forces.
         hook_load: of the held end, along the hole, N; surface_torque: N m; reaction: (3,) N and (3,) N m there.
         wall_force: sum of all forces of the wall and of the rings, across the rod, without friction, N.
@@ -426,12 +426,11 @@ class _Errors:
     ratios: tuple[float, float] = (0.1, 0.9)  # bounds of the ratio of changes
     unknown: float = 0.5  # that ratio where it is not known
     # A change by the mesh below this share of the change before is taken as small by chance: changes fall to a
-    # twentieth (the median, from equal elements to others) or a seventh (later).
-    falls: float = 1 / 32
-    # Errors of the finer mesh over what changed of hook load and torque, where one change is known and where two are;
-    # and the share of the change along most of the string that counts beside it, as it is not small by chance.
-    by_one: float = 3.0
-    by_two: float = 0.8
+    # twentieth (the median) or a seventh.
+    falls: float = 1 / 10
+    # Errors of the finer mesh over what changed of hook load and torque; and the share of the change along most of the
+    # string that counts beside it, as it is not small by chance. All elements differ, see `_Meshes.parts`.
+    of_change: float = 1.5
     along: float = 0.1
 
 
@@ -459,7 +458,7 @@ class RodErrors:
         self.values, self._capped = dict(sorted(values.items())), capped
         self._of_rings = before._of_rings if before else dict.fromkeys(NAMES, 0.0)
         self._by_stiffness, self.ratio = self._left_of_softness(scales, counted, before)
-        changes, share = dict.fromkeys(NAMES, np.inf), _ERRORS.by_one
+        changes = dict.fromkeys(NAMES, np.inf)
         common = set(self.values) & set(before.values if before else ())
         if common:
             factor = max(common)
@@ -469,9 +468,8 @@ class RodErrors:
         if before is not None:
             known = {name: x for name, x in before.changes.items() if np.isfinite(x)}
             changes |= {name: max(changes[name], _ERRORS.falls * x) for name, x in known.items()}
-            share = _ERRORS.by_two if known else share
         self.changes = changes
-        shares = _OF_CHANGE | dict.fromkeys(counted, share)
+        shares = _OF_CHANGE | dict.fromkeys(counted, _ERRORS.of_change)
         of_mesh = {name: shares[name] * changes[name] * scales[name] for name in NAMES}
         self.errors = {name: of_mesh[name] + self._by_stiffness[name] + rounding[name] for name in NAMES}
         self.error = max(self.errors[name] / scales[name] for name in counted)

@@ -17,7 +17,7 @@ from cosserat_fenicsx.ranks import communicator
 from cosserat_fenicsx.results.accuracy import on_mesh
 from cosserat_fenicsx.results.path import Path
 from cosserat_fenicsx.statics.problem import record_of, solvers_of
-from cosserat_fenicsx.statics.settling import BACK, DECADES, LAST, LAST_TWO, settle, stages_from
+from cosserat_fenicsx.statics.settling import DECADES, LAST, LAST_TWO, settle, stages_back, stages_from
 from cosserat_fenicsx.statics.small_motions import conservative_along
 from cosserat_fenicsx.well.rod.in_hole import NAMES, UNKNOWN, UNSEEN, InHole
 from cosserat_fenicsx.well.rod.string_scene import in_helix, on_axis, string_in
@@ -33,8 +33,15 @@ class _Meshes:
     finer: int = 2  # factor from one mesh to the next
     before: int = 4  # a requested number of elements over that of the mesh before
     per_piece: float = 1.5  # least number of elements of the first mesh over the pieces of the string
-    fewest: float = 0.3  # bounds of the density of elements on a finer mesh, over equal ones
-    densest: float = 2.4
+    # density of elements of the first mesh beside a place where the pressure may jump, over that far from all; and the
+    # length along which it decays, over that in which the rod's typical load bends it by the clearance
+    beside: float = 5.0
+    within: float = 3.5
+    places: int = 4096  # elements of equal length whose density is said so
+    parts: float = 1.5  # least number of elements on a finer mesh for one on the mesh before: all errors change
+    # root of the change of pressure over the usual one, below which an element gets no others; cap on what is above
+    equal: float = 0.3
+    densest: float = 2.1
     by_wall: float = 1.25  # below this multiple of the wall-stiffness error, the mesh error is taken as resolved
     fine: int = 1024  # the first mesh that must have a solution: snakes and helices need more elements than others
 
@@ -49,6 +56,7 @@ class _Walls:
     # share of the tolerance above which the wall is made ten times stiffer, and below which its effect is not found
     # again on a finer mesh: of 60 operations none has more than 1.6 times as much there, which the caution covers
     too_soft: float = 0.25
+    stiff: float = 100.0  # factor from which on Newton's method mostly fails on a finer mesh, or takes many steps
     hold: float = 1e-10  # springs that hold a helix, see `settle`
     rounding: float = 20.0  # residual of a node over the rounding of its position times its wall or ring stiffness
     astray: int = 8  # too long Newton steps in a stage from the mesh before, see `settle`
@@ -61,7 +69,7 @@ _STARTS, _FROM_HELIX = ("fast", "gentle", "relaxed"), ("helix",)
 # Stands for an unknown number of negative modes in comparisons, instead of -1 where the second variation is singular.
 _SINGULAR = 1 << 30
 # Elements times Newton steps in a second.
-_STEPS = 6e4
+_STEPS = 3e4
 
 
 def solve_in_hole(path, lengths, stiffness, weight, contact_radius, *, wall_stiffness=None, helix=False, tol=1e-4,
@@ -129,7 +137,7 @@ def solve_in_hole(path, lengths, stiffness, weight, contact_radius, *, wall_stif
 
 
 class Work:
-    """What a search for an equilibrium may cost: `left`, elements times Newton steps, of which a second takes about 60
+    """What a search for an equilibrium may cost: `left`, elements times Newton steps, of which a second takes about 30
     000. So where it ends does not depend on the machine. seconds: about how long it may take."""
 
     def __init__(self, seconds):
@@ -199,7 +207,9 @@ def _finer(string, count, before, job):
         near = LAST_TWO if before.estimates.ratio <= _WALLS.regular else DECADES
         near = LAST if max(before.of_stiffness, UNSEEN) <= _WALLS.too_soft * job.tol else near
         # the contact on the coarse mesh may be too far off, or the wall too stiff for this one
-        for stages, factor in ((near, before.factor), (BACK, before.factor), (BACK, 1.0)):
+        spring, stiffer = string.spring, before.factor
+        near = near if stiffer < _WALLS.stiff else stages_back(spring / stiffer, near)
+        for stages, factor in ((near, stiffer), (stages_back(spring / stiffer), stiffer), (stages_back(spring), 1.0)):
             with contextlib.suppress(NotConverged):
                 return _on_mesh(string, layout, stages, factor, before, before, job)
     if job.start is not None:
@@ -208,8 +218,7 @@ def _finer(string, count, before, job):
             answer = _on_mesh(string, layout, DECADES, job.start.factor, job.start, None, job)
             if answer.negative_modes == 0:
                 return answer
-    pieces = Layout.of(string.scene, 1)
-    layout = _divided(string, pieces, np.diff(pieces.breaks[0]), count)
+    layout = _divided(string, *_at_first(string), count)
     found = []
     for way in _FROM_HELIX if job.helix else _STARTS:
         try:
@@ -228,13 +237,29 @@ def _finer(string, count, before, job):
     )
 
 
+def _at_first(string):
+    """A `Layout`, and the density of the first mesh on its elements: larger beside ends of the string and of its
+    sections, rings, stations of the survey and jumps of the hole."""
+    layout, length = Layout.of(string.scene, _MESHES.places), float(string.ends[-1])
+    ends = length * layout.breaks[0]
+    stations = string.path.md - string.begins
+    jumps = [*string.ends, *stations[(stations > 0) & (stations < length)], *string.wall.breaks(string.rod)]
+    jumps = np.unique([0.0, *jumps, *(ring.station.s for ring in string.rings)])
+    at = (ends[1:] + ends[:-1]) / 2
+    beyond = np.searchsorted(jumps, at)
+    away = np.minimum(at - jumps[beyond - 1], jumps[beyond] - at)
+    within = _MESHES.within * string.bending_length
+    return layout, np.diff(ends) * (1.0 + (_MESHES.beside - 1.0) * np.exp(-away / within))
+
+
 def _wanted(answer):
-    """(elements,) density of elements on a finer mesh: larger where the pressure changes."""
+    """(elements,) numbers of elements for each, of a mesh with twice as many: more where the pressure changes."""
     h, p = np.diff(answer.path.layout.breaks[0]), answer.element_pressures
     change = p.max(axis=1) - p.min(axis=1)
     change = np.maximum(change, np.maximum(np.append(change[1:], 0.0), np.append(0.0, change[:-1])))
     usual = np.median(p[p > 0]) if (p > 0).any() else 1.0
-    return h * np.clip(np.sqrt(change / usual), _MESHES.fewest, _MESHES.densest)
+    more = h * np.clip(np.sqrt(change / usual) - _MESHES.equal, 0.0, _MESHES.densest)
+    return _MESHES.parts + (_MESHES.finer - _MESHES.parts) * more / max(more.mean(), np.finfo(float).tiny)
 
 
 def _divided(string, layout, wanted, count):

@@ -185,16 +185,27 @@ class StringScene:
         return along + above[-1] - (above[part] + self.weight[part] * (at - z[part]))
 
     @cached_property
+    def _typical(self):
+        """A lateral load that few of the string are above, N/m."""
+        s = np.linspace(0.0, self.ends[-1], _SET.samples)
+        near, at, tension = self.near(s), self.section_at(s)[1:], self.tension(s)[:-1]
+        down = np.array([0.0, 0.0, 1.0]) - near.tangent[:, 2:] * near.tangent
+        load = tension[:, None] * near.curvature[1:] + self.weight[at, None] * down[1:]
+        return max(np.quantile(np.linalg.norm(load, axis=1), _SET.typical), _SET.least * self.weight.max())
+
+    @property
+    def bending_length(self):
+        """Length along which the typical load bends the string by the clearance, m."""
+        return float((self.bending.min() * self.clearance / self._typical) ** 0.25)
+
+    @cached_property
     def spring(self):
         """Stiffness of a spring to the axis in which the loads, and the string's resistance to the axis's curvature k,
         move it by about twice the clearance c, and in which its compression F does not buckle it; over the wall's
         stiffness. The moment EI k acts within the length sqrt(8 c/k), which gives EI k^2/(16 c^2); F^2/(4 EI) prevents
         buckling."""
         s = np.linspace(0.0, self.ends[-1], _SET.samples)
-        near, at, tension = self.near(s), self.section_at(s)[1:], self.tension(s)[:-1]
-        down = np.array([0.0, 0.0, 1.0]) - near.tangent[:, 2:] * near.tangent
-        load = tension[:, None] * near.curvature[1:] + self.weight[at, None] * down[1:]
-        typical = max(np.quantile(np.linalg.norm(load, axis=1), _SET.typical), _SET.least * self.weight.max())
+        near, at, tension, typical = self.near(s), self.section_at(s)[1:], self.tension(s)[:-1], self._typical
         EI = self.bending[at]
         buckles = (np.minimum(tension, 0.0) ** 2 / (4 * EI)).max()
         bends = (EI * (near.curvature[1:] ** 2).sum(axis=1)).max() / (16 * self.clearance**2)
