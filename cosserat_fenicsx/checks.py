@@ -269,8 +269,9 @@ def in_words(found):
     objects: the method `__init__` of those that are dataclasses is replaced."""
     if isinstance(found, types.FunctionType):
         return _checked(found, found)
-    if dataclasses.is_dataclass(found) and isinstance(vars(found).get("__init__"), types.FunctionType):
-        found.__init__ = _checked(found.__init__, found)
+    if dataclasses.is_dataclass(found) and isinstance(found.__init__, types.FunctionType):
+        own = "__init__" in vars(found)
+        found.__init__ = _checked(found.__init__ if own else inspect.unwrap(found.__init__), found)
     return found
 
 

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 from copy import copy
-from dataclasses import dataclass, replace
+from dataclasses import KW_ONLY, dataclass, replace
 from itertools import pairwise
 from typing import Annotated, ClassVar
 
@@ -96,7 +96,7 @@ class Borehole(InWords, Part):
 
     Args:
         path: a `WellPath`.
-        sections: each a `HoleSection`, from the surface down.
+        sections: one `HoleSection`, or a list of them from the surface down.
         wall_stiffness: pressure per length over penetration, N/m^2; rock and steel have 1e9 and more. None for a rigid
             wall, which the rod in contact approaches by stiffer ones until the remaining error is small beside the
             tolerance. Only the rod in contact needs it.
@@ -107,6 +107,8 @@ class Borehole(InWords, Part):
 
     path: WellPath
     sections: tuple[HoleSection, ...]
+    # a second section there is a mistake
+    _: KW_ONLY
     wall_stiffness: WallStiffness | None = None
 
     @classmethod
@@ -171,7 +173,7 @@ class Borehole(InWords, Part):
                 doubt_depth("stations: their depths have", path.length)
         if tortuosity is not None:
             path = made_crooked(path, **tortuosity.arguments())
-        return cls(path, sections, wall_stiffness)
+        return cls(path, sections, wall_stiffness=wall_stiffness)
 
     def __post_init__(self):
         if isinstance(self.sections, HoleSection):
