@@ -168,7 +168,8 @@ class MostWeightOnBit(Result):
         )
         yield (
             f"{self.operation}: at most {self._told('weight', units, form='.4g')} on bit, limited by "
-            f"{self.limit}{where}; strength with a safety factor of {self.safety:g}."
+            f"{self.limit}{where}; strength with a safety factor of {self.safety:g}; buckling by He and Kyllingstad's "
+            "criterion and Lubinski's."
         )
         if self.incomplete:
             yield (

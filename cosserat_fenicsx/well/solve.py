@@ -243,7 +243,10 @@ MODELS = (AUTO, SOFT, BUCKLED, ROD)
 CONVENTIONS = ("coulomb", "johancsik")
 _QUANTITIES = {"hook load": "N", "surface torque": "N m"}
 _LOCKS_UP = "WITH THE WALL FORCE OF A HELIX IT LOCKS UP"
-_HOW_LONG = "solving the rod in contact mostly takes a second, and ends after about {:.0f} s of processor time"
+_HOW_LONG = (
+    "solving the rod in contact mostly takes a second, the first time half a minute more for compiling, and ends after "
+    "about {:.0f} s of processor time"
+)
 _NO_ROD = (
     "the exact rod in contact is not tried: beyond helical buckling there are many equilibria, and it may return "
     "another one than the string's; use model='rod' to force it"

@@ -198,6 +198,8 @@ def limit_speed(
 ) -> float:
     """The lowest speed from which on all modes decay, up to a frequency; a drive that feeds faster waves is warned of.
 
+    Of small motions about a steady rotation: from rest a bit may stick and slip on at higher speeds, see `simulate`.
+
     Args:
         scene: a `Drilling`. weight: on bit, N; None for that of the scene.
         up_to: highest frequency of modes, Hz.

@@ -212,8 +212,9 @@ class Stability(Result):
             (rpm, kN), (speed, weight) = (x[0] for x in _case_units(units)), _case(self, units, i, j)
             what = "No mode grows" if self._fed is None else f"No mode up to {self.up_to:.4g} Hz grows, FASTER ONES DO"
             yield f"{what}. Least damped: {least} at {speed} {rpm}{weight and f', {weight} {kN}'}."
+            yield _SMALL
             return
-        yield f"{count} modes grow."
+        yield f"{count} modes grow. {_SMALL}"
         yield from (
             f"{text}." for text in _advice(self, rows, [name for name in rows[0][3] if name != own_rule(self.scene)])
         )
@@ -504,6 +505,9 @@ def _advice(answer, rows, names):
 
 def _frequencies(answer, rows):
     return ", ".join(f"{answer.frequency[i, j, k]:.3g}" for k, i, j, _ in sorted(rows)) + " Hz"
+
+
+_SMALL = "Of small motions alone: large ones, such as stick-slip from rest, may go on where no mode grows (`simulate`)."
 
 
 def _case_units(units):
