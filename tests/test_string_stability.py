@@ -17,6 +17,7 @@ from cosserat_fenicsx.drilling.elements import AxialTorsional
 from cosserat_fenicsx.drilling.laws import check_bit
 from cosserat_fenicsx.drilling.linear import stability as linear
 from cosserat_fenicsx.drilling.linear.impedances import axial, torsional
+from cosserat_fenicsx.drilling.linear.limits import fed_by_bit
 from cosserat_fenicsx.quantities import Units
 
 pytestmark = [pytest.mark.serial, pytest.mark.once]
@@ -286,6 +287,21 @@ def test_limit_speed_of_a_bit_that_cuts():
     grow = cf.drilling.stability(scene, [0.999 * limit, 1.001 * limit], up_to=2.0).unstable_modes.ravel()
     assert grow[0] > 0 == grow[1]
     assert math.isinf(cf.drilling.limit_speed(scene, up_to=2.0, between=(2.0, 0.9 * limit), points=3))
+
+
+def test_a_bit_without_inertia_feeds_the_fastest_modes_that_steps_resolve():
+    """As critical_slopes has them; an inertia ends it."""
+    case, dt, speed = GIVEN["roots"][0], 0.005, 6.0
+    scene = pipe_and_collars(case["top"], case["drag_rate"])
+    w, slopes = cf.drilling.critical_slopes(scene, 0.25 / dt)
+    limit = slopes[w > 0.25 * math.pi / dt].max()
+
+    def told(slope, **more):
+        bit = replace(scene.bit, weight=weight_of_slope(slope, speed), **more)
+        return fed_by_bit(replace(scene, drive=replace(scene.drive, speed=speed), bit=bit), dt)
+
+    assert "the motion depends on the step" in told(1.01 * limit) and not told(0.99 * limit)
+    assert not told(1.01 * limit, inertia=5.0)
 
 
 def test_other_drives():

@@ -165,13 +165,12 @@ def simulate(
     """
     instance("simulate", "scene", scene, Drilling, "a Drilling")
     duration, dt, save_every, profile_every = check_arguments(scene, duration, dt, elements, save_every, profile_every)
-    from cosserat_fenicsx.drilling.linear.limits import fed_waves
+    from cosserat_fenicsx.drilling.linear.limits import fed_by_bit, fed_waves
 
     name, why = chosen(scene, model)
     running = model_of(scene, name, dt, elements)
     check_step(scene, running.dt, duration, save_every)
-    fed = fed_waves(scene)
-    why += [f"CAUTION: {fed}"] if fed else []
+    why += [f"CAUTION: {fed}" for fed in (fed_waves(scene), fed_by_bit(scene, running.dt)) if fed]
     history = DrillingHistory(scene, running.name, [*why, *running.why], running.dt, running.depths)
     apart = {
         "save_every": max(1, round((save_every or 0.0) / running.dt)),

@@ -1,5 +1,5 @@
 """Limits of stability: slope of the bit's torque, speed and weight at which a first mode begins to grow; and waves that
-a drive sends back larger than they come.
+a drive, or a bit without inertia, sends back larger than they come.
 
 At a real frequency a drive of the impedance Zd reflects waves in a string of the impedance Z by |(Zd - Z)/(Zd + Z)|.
 Where that is R, above 1, and waves lose exp(-2 a) on their way down the string and up again, in the time 2 T, they
@@ -28,6 +28,8 @@ from cosserat_fenicsx.errors import NotConverged, SceneError
 _DEGREE, _RESOLVED = 24, 1e-11
 # Most times that a piece is halved; most pieces at a time over those at first.
 _HALVED, _MORE = 32, 16
+# Steps in a period that resolve it; samples of the impedance from mode to mode.
+_STEPS, _TO_A_MODE = 4, 40
 # Weight on bit (N) that is as good as infinite.
 _HEAVIEST = 1e8
 
@@ -304,3 +306,36 @@ def fed_waves(scene, above: float = 0.0) -> FedWaves | None:
         return None
     first, last = np.flatnonzero(grows)[[0, -1]]
     return FedWaves(*map(float, (f[first], f[last], f[k], growth[k])))
+
+
+def fed_by_bit(scene: Drilling, dt: float) -> str:
+    """A sentence on modes that a bit without inertia feeds at the speed of the drive, as fast as steps of dt (s)
+    resolve: they grow however fast they are, so that the motion depends on the step. "" where there are none, and where
+    the linear theory does not know the speed or the torque.
+
+    Modes are where Im Z(iw) = 0, of the impedance at the bit; they grow if the torque falls by more than Re Z there.
+    """
+    if scene.bit is None or scene.discs or scene.bit_inertia or scene.bit.law.drills:
+        return ""
+    top = 2 * math.pi / (_STEPS * dt)
+    try:
+        speed = speed_of("simulate", scene)
+        kappa = Steady(scene).parameters(speed, scene.bit.weight)[0]
+        if not kappa < 0:
+            return ""
+        guide = _torsion(scene, speed)
+    except SceneError:
+        return ""
+    w = np.linspace(top / 2, top, 1 + math.ceil(_TO_A_MODE * top / 2 * guide.travel / math.pi))
+    Z = guide.impedance_at_bit(1j * w)
+    small = np.abs(Z) < guide.impedance  # elsewhere Im Z changes its sign between two modes
+    at = np.flatnonzero((Z.imag[:-1] * Z.imag[1:] <= 0) & small[:-1] & small[1:])
+    share = Z.imag[at] / (Z.imag[at] - Z.imag[at + 1])
+    grows = w[at][(1 - share) * Z.real[at] + share * Z.real[at + 1] < -kappa]
+    if not len(grows):
+        return ""
+    return (
+        "the bit has no inertia and its torque falls with the speed, so that modes up to "
+        f"{grows[-1] / (2 * math.pi):.3g} Hz and more grow at {speed * 30 / math.pi:.4g} rpm: the motion depends on "
+        "the step, and may have stick-slip with another one; give BitOnRock.inertia, kg m^2"
+    )
