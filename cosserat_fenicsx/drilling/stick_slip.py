@@ -102,7 +102,8 @@ class StickSlip:
         elif not self.sticks:
             what = f"no stick-slip: {speed}, severity {as_text(self.severity, 3)}"
         elif self.stuck < 1e-3:
-            what = f"the bit swings back and does not stick: {again}{speed}"
+            turns = "swings back" if self.least < 0 else "stops for a moment"
+            what = f"the bit {turns} and does not stick: {again}{speed}"
         else:
             what = f"stick-slip: {again}{speed}, at rest {100 * self.stuck:.3g} % of the time"
         low, high = (as_text(x / size, 4) for x in self.torque)
