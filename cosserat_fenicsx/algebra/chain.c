@@ -9,8 +9,6 @@
    delayed to the next element: the axial force of a straight inextensible element between two points is not determined
    before the points are. */
 static const double SMALLEST_PIVOT = 1e-2;
-/* Relative to the diagonal before elimination, smaller pivots of a symmetric matrix are zero to rounding. */
-static const double ZERO_PIVOT = 2e-15;
 
 #if KERNEL_ARGUMENTS == 6
 typedef void tabulator(double *, const double *, const double *, const double *, const int *, const uint8_t *);
@@ -338,35 +336,6 @@ static int reduce(double *F, int n, int wide, int m, int most, int *row, int *co
     return k;
 }
 
-/* Signs of the pivots of the first m rows and columns of a symmetric F, the largest on the diagonal first;
-   whole: their diagonal before, against which zero is judged, whatever the scale of an unknown. Returns the logarithm
-   of the product of their absolute values. */
-static double signs(double *F, int n, int wide, int m, double *whole, int *negative, int *zero)
-{
-    double product = 1;
-    int power = 0, exponent;
-    for (int i = 0; i < m; i++) whole[i] = fabs(F[(size_t)i * wide + i]);
-    for (int k = 0; k < m; k++) {
-        int at = k;
-        for (int i = k + 1; i < m; i++)
-            if (fabs(F[(size_t)i * wide + i]) > fabs(F[(size_t)at * wide + at])) at = i;
-        if (at != k) {
-            swap_rows(F + (size_t)k * wide, F + (size_t)at * wide, n);
-            swap(F + k, F + at, n, wide);
-            swap(whole + k, whole + at, 1, 1);
-        }
-        const double pivot = F[(size_t)k * wide + k];
-        if (!(fabs(pivot) > ZERO_PIVOT * whole[k])) {
-            ++*zero;
-            continue;
-        }
-        *negative += pivot < 0;
-        product = frexp(product * pivot, &exponent), power += exponent;
-        subtract_pivot(F, n, wide, k);
-    }
-    return log(fabs(product)) + power * log(2);
-}
-
 /* ---- along the rods ---------------------------------------------------------------------------------------------- */
 
 /* Where the i-th of the numbers carried from the element before is in the front; `ahead`: how many are in front of the
@@ -577,24 +546,6 @@ int eliminate(chain *s, kernel *k, const double *matrices)
         if (last) condense(s, t, F, n, k_before, d), before = 0, d = 0;
     }
     return 0;
-}
-
-/* The negative and zero pivots of a symmetric sum of elements; the interface's matrices are condensed too. */
-void count(chain *s, kernel *k)
-{
-    const double *before = 0;
-    int n_before = 0, k_before = 0;
-    s->negative = s->zero = 0, s->logarithm = 0;
-    memset(s->diagonal, 0, s->kept * sizeof *s->diagonal);
-    take_constants(k);
-    for (int t = 0; t < s->elements; t++) {
-        const int *shape = s->shape + 4 * t, m = shape[0] + shape[1], n = m + shape[2] + shape[3];
-        double *F = s->front + (size_t)(t % 2) * s->wide * s->wide; /* of earlier ones nothing is needed */
-        assemble(s, k, 0, F, t, 0, before, n_before, k_before, s->diagonal);
-        s->logarithm += signs(F, n, s->wide, m, s->work, &s->negative, &s->zero);
-        before = F, n_before = n, k_before = m;
-        if (s->ends[t] != -1) condense(s, t, F, n, m, 0), before = 0;
-    }
 }
 
 /* Forward substitution of b (this rank's unknowns, many); what the interface gets is added to it. found: (elements,

@@ -1,5 +1,5 @@
-/* A sweep over load factors: predictor, Newton's method, and the checks of statics/path/load_control.py. A step that is
-   neither accepted nor halved is left to Python. */
+/* Negative modes, and a sweep over load factors: predictor, Newton's method, and the checks of
+   statics/path/load_control.py. A step that is neither accepted nor halved is left to Python. */
 #include "chain.h"
 
 #include <math.h>
@@ -10,6 +10,95 @@ enum { COUNT = 128, FAILED_COUNT = -100 };
 enum { NEARLY_LINEAR = 4 }; /* most Newton iterations of a first step that is nearly linear */
 
 #define EACH(k, g, in) for (int k = 0; k < (g)->count; k++) if ((in)[k])
+
+/* ---- negative modes --------------------------------------------------------------------------------------------- */
+
+/* Relative to the diagonal before elimination, smaller pivots of a symmetric matrix are zero to rounding. */
+static const double ZERO_PIVOT = 2e-15;
+
+/* Signs of the pivots of the first m rows and columns of a symmetric F, the largest on the diagonal first;
+   whole: their diagonal before, against which zero is judged, whatever the scale of an unknown. Returns the logarithm
+   of the product of their absolute values. */
+static double signs(double *F, int n, int wide, int m, double *whole, int *negative, int *zero)
+{
+    double product = 1;
+    int power = 0, exponent;
+    for (int i = 0; i < m; i++) whole[i] = fabs(F[(size_t)i * wide + i]);
+    for (int k = 0; k < m; k++) {
+        int at = k;
+        for (int i = k + 1; i < m; i++)
+            if (fabs(F[(size_t)i * wide + i]) > fabs(F[(size_t)at * wide + at])) at = i;
+        if (at != k) {
+            swap_rows(F + (size_t)k * wide, F + (size_t)at * wide, n);
+            swap(F + k, F + at, n, wide);
+            swap(whole + k, whole + at, 1, 1);
+        }
+        const double pivot = F[(size_t)k * wide + k];
+        if (!(fabs(pivot) > ZERO_PIVOT * whole[k])) {
+            ++*zero;
+            continue;
+        }
+        *negative += pivot < 0;
+        product = frexp(product * pivot, &exponent), power += exponent;
+        subtract_pivot(F, n, wide, k);
+    }
+    return log(fabs(product)) + power * log(2);
+}
+
+/* Reduce a symmetric F, of which the upper half is read, by its first m pivots if these are surely positive: in turn,
+   without the exchanges of `signs`. Returns whether they are, with the logarithm of their product; whole: (m,) work
+   space. */
+static int reduce_definite(double *F, int n, int wide, int m, double *restrict whole, double *logarithm)
+{
+    double product = 1, by[BESIDE], inverse[BESIDE];
+    int power = 0, exponent;
+    for (int i = 0; i < m; i++) whole[i] = fabs(F[(size_t)i * wide + i]);
+    for (int first = 0, end; first < m; first = end) {
+        const double *u = F + (size_t)first * wide;
+        end = first + BESIDE < m ? first + BESIDE : m;
+        for (int i = first; i < n; i++) {
+            double *row = F + (size_t)i * wide;
+            const int known = (i < end ? i : end) - first;
+            for (int l = 0; l < known; l++) by[l] = u[(size_t)l * wide + i] * inverse[l];
+            for (int j = round_down(i); j < n; j += BESIDE) { /* what is left of the diagonal does not matter */
+                vector v = load(row + j);
+                for (int l = 0; l < known; l++) v -= load(u + (size_t)l * wide + j) * by[l];
+                keep(v, row + j);
+            }
+            if (i >= end) continue;
+            if (!(row[i] > POSITIVE_PIVOT * whole[i])) return 0;
+            inverse[i - first] = 1 / row[i];
+            product = frexp(product * row[i], &exponent), power += exponent;
+        }
+    }
+    for (int i = m; i < n; i++)
+        for (int j = m; j < i; j++) F[(size_t)i * wide + j] = F[(size_t)j * wide + i];
+    *logarithm = log(product) + power * log(2);
+    return 1;
+}
+
+/* The negative and zero pivots of a symmetric sum of elements; the interface's matrices are condensed too. */
+void count(chain *s, kernel *k)
+{
+    const double *before = 0;
+    int n_before = 0, k_before = 0;
+    s->negative = s->zero = 0, s->logarithm = 0;
+    memset(s->diagonal, 0, s->kept * sizeof *s->diagonal);
+    take_constants(k);
+    for (int t = 0; t < s->elements; t++) {
+        const int *shape = s->shape + 4 * t, m = shape[0] + shape[1], n = m + shape[2] + shape[3];
+        double *F = s->front + (size_t)(t % 2) * s->wide * s->wide; /* of earlier ones nothing is needed */
+        double logarithm;
+        assemble(s, k, 0, F, t, 0, before, n_before, k_before, s->diagonal);
+        if (!reduce_definite(F, n, s->wide, m, s->work, &logarithm)) {
+            assemble(s, k, 0, F, t, 0, before, n_before, k_before, 0);
+            logarithm = signs(F, n, s->wide, m, s->work, &s->negative, &s->zero);
+        }
+        s->logarithm += logarithm;
+        before = F, n_before = n, k_before = m;
+        if (s->ends[t] != -1) condense(s, t, F, n, m, 0), before = 0;
+    }
+}
 
 static int python_hook(void *self, int what, double *a, double *b);
 
