@@ -530,3 +530,35 @@ def test_errors_of_a_whole_scene_have_the_line_of_their_table(tmp_path, file, ol
     number = int(re.search(r"line (\d+)", str(refused.value))[1])
     here, message = " ".join(text.splitlines()[number - 1 : number + 2]), str(refused.value).partition("column 1")[2]
     assert re.search(line, f"{here} {message}"), (here, message)
+
+
+@pytest.mark.once
+def test_depths_and_frictions_that_are_probably_in_other_units_are_told_as_typed(tmp_path):
+    path = cf.well.WellPath.from_survey(["0 ft", "10000 ft"], [0, 0], [0, 0])
+    hole = cf.well.Borehole(path, cf.well.HoleSection("10000 ft", "8.5 in", 0.2))
+    string = cf.well.DrillString([cf.well.Component(weight=241.13, contact_radius=0.0635)])
+    ends = r"expected a measured depth in the hole, which ends at 10000 ft \(survey 10000 ft, sections 10000 ft\)"
+    for depth, words in (
+        (9000, r"9000 m \(29528 ft\): {}; if these are feet, write '9000 ft'$"),
+        (40000, r"40000 m \(131234 ft\): {}$"),
+        ("11000 ft", "11000 ft: {}$"),
+    ):
+        with pytest.raises(cf.SceneError, match="^torque_and_drag: depth = " + words.format(ends)):
+            cf.well.torque_and_drag(hole, string, cf.well.TripOut(), depth=depth)
+    with pytest.raises(cf.SceneError, match=r"^depth_sweep: depths\[3\] = 10000 m \(32808 ft\): .*write '10000 ft'$"):
+        cf.well.depth_sweep(hole, string, [cf.well.TripOut()], range(1000, 10001, 3000))
+    words = r"to = 10000 ft: expected more than 6000 m \(19685 ft\), the section above; if .* feet, write '6000 ft'$"
+    with pytest.raises(cf.SceneError, match=words):
+        cf.well.Borehole(path, [cf.well.HoleSection(to, "8.5 in", 0.2) for to in (6000, "10000 ft")])
+    volve = Path(__file__).parents[1] / "demos" / "wells" / "volve_f12.toml"
+    text = volve.read_text(encoding="utf-8").replace("to = 3438.0, count", "to = 11000, count")
+    (tmp_path / "well.toml").write_text(text, encoding="utf-8")
+    (tmp_path / "volve_f12.csv").write_bytes(volve.with_suffix(".csv").read_bytes())
+    words = r"line \d+, column \d+: depth_sweep: depths\[19\] = 11000 m: .*write '11000 ft'$"
+    with pytest.raises(cf.SceneError, match=words):
+        cf.read(tmp_path / "well.toml")
+    words = "coefficient of friction from 0 to 5, in the section that ends at 10000 ft; 25 percent are 0.25$"
+    with pytest.raises(cf.SceneError, match=words):
+        cf.well.HoleSection("10000 ft", "8.5 in", 25)
+    with pytest.raises(cf.SceneError, match=words):
+        hole.with_friction(25)

@@ -581,6 +581,6 @@ def test_soft_torque_asks_for_the_depth():
     string = scene().string
     parts = string.components
     endless = replace(string, components=(*parts[:-1], replace(parts[-1], length=None)))
-    with pytest.raises(cf.SceneError, match="SoftTorque.depth = None.*measured depth of the bit"):
+    with pytest.raises(cf.SceneError, match="SoftTorque.depth = None.*depth of the bit.*SoftTorque.scene, inertia"):
         cf.drilling.SoftTorque(endless, inertia=2000.0)
     assert cf.drilling.SoftTorque(endless, inertia=2000.0, depth=3000.0).Kp > 0

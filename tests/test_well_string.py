@@ -333,7 +333,7 @@ def test_field_units(text, dimension, value):
     ('survey = "volve_f12.csv"', 'survey = "none.csv"', "cannot be read"),
     (", count = 20", "", "'count' is missing"),
     ("{ from = 300.0, to = 3438.0, count = 20 }", "3000", r"depth_sweep.depths = 3000: expected a list, each"),
-    ("to = 3438.0, count", 'to = "11400 ft", count', "depth = 3474.72 m: expected a measured depth in the hole"),
+    ("to = 3438.0, count", 'to = "11400 ft", count', "depths.19. = 3474.72 m: expected a measured depth in the hole"),
     ("tol = 2e-2", 'tol = "1 %"', "torque_and_drag.tol = '1 %': expected a finite number"),
     ("tol = 2e-2", 'model = "stiff"', "torque_and_drag.model = 'stiff': expected 'auto'"),
     ("tol = 2e-2", 'model = "rod"\ntorque_convention = "johancsik"', "the law that the rod in contact follows"),

@@ -30,7 +30,7 @@ _ATMOSPHERE = 101325.0
 _DOUBTED = {
     "density": ([(0.5, 3.0), (5.0, 300.0), (2700.0, math.inf)], "is hardly that of a mud: 1.2 g/cm^3 are 1200, 10 "
                 "pounds per US gallon 10 * units.ppg = 1198"),
-    "friction": ([(1.0, math.inf)], "is more than the wall of a well has (0.1 to 0.5)"),
+    "friction": ([(1.0, math.inf)], "is more than the wall of a well has (0.1 to 0.5; 25 percent are 0.25)"),
 }  # fmt: skip
 
 
@@ -65,10 +65,13 @@ class HoleSection(Part):
     casing: str | None = None
 
     def __post_init__(self):
+        ends = self.to if isinstance(self.to, str) else f"{self.to:g} m" if isinstance(self.to, float | int) else ""
         try:
             super().__post_init__()
         except SceneError as problem:  # of several sections: which one
-            told = "" if ".to =" in str(problem) else f", in the section that ends at {self.to:g} m"
+            told = "" if ".to =" in str(problem) else f", in the section that ends at {ends}"
+            if ".friction =" in str(problem) and isinstance(self.friction, float | int) and 5 < self.friction <= 100:
+                told += f"; {self.friction:g} percent are {self.friction / 100:g}"
             raise SceneError(f"{problem}{told}") from None
 
     def validate(self):
@@ -187,8 +190,9 @@ class Borehole(InWords, Part):
         above = 0.0
         for section in self.sections:
             if section.to <= above:
-                told = f"HoleSection.to = {section.to:g} m: expected more than {above:g} m, the section above"
-                raise SceneError(self.path.told(told))
+                told = self.path.told(f"HoleSection.to = {section.to:g} m: expected more than")
+                found, feet = self.path.depth_told(above, most=section.to)
+                raise SceneError(f"{told} {found}, the section above{feet}")
             above = section.to
         if abs(self.path.length - above) > 1e-3 * self.length:
             ratio = max(self.path.length, above) * constants.foot / self.length
@@ -244,7 +248,10 @@ class Borehole(InWords, Part):
         values = [friction] * len(self.sections) if np.ndim(friction) == 0 else list(friction)
         if len(values) != len(self.sections):
             refuse(self, "friction", friction, f"a number, or {len(self.sections)}, one for each section of the hole")
-        sections = [replace(section, friction=value) for section, value in zip(self.sections, values, strict=True)]
+        try:
+            sections = [replace(section, friction=value) for section, value in zip(self.sections, values, strict=True)]
+        except SceneError as problem:
+            raise SceneError(self.path.told(str(problem))) from None
         found = copy(self)  # which was checked, and warned of
         store(found, sections=tuple(sections))
         return found

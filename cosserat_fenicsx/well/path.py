@@ -123,6 +123,17 @@ class WellPath(TubeAxis):
         loads = {"force": "klbf", "moment": "ft-lbf", "rad/m": "deg/100ft"} if self.unit == "ft" else {}
         return Units({"length": self.unit, **loads}).sentence(text)
 
+    def depth_told(self, depth, least=0.0, most=math.inf):
+        """A depth (m), as it was probably typed; and a question where as many feet are more than `least` and at most
+        `most` (m), else ""."""
+        given = f"{depth:.10g} m"
+        feet = depth / foot
+        if self.unit == "ft" and abs(feet - round(feet)) < 1e-6:  # typed in feet
+            return self.told(given), ""
+        found = given if self.unit == "m" else f"{given} ({self.told(given)})"
+        asks = least < depth * foot <= most * (1 + 1e-12)
+        return found, f"; if these are feet, write '{depth:.10g} ft'" if asks else ""
+
     @classmethod
     def from_csv(
         cls,

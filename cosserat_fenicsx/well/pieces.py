@@ -170,6 +170,17 @@ def checked_depth(owner, hole, string, operation, mud, depth, such="TripOut()"):
     return number(owner, "depth", depth, "a measured depth (m), positive", lambda x: x > 0)
 
 
+def within(what, hole, depth):
+    """Refuse a measured depth (m) outside a hole; what: it, in messages."""
+    if not 0 < depth <= hole.length * (1 + 1e-12):
+        found, feet = hole.path.depth_told(depth, most=hole.length)
+        told = hole.path.told(
+            f"expected a measured depth in the hole, which ends at {hole.length:.10g} m "
+            f"(survey {hole.path.length:.10g} m, sections {hole.sections[-1].to:.10g} m)"
+        )
+        raise SceneError(f"{what} = {found}: {told}{feet}")
+
+
 def pieces_of(hole, string, operation, mud, depth):
     """The `Pieces` of a string whose lower end is at a measured depth (m), and its components in their places. Raises
     SceneError: a string that does not fit the hole: too long, too short, too wide, or a hole that ends above it."""
@@ -185,10 +196,7 @@ def pieces_of(hole, string, operation, mud, depth):
 @per_scene
 def _in_place(hole, string, mud, depth):
     """What `pieces_of` returns, as far as it does not depend on the operation; and sentences on what floats."""
-    if not 0 < depth <= hole.length * (1 + 1e-12):
-        told = f"torque_and_drag: depth = {depth:.10g} m: expected a measured depth in the hole, which ends at "
-        told += f"{hole.length:.10g} m (survey {hole.path.length:.10g} m, sections {hole.sections[-1].to:.10g} m)"
-        raise SceneError(hole.path.told(told))
+    within("torque_and_drag: depth", hole, depth)
     laid = string.laid(depth, hole.path.told)
     ends = [place.top for place in laid]
     interfaces = [] if mud is None else mud.interfaces

@@ -64,7 +64,7 @@ from cosserat_fenicsx.well.assembly import LENGTH, BuildRate, assembly_of, build
 from cosserat_fenicsx.well.components import DrillString, in_columns
 from cosserat_fenicsx.well.hole import Borehole, Mud
 from cosserat_fenicsx.well.operations import Operation
-from cosserat_fenicsx.well.pieces import pieces_of
+from cosserat_fenicsx.well.pieces import pieces_of, within
 from cosserat_fenicsx.well.rod.rod_answer import check_rod
 from cosserat_fenicsx.well.solve import CONVENTIONS, ROD, check_settings, torque_and_drag
 from cosserat_fenicsx.well.sweep import DepthSweep, depth_sweep
@@ -194,6 +194,9 @@ class WellScene(InWords, Part):
             for value in friction if isinstance(friction, list) else [friction]:
                 hole.with_friction(value)
         self._check(settings, here)
+        with concerning("depth_sweep", "depths"):
+            if len(depths):
+                within(f"depth_sweep: depths[{depths.argmax()}]", hole, float(depths.max()))
         with concerning("depth_sweep"):
             self._check({**settings, **of_sweep}, self.string.fitting(depths))
         if self.strength is not None:

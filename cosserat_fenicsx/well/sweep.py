@@ -26,7 +26,7 @@ from cosserat_fenicsx.well.criteria import LockUp
 from cosserat_fenicsx.well.components import DrillString
 from cosserat_fenicsx.well.hole import Borehole, Mud
 from cosserat_fenicsx.well.operations import Operation
-from cosserat_fenicsx.well.pieces import pieces_of
+from cosserat_fenicsx.well.pieces import pieces_of, within
 from cosserat_fenicsx.well.solve import AUTO, BUCKLED, ROD, SOFT, torque_and_drag
 
 #: Numbers that are kept of an answer; `locked` is where the string locks up, m, or NaN; `model` the index of its model.
@@ -194,6 +194,7 @@ def depth_sweep(
     friction = tuple(friction) if isinstance(friction, Sequence | np.ndarray) else (friction,)
     holes = [hole if value is None else hole.with_friction(value) for value in friction]
     settings = {"mud": mud, "model": model, "tol": tol, "torque_convention": torque_convention}
+    within(f"depth_sweep: depths[{depths.argmax()}]", hole, float(depths.max()))
     for depth in (min(string.fitting(depths)), depths.max()):  # refuse misfits before the computation
         pieces_of(hole, string, operations[0], mud, float(depth))
     sweep = _empty(operations, depths, friction, string)

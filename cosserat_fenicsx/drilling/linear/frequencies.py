@@ -175,7 +175,8 @@ def _matched(name, string, inertia, depth, bit_inertia):
         string = DrillString((string,))
     instance(name, "string", string, DrillString, "a DrillString, a component or a Drilling")
     if depth is None and string.components[-1].length is None:
-        refuse(name, "depth", None, "depth= (m), the measured depth of the bit, or a length of the uppermost component")
+        ways = f"a length of the uppermost component, or {name}(scene, inertia) of a Drilling with a hole or a depth"
+        refuse(name, "depth", None, f"depth= (m), the measured depth of the bit, {ways}")
     scene = Drilling(string, TopDrive(0.0), BitOnRock(Stribeck(0.0, 0.0), inertia=bit_inertia), depth=depth)
     first = 2 * math.pi * natural_frequencies(scene, 1)[0]
     return PI(RULES[name] * scene.segments[0].torsional_impedance, inertia * first**2, name)
