@@ -142,7 +142,8 @@ class Units:
         elif units == "field":
             self._chosen = {name: dimension.field for name, dimension in DIMENSIONS.items()}
         elif not self.si:
-            for unit in map(str.strip, str(units).split(",")):
+            asked = [unit.strip() for unit in str(units).split(",")]
+            for unit in asked:
                 known = {name: unit for name, x in DIMENSIONS.items() if unit in x.units}
                 if not known:
                     raise SceneError(
@@ -151,7 +152,7 @@ class Units:
                         f"'{unit}' is none"
                     )
                 self._chosen |= known
-            if lost := [unit for unit in map(str.strip, str(units).split(",")) if unit not in self._chosen.values()]:
+            if lost := [unit for unit in asked if unit not in self._chosen.values()]:
                 raise SceneError(
                     f"units = {units!r}: '{lost[0]}' and a later one are units of the same kind: expected one of them "
                     "(a dict of units by dimensions, or 'field', has lengths apart from diameters)"

@@ -550,7 +550,7 @@ def test_depths_and_frictions_that_are_probably_in_other_units_are_told_as_typed
     words = r"to = 10000 ft: expected more than 6000 m \(19685 ft\), the section above; if .* feet, write '6000 ft'$"
     with pytest.raises(cf.SceneError, match=words):
         cf.well.Borehole(path, [cf.well.HoleSection(to, "8.5 in", 0.2) for to in (6000, "10000 ft")])
-    volve = Path(__file__).parents[1] / "demos" / "wells" / "volve_f12.toml"
+    volve = DEMOS / "wells" / "volve_f12.toml"
     text = volve.read_text(encoding="utf-8").replace("to = 3438.0, count", "to = 11000, count")
     (tmp_path / "well.toml").write_text(text, encoding="utf-8")
     (tmp_path / "volve_f12.csv").write_bytes(volve.with_suffix(".csv").read_bytes())

@@ -32,6 +32,11 @@ static inline void keep(vector a, double *to)
     *(place_of_vector *)to = a;
 }
 
+/* The symmetric part of a matrix A (n, n), of numbers or of vectors, takes its place. */
+#define TAKE_SYMMETRIC_PART(A, n) \
+    for (int i = 0; i < (n); i++) \
+        for (int j = 0; j < i; j++) (A)[i * (n) + j] = (A)[j * (n) + i] = 0.5 * ((A)[i * (n) + j] + (A)[j * (n) + i])
+
 enum { BESIDE = LANES }; /* numbers of a front that are taken together */
 
 static inline int round_down(int i)
@@ -82,8 +87,7 @@ static const double *element(kernel *k, int e, double *A)
     for (int i = 0; i < 2; i++) memcpy(x + 3 * i, k->x + 3 * (size_t)k->corners[2 * e + i], 3 * sizeof *x);
     memset(A, 0, k->size * sizeof *A);
     for (; k; k = k->next) ((tabulator *)k->tabulate)(A, coefficients(k, e), k->c, x, 0, 0 LAST);
-    for (int i = 0; i < n; i++)
-        for (int j = 0; j < i; j++) A[i * n + j] = A[j * n + i] = 0.5 * (A[i * n + j] + A[j * n + i]);
+    TAKE_SYMMETRIC_PART(A, n);
     return A;
 }
 
@@ -104,12 +108,7 @@ static const double *elements_together(kernel *k, int e, int count)
                 }
         ((tabulator *)k->together)(A, w, k->lanes_c, x, 0, 0 LAST);
     }
-    for (int i = 0; i < n; i++)
-        for (int j = 0; j < i; j++) {
-            double *a = A + LANES * (i * n + j), *b = A + LANES * (j * n + i);
-            const vector mean = 0.5 * (load(a) + load(b));
-            keep(mean, a), keep(mean, b);
-        }
+    TAKE_SYMMETRIC_PART((place_of_vector *)A, n);
     return A;
 }
 

@@ -101,8 +101,7 @@ static void tabulate_lanes(const lane_kernel *v, kernel *const *of, const int *i
         }
         ((lane_tabulator *)v->tabulate)(A, (const vector *)w, (const vector *)v->c, x, 0, 0 LAST);
     }
-    for (int i = 0; i < n; i++)
-        for (int j = 0; j < i; j++) A[i * n + j] = A[j * n + i] = 0.5 * (A[i * n + j] + A[j * n + i]);
+    TAKE_SYMMETRIC_PART(A, n);
 }
 
 /* ---- fronts ------------------------------------------------------------------------------------------------------ */

@@ -193,7 +193,7 @@ class Pattern(namedtuple("Pattern", "made_on_demand kind numbers evolutions leav
         content = code_cache.kept(compat.name_of("pattern", kind))
         if not content:
             return None
-        pattern = cls(*pickle.loads(content))
+        pattern = cls(*pickle.loads(content))  # no less safe than the compiled code: the folder is the user's own
         try:
             return pattern._replace(leaves=[(compat.from_names(*code), *places) for code, *places in pattern.leaves])
         except LookupError:  # somebody has removed the code

@@ -84,10 +84,9 @@ _COLUMNS = (
 
 def contacts_of(path, obstacle):
     """See `Path.contacts`."""
-    obstacles = [action for action in path.scene.actions if action.gaps is not None]
-    if not any(obstacle is one for one in obstacles):
+    if not any(obstacle is one for one in _obstacles(path.scene)):
         refuse("contacts", "obstacle", obstacle, "an obstacle of the scene, such as a Plane")
-    parts = [_of_rod(path, obstacle, i) for i, rod in enumerate(path.scene.rods) if obstacle.acts_on(rod)]
+    parts = [_of_rod(path, obstacle, *where) for where in _nodes_at(path, obstacle)]
     rod, s, gap, normal, pressure, friction, sticks, weight = (
         np.concatenate(arrays, axis=min(arrays[0].ndim - 1, 1)) for arrays in zip(*parts, strict=True)
     )
@@ -95,9 +94,8 @@ def contacts_of(path, obstacle):
     return Contacts(rod, s, gap, normal, pressure, friction, sticks, force, describe(obstacle))
 
 
-def _of_rod(path, obstacle, i):
-    rod, x = path.scene.rods[i], path.layout.node_s(path.rule.nodes)[i]
-    acting = [one for one in path.scene.actions if one.gaps is not None and one.acts_on(rod)]
+def _of_rod(path, obstacle, i, rod, x):
+    acting = [one for one in _obstacles(path.scene) if one.acts_on(rod)]
     found = {id(one): _gaps(path, one, rod, x) for one in acting}
     gap, normal = found[id(obstacle)]
     pressure = obstacle.stiffness * np.maximum(-gap, 0.0) if obstacle.law is None else _at_nodes(path, i, normal)
@@ -111,6 +109,16 @@ def _of_rod(path, obstacle, i):
     limit = obstacle.friction * pressure
     sticks = (gap < 0) & (np.linalg.norm(friction, axis=2) < _STICKS * limit)
     return np.full(len(x), rod.name), x * rod.length, gap, normal, pressure, friction, sticks, shares_of(path, i)
+
+
+def _obstacles(scene):
+    return [action for action in scene.actions if action.gaps is not None]
+
+
+def _nodes_at(path, obstacle):
+    """(number, rod, arc lengths (n,) of its nodes over the rod's) of the rods that an obstacle acts on."""
+    nodes = zip(path.scene.rods, path.layout.node_s(path.rule.nodes), strict=True)
+    return [(i, rod, x) for i, (rod, x) in enumerate(nodes) if obstacle.acts_on(rod)]
 
 
 def _gaps(path, obstacle, rod, x):
@@ -149,14 +157,11 @@ def contacts_in_words(path):
             yield from (f"{path.stage_label(stage)}: {sentence}" for sentence in contacts_in_words(part))
         return
     largest = path.largest_displacement().max(initial=0.0)
-    for obstacle in path.scene.actions:
-        if obstacle.gaps is None or not len(path):
-            continue
+    for obstacle in _obstacles(path.scene) if len(path) else ():
         depth = 0.0
-        for rod, x in zip(path.scene.rods, path.layout.node_s(path.rule.nodes), strict=True):
-            if obstacle.acts_on(rod):
-                gap, _ = _gaps(path, obstacle, rod, x)
-                depth = max(depth, -gap.min())
+        for _, rod, x in _nodes_at(path, obstacle):
+            gap, _ = _gaps(path, obstacle, rod, x)
+            depth = max(depth, -gap.min())
         if depth > 0 and obstacle.law is None and largest:
             yield (
                 f"{describe(obstacle)} lets rods in by up to {depth:.2g} m, {depth / largest:.1g} of the largest "
@@ -169,8 +174,8 @@ def contacts_in_words(path):
 def slanted(path, obstacle):
     """A sentence where an obstacle pushes along rods: a rod touches beside its nodes, where the normal is another."""
     rods = []
-    for i, (rod, x) in enumerate(zip(path.scene.rods, path.layout.node_s(path.rule.nodes), strict=True)):
-        if len(path) and obstacle.acts_on(rod):
+    for i, rod, x in _nodes_at(path, obstacle):
+        if len(path):
             s, moved = x * rod.length, path.motion(rod, x)[..., :3] * path.scales.length
             rods.append((rod, s, rod.curve.position(s) + moved, shares_of(path, i)))
     return _slanted(obstacle, rods, "more elements there, or a tol, which puts a node there")
@@ -180,11 +185,10 @@ def warn_of_contact(owner, state):
     """Give a warning where `slanted` has a sentence, of an `Equilibrium`, and where rods touch what is rough."""
     known = enumerate(state.scene.rods if state.scene.has_obstacles else ())
     rods = [(rod, state.s(rod), state.position(rod)[None], shares_of(state, i)) for i, rod in known]
-    for obstacle in state.scene.actions:
-        if obstacle.gaps is not None:
-            on = [x for x in rods if obstacle.acts_on(x[0])]
-            for words in _slanted(obstacle, on, "more elements: estimated errors do not contain it"):
-                warn(f"{owner}: {words}")
+    for obstacle in _obstacles(state.scene):
+        on = [x for x in rods if obstacle.acts_on(x[0])]
+        for words in _slanted(obstacle, on, "more elements: estimated errors do not contain it"):
+            warn(f"{owner}: {words}")
     rough = [describe(obstacle) for obstacle, *_, gap, _ in gaps_at(state) if obstacle.friction and (gap < 0).any()]
     for obstacle in dict.fromkeys(rough):
         warn(
@@ -217,16 +221,14 @@ def _slanted(obstacle, rods, expected):
 
 def lifting(path):
     """Sentences on rods that touch an obstacle at last without pressing on it, where stability depends on that."""
-    obstacles = [action for action in path.scene.actions if action.gaps is not None]
-    for obstacle in obstacles if len(path) and path.counts_modes else ():
+    for obstacle in _obstacles(path.scene) if len(path) and path.counts_modes else ():
         if path.negative_modes[-1] >= 0 and not obstacle.friction:
             continue
         last = path[len(path) - 1]
-        for rod, x in zip(path.scene.rods, path.layout.node_s(path.rule.nodes), strict=True):
-            if obstacle.acts_on(rod):
-                if where := _grazing(path.scene, rod, x * rod.length, _gaps(last, obstacle, rod, x)[0][-1]):
-                    yield f"{where} {describe(obstacle)} {_LIFTS}."
-                    break
+        for _, rod, x in _nodes_at(path, obstacle):
+            if where := _grazing(path.scene, rod, x * rod.length, _gaps(last, obstacle, rod, x)[0][-1]):
+                yield f"{where} {describe(obstacle)} {_LIFTS}."
+                break
 
 
 _LIFTS = (
@@ -250,12 +252,10 @@ def _grazing(scene, rod, s, gap):
 
 def grazing(path):
     """(states,) whether a rod touches an obstacle without pressing on it."""
-    found, obstacles = np.zeros(len(path), dtype=bool), [x for x in path.scene.actions if x.gaps is not None]
-    for rod, x in zip(path.scene.rods, path.layout.node_s(path.rule.nodes), strict=True) if len(path) else ():
-        for obstacle in obstacles:
-            if obstacle.acts_on(rod):
-                s = x * rod.length
-                found |= _grazes(path.scene, rod, s, _gaps(path, obstacle, rod, x)[0]).any(axis=1)
+    found = np.zeros(len(path), dtype=bool)
+    for obstacle in _obstacles(path.scene) if len(path) else ():
+        for _, rod, x in _nodes_at(path, obstacle):
+            found |= _grazes(path.scene, rod, x * rod.length, _gaps(path, obstacle, rod, x)[0]).any(axis=1)
     return found
 
 
@@ -264,8 +264,8 @@ def gaps_at(state):
     `Equilibrium`, for each obstacle and each rod that it acts on."""
     known = enumerate(state.scene.rods if state.scene.has_obstacles else ())
     rods = [(rod, i, state.s(rod), state.position(rod)) for i, rod in known]
-    for obstacle in state.scene.actions:
-        for rod, i, s, r in rods if obstacle.gaps is not None else ():
+    for obstacle in _obstacles(state.scene):
+        for rod, i, s, r in rods:
             if obstacle.acts_on(rod):
                 yield obstacle, rod, i, s, *obstacle.gaps(rod, s, r)
 
@@ -299,9 +299,8 @@ def refuse_grazing(state, owner):
 
 def least_gap(path):
     """The smallest gap of a node from an obstacle in all states, m."""
-    rods = list(zip(path.scene.rods, path.layout.node_s(path.rule.nodes), strict=True))
-    obstacles = [action for action in path.scene.actions if action.gaps is not None]
-    return min(_gaps(path, one, rod, x)[0].min() for one in obstacles for rod, x in rods if one.acts_on(rod))
+    at = ((obstacle, rod, x) for obstacle in _obstacles(path.scene) for _, rod, x in _nodes_at(path, obstacle))
+    return min(_gaps(path, *where)[0].min() for where in at)
 
 
 def check_passes(path, share=1e-2, whole=None):
@@ -312,13 +311,11 @@ def check_passes(path, share=1e-2, whole=None):
         for part in path.parts.values():
             check_passes(part, share, whole=path)
         return
-    obstacles = [action for action in path.scene.actions if action.gaps is not None]
+    obstacles = _obstacles(path.scene)
     moved = path.largest_displacement() if obstacles else None
     for obstacle in obstacles:
         allowed = np.minimum(share * moved, _SHALLOW * obstacle.largest_step)
-        for rod, x in zip(path.scene.rods, path.layout.node_s(path.rule.nodes), strict=True):
-            if not obstacle.acts_on(rod):
-                continue
+        for _, rod, x in _nodes_at(path, obstacle):
             depth = np.maximum(-_gaps(path, obstacle, rod, x)[0], 0.0)
             places = max(_BETWEEN, math.ceil(np.diff(x).max() * rod.length / obstacle.largest_step))
             between = x[:-1, None] + np.diff(x)[:, None] * np.arange(1, places + 1) / (places + 1)

@@ -29,6 +29,8 @@ from cosserat_fenicsx.quantities import Quantity
 from cosserat_fenicsx.parts import per_scene
 from cosserat_fenicsx.results.result import Result, by_name
 
+# What the answer leaves out.
+_SMALL = "Of small motions alone: large ones, such as stick-slip from rest, may go on where no mode grows (`simulate`)."
 # Growth below this share of the root is rounding: a mode without losses.
 _NEUTRAL = 1e-11
 # A bit whose speed changes by less than this share of it is not disturbed: the rest is rounding.
@@ -505,9 +507,6 @@ def _advice(answer, rows, names):
 
 def _frequencies(answer, rows):
     return ", ".join(f"{answer.frequency[i, j, k]:.3g}" for k, i, j, _ in sorted(rows)) + " Hz"
-
-
-_SMALL = "Of small motions alone: large ones, such as stick-slip from rest, may go on where no mode grows (`simulate`)."
 
 
 def _case_units(units):

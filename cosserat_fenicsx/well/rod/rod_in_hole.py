@@ -139,8 +139,8 @@ def solve_in_hole(path, lengths, stiffness, weight, contact_radius, *, wall_stif
 
 
 class Work:
-    """What a search for an equilibrium may cost: `left`, elements times Newton steps, of which a second takes about 30
-    000. So where it ends does not depend on the machine. seconds: about how long it may take."""
+    """What a search for an equilibrium may cost: `left`, elements times Newton steps, of which a second takes about
+    3e4. So where it ends does not depend on the machine. seconds: about how long it may take."""
 
     def __init__(self, seconds):
         self._seconds, self.left = seconds, _STEPS * seconds

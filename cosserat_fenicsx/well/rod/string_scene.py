@@ -185,10 +185,15 @@ class StringScene:
         return along + above[-1] - (above[part] + self.weight[part] * (at - z[part]))
 
     @cached_property
+    def _sampled(self):
+        """The axis at points along the string, and section and tension (N) of what lies between these."""
+        s = np.linspace(0.0, self.ends[-1], _SET.samples)
+        return self.near(s), self.section_at(s)[1:], self.tension(s)[:-1]
+
+    @cached_property
     def _typical(self):
         """A lateral load that few of the string are above, N/m."""
-        s = np.linspace(0.0, self.ends[-1], _SET.samples)
-        near, at, tension = self.near(s), self.section_at(s)[1:], self.tension(s)[:-1]
+        near, at, tension = self._sampled
         down = np.array([0.0, 0.0, 1.0]) - near.tangent[:, 2:] * near.tangent
         load = tension[:, None] * near.curvature[1:] + self.weight[at, None] * down[1:]
         return max(np.quantile(np.linalg.norm(load, axis=1), _SET.typical), _SET.least * self.weight.max())
@@ -204,8 +209,7 @@ class StringScene:
         move it by about twice the clearance c, and in which its compression F does not buckle it; over the wall's
         stiffness. The moment EI k acts within the length sqrt(8 c/k), which gives EI k^2/(16 c^2); F^2/(4 EI) prevents
         buckling."""
-        s = np.linspace(0.0, self.ends[-1], _SET.samples)
-        near, at, tension, typical = self.near(s), self.section_at(s)[1:], self.tension(s)[:-1], self._typical
+        (near, at, tension), typical = self._sampled, self._typical
         EI = self.bending[at]
         buckles = (np.minimum(tension, 0.0) ** 2 / (4 * EI)).max()
         bends = (EI * (near.curvature[1:] ** 2).sum(axis=1)).max() / (16 * self.clearance**2)
