@@ -17,7 +17,7 @@ from cosserat_fenicsx.numerics import svd
 
 # Eigenvalues below this fraction of the shift are not resolved: the solver returns combinations of their vectors.
 _BLURRED = 1e-5
-# Values of x^T K x below this times a bound on their rounding error count as zero; errors reach a fifth of it.
+# Values of x^T K x below this times a bound on their rounding error count as zero; typical errors are a fifth of it.
 _SAFETY, _TYPICAL = 2.0, 0.2
 # Eigenvalues with a smaller relative difference are counted as one multiple eigenvalue.
 _TOGETHER = 1e-6
@@ -374,7 +374,8 @@ class QuadraticPencil:
             x = X @ turns[:, j]
             x = x / np.linalg.norm(x)
             value = roots[j]
-            error = _TYPICAL * np.finfo(float).eps * np.max(bound.T @ (self._K_sizes @ np.abs(x)))
+            scale = np.max(bound.T @ (self._K_sizes @ np.abs(x)))
+            error = _SAFETY * _TYPICAL * np.finfo(float).eps * scale
             if abs(value.imag) <= max(_REAL * abs(value), error):
                 value = complex(value.real)
             if value.imag >= 0:
