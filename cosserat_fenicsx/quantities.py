@@ -32,7 +32,7 @@ _PREFIXED = {
 }
 # Numbers, also "a to b", with a unit in a sentence, and no longer unit after it.
 _NUMBER = r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?"
-_UNIT = r"(m|k?N m|N/m|k?N|kJ|Pa|deg/30m)"
+_UNIT = r"(m|k?N m|N/m|k?N|kJ|Pa|deg/30m|kg/m\^3)"
 _NUMBERS = rf"{_NUMBER}(?: (?:to|and) {_NUMBER})?|\({_NUMBER}(?:, {_NUMBER})*\)"
 _WITH_UNIT = re.compile(rf"(?<![\w.])({_NUMBERS}) {_UNIT}(?![\w/^]| m\b| s\b)")
 _SI = {"kN m": ("N m", 1e3), "kN": ("N", 1e3), "kJ": ("J", 1e3), "deg/30m": ("rad/m", units.deg_per_30m)}
@@ -181,8 +181,8 @@ class Units:
         return f"{value / size:{form}} {shown}"
 
     def sentence(self, text: str) -> str:
-        """A sentence with its lengths, forces, forces per length, moments, stresses and energies in these units, with
-        as many digits as it has, at least three."""
+        """A sentence with its lengths, forces, forces per length, moments, stresses, energies and densities in these
+        units, with as many digits as it has, at least three."""
         return text if self.si else _WITH_UNIT.sub(self._again, text)
 
     def _again(self, found):

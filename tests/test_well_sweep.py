@@ -200,7 +200,7 @@ def test_friction_from_measurements():
     assert f"deviations: 10 kN of hook loads {assumed} and 500 N m of surface torques {assumed}." in " ".join(
         str(noisy).split()
     )
-    assert f"2.24809 klbf of hook loads {assumed} and 368.781 ft-lbf of" in " ".join(noisy.summary("field").split())
+    assert f"2.248 klbf of hook loads {assumed} and 368.8 ft-lbf of" in " ".join(noisy.summary("field").split())
     block = cf.well.calibrate_friction(HOLE, STRING, measured(0.0, 250e3), mud=MUD, block_weight=None)
     assert block.block_weight == pytest.approx(250e3, rel=1e-6) and block.friction == pytest.approx(
         [0.2, 0.3], abs=1e-6
@@ -222,6 +222,27 @@ def test_readings_that_do_not_fit_are_doubted(wrong, words):
     with pytest.warns(cf.SceneWarning, match=words):
         found = cf.well.calibrate_friction(HOLE, STRING, changed, mud=MUD)
     assert f"DOUBTFUL: misfit {found.misfit:.3g} where 1" in str(found)
+
+
+@pytest.mark.once
+def test_a_wrong_weight_of_the_string_is_not_taken_for_friction():
+    """Friction makes hook loads up and down differ, and leaves that of a string that rotates: another mud does not."""
+    exact, kinds = measured(0.2), {"rotate off bottom": OPERATIONS[2:], "trip in": OPERATIONS[:2]}
+    for name, operations in kinds.items():
+        readings = [m for m in exact if m.operation in operations]
+        right = cf.well.calibrate_friction(HOLE, STRING, readings, mud=MUD)
+        assert not right.doubts and right.weight_change[0] < 0 < right.weight_change[1] < 0.01, name
+        with pytest.warns(cf.SceneWarning, match="trend that friction cannot make.*check the mud weight"):
+            wrong = cf.well.calibrate_friction(HOLE, STRING, readings, mud=cf.well.Mud(1440.0))
+        assert wrong.misfit < 1.5 and "DOUBTFUL: the residuals have a trend" in str(wrong)
+        found = float(wrong.doubts[0].partition("as in mud of ")[2].split()[0])
+        assert found == pytest.approx(1200, abs=25)
+        assert ("RotateOffBottom, are 14.3 kN above" in wrong.doubts[0]) == (name == "rotate off bottom")
+    assert "in place of 12.02 ppg" in " ".join(wrong.summary("field").split())
+    with pytest.warns(cf.SceneWarning, match=r"trend .* with \+29.8 kN on block and top drive"):
+        cf.well.calibrate_friction(HOLE, STRING, measured(0.2, 30e3), mud=MUD)
+    out = cf.well.calibrate_friction(HOLE, STRING, [m for m in exact if m.operation == OPERATIONS[0]], mud=MUD)
+    assert "do not tell a wrong weight of the string in mud from friction" in str(out).replace("\n", " ")
 
 
 @pytest.mark.once

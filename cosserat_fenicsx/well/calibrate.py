@@ -6,6 +6,7 @@ least squares of the others are the answer. The deviation is 1, as the readings'
 scatter more, 1.48 times the median distance, which for a normal distribution is the same.
 """
 
+import math
 import warnings
 from collections import namedtuple
 from collections.abc import Sequence
@@ -14,7 +15,7 @@ from functools import lru_cache, partial
 from typing import Annotated
 
 import numpy as np
-from scipy.optimize import least_squares
+from scipy.optimize import least_squares, lsq_linear
 from scipy.stats import t as student
 
 from cosserat_fenicsx.checks import instance, number, refuse, warn
@@ -22,7 +23,7 @@ from cosserat_fenicsx.errors import SceneError, SceneWarning
 from cosserat_fenicsx.parts import Depth, ForceSize, Part, Torque, positive
 from cosserat_fenicsx.quantities import Quantity
 from cosserat_fenicsx.results.result import Charted, by_name
-from cosserat_fenicsx.well.components import DrillString
+from cosserat_fenicsx.well.components import STEEL, DrillString
 from cosserat_fenicsx.well.hole import Borehole, Mud
 from cosserat_fenicsx.well.operations import Operation, doubt_load
 from cosserat_fenicsx.well.solve import BUCKLED, SOFT, torque_and_drag
@@ -31,6 +32,8 @@ from cosserat_fenicsx.well.solve import BUCKLED, SOFT, torque_and_drag
 # Deviations beyond which a reading is an outlier; the largest share of the readings that may be; the scales of Cauchy's
 # loss, one after the other, in deviations; the median distance of a normal distribution, over its deviation, inverted.
 _FAR, _MOST, _SCALES, _MEDIAN = 5.0, 0.3, (4.0, 2.0, 1.0), 1.4826
+# Width (%) of the interval of a change of the string's weight up to which readings tell whether it is right.
+_TELLS = 5.0
 _TOLERANCES = {"xtol": 1e-10, "ftol": 1e-12, "gtol": 1e-12}
 
 
@@ -124,6 +127,11 @@ class _Fit:
     bad: float = 3.0  # misfit above which readings or string are wrong; its fall where the cause is found
     other_unit: float = 50.0  # least factor between hook loads in different units
     singular: float = 1e-6  # smallest singular value of the sensitivities, over the largest one
+    # A trend is a change of the string's weight, or the block's over it, above this, and beyond what scatter explains
+    # with this probability, or by as many standard deviations as they are given.
+    trend: float = 0.01
+    sure: float = 0.99
+    deviations: float = 3.3
 
 
 _SET = _Fit()
@@ -189,8 +197,11 @@ class FrictionFit(Charted):
             were left out.
         misfit: root of the sum of squares of the residuals that are kept, over the readings in excess: 1 where the
             standard deviations are right.
-        doubts: sentences on readings that were left out, on possible mistakes where the misfit is far above 1, and on a
-            bend, which the models of the fit have not; also given as warnings.
+        weight_change: (2,) confidence interval of the relative change of the string's weight in mud with which the
+            readings would fit best, of the linearised problem; NaN where they do not tell it from friction.
+        doubts: sentences on readings that were left out, on possible mistakes where the misfit is far above 1 or the
+            residuals have a trend that friction cannot make, and on a bend, which the models of the fit have not; also
+            given as warnings.
         measurements: as given.
     """
 
@@ -205,6 +216,7 @@ class FrictionFit(Charted):
     residuals: np.ndarray
     kept: np.ndarray
     misfit: float
+    weight_change: np.ndarray
     doubts: tuple[str, ...] = ()
     measurements: tuple[RigMeasurement, ...] = ()
 
@@ -219,6 +231,7 @@ class FrictionFit(Charted):
         Quantity("block_interval", unit="N", parts=("from", "to"), axes=()),
         Quantity("residuals", axes=("reading",)),
         Quantity("misfit", axes=()),
+        Quantity("weight_change", parts=("from", "to"), axes=()),
     )  # fmt: skip
     _on_screen = ("section", "to", "friction", "interval")
 
@@ -231,6 +244,12 @@ class FrictionFit(Charted):
         yield f"Coefficients of friction by least squares, with {100 * self.confidence:g} % intervals."
         yield f"misfit {self.misfit:.3g} (1: as the standard deviations say)"
         yield f"Standard deviations: {' and '.join(self._deviations(units))}."
+        low, high = 100 * self.weight_change
+        if high - low < _TELLS:
+            yield f"The readings fit best with {low:+.2g} to {high:+.2g} % on the string's weight in mud."
+        else:
+            yield ("The readings do not tell a wrong weight of the string in mud from friction; hook loads of "
+                   "RotateOffBottom do, which friction hardly changes.")  # fmt: skip
         for section, friction in zip(self.quantities["section"].of(self), self.friction, strict=True):
             if friction < 1e-6:
                 yield f"The friction of section {section} is at 0, its bound: the readings ask for less than none."
@@ -244,7 +263,7 @@ class FrictionFit(Charted):
         for query, name, unit in (("hook_load", "hook_load_sd", "N"), ("surface_torque", "torque_sd", "N m")):
             sizes = sorted({x.sd for x in self._readings if x.query == query})
             if sizes:
-                told = " to ".join(dict.fromkeys(units.told(x, unit) for x in (sizes[0], sizes[-1])))
+                told = " to ".join(dict.fromkeys(units.told(x, unit, form=".4g") for x in (sizes[0], sizes[-1])))
                 assumed = " (assumed where none is given)" if getattr(RigMeasurement, name) in sizes else ""
                 yield f"{told} of {query.replace('_', ' ')}s{assumed}"
 
@@ -342,20 +361,29 @@ def calibrate_friction(
     doubts = tuple(_left_out(readings, found))
     if string.bent:
         doubts += (f"the bend of {string.bent} is not in the {model} string: its friction counts as the hole's",)
+    hung = np.array([x.value for x in readings]) - found.residuals * sd - block * of_block  # as computed
+    hung += [x.at.operation.weight if x.query == "hook_load" else -x.at.operation.torque for x in readings]
+    changes = {"string": _changed(found, -hung / sd, bounds, confidence)}
+    if not unknown_block and of_block.any():
+        changes["block"] = _changed(found, -np.abs(hung * of_block).max() * of_block / sd, bounds, confidence)
+    trend = tuple(_trend(readings, found, misfit, changes, np.abs(hung * of_block).max(), mud))
     if misfit > _SET.bad:
         with_block = partial(calibrate_friction, hole, string, measurements, mud=mud, block_weight=None, model=model,
                              torque_convention=torque_convention)  # fmt: skip
         doubts += (
             f"misfit {misfit:.3g} where 1 is as the standard deviations say: neither coefficients nor intervals are to "
             "be relied on",
-            *_causes(readings, found.residuals * sd, misfit, None if unknown_block else with_block),
+            *_causes(readings, found.residuals * sd, misfit, None if unknown_block else with_block, trend),
         )
+    else:
+        doubts += trend
     if doubts:
         warn(hole.path.told(f"calibrate_friction: {'; '.join(doubts)}"))
     return FrictionFit(
         hole.with_friction(friction), friction, np.maximum(ends[:sections], 0.0), block,
         ends[-1] if unknown_block else np.full(2, np.nan), confidence, found.correlation,
-        found.spread * scale, found.residuals, found.kept, misfit, doubts, tuple(measurements),
+        found.spread * scale, found.residuals, found.kept, misfit, changes["string"].interval, doubts,
+        tuple(measurements),
     )  # fmt: skip
 
 
@@ -371,8 +399,57 @@ def _left_out(readings, found):
             )
 
 
-def _causes(readings, apart, misfit, with_block):
-    """Sentences on why readings may not fit, by their differences (n,); `with_block`: a fit of the block's weight."""
+#: One more unknown, linearised: its best value, its confidence interval (2,), the misfit with it, and whether it is of
+#: a size that scatter does not explain.
+_Change = namedtuple("_Change", "value interval misfit sure")
+
+
+def _changed(found, column, bounds, confidence):
+    """The `_Change` of an unknown beside those of an `Estimate`, from the derivatives (n,) of all residuals by it."""
+    column, excess = column[found.kept], found.excess - 1
+    apart = column - found.jacobian @ np.linalg.lstsq(found.jacobian, column, rcond=None)[0]
+    size = np.linalg.norm(apart)
+    if excess < 1 or size <= _SET.singular * np.linalg.norm(column):
+        return _Change(np.nan, np.full(2, np.nan), np.inf, False)
+    limits = [np.append(x - found.values, far) for x, far in zip(bounds, (-np.inf, np.inf), strict=True)]
+    best = lsq_linear(np.column_stack([found.jacobian, column]), -found.residuals[found.kept], limits)
+    value, misfit = best.x[-1], math.sqrt(2 * best.cost / excess)
+    half = student.ppf((1 + confidence) / 2, excess) * misfit / size
+    least = min(student.ppf((1 + _SET.sure) / 2, excess) * misfit, _SET.deviations * max(1.0, misfit)) / size
+    return _Change(value, np.array([value - half, value + half]), misfit, abs(value) > max(_SET.trend, least))
+
+
+def _trend(readings, found, misfit, changes, largest, mud):
+    """A sentence on residuals that another weight of the string (the whole of it), or of the block (N over `largest`),
+    would explain and friction does not, by their `changes`."""
+    told = []
+    for name, change in sorted(changes.items(), key=lambda x: x[1].misfit):
+        if change.sure and name == "string":
+            uniform = mud is not None and not isinstance(mud.density, tuple)
+            other = mud.density - change.value * (STEEL.density - mud.density) if uniform else -1.0
+            fluid = f", as in mud of {other:.4g} kg/m^3 in place of {mud.density:.4g} kg/m^3" if other > 0 else ""
+            told.append(f"{100 * change.value:+.2g} % on the string's weight in mud{fluid}")
+        elif change.sure:
+            told.append(f"{change.value * largest / 1e3:+.3g} kN on block and top drive")
+        if change.sure:
+            told[-1] += f" (misfit {change.misfit:.2g})"
+    if not told:
+        return
+    turning = [found.residuals[i] * x.sd for i, x in enumerate(readings)
+               if x.query == "hook_load" and found.kept[i] and x.at.operation.direction(1.0)[0] == 0]  # fmt: skip
+    mean = np.mean(turning or 0.0) / 1e3
+    side = f"{abs(mean):.3g} kN {'above' if mean > 0 else 'below'}"
+    seen = f": hook loads without drag, as of RotateOffBottom, are {side} those computed" if turning else ""
+    yield (
+        f"the residuals have a trend that friction cannot make{seen}. They would fit better than now (misfit "
+        f"{misfit:.2g}), and with other friction, with {' or with '.join(told)}: check the mud weight, weights and "
+        "lengths of the string, and block_weight"
+    )
+
+
+def _causes(readings, apart, misfit, with_block, trend):
+    """Sentences on why readings may not fit, by their differences (n,) and their `_trend`; `with_block`: a fit of the
+    block's weight."""
     hooks = [(x.at, x.value - more) for x, more in zip(readings, apart, strict=True) if x.query == "hook_load"]
     sizes = sum(abs(m.hook_load) for m, _ in hooks), sum(abs(computed) for _, computed in hooks)
     if hooks and not sizes[1] / _SET.other_unit < sizes[0] < sizes[1] * _SET.other_unit:
@@ -395,7 +472,9 @@ def _causes(readings, apart, misfit, with_block):
             f"{free.block_weight / 1e3:.4g} kN: hook loads include them unless they were subtracted"
         )
     else:
-        yield "expected depths in m, hook loads in N, torques in N m, and the string and mud of the readings"
+        yield from trend or [
+            "expected depths in m, hook loads in N, torques in N m, and the string and mud of the readings"
+        ]
 
 
 def _check_determined(hole, sensitivity, unknown_block):

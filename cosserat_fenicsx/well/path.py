@@ -120,8 +120,8 @@ class WellPath(TubeAxis):
 
     def told(self, text):
         """A sentence with its lengths in the unit of the survey; its loads in field units where these are feet."""
-        loads = {"force": "klbf", "moment": "ft-lbf", "rad/m": "deg/100ft"} if self.unit == "ft" else {}
-        return Units({"length": self.unit, **loads}).sentence(text)
+        field = {"force": "klbf", "moment": "ft-lbf", "rad/m": "deg/100ft", "density": "ppg"}
+        return Units({"length": self.unit, **(field if self.unit == "ft" else {})}).sentence(text)
 
     def depth_told(self, depth, least=0.0, most=math.inf):
         """A depth (m), as it was probably typed; and a question where as many feet are more than `least` and at most
