@@ -52,6 +52,19 @@ def test_reference_limits(case):
         assert cf.drilling.limit_speed(scene, weights["180"], up_to=BAND) == pytest.approx(180 * RPM, rel=1e-9)
 
 
+def test_limit_speeds_by_drive():
+    """Each is that of `limit_speed` with that drive; a tuned one calms the first mode from a lower speed on."""
+    scene = pipe_and_collars("tuned")
+    answer = cf.drilling.stability(scene, weights=[40e3, 80e3])
+    assert answer.speeds[[0, -1]] == pytest.approx([20 * RPM, 200 * RPM]) and len(answer.speeds) == 19
+    limits = answer.limit_speeds
+    assert limits["PI (own)"][1] == cf.drilling.limit_speed(scene, 80e3) and limits["PI (own)"][0] < limits["stiff"][0]
+    assert all(first <= every for first, every in limits.values())
+    assert f"PI (own) {limits['PI (own)'][0] / RPM:.4g} rpm" in " ".join(str(answer).split())
+    cutting = replace(scene, bit=cf.drilling.BitOnRock(cf.drilling.Cutting(0.1, 60e6, 0.6, 4), 50e3))
+    assert not replace(answer, scene=cutting).limit_speeds
+
+
 def test_a_string_without_losses():
     """Any falling torque makes it grow; none leaves it as it is."""
     scene = pipe_and_collars(drag=0.0)

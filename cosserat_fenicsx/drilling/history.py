@@ -6,13 +6,15 @@ from typing import Any
 import numpy as np
 
 from cosserat_fenicsx.checks import File, number, positive, refuse
-from cosserat_fenicsx.drilling.choose import fastest
+from cosserat_fenicsx.drilling.choose import chosen, fastest, model_of
 from cosserat_fenicsx.drilling.joints import fastest_rotor
 from cosserat_fenicsx.drilling.linear_control import ZTorque
 from cosserat_fenicsx.drilling.protocol import LEDGER, PROFILE, SERIES, columns
 from cosserat_fenicsx.drilling.scene import Drilling
 from cosserat_fenicsx.drilling.stick_slip import SPEED, TORQUE, StickSlip, alias, stick_slip_of
-from cosserat_fenicsx.errors import SceneError, nearest
+from cosserat_fenicsx.drilling.top_drive import TopDrive
+from cosserat_fenicsx.errors import NotConverged, SceneError, nearest
+from cosserat_fenicsx.parts import per_scene
 from cosserat_fenicsx.quantities import Quantity, as_text
 from cosserat_fenicsx.results import screen
 from cosserat_fenicsx.results.result import ChartedBetween, by_name
@@ -67,13 +69,28 @@ _CAPTION = (
 
 
 def _without_torque(scene):
-    """A sentence on a `ZTorque` without a torque, from rest, under which a bit never turned; else ""."""
+    """A sentence on a `ZTorque` from rest that stands before it frees the bit; else ""."""
     control, speed = scene.drive.control, scene.drive.speed
-    if scene.start != "rest" or not isinstance(control, ZTorque) or control.torque is not None or callable(speed):
+    if scene.start != "rest" or not isinstance(control, ZTorque) or callable(speed):
         return ""
-    Z = control.impedance or scene.segments[0].torsional_impedance
-    return (f"ZTorque without torque= has the speed asked for at 0 N m, from rest, and stands at {Z * speed:.4g} N m: "
-            'expected torque= (N m), that of the steady rotation, or start="steady".')  # fmt: skip
+    Z, level = control.impedance or scene.segments[0].torsional_impedance, control.torque
+    has = "is 0 from rest where it is not given" if level is None else f"is {level / 1e3:.4g} kN m"
+    most = ((level or 0.0) + Z * speed) / 1e3
+    return (f"A ZTorque turns slower the larger the torque, and stands at {most:.4g} kN m: torque=, at which it has "
+            f"the speed asked for, {has}. Expected that of the steady rotation"
+            f'{_steady_torque(scene)}, or start="steady".')  # fmt: skip
+
+
+@per_scene
+def _steady_torque(scene):
+    """" (about ... kN m)": that at the surface in steady rotation; "" where none is found."""
+    turning = replace(scene, drive=TopDrive(scene.drive.speed), start="steady")
+    try:
+        name, _ = chosen(turning)
+        torque = model_of(turning, name).advance(1)[0, 1 + SERIES.index("surface_torque")]
+    except (SceneError, NotConverged):
+        return ""
+    return f" (about {torque / 1e3:.3g} kN m)"
 
 
 class DrillingHistory(ChartedBetween):

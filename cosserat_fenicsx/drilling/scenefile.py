@@ -47,7 +47,7 @@ from cosserat_fenicsx.drilling.fitting import DrillingFit, fit, ranges_of
 from cosserat_fenicsx.drilling.history import DrillingHistory
 from cosserat_fenicsx.drilling.linear import frequencies
 from cosserat_fenicsx.drilling.linear.response import FrequencyResponse, frequency_response
-from cosserat_fenicsx.drilling.linear.stability import Stability, stability
+from cosserat_fenicsx.drilling.linear.stability import SPEEDS, Stability, stability
 from cosserat_fenicsx.drilling.motion import check_arguments as check_simulation
 from cosserat_fenicsx.drilling.motion import simulate
 from cosserat_fenicsx.drilling.readings import READ, Readings
@@ -138,7 +138,7 @@ class StabilityMap(Part):
         up_to, kind: as for `stability`.
     """
 
-    speeds: Annotated[Sequence[float], Values(Number("angular velocity", positive()))]
+    speeds: Annotated[Sequence[float], Values(Number("angular velocity", positive()))] = SPEEDS
     weights: Annotated[Sequence[float], Values(Number("force", positive()))] | None = None
     up_to: Annotated[Frequency, positive()] = 10.0
     kind: Literal["torsion", "axial"] = "torsion"

@@ -34,7 +34,8 @@ class StickSlip:
         stuck: share of the time that the bit is at rest, over whole periods where there are some; 1 where it never
             turns.
         severity: half the range of the bit's speed over the mean speed of the drive, or of the bit where the drive
-            stands: 0 for a steady rotation, 1 and more where the bit comes to rest; NaN where both stand in the mean.
+            stands: 0 for a steady rotation, 1 and more where the bit comes to rest; NaN where both stand in the mean,
+            and for a bit that never turned.
         torque: (smallest, largest) surface torque, N m. bit_torque: the same at the bit.
         caution: a sentence where the bit stays in an unstable steady state that nothing disturbs, or where a `ZTorque`
             has no torque to free it; else "".
@@ -108,7 +109,7 @@ class StickSlip:
             what = f"stick-slip: {again}{speed}, at rest {100 * self.stuck:.3g} % of the time"
         low, high = (as_text(x / size, 4) for x in self.torque)
         told = f"From {self.since:g} to {self.until:g} s: {what}; surface torque {low} to {high} {moment}."
-        return f"{told} {self.caution}".rstrip()
+        return f"{told} {Units(units).sentence(self.caution)}".rstrip()
 
 
 def crossings(times, speed, level, fast):
@@ -145,10 +146,11 @@ def stick_slip_of(history, since):
     slow = whole & (np.abs(bit[1:]) <= level) & (np.abs(bit[:-1]) <= level)
     of = abs(mean_drive) if abs(mean_drive) > AT_REST * abs(mean) else abs(mean)
     torque, bit_torque = history.surface_torque[rows], history.torque_on_bit[rows]
+    stuck = float(lengths[slow].sum() / lengths[whole].sum())
     return StickSlip(
         float(t[0]), float(t[-1]), mean_drive, mean, float(bit.max()), float(bit.min()),
         float(periods.mean()) if len(periods) else np.nan, periods, starts, stops,
-        float(lengths[slow].sum() / lengths[whole].sum()), float(np.ptp(bit) / 2 / of) if of else np.nan,
+        stuck, float(np.ptp(bit) / 2 / of) if of and stuck < 1 else np.nan,
         (float(torque.min()), float(torque.max())), (float(bit_torque.min()), float(bit_torque.max())),
     )  # fmt: skip
 

@@ -185,6 +185,13 @@ def _doubt_drive(owner, scene, up_to):
         warn(f"{owner}: at every speed and weight {fed}")
 
 
+def searches(scene):
+    """Whether `limit_speed` looks at many speeds, for seconds: friction at the wall falls with the slip, a motor
+    turns what is below, or the bit cuts."""
+    cuts = scene.bit is not None and scene.bit.law.drills
+    return cuts or _falls_at_wall(scene) or scene.motor is not None
+
+
 def _falls_at_wall(scene):
     """Whether friction at the wall falls with the slip."""
     return scene.hole is not None and scene.friction is not None and scene.friction.decays
@@ -218,15 +225,14 @@ def limit_speed(
     """
     up_to = positive("limit_speed", "up_to", up_to, "Hz")
     _doubt_drive("limit_speed", scene, up_to)
-    searched = _falls_at_wall(scene) or scene.motor is not None
-    if scene.bit is None and not searched:
+    if scene.bit is None and not searches(scene):
         refuse(scene, "bit", None, "a BitOnRock with a law, or a WallFriction that falls with the slip")
     if weight is not None:
         weight = positive("limit_speed", "weight", weight, "N")
     elif scene.bit is not None:
         weight = scene.bit.weight
     steady = Steady(scene)
-    if steady.cuts or searched:
+    if searches(scene):
         return _searched_limit(steady, weight, up_to, between, points)
     law = scene.bit.law.resistance(weight)
     if law is None or law.steepest == 0:

@@ -1,6 +1,7 @@
 """Growth of the modes of a string that drills steadily, over speed and weight; their shapes, and other drives."""
 
 import math
+import warnings
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -19,15 +20,16 @@ from cosserat_fenicsx.drilling.linear.characteristic import (
 from cosserat_fenicsx.drilling.linear.frequencies import SoftSpeed, SoftTorque, natural_frequencies, own_rule, with_rule
 from cosserat_fenicsx.drilling.linear.excitation import Hfto, oscillations
 from cosserat_fenicsx.drilling.linear.impedances import Disc
-from cosserat_fenicsx.drilling.linear.limits import fed_waves
+from cosserat_fenicsx.drilling.linear.limits import fed_waves, limit_speed, searches
 from cosserat_fenicsx.drilling.linear.roots import all_roots, follow
 from cosserat_fenicsx.drilling.scene import Drilling
 from cosserat_fenicsx.drilling.stick_slip import SPEED, WEIGHT
 from cosserat_fenicsx.drilling.top_drive import Matched, Stiff, TopDrive
-from cosserat_fenicsx.errors import NotConverged, SceneError
+from cosserat_fenicsx.errors import NotConverged, SceneError, SceneWarning
 from cosserat_fenicsx.quantities import Quantity
 from cosserat_fenicsx.parts import per_scene
 from cosserat_fenicsx.results.result import Result, by_name
+from cosserat_fenicsx.units import rpm
 
 # What the answer leaves out.
 _SMALL = "Of small motions alone: large ones, such as stick-slip from rest, may go on where no mode grows (`simulate`)."
@@ -35,6 +37,8 @@ _SMALL = "Of small motions alone: large ones, such as stick-slip from rest, may 
 _NEUTRAL = 1e-11
 # A bit whose speed changes by less than this share of it is not disturbed: the rest is rounding.
 _STILL = 1e-9
+#: Speeds (rad/s) where none are given: those of top drives.
+SPEEDS = tuple(x * rpm for x in range(20, 201, 10))
 # Gauss points in a part, beside those for its waves.
 _POINTS = 8
 # Motion of a bit, over the largest one of the string, that is rounding.
@@ -214,12 +218,48 @@ class Stability(Result):
             (rpm, kN), (speed, weight) = (x[0] for x in _case_units(units)), _case(self, units, i, j)
             what = "No mode grows" if self._fed is None else f"No mode up to {self.up_to:.4g} Hz grows, FASTER ONES DO"
             yield f"{what}. Least damped: {least} at {speed} {rpm}{weight and f', {weight} {kN}'}."
+            yield from self._limits(units)
             yield _SMALL
             return
         yield f"{count} modes grow. {_SMALL}"
+        yield from self._limits(units)
         yield from (
             f"{text}." for text in _advice(self, rows, [name for name in rows[0][3] if name != own_rule(self.scene)])
         )
+
+    @cached_property
+    def limit_speeds(self) -> dict[str, tuple[float, float]]:
+        """{drive: (rad/s of the first mode alone, of all up to `up_to`)}: the lowest speeds from which on they decay at
+        the largest weight, see `limit_speed`, with the drive of the scene and those of `with_drives`; empty for axial
+        motion, and where that function searches for them."""
+        if self.kind == "axial" or self.scene.bit is None or searches(self.scene):
+            return {}
+        scene, found = self.scene, {}
+        weight, first = or_none(self.weights.max()), min(highest(scene, 1, self.up_to), self.up_to)
+        own = own_rule(scene) or type(scene.drive.control).__name__
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", SceneWarning)  # the cautions have them
+            for name, drive in {f"{own} (own)": scene.drive, **usual_drives(scene)}.items():
+                other = replace(scene, drive=drive)
+                if name != own:
+                    found[name] = tuple(limit_speed(other, weight, up_to=top) for top in (first, self.up_to))
+        return found
+
+    def _limits(self, units):
+        """A sentence on the lowest speeds of steady drilling by drive."""
+        (rpm, turning), (kN, pressing) = _case_units(units)
+
+        def told(speed):
+            return "none" if math.isinf(speed) else f"{speed / turning:.4g} {rpm}" if speed else "any"
+
+        weight = or_none(self.weights.max())
+        at = "" if weight is None else f" with {weight / pressing:.4g} {kN} on bit"
+        each = [f"{name} {told(first)} ({told(every)})" for name, (first, every) in self.limit_speeds.items()]
+        if each:
+            yield (f"Speeds from which on the first mode{at} no longer grows, and in brackets none up to "
+                   f"{self.up_to:.4g} Hz: {', '.join(each)}.")  # fmt: skip
+        elif self.kind == "torsion" and self.scene.bit is not None:
+            yield "limit_speed(scene) searches the speed from which on no mode grows."
 
     def _more(self, units):
         rows, count = self._growing
@@ -389,7 +429,7 @@ class Stability(Result):
 
 def stability(
     scene: Drilling,
-    speeds: Numbers,
+    speeds: Numbers | None = None,
     weights: Numbers | None = None,
     *,
     modes: int | None = None,
@@ -412,7 +452,8 @@ def stability(
 
     Args:
         scene: a `Drilling`; the speed of its drive and its weight on bit are replaced by those of the cases.
-        speeds: rotation, rad/s, (n,); 0 for a string without a bit that its hook moves along a hole.
+        speeds: rotation, rad/s, (n,); 0 for a string without a bit that its hook moves along a hole. None for 20 to 200
+            rev/min, every 10.
         weights: on bit, N, (m,); None for that of the scene.
         modes: how many of the lowest modes of the string, counted with the lower end free; None for `up_to`.
         up_to: highest frequency, Hz; where a drive that acts late feeds faster waves, `Stability.cautions` says so, and
@@ -429,7 +470,7 @@ def stability(
         NotConverged: the roots that were found are fewer than those counted.
     """
     instance("stability", "scene", scene, Drilling, "a Drilling(...)")
-    speeds, weights = speeds_and_weights("stability", scene, speeds, weights)
+    speeds, weights = speeds_and_weights("stability", scene, SPEEDS if speeds is None else speeds, weights)
     steady = steady_of("stability", scene, kind)
     top = 2 * math.pi * highest(scene, modes, up_to, kind)
     order = [(i, j) for j in range(len(weights)) for i in np.argsort(-speeds, kind="stable")]
