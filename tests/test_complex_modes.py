@@ -285,10 +285,12 @@ def test_modes_are_followed_from_free_ones():
 @pytest.mark.serial
 @pytest.mark.parametrize("damped", [False, True])
 def test_the_error_covers_the_bounds_in_place_of_infinite_stiffnesses(damped):
-    """A cantilever without shear: cos x cosh x = -1."""
+    """A cantilever without shear: cos x cosh x = -1. Rounding of the last mode was up to 4.4 times the estimate, by the
+    direction of the rod: its vector was less accurate than the others; of all modes it is now at most 0.38."""
     stiff = cf.Stiffness((np.inf,) * 2, np.inf, (1.0, 1.0), 1.0, mass=1.0, inertia=(1e-12,) * 3)
-    rod = cf.Rod(cf.Line((0, 0, 0), (0, 0, 1)), stiff)
-    found = cf.modes(cf.Scene([rod], [cf.Clamp(rod.start)]), 6, tol=1e-5, damped=damped)
     exact = np.repeat([1.875104068711961, 4.694091132974175, 7.854757438237613], 2) ** 2
-    off = np.abs(np.abs(found.eigenvalues) / exact - 1) * (1 if damped else 2)
-    assert (off <= found.error).all() and off.max() < 2e-6  # without the correction 7.7e-6
+    for end in ((0, 0, 1), (-0.09, 0.93, -0.36), (-0.64, 0.47, 0.61)):
+        rod = cf.Rod(cf.Line((0, 0, 0), end / np.linalg.norm(end)), stiff)
+        found = cf.modes(cf.Scene([rod], [cf.Clamp(rod.start)]), 6, tol=1e-5, damped=damped)
+        off = np.abs(np.abs(found.eigenvalues) / exact - 1) * (1 if damped else 2)
+        assert (off <= found.error).all() and off.max() < 3e-6  # without the correction 7.7e-6

@@ -99,6 +99,9 @@ class Pencil:
         """Eigenvalues next to a shift, and their vectors, orthogonal to the known ones."""
         factored = _Factored(self._shifted(shift), self._L, self.size)
         _, vectors = eigen.largest_of_operator(factored, self.size, min(count, self.count - known.shape[1]), known)
+        # The iteration leaves parts along stiff motions, which a large K squares into errors above those of rounding.
+        vectors = np.array([factored.applied(x) for x in vectors.T]).T
+        vectors, _ = np.linalg.qr(vectors - known @ (known.T @ vectors))
         factored.free()
         x = self._unknowns(vectors)
 
@@ -161,11 +164,15 @@ class _Factored:
 
     def mult(self, mat, x, y):
         """PETSc's name for y = L^T A L x."""
+        y.array_w[:] = self.applied(x.array_r)
+
+    def applied(self, x):
+        """L^T A L x of an array."""
         obey()
         self._force.array_w[:] = 0.0
-        self._force.array_w[: self._size] = self._L @ x.array_r
+        self._force.array_w[: self._size] = self._L @ x
         self._pc.apply(self._force, self._moved)
-        y.array_w[:] = self._L.T @ self._moved.array_r[: self._size]
+        return self._L.T @ self._moved.array_r[: self._size]
 
     def free(self):
         """Free the factors."""
