@@ -85,9 +85,12 @@ def _write(figure, file, dpi=None):
     known = figure.canvas.get_supported_filetypes()
     if file.suffix.removeprefix(".") not in known:
         raise SceneError(f"{file}: expected a name that ends in .{', .'.join(sorted(known))}")
+    if dpi:
+        figure.set_dpi(dpi)
+        figure.draw_without_rendering()  # letters are not exactly in proportion, and labels at the edge would be cut
     figure.set_layout_engine("none")  # all is where `arrange` has put it
     picture = io.BytesIO()  # complete in memory first: a full disk leads matplotlib to other exceptions than OSError
-    figure.savefig(picture, format=file.suffix[1:], dpi=dpi or figure.dpi)
+    figure.savefig(picture, format=file.suffix[1:], dpi=figure.dpi)
     with replaced(file) as fresh:
         fresh.write_bytes(picture.getvalue())
 

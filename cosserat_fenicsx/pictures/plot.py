@@ -200,7 +200,7 @@ def _finish(plotter, pyvista, everywhere, symbols, lines, title, label, most=6):
     """Draw signs, axes, labels, key and title, and place the camera; lines: centrelines that labels keep off."""
     symbols.draw(plotter)
     font = letters(plotter)
-    lettered = [line for text in title for line in textwrap.wrap(text, _TITLE_WIDTH)]
+    lettered = [line for text in title for line in _even(text)]
     over = font * _LINE * (len(lettered) + 0.5)
 
     def prepared(view):
@@ -228,10 +228,19 @@ def _finish(plotter, pyvista, everywhere, symbols, lines, title, label, most=6):
     plotter.add_text(plain("\n".join(lettered)), position="upper_edge", color="black", font_size=font / 2)
 
 
+def _even(text):
+    """The lines of a text, none of which is much shorter than the others."""
+    lines = textwrap.wrap(text, _TITLE_WIDTH)
+    while len(lines) > 1 and len(narrower := textwrap.wrap(text, max(map(len, lines)) - 1)) == len(lines):
+        lines = narrower
+    return lines
+
+
 def _title(path, shown, magnify, small, apart, factors):
     """The lines of the title: the points shown, and notes in parentheses."""
     some = "" if len(shown) == len(path) else f" ({len(shown)} of {len(path)} states)"
-    values = ", ".join(path.label(k) for k in shown)
+    stages = itertools.groupby((path.label(k).rpartition(": ") for k in shown), lambda parts: "".join(parts[:2]))
+    values = "; ".join(stage + ", ".join(value for *_, value in of_stage) for stage, of_stage in stages)
     title = f"{path.scene.title or 'Deformed rods'}:"
     several = "s" if len(shown) > 1 else ""
     shapes = f"shape{several} at {path.axis}{several} {values}{some}"
