@@ -12,10 +12,10 @@ from cosserat_fenicsx.errors import NotConverged
 from cosserat_fenicsx.interrupts import obey
 
 #: Stages from a state close to the solution, such as the solution on a coarser mesh; first with a softer wall or not.
-LAST = ((1.0, 0.0, False),)
-LAST_TWO = ((0.1, 0.0, False), *LAST)
+LAST = ((1.0, 0.0, 0),)
+LAST_TWO = ((0.1, 0.0, 0), *LAST)
 #: The last stages of a start, which show how the solution depends on the wall's stiffness.
-DECADES = ((1e-2, 0.0, False), *LAST_TWO)
+DECADES = ((1e-2, 0.0, 0), *LAST_TWO)
 _TAKES_OVER = 10.0  # stiffness of the first wall over that of the spring
 _SOFTEST = 1e-12  # smallest stiffness of the spring, over the wall's
 # Powers of ten by which the spring fades before it is removed; factors of its steps and of those of the wall, usual and
@@ -23,9 +23,10 @@ _SOFTEST = 1e-12  # smallest stiffness of the spring, over the wall's
 _FADED, _STEPS, _SMALL_STEPS = 2, (10.0 ** (2 / 3), 10.0), (2.0, 2.0)
 # First viscosity from a state close to the solution, over that spring; walls from there to the last one.
 _HOLDS, _BETWEEN = 100.0, (0.05, 0.25)
-# Steps of the viscous motion: largest number, intended movement over the clearance, bounds of the change of the
-# viscosity after a step, and bounds of the viscosity over the first one.
-_VISCOUS, _WANTED, _CHANGE, _BOUNDS = 300, 0.3, (0.5, 4.0), (1e-4, 30.0)
+# Steps of the viscous motion: largest number, intended movement over the clearance, largest factor of the viscosity
+# after a step, bounds of the viscosity over the first one; and the least factor of it from a start, where buckling
+# grows from rounding, and from a state close to the solution.
+_VISCOUS, _WANTED, _RISES, _BOUNDS, _GROWS, _NEAR = 300, 0.3, 4.0, (1e-4, 30.0), 0.5, 0.1
 # Newton step limits: displacement over the clearance, displacement over the longest rod, rotation (rad).
 _LONGEST, _OF_LENGTH, _WIDEST = 10.0, 1e-4, 0.5
 # Step over the clearance at which a stage ends: first stages, stages with full results (`careful`), last stage; and the
@@ -41,23 +42,23 @@ _BALANCED = 1e-6  # residual force of a node at equilibrium, over the norm of th
 
 def stages_from(spring, way="fast"):
     """The stages of a start on the axis: tuples (stiffness of the wall, stiffness of a spring to its axis, both over
-    the wall's own; whether the rod moves as in a viscous fluid, see `_relax`). spring: the first one, with which the
-    loads move the rod by about the clearance. way: "fast"; "gentle", by small steps; "relaxed", for a rod that is
-    compressed beyond its buckling load; or "helix", for a rod that starts buckled, at the wall: as "relaxed", without
-    the spring to the axis."""
+    the wall's own; 0, or where the rod moves as in a viscous fluid the least factor of the viscosity, see `_relax`).
+    spring: the first one, with which the loads move the rod by about the clearance. way: "fast"; "gentle", by small
+    steps; "relaxed", for a rod that is compressed beyond its buckling load; or "helix", for a rod that starts buckled,
+    at the wall: as "relaxed", without the spring to the axis."""
     least = DECADES[0][0]
     spring = min(max(spring, _SOFTEST), least / _TAKES_OVER)
     wall, (fades, step) = _TAKES_OVER * spring, _STEPS if way == "fast" else _SMALL_STEPS
     if way == "helix":
         wall = min(_TAKES_OVER * wall, least)
     count = max(0, math.ceil(math.log(least / wall, step) - 1e-9))
-    stiffer = [(least * (wall / least) ** (1 - k / count), 0.0, False) for k in range(1, count)]
+    stiffer = [(least * (wall / least) ** (1 - k / count), 0.0, 0) for k in range(1, count)]
     if way in ("relaxed", "helix"):
-        fading = [(wall, spring, True)]
+        fading = [(wall, spring, _GROWS)]
     else:
-        fading = [(wall, spring / fades**k, False) for k in range(1, 1 + math.ceil(_FADED / math.log10(fades) - 1e-9))]
-    to_axis = () if way == "helix" else ((0.0, spring, False),)
-    return (*to_axis, *fading, (wall, 0.0, False), *stiffer, *DECADES)
+        fading = [(wall, spring / fades**k, 0) for k in range(1, 1 + math.ceil(_FADED / math.log10(fades) - 1e-9))]
+    to_axis = () if way == "helix" else ((0.0, spring, 0),)
+    return (*to_axis, *fading, (wall, 0.0, 0), *stiffer, *DECADES)
 
 
 def stages_back(spring, last=DECADES):
@@ -65,8 +66,8 @@ def stages_back(spring, last=DECADES):
     keeps from buckling and that leaves it: before the `last` ones it moves as in a viscous fluid. spring: see
     `stages_from`."""
     least = DECADES[0][0]
-    stiffer = [(wall, 0.0, False) for wall in _BETWEEN] if last == LAST else []
-    return (least, min(_HOLDS * spring, least), True), *stiffer, *last
+    stiffer = [(wall, 0.0, 0) for wall in _BETWEEN] if last == LAST else []
+    return (least, min(_HOLDS * spring, least), _NEAR), *stiffer, *last
 
 
 def settle(problem, walls, clearance, rounding, stages, careful=(), on_stage=None, hold=0.0, before_step=None,
@@ -90,7 +91,7 @@ def settle(problem, walls, clearance, rounding, stages, careful=(), on_stage=Non
         share = _ENOUGH if last else _CAREFUL if k in careful else _ROUGH
         name = f"stage {k + 1} of {len(stages)} of the start"
         if viscous:
-            _relax(newton, walls, spring, clearance, name)
+            _relax(newton, walls, spring, viscous, clearance, name)
         else:
             enough = share * clearance * (_FREE if hold else 1.0)
             _solve_stage(newton, max(enough, _ROUNDING), name, walls, hold, astray)
@@ -141,8 +142,9 @@ def _fasten(newton, walls, stiffness):
         wall.spring = stiffness
 
 
-def _relax(newton, walls, spring, clearance, name):
-    """Let the rod rest as in a viscous fluid, by implicit steps of one Newton step: the spring follows the rod."""
+def _relax(newton, walls, spring, falls, clearance, name):
+    """Let the rod rest as in a viscous fluid, by implicit steps of one Newton step: the spring follows the rod. falls:
+    the least factor of its stiffness from step to step."""
     viscosity = spring
     for _ in range(_VISCOUS):
         obey()
@@ -152,7 +154,7 @@ def _relax(newton, walls, spring, clearance, name):
             raise NotConverged(f"the tangent is singular in {name}")
         if step.moved <= _ROUGH * clearance and viscosity <= _BOUNDS[0] * spring:
             break
-        change = min(max(step.moved / (_WANTED * clearance), _CHANGE[0]), _CHANGE[1])
+        change = min(max(step.moved / (_WANTED * clearance), falls), _RISES)
         viscosity = min(max(change * viscosity, _BOUNDS[0] * spring), _BOUNDS[1] * spring)
     else:
         raise NotConverged(f"the rod has not come to rest in {name}")

@@ -56,7 +56,9 @@ class _Walls:
     # share of the tolerance above which the wall is made ten times stiffer, and below which its effect is not found
     # again on a finer mesh: of 60 operations none has more than 1.6 times as much there, which the caution covers
     too_soft: float = 0.25
-    stiff: float = 100.0  # factor from which on Newton's method mostly fails on a finer mesh, or takes many steps
+    # factor from which on Newton's method mostly fails on a finer mesh, or takes many steps; and from which on the wall
+    # is made no stiffer to see its effect again
+    stiff: float = 100.0
     hold: float = 1e-10  # springs that hold a helix, see `settle`
     rounding: float = 20.0  # residual of a node over the rounding of its position times its wall or ring stiffness
     astray: int = 8  # too long Newton steps in a stage from the mesh before, see `settle`
@@ -307,9 +309,10 @@ def _on_mesh(string, layout, stages, factor, start, before, job):
 
 def _soft(answer, values, before, job):
     """Whether an `InHole` asks for a stiffer wall. On the last mesh also where a coarse one has shown what its wall
-    changes, and this one has not yet; but a wall that is much stiffer than that makes errors of its own there."""
+    changes, and this one has not yet; but rounding in a wall that is much stiffer than the first one is larger than
+    that."""
     if before is not None and answer.error <= job.tol:
-        return len(values) == 1 and answer.of_stiffness > 1.001 * UNSEEN
+        return len(values) == 1 and answer.of_stiffness > 1.001 * UNSEEN and answer.factor < _WALLS.stiff
     return answer.of_stiffness > _WALLS.too_soft * job.tol
 
 
