@@ -234,6 +234,27 @@ def test_no_rod_passes_through_another(tangle):
             assert apart[i, j] > 2.5e-3 or p[i, 2] > q[j, 2]
 
 
+def test_many_contacts_are_solved_by_the_sparse_tangent(monkeypatch):
+    """Forces, places and negative modes are those by the responses to all forces; some candidates do not press."""
+    section, material = cf.Circle(0.01), cf.Material(E=1e9, nu=0.3, density=1000.0)
+    lower = [cf.Rod(cf.Line((0, y, 0), (0.3, y, 0)), section, material) for y in (0.05, 0.12, 0.22)]
+    upper = [cf.Rod(cf.Line((x, 0, 0.01), (x, 0.3, 0.01)), section, material) for x in (0.08, 0.1, 0.2)]
+    held = [end for rod in (*lower, *upper[1:]) for end in (rod.start, rod.end)]
+    touch, supports = cf.RodContact(), [cf.Clamp(end) for end in held]
+    supports += [cf.Hinge(upper[0].start, (1, 0, 0)), *(cf.Roller(upper[0].end, n) for n in ((0, 0, 1), (1, 0, 0)))]
+    loads = [touch, cf.Force(upper[0].at(0.2), (0, 0, -2.0)), cf.Force(upper[2].at(0.1), (0, 0, 1.0)),
+             cf.Moment(upper[0].at(0.1), (0, 0.01, 0))]  # fmt: skip
+    scene, found = cf.Scene([*lower, *upper], supports, loads), []
+    for many in (10**6, 0):
+        monkeypatch.setattr("cosserat_fenicsx.statics.touching._MANY", many)
+        path = cf.solve(scene, [0.5, 1.0], elements=3)
+        table = path.contacts(touch)
+        found.append((table.force, table.s, [path.position(rod.at(0.13))[-1] for rod in upper], path.negative_modes))
+    assert 3 <= len(found[0][0]) < 9
+    for by_responses, by_tangent in zip(*found, strict=True):
+        np.testing.assert_allclose(by_tangent, by_responses, rtol=1e-8, atol=1e-10)
+
+
 @pytest.mark.slow
 def test_friction_holds_and_slips(tmp_path, truth):
     """A rod on another one is pulled to and fro against a spring k: it sticks with the compliance of the lower rod in

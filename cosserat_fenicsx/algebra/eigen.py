@@ -434,6 +434,13 @@ class RepeatedFactors:
         return self._x.array_r
 
 
+    def destroy(self):
+        """Free the memory, which PETSc may keep otherwise."""
+        for part in (self._ksp, self._matrix, self._b, self._x):
+            if part is not None:
+                part.destroy()
+
+
 def _factor_symmetric(pc, K, more=_EXCHANGE):
     pc.setType("cholesky")
     factor = _mumps(pc, K, more)

@@ -5,8 +5,9 @@ In every iteration the step dx and the contact forces l follow from
     (K - sum l d2g) dx + r - G^T l = 0,    g + G dx >= 0,    l >= 0,    l (g + G dx) = 0,
 
 with the rods' tangent K and residual r without contact, the gaps g, their derivatives G, and their second derivatives
-d2g, in which the nearest points slide. K is never assembled: the columns of G^T and of the few eigenvectors of d2g are
-solved with its factors, and what is left is a small complementarity problem, for the changes of the forces.
+d2g, in which the nearest points slide. K is not assembled: the columns of G^T and of the few eigenvectors of d2g are
+solved with its factors, and what is left is a small complementarity problem, for the changes of the forces. Of many
+contacts without friction K is assembled, with the rows of those that press, and factorised as a sparse matrix.
 
 With friction, contacts that touched in the last accepted state have two more forces across the normal, on the surfaces
 and so with moments about the centrelines. Coulomb's law is exact: such a contact does not slip since that state, or
@@ -18,7 +19,9 @@ sum of their radii, cannot cross in it.
 """
 
 import numpy as np
+from scipy import sparse
 
+from cosserat_fenicsx.algebra.eigen import RepeatedFactors, constrained_factors
 from cosserat_fenicsx.algebra.newton import LimitedNewton, Solved
 from cosserat_fenicsx.interrupts import obey
 from cosserat_fenicsx.numerics import small_rotations
@@ -53,6 +56,10 @@ _MOST_LAWS, _LAWS, _LEAST, _LAWS_MET = 60, 1e-13, 1e-3, 1e-8
 # eigenvalues of the compliance that need none, over its mean: out of equilibrium it is not symmetric.
 _SPRINGS = ((0.0, 0.0), (1.0, 0.0), (30.0, 0.0), (1e3, 0.0), *((1e3, 10.0**k) for k in range(-3, 7)))
 _NOTHING = 1e-6
+# Forces and columns above which the sparse tangent is factorised with the contacts' rows, and above which nothing else
+# is tried where that fails; sets of contacts that press which are tried; those after which they change one by one;
+# error of a force, and of a gap, over the largest force and radius; contacts that give the typical compliance.
+_MANY, _TOO_MANY, _MOST_SETS, _ALL, _OF_FORCE, _OF_GAP, _SAMPLES = 1000, 2500, 60, 4, 1e-9, 1e-10, 8
 
 
 def complementary(A, b):
@@ -112,6 +119,14 @@ def rubbing(A, b, friction, start):
                 error, by = off(f - share * step)
             f = f - share * step
     return best.reshape(m, 3), least / max(np.abs(best).max(), np.finfo(float).tiny)
+
+
+def _bordered(K, C, factors, G, small):
+    """The sparse matrix of K - sum factor c c^T, c the rows of C, with rows of G as constraints that give by `small`
+    times their force; symmetric where K is."""
+    C = sparse.diags(np.sqrt(np.abs(factors))) @ C
+    signs, gives = sparse.diags(np.sign(factors)), sparse.diags(np.full(G.shape[0], -small))
+    return sparse.csr_array(sparse.bmat([[K, -C.T, -G.T], [-C, signs, None], [-G, None, gives]], format="csr"))
 
 
 class _Steps(LimitedNewton):
@@ -249,9 +264,9 @@ class RodContacts:
 
     def _confirmed(self, iterations):
         """`Solved`, where the contacts of the last step are those of the state, with its negative modes."""
-        problem, (A, removed), (normal, *friction) = self._problem, self._last, self._forces.T
+        problem, (normal, *friction) = self._problem, self._forces.T
         held = np.linalg.norm(friction, axis=0) < (1 - AT_BOUND) * self._friction * normal if friction else ()
-        active = np.stack([normal > 0, *[held for _ in friction]], axis=1).ravel()
+        active = np.stack([normal > 0, *[held for _ in friction]], axis=1)[self._near].ravel()
         allowed = _BALANCED * (problem.load_norm + normal.max(initial=0.0)) + max(self._model.round_off, _UNLOADED)
         if not self._newton.imbalance() <= allowed:
             return Solved(False, iterations, f"forces are left over at a node, {self._in_words(self._touches)}")
@@ -259,6 +274,10 @@ class RodContacts:
             return Solved(False, iterations, f"no forces obey the law of friction, {self._in_words(self._touches)}")
         if self._gives > _GIVES * self._largest:
             return Solved(False, iterations, f"forces at contacts are not determined, {self._in_words(self._touches)}")
+        self.removed = None if normal.any() else 0
+        if self._last is None:
+            return Solved(True, iterations, "converged")
+        A, removed = self._last
         A = A[np.ix_(active, active)]
         self.removed = removed - np.count_nonzero(np.linalg.eigvalsh((A + A.T) / 2) < 0)
         return Solved(True, iterations, "converged")
@@ -281,12 +300,14 @@ class RodContacts:
         """Which (m,) of other `Touches` each contact is the same as; -1 for a new one."""
         if not len(old) or not len(touches):
             return np.full(len(touches), -1)
-        (rods, s), (old_rods, old_s) = ((self.strands.rods[x.element], self._s(x)) for x in (touches, old))
-        off = np.abs(s[:, None] - old_s).max(axis=2)
-        same = (rods[:, None] == old_rods).all(axis=2) & (touches.node[:, None] == old.node)
-        off = np.where(same & (off < _SAME * self._largest), off, np.inf)
-        nearest = off.argmin(axis=1)
-        return np.where(np.isfinite(off[np.arange(len(touches)), nearest]), nearest, -1)
+        from scipy.spatial import cKDTree  # late: scipy is slow to import
+
+        both = [np.c_[self.strands.rods[x.element], x.node] for x in (touches, old)]
+        kinds = np.unique(np.concatenate(both), axis=0, return_inverse=True)[1].ravel()
+        s, close = np.concatenate([self._s(x) for x in (touches, old)]), _SAME * self._largest
+        places = np.c_[s, kinds * 3 * close]  # those of other rods and nodes are farther
+        nearest = cKDTree(places[len(touches) :]).query(places[: len(touches)], p=np.inf, distance_upper_bound=close)[1]
+        return np.where(nearest < len(old), nearest, -1)
 
     def _known_forces(self, touches):
         """The forces of the iteration before at the same contacts; 0 at new ones."""
@@ -323,7 +344,7 @@ class RodContacts:
         touches, near, parts = self._touches, self._near, self._parts
         self._found, self._broken, self._gives = np.zeros((len(touches), parts)), 0.0, 0.0
         if not near.any():
-            self._last = np.zeros((self._found.size,) * 2), 0
+            self._last = np.zeros((0, 0)), 0
             return True
         touches, known = touches.of(near), self._forces[near]
         nodes, pulls = self._pulls(touches)
@@ -338,14 +359,17 @@ class RodContacts:
         bent = np.repeat(places[pressed], 4, axis=0)[kept]
         loads = [*zip(bent, columns, strict=True),
                  *zip(np.repeat(forces, parts, axis=0), pulls.reshape(m * parts, -1), strict=True)]  # fmt: skip
+        if parts == 1 and len(loads) > _MANY:
+            G = self._by_unknowns(places, pulls[:, 0, :, :3].reshape(m, -1))
+            done = self._complete_many(change, self._by_unknowns(bent, columns), factors, G, touches.gap, known[:, 0])
+            if done or len(loads) > _TOO_MANY:
+                return done
         solved = np.empty((len(change.array_r), q + m * parts))
-        load, answer = self._vectors
-        for k, (at, values) in enumerate(loads):
-            load.array_w[:] = 0.0
-            np.add.at(load.array_w, np.maximum(at, 0), np.where(at < 0, 0.0, values))
-            if not self._problem.solve(load, answer):
+        for k, load in enumerate(loads):
+            response = self._response(*load)
+            if response is None:
                 return False
-            solved[:, k] = answer.array_r
+            solved[:, k] = response
         motions = np.c_[solved, -change.array_r]
 
         def moved(at, by):
@@ -396,11 +420,96 @@ class RodContacts:
         if q:
             inner = np.diag(1 / factors) - S[:q, :q]
             removed = np.count_nonzero(np.linalg.eigvalsh(inner) < 0) - np.count_nonzero(factors < 0)
-        whole, there = np.zeros((self._found.size,) * 2), np.repeat(near, parts)
         M = np.linalg.solve(np.eye(q) - factors[:, None] * S[:q, :q], np.diag(factors)) if q else np.zeros((0, 0))
-        whole[np.ix_(there, there)] = S[q:, q:] + S[q:, :q] @ M @ S[:q, q:]
-        self._last = whole, removed
+        self._last = S[q:, q:] + S[q:, :q] @ M @ S[:q, q:], removed
         return True
+
+    def _response(self, rows, values):
+        """The change of the unknowns by a load without contact, until the next call; None where it is singular."""
+        load, answer = self._vectors
+        load.array_w[:] = 0.0
+        np.add.at(load.array_w, np.maximum(rows, 0), np.where(rows < 0, 0.0, values))
+        return answer.array_r if self._problem.solve(load, answer) else None
+
+    def _by_unknowns(self, rows, values):
+        """(m, unknowns) a sparse matrix of values (m, n) at the rows of unknowns, -1 where clamped."""
+        held = rows >= 0
+        place = np.repeat(np.arange(len(rows)), held.sum(axis=1)), rows[held]
+        return sparse.csr_array((values[held], place), shape=(len(rows), self._problem.numbering.size))
+
+    def _complete_many(self, change, C, factors, G, gap, known):
+        """`complete` without friction, without the responses to all forces: by factors of the sparse tangent with the
+        rows of the contacts that press, for the set of these in which none pulls and none of the others is entered
+        (block pivoting: Judice & Pires, Comput. Oper. Res. 21 (1994) 587). False where none is found.
+
+        C: (q, unknowns) columns of `Strands.curvatures`, with their factors (q,); G: (m, unknowns) derivatives of the
+        gaps (m,); known: (m,) forces of the iteration before."""
+        b, K, size, q = self._problem.b.array_r, self._tangent(), G.shape[1], len(factors)
+        free, samples = gap - G @ change.array_r, np.linspace(0, len(gap) - 1, _SAMPLES).astype(int)
+        rows = np.arange(size)
+        small = _REGULAR * np.mean([abs(G[[k]] @ self._response(rows, G[[k]].toarray().ravel())) for k in samples])
+        active, best, tries = known > 0 if known.any() else free < 0, np.inf, _ALL
+        for _ in range(_MOST_SETS):
+            whole = _bordered(K, C, factors, G[active], small)
+            solver = RepeatedFactors(whole.indptr, whole.indices)
+            regular = solver.factor(whole.data)
+            load = np.concatenate([-b - G.T @ np.where(active, 0.0, known), np.zeros(q), gap[active]])
+            found = solver.solve(load).copy() if regular else load * np.nan
+            solver.destroy()
+            if not np.isfinite(found).all():
+                return False
+            forces = np.zeros(len(gap))
+            forces[active] = known[active] + found[size + q :]
+            wrong = np.where(active, forces < -_OF_FORCE * np.abs(forces).max(initial=0.0),
+                             gap + G @ found[:size] < -_OF_GAP * self._largest)  # fmt: skip
+            count = np.count_nonzero(wrong)
+            if not count:
+                change.array_w[:] = -found[:size]
+                self._found[self._near, 0] = np.maximum(forces, 0)
+                self._last = None
+                return True
+            best, tries = min(best, count), _ALL if count < best else tries - 1
+            if tries < 0:  # one after another they end in finite time
+                wrong[: np.flatnonzero(wrong)[-1]] = False
+            active ^= wrong
+        return False
+
+    def _tangent(self):
+        """The tangent without contact as a sparse matrix."""
+        problem, model = self._problem, self._model
+        links, numbering = model.signature.connections, problem.numbering
+        cells = numbering.rows[model.cell_dofs]
+        n = cells.shape[1]
+        parts = [(np.repeat(cells, n, axis=1), np.tile(cells, n), problem.tangent_form.matrices())]
+        if problem.ties:
+            of_nodes, ends, back = problem.ties.tangent_blocks(problem.tie_load_factor)
+            equations = np.array(links.equations, dtype=np.intp)
+            blocks, rows, numbers = links.pattern.places(problem.ties.rows, equations)
+            numbers = numbering.first_multiplier + numbers
+            parts += [(*blocks, of_nodes), (rows, numbers, ends), (numbers, rows, back)]
+        rows, columns, values = (np.concatenate([x.ravel() for x in part]) for part in zip(*parts, strict=True))
+        held = (rows >= 0) & (columns >= 0)
+        return sparse.csr_array((values[held], (rows[held], columns[held])), shape=(numbering.size,) * 2)
+
+    def negative_modes(self, variation):
+        """The number of negative modes in which the contacts that press remain, by the `stability.Part` of the rods;
+        -1 where one is neutral. Where `removed` is None, of many contacts without friction."""
+        variation.assemble()
+        starts, columns, values = variation.K.getValuesCSR()
+        K = sparse.csr_array((values, columns, starts))
+        pressed = self._forces[:, 0] > 0
+        touches = self._touches.of(pressed)
+        columns, factors = self.strands.curvatures(self._x, touches)
+        factors = (self._forces[pressed] * factors).ravel()
+        rows = self._model.rows_of_nodes[self.strands.nodes_of(touches)][..., :3].reshape(len(touches), -1)
+        G, C = (self._by_unknowns(*of) for of in ((rows, self.strands.gradients(touches).reshape(rows.shape)),
+                (np.repeat(rows, 4, axis=0), columns.reshape(len(factors), -1))))  # fmt: skip
+        scale = sparse.diags(1 / np.sqrt(np.abs(K.diagonal())))
+        C, G = (sparse.csr_array(part[:, : K.shape[0]] @ scale) for part in (C, G))
+        pc = constrained_factors(_bordered(scale @ K @ scale, C, factors, G, 0.0))
+        negative, zero, _ = pc.getFactorMatrix().getInertia()
+        pc.destroy()
+        return -1 if zero else negative - np.count_nonzero(factors < 0) - len(touches)
 
     # -- for records -------------------------------------------------------------------------------------------------
 

@@ -258,7 +258,11 @@ class Track:
     def _negative_modes(self, *, neutral=False):
         """See `NegativeModes.count`; of rods that touch, of motions in which they remain in contact."""
         found = self.stability.count(neutral=neutral)
-        return found + self.touching.removed if self.touching and found >= 0 else found
+        if not self.touching or found < 0:
+            return found
+        if self.touching.removed is None:
+            return self.touching.negative_modes(self.stability.whole)
+        return found + self.touching.removed
 
     def set_tangent(self, point, slope, step, weight):
         """Set the unit tangent of a `PathPoint` from dx/d eta, oriented along a step (dx, d eta)."""
