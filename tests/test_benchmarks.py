@@ -85,9 +85,7 @@ def test_order_of_loads_does_not_matter():
 
 @pytest.mark.once
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "drawn", [*random_scenes.scenes(4, first=20), random_scenes.draw(5097)], ids=lambda drawn: str(drawn.seed)
-)
+@pytest.mark.parametrize("drawn", [random_scenes.draw(seed) for seed in (20, 22, 23, 5097)], ids=lambda x: str(x.seed))
 def test_random_scenes(drawn):
     """`make random` solves 200 of them. The last is so slender that rounding makes its tangent inexact for bending."""
     verdict, rows = random_comparison.compare(drawn)
@@ -256,6 +254,7 @@ def test_the_solid_bar():
 @pytest.mark.slow
 def test_figure3_is_broken_off_and_goes_on(tmp_path, monkeypatch, capsys):
     import figure3
+    import harness
 
     def broken(self, name, curve, points):
         keep(self, name, curve, points)
@@ -263,6 +262,7 @@ def test_figure3_is_broken_off_and_goes_on(tmp_path, monkeypatch, capsys):
             raise KeyboardInterrupt
 
     keep = figure3.Store.keep_part
+    monkeypatch.setattr(harness, "draw_both", lambda plot, file: plot(file=file))  # once, not for two widths of pages
     monkeypatch.setattr(figure3.Store, "keep_part", broken)
     with pytest.raises(KeyboardInterrupt):
         figure3.main(tmp_path, quick=True)

@@ -109,7 +109,7 @@ def found_by(name):
     bit = BitOnRock(law, inertia=given["I"])
     scene = Drilling(pipe(given["L"]), TopDrive(given["Om"], control=control), bit)
     return cf.drilling.simulate(
-        scene, given["duration"], elements=2000 if given["law"] == "Coulomb" else 600, progress=False
+        scene, given["duration"], elements=1000 if given["law"] == "Coulomb" else 600, progress=False
     )
 
 

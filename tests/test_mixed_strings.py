@@ -403,7 +403,7 @@ def test_a_matched_drive_reflects_nothing():
     rod, scene = collars(cf.drilling.TopDrive(0.0, control=cf.drilling.Matched()), torque())
     dashpot = cf.Scene([rod], [cf.Pin(rod.start), *scene.supports[2:]],
                        [cf.Dashpot(rod.start, rotational=Z_ABOVE), torque()(rod)])  # fmt: skip
-    speed, other = (bit_speed(motion(x, 4.0, 0.01), rod) for x in (scene, dashpot))
+    speed, other = (bit_speed(motion(x, 3.0, 0.01), rod) for x in (scene, dashpot))
     np.testing.assert_allclose(speed, other, atol=1e-9 * np.abs(other).max())
 
 
@@ -423,13 +423,15 @@ def test_a_controlled_drive_turns_the_rod_as_it_turns_the_string(drag):
     np.testing.assert_allclose(bit_speed(history, rod), expected, atol=2e-4 * expected.max())
 
 
-@pytest.mark.parametrize(("scheme", "allowed"), [("momentum", 1e-5), ("energy", 1e-9), ("generalised-alpha", 2e-3)])
-def test_energy_balance_with_all_that_the_pipe_does(scheme, allowed):
+@pytest.mark.parametrize(
+    ("scheme", "dt", "allowed"), [("momentum", 5e-3, 1e-5), ("energy", 1e-2, 1e-9), ("generalised-alpha", 1e-2, 2e-3)]
+)
+def test_energy_balance_with_all_that_the_pipe_does(scheme, dt, allowed):
     """Off the vertical, under a torque and a force; the first scheme keeps energy to second order alone."""
     drive = cf.drilling.TopDrive(lambda t: 3 * math.sin(t) ** 2, 2000.0, cf.drilling.PI(800.0, 200.0))
     blow = pulse((2e3, 0, -2e4), 0.5)
     rod, scene = collars(drive, torque(), lambda rod: cf.Force(rod.at(100.0), blow), hook=cf.drilling.Hook(5e6))
-    assert imbalance(motion(scene, 3.0, 0.005, scheme=scheme)) < allowed
+    assert imbalance(motion(scene, 3.0, dt, scheme=scheme)) < allowed
 
 
 @pytest.mark.slow
@@ -447,8 +449,8 @@ def test_from_hanging_at_rest_the_hook_lifts_it():
 
 def test_adaptive_steps_that_are_taken_back_do_not_count():
     rod, scene = collars(None, torque())
-    times, exact = exact_bit_speed(lambda t: torque()(rod).moment(t)[2], 4.0)
-    history = cf.simulate(scene, 4.0, tol=1e-5, elements=4, degree=2)
+    times, exact = exact_bit_speed(lambda t: torque()(rod).moment(t)[2], 2.8)
+    history = cf.simulate(scene, 2.8, tol=1e-5, elements=4, degree=2)
     off = bit_speed(history, rod) - np.interp(history.times, times, exact)
     assert np.abs(off).max() < 2e-3 * np.abs(exact).max()
 
@@ -457,10 +459,10 @@ def test_adaptive_steps_that_are_taken_back_do_not_count():
 def test_pipe_resumes_to_identical_digits(steps, tmp_path, monkeypatch):
     drive = cf.drilling.TopDrive(3.0, 2000.0, cf.drilling.PI(800.0, 200.0))
     rod, scene = collars(drive, torque(), hook=cf.drilling.Hook(5e6))
-    whole = cf.simulate(scene, 4.0, elements=2, degree=2, **steps)
-    stop_at(monkeypatch, 90, 0.0)
+    whole = cf.simulate(scene, 2.6, elements=2, degree=2, **steps)
+    stop_at(monkeypatch, 60, 0.0)
     with pytest.raises(Exception, match="^$"):
-        cf.simulate(scene, 4.0, elements=2, degree=2, folder=tmp_path / "kept", **steps)
+        cf.simulate(scene, 2.6, elements=2, degree=2, folder=tmp_path / "kept", **steps)
     history = cf.resume(tmp_path / "kept", scene)
     for name in ("times", "energy", "work"):
         assert np.array_equal(getattr(history, name), getattr(whole, name))
