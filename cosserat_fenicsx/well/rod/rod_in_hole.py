@@ -72,8 +72,8 @@ _MESHES, _WALLS = _Meshes(), _Walls()
 _STARTS, _FROM_HELIX = ("fast", "gentle", "relaxed"), ("helix",)
 # Stands for an unknown number of negative modes in comparisons, instead of -1 where the second variation is singular.
 _SINGULAR = 1 << 30
-# Elements times Newton steps in a second.
-_STEPS = 3e4
+# Elements times Newton steps in a second of a busy machine; an idle one does half as many more.
+_STEPS = 2.5e4
 
 
 def solve_in_hole(path, lengths, stiffness, weight, contact_radius, *, wall_stiffness=None, helix=False, tol=1e-4,
@@ -142,7 +142,7 @@ def solve_in_hole(path, lengths, stiffness, weight, contact_radius, *, wall_stif
 
 class Work:
     """What a search for an equilibrium may cost: `left`, elements times Newton steps, of which a second takes about
-    3e4. So where it ends does not depend on the machine. seconds: about how long it may take."""
+    2.5e4. So where it ends does not depend on the machine. seconds: about how long it may take."""
 
     def __init__(self, seconds):
         self._seconds, self.left = seconds, _STEPS * seconds
