@@ -162,7 +162,8 @@ typedef struct {
 typedef struct {
     int count, parts, most;         /* contacts; 1, or 3 with friction; sweeps */
     double friction, share, smallest; /* coefficient; changes that end the sweeps, of the first one and of all */
-    const double *compliance;       /* (count parts, count parts) by each unit force all motions */
+    const double *compliance;       /* by each unit force the motions that it changes, force by force: */
+    const int *start, *place, *own; /* (count parts + 1,) where each begins; the motions; where its own contact's are */
     const double *gap, *normal, *slope; /* (count,) the normal force at a gap, and its slope by the depth */
     double *motion, *force;         /* (count, parts) with the forces */
     double *multiplier;             /* (count,) of friction at its bound, the last ones */

@@ -305,15 +305,16 @@ void nearest_on_arcs(const arcs *a, int count, const double *points, int whole, 
 /* Solve contact i with the forces of all others; returns the size of the change of its motion by its own. */
 static double settle_pair(pairs *c, int i)
 {
-    const int parts = c->parts, all = c->count * parts;
-    const double *A = c->compliance + (size_t)i * parts * all + i * parts; /* A[k all + j]: j by a unit force k */
+    const int parts = c->parts, *own = c->own + i * parts;
+    const double *A = c->compliance + own[0]; /* by the normal force */
     double *motion = c->motion + i * parts, *force = c->force + i * parts, change[3] = {0};
     const double slope = c->slope[i];
     const double gap = motion[0] - A[0] * force[0];
     const double N = fmax((c->normal[i] - slope * (gap - c->gap[i])) / (1 + slope * A[0]), 0);
     change[0] = N - force[0];
     if (parts == 3) {
-        const double B[3] = {A[all + 1], (A[all + 2] + A[2 * all + 1]) / 2, A[2 * all + 2]};
+        const double *by_first = c->compliance + own[1], *by_second = c->compliance + own[2];
+        const double B[3] = {by_first[1], (by_first[2] + by_second[1]) / 2, by_second[2]};
         const vector none = {0}, C[3] = {none + B[0], none + B[1], none + B[2]};
         const vector b[2] = {none + motion[1] + A[1] * change[0] - B[0] * force[1] - B[1] * force[2],
                              none + motion[2] + A[2] * change[0] - B[1] * force[1] - B[2] * force[2]};
@@ -323,11 +324,12 @@ static double settle_pair(pairs *c, int i)
     }
     double size = 0;
     for (int k = 0; k < parts; k++) {
-        const double *column = c->compliance + ((size_t)i * parts + k) * all, by = change[k];
+        const double by = change[k];
         force[k] += by;
         if (by == 0) continue;
-        for (int j = 0; j < all; j++) c->motion[j] += column[j] * by;
-        size = fmax(size, fabs(column[i * parts + k] * by));
+        for (int e = c->start[i * parts + k]; e < c->start[i * parts + k + 1]; e++)
+            c->motion[c->place[e]] += c->compliance[e] * by;
+        size = fmax(size, fabs(c->compliance[own[k] + k] * by));
     }
     return size;
 }

@@ -156,7 +156,22 @@ class RodsTouching(Pointers):
         self._parts = 3 if action.friction else 1
         self._c = self._ffi.new("pairs *", {"parts": self._parts, "most": _SWEEPS, "friction": action.friction,
                                             "share": _SHARE_LEFT, "smallest": _SMALLEST * self._largest})  # fmt: skip
+        self._body, self._rows_of = self._bodies()
         self._look, self._polygons = None, _Polygons(scene, layout, model.rule, length)
+
+    def _bodies(self):
+        """(rods,) which body each rod is part of, and the rows of the unknowns of each body. Rods are bodies of their
+        own where each is solved without the others, and else all are one."""
+        problem, strands = self._problem, self._strands
+        size, count = len(self._vectors[0].array_r), strands.rods.max() + 1
+        if problem.interface or problem.tensions:
+            return np.zeros(count, dtype=int), [np.arange(size)]
+        model, of_rows = problem.model, np.zeros(size, dtype=int)
+        rows = problem.numbering.rows[model.cell_dofs]
+        rods = np.broadcast_to(strands.rods[model.rods.cells[: len(rows)], None], rows.shape)
+        of_rows[rows[rows >= 0]] = rods[rows >= 0]
+        order = np.argsort(of_rows, kind="stable")
+        return np.arange(count), np.split(order, np.searchsorted(of_rows[order], np.arange(1, count)))
 
     @property
     def _x(self):
@@ -227,7 +242,7 @@ class RodsTouching(Pointers):
         if not len(near):
             return
         nodes, pulls = pairs.pulls(near, parts)
-        A, columns = self._compliance(pairs, near, nodes, pulls)
+        A, own, columns = self._compliance(pairs, near, nodes, pulls)
         before, motion = np.zeros((2, len(near), parts))
         before[:, 0], motion[:, 0] = pairs.force[near], free[near]
         if parts > 1:
@@ -237,7 +252,8 @@ class RodsTouching(Pointers):
             motion[:, 1:] += slips - ahead
         force, gap, multiplier, law = before.copy(), pairs.now.gap[near], np.zeros(len(near)), self._c
         whole = pairs.now.gap.copy()
-        law.count, law.compliance = len(near), self._pointer(A)
+        law.count, law.compliance = len(near), self._pointer(A.data)
+        law.start, law.place, law.own = (self._pointer(x, "int *") for x in (A.indptr, A.indices, own))
         law.motion, law.force, law.multiplier = (self._pointer(part) for part in (motion, force, multiplier))
         for _ in range(_MOST):
             whole[near] = gap
@@ -254,9 +270,9 @@ class RodsTouching(Pointers):
             self._of_step[pairs.which[near[adds]]] = True
         change -= columns @ (force - before).ravel()
 
-    def _pointer(self, array):
+    def _pointer(self, array, kind="double *"):
         """C's pointer to an array that lives as long as it is used."""
-        return self._ffi.cast("double *", array.ctypes.data)
+        return self._ffi.cast(kind, array.ctypes.data)
 
     @staticmethod
     def _changes(change, rows, by):
@@ -284,43 +300,61 @@ class RodsTouching(Pointers):
         return slips, np.where(self._of_step[names][:, None], 0.0, ahead)
 
     def _compliance(self, pairs, near, nodes, pulls):
-        """Motions of gaps and slips (k parts, k parts), and of unknowns, by unit forces of the first contacts."""
+        """Motions of gaps and slips (k parts, k parts), sparse, by unit forces of the first contacts, where those of
+        the contact itself begin in them, and changes of the unknowns (unknowns, k parts) by these forces."""
         names, parts = pairs.which[near], self._parts
         if self._near is None or not np.array_equal(self._near[0], names):
-            rows = self._rows[nodes][:, :, [0, 1, 2, 4, 5, 6]]
-            columns = np.concatenate(
-                [self._response(name, *both) for name, *both in zip(names.tolist(), rows, pulls, strict=True)]
-            )
-            k = len(near)
-            A = np.empty((k, parts, len(columns)))  # of motions
-            for first, (at, by) in ((0, self._gradients(pairs, near)), (1, self._by_unknowns(nodes, pulls[:, 1:]))):
-                if by.size:
-                    A[:, first:] = self._of_columns(columns, at.reshape(k, 1, -1), by.reshape(k, -1, at.shape[-1]))
-            A = np.ascontiguousarray(A.reshape(k * parts, -1).T)
-            self._near = names, A, np.ascontiguousarray(columns.T)
+            k, size = len(near), len(self._vectors[0].array_r)
+            self._respond(names, self._rows[nodes][:, :, [0, 1, 2, 4, 5, 6]], pulls)
+            rows, found = zip(*(self._columns[name] for name in names.tolist()), strict=True)
+            places = np.concatenate([np.tile(at, parts) for at in rows])
+            starts = np.cumsum([0, *np.repeat([len(at) for at in rows], parts)])
+            columns = csr_array((np.concatenate([x.ravel() for x in found]), places, starts), shape=(k * parts, size))
+            of_parts = [self._gradients(pairs, near)]
+            if parts > 1:
+                at, by = self._by_unknowns(nodes, pulls[:, 1:])
+                of_parts += [(at[:, 0], by[:, i]) for i in (0, 1)]
+            at, by = (np.concatenate(part, axis=1) for part in zip(*of_parts, strict=True))
+            widths = [part.shape[1] for part, _ in of_parts]
+            held, row = at >= 0, parts * np.arange(k)[:, None] + np.repeat(np.arange(parts), widths)
+            motions = csr_array((by[held], (row[held], at[held])), shape=(k * parts, size))
+            A, row = (columns @ motions.T).tocoo(), np.arange(k * parts, dtype=np.int64)
+            first, each = row // parts * parts, np.repeat(row, parts)  # own motions are there, also where they are zero
+            at = np.append(A.row, each), np.append(A.col, (first[:, None] + np.arange(parts)).ravel())
+            A = csr_array((np.append(A.data, np.zeros(len(each))), at), shape=A.shape)
+            keys = np.repeat(row, np.diff(A.indptr)) * len(row) + A.indices
+            own = np.searchsorted(keys, row * len(row) + first).astype(np.intc)
+            A.indptr, A.indices = A.indptr.astype(np.intc), A.indices.astype(np.intc)
+            self._near = names, A, own, columns.T.tocsr()
         return self._near[1:]
 
-    @staticmethod
-    def _of_columns(columns, rows, by):
-        """(k, p, c) of derivatives (k, p, n) at the unknowns `rows` (k, 1, n) times columns (c, unknowns)."""
-        k, p, n = by.shape
-        rows = np.broadcast_to(rows, by.shape)
-        held = np.where(rows < 0, 0.0, by).ravel()
-        starts = np.arange(0, k * p * n + 1, n)
-        matrix = csr_array((held, np.maximum(rows, 0).ravel(), starts), shape=(k * p, columns.shape[1]))
-        return (matrix @ columns.T).reshape(k, p, -1)
-
-    def _response(self, name, rows, pulls):
-        """(parts, unknowns) changes by unit forces of a pair, as at its first contact in the step."""
-        if name not in self._columns:
-            load, answer = self._vectors
-            self._columns[name] = found = np.empty((len(pulls), len(load.array_r)))
-            for column, pull in zip(found, pulls, strict=True):
+    def _respond(self, names, rows, pulls):
+        """Find changes by unit forces of pairs, as at their first contact in the step: in `_columns` by name the rows
+        of unknowns that change, and the changes (parts, rows). One solution serves many pairs that have no rod in
+        common, since rods that are not joined do not move each other."""
+        strands, (load, answer) = self._strands, self._vectors
+        new = [i for i, name in enumerate(names.tolist()) if name not in self._columns]
+        bodies = self._body[strands.rods[self._start.touches.element[names[new]]]]
+        rounds, taken = {}, [0] * len(self._rows_of)
+        for i, (a, b) in zip(new, bodies.tolist(), strict=True):
+            free = ~(taken[a] | taken[b])
+            bit = free & -free  # the first round in which neither has its turn
+            taken[a] |= bit
+            taken[b] |= bit
+            rounds.setdefault(bit, []).append((i, a, b))
+        for together in rounds.values():
+            which = [i for i, _, _ in together]
+            places = [self._rows_of[a] if a == b else np.concatenate([self._rows_of[a], self._rows_of[b]])
+                      for _, a, b in together]  # fmt: skip
+            found = [np.empty((pulls.shape[1], len(at))) for at in places]
+            for part in range(pulls.shape[1]):
                 load.set(0.0)
-                np.add.at(load.array_w, np.maximum(rows, 0), np.where(rows < 0, 0.0, pull))
+                at = rows[which]
+                np.add.at(load.array_w, np.maximum(at, 0), np.where(at < 0, 0.0, pulls[which, part]))
                 self._problem.solve(load, answer)
-                column[:] = answer.array_r
-        return self._columns[name]
+                for values, place in zip(found, places, strict=True):
+                    values[part] = answer.array_r[place]
+            self._columns |= {names[i]: both for i, *both in zip(which, places, found, strict=True)}
 
     # -- after a step ------------------------------------------------------------------------------------------------
 
