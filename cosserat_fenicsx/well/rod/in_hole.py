@@ -429,9 +429,10 @@ class _Errors:
     # twentieth (the median) or a seventh.
     falls: float = 1 / 10
     # Errors of the finer mesh over what changed of hook load and torque; and the share of the change along most of the
-    # string that counts beside it, as it is not small by chance. All elements differ, see `_Meshes.parts`.
+    # string that counts beside it, as it is not small by chance: with 0.1 one of 131 errors in wells that no setting
+    # was chosen by was 1.1 times its estimate. All elements differ, see `_Meshes.parts`.
     of_change: float = 1.5
-    along: float = 0.1
+    along: float = 0.2
 
 
 _ERRORS = _Errors()
