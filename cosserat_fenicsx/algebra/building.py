@@ -179,7 +179,8 @@ class Mesh(Pointers):
 
 # C's types of numpy's arrays.
 _POINTERS = {"d": "double[]", "i": "int[]"}
-_MARK = 0.8765432198765432
+# What is added to an index so that no other number looks like one; and how many elements tell which columns have it.
+_MARK, _ASKED = 0.8765432198765432, 16
 
 
 class _Kernel(Pointers):
@@ -256,13 +257,13 @@ class Packed(_Kernel):
         packed = self._pack().get(self._key, self._w)
         for numbers, values in zip(arrays, kept, strict=True):
             numbers[:] = values
-        off = packed - _MARK
+        off = packed[:: 1 + len(packed) // _ASKED] - _MARK
         columns = np.flatnonzero((abs(off - np.rint(off)) < 1e-6).all(axis=0)) if len(packed) else np.empty(0, int)
         of = np.searchsorted(first, packed[:1, columns].ravel(), side="right") - 1
         for run in np.split(np.arange(len(columns)), np.flatnonzero((np.diff(columns) > 1) | np.diff(of)) + 1):
             if len(run):
                 k, at = of[run[0]], columns[run]
-                yield arrays[k], np.rint(off[:, at]) - first[k], at[0]
+                yield arrays[k], np.rint(packed[:, at] - (_MARK + first[k])), at[0]
 
     def _slots(self, value):
         """The places of a Constant among the packed ones, found in the same way."""
@@ -297,8 +298,9 @@ class Packed(_Kernel):
         mesh, lanes = self._form.mesh, self._lanes
         ends = mesh.geometry.x[compat.geometry_dofs(mesh)[: self.elements]].reshape(self.elements, 6)
         for to, numbers in ((lanes["w"], self._w), (lanes["x"], ends)):
-            last = np.repeat(numbers[-1:], -len(numbers) % self._lib.LANES, axis=0)  # where no element is
-            to[:] = np.concatenate([numbers, last]).reshape(len(to), self._lib.LANES, to.shape[1]).transpose(0, 2, 1)
+            for lane in range(self._lib.LANES):
+                part = numbers[lane :: self._lib.LANES]
+                to[: len(part), :, lane], to[len(part) :, :, lane] = part, numbers[-1]  # where no element is
         lanes["c"][:] = self._c[:, None]
 
     def add_to_vector(self, array):
@@ -422,6 +424,11 @@ def functions_in_lanes(addresses, lanes):
         return None
     places = {name: lib.lane_kernels[i] for i, name in enumerate(kernels)}
     return {address: places[name] for address, (name, _) in sources.items()}
+
+
+#: Elements from which several are computed at once in equilibria, and in motions, where tangents are left as they are:
+#: the code for it takes two seconds to compile, or one.
+MANY_AT_REST, MANY_IN_MOTION = 1000, 100
 
 
 def take_together(*forms):

@@ -11,7 +11,7 @@ import functools
 import numpy as np
 
 from cosserat_fenicsx.algebra import eigen
-from cosserat_fenicsx.algebra.building import Pointers, module
+from cosserat_fenicsx.algebra.building import MANY_AT_REST, Pointers, module
 
 #: Relative to the largest number in its column, smaller pivots are zero to rounding.
 ZERO_PIVOT = 2e-15
@@ -19,8 +19,6 @@ ZERO_PIVOT = 2e-15
 _DELAYS = 3
 # Numbers of a front that C takes together.
 _BESIDE = 4
-# Elements from which several are computed at once in equilibria: the code for it takes two seconds to compile.
-_MANY_ELEMENTS = 1000
 
 
 def _round_up(number):
@@ -194,7 +192,7 @@ def condensed(model, numbering, cell_dofs, tied, **options):
     tied: (tied nodes, block) numbers of the unknowns in constraint equations, -1 where clamped."""
     order = np.argsort(model.rods.cells[: len(cell_dofs)])
     elimination = Elimination(numbering, cell_dofs, order, tied.ravel(), **options)
-    elimination.many = sum(model.signature.counts) >= _MANY_ELEMENTS and bool((np.diff(order) == 1).all())
+    elimination.many = sum(model.signature.counts) >= MANY_AT_REST and bool((np.diff(order) == 1).all())
     if not elimination.unknowns and numbering.comm.size == 1:
         return elimination, None
     links = model.signature.connections
@@ -372,7 +370,7 @@ class _Sparse:
         arrays = (ffi.from_buffer("int[]", x) for x in (rows, columns, self._starts, *found))
         self.room = lib.number_entries(self._size, len(rows), *arrays)
         self._columns = found[0, : self.room].copy()
-        return found[1, : len(rows) - self._size].copy()
+        return found[1, : len(rows) - self._size].astype(np.intp)  # as `bincount` takes them
 
     @functools.cached_property
     def _factors(self):

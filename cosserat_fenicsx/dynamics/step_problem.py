@@ -16,17 +16,13 @@ takes of the kinetic energy counts as dissipated.
 import numpy as np
 from dolfinx import fem
 
-from cosserat_fenicsx.algebra.building import Packed, take_together
+from cosserat_fenicsx.algebra.building import MANY_IN_MOTION, Packed, take_together
 from cosserat_fenicsx.algebra.equations import CONTACT, NODES, RESIDUAL, STATE, Equations
 from cosserat_fenicsx.algebra.tie_rows import TieRows
 from cosserat_fenicsx.dynamics.contact import NodalContact, TouchingNodes, motion_between
 from cosserat_fenicsx.dynamics.touching import RodsTouching
 from cosserat_fenicsx.numerics import directors, small_rotations
 from cosserat_fenicsx.statics.tensions import ThreadLengths
-
-
-# Number of elements from which several are computed at once: the code for it takes a second to compile.
-_MANY_ELEMENTS = 100
 
 
 class MovingTies(TieRows):
@@ -305,7 +301,7 @@ class StepProblem(Equations):
         self._live, self._momentum, self._dead, self._permanent = (
             self._pack_form(form) for form in (forms.live, forms.momentum, forms.dead, forms.permanent)
         )
-        if sum(self.model.signature.counts) >= _MANY_ELEMENTS:
+        if sum(self.model.signature.counts) >= MANY_IN_MOTION:
             take_together(self._residual, self._momentum)
 
     def _pack_form(self, form):

@@ -306,8 +306,8 @@ class CompiledScene:
         scales, of_motion = Scales.of(self._scene), signatures[0].formulation.force.of_motion
         layouts, iterations = (layout, layout.finer(scene, 2)), (10 if of_motion is False else 30, CORRECTIONS)
         meshes = [
-            Loaded(make_solvers(self._comm, signature), scene, mesh, scales.moment * scales.length, self._load_factor,
-                   iterations=most)
+            Loaded(make_solvers(self._comm, signature, together=False), scene, mesh, scales.moment * scales.length,
+                   self._load_factor, iterations=most)
             for signature, mesh, most in zip(signatures, layouts, iterations, strict=True)
         ]  # fmt: skip
         for mesh in meshes:

@@ -313,7 +313,8 @@ class Loaded(Mesh):
     """A problem of its own on one mesh, with what C needs to expand its states (`c`, the `mesh` of chain.h).
 
     EI, N m^2, is that of the units, which then depend on no case; load_factor: of all cases; iterations: of Newton's
-    method in a step; turned: the largest angle of `surely_resolved`.
+    method in a step; turned: the largest angle of `surely_resolved`; solvers: not `together`, since cases write
+    coefficients, of which there would be copies.
     """
 
     def __init__(self, solvers, scene, layout, EI, load_factor, *, iterations):
@@ -332,8 +333,6 @@ class Loaded(Mesh):
         sweep = self.c.sweep = self._sweep.c
         sweep.control, sweep.patience, sweep.every = self._control, np.inf, False
         sweep.load_factors, sweep.count = self.doubles(self._load_factor), 1
-        for form in self._packed():  # cases write coefficients, of which there are copies for several elements at once
-            form.c.together = self._ffi.NULL
         self._describe()
 
     def _describe(self):

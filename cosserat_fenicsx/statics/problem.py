@@ -155,8 +155,6 @@ class Problem(Equations):
             elements, size = model.carried_dofs.shape
             advance = PackedExpression(forms.advance, model.mesh, elements, size)
         self.take_forms(Packed(forms.residual, moving, constants), Packed(forms.tangent, moving, constants), advance)
-        if self.elimination.many:
-            take_together(self._residual, self.tangent_form)
         self._dead, self._permanent, *self._difference = (self.numbering.vector() for _ in range(4))
         self._loads, self._permanent_loads = (
             Packed(form, (), ()) if form else None for form in (forms.dead, forms.permanent)
@@ -426,11 +424,15 @@ _LARGE = 200_000
 _OUTCOMES = (NotConverged, Promoted)
 
 
-def make_solvers(comm, signature):
-    """A new `Problem`, not loaded, its Newton solver and its `NegativeModes`."""
-    model = _MODELS[signature.model, signature.flat](comm, signature)
-    problem = Problem(model)
-    return problem, Newton(problem), NegativeModes(problem)
+def make_solvers(comm, signature, *, together=True):
+    """A new `Problem`, not loaded, its Newton solver and its `NegativeModes`; together: whether several of many
+    elements may be computed at once."""
+    problem = Problem(_MODELS[signature.model, signature.flat](comm, signature))
+    stability = NegativeModes(problem)
+    if together and problem.elimination.many:
+        for forms in ((problem._residual, problem.tangent_form), *((part.form,) for part in stability.parts)):
+            take_together(*forms)
+    return problem, Newton(problem), stability
 
 
 @contextlib.contextmanager

@@ -13,7 +13,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from cosserat_fenicsx.algebra import eigen
-from cosserat_fenicsx.algebra.building import Packed, Pointers, take_together
+from cosserat_fenicsx.algebra.building import Packed, Pointers
 from cosserat_fenicsx.algebra.elimination import condensed
 from cosserat_fenicsx.algebra.equations import COUNT, Called
 
@@ -111,8 +111,6 @@ class Part(Pointers):
         self.elimination, self.interface = condensed(
             self.model, variation.numbering, variation.cell_dofs, variation.tied, factors=False
         )
-        if self.elimination.many:
-            take_together(self.form)
         self.tied = self._tie() if problem.ties else None
         #: of scipy: what is added to K, which counts do not know
         self.lacking = None
