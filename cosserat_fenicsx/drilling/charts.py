@@ -80,6 +80,14 @@ def swings(values):
     return int((above[1:] != above[:-1]).sum()) // 2
 
 
+def chatter(values):
+    """How often values oscillate by a notable share of their range, about: half the times that they turn back so far."""
+    steps = np.diff(values[np.isfinite(values)])
+    turns = np.flatnonzero(steps[1:] * steps[:-1] < 0) + 1
+    sizes = np.abs(np.diff(values[turns]))
+    return int((sizes > _NOTABLE * (np.nanmax(values) - np.nanmin(values))).sum()) // 2
+
+
 def lower_end(history):
     """The name of what is at the lower end: a string off bottom has no bit on rock."""
     return "lower end" if history.scene.bit is None else "bit"
@@ -175,6 +183,8 @@ _STYLES = {"work": "--", "lost": ":"}
 # A chart with more oscillations of the bit than this shows the bands between their extremes; oscillations that can be
 # seen one by one.
 _SWINGS, _SOME_SWINGS = 80, 20
+# Share of the range of values by which they turn back where it is seen.
+_NOTABLE = 0.02
 
 
 def over_time_figure(history, between=None):
@@ -184,13 +194,15 @@ def over_time_figure(history, between=None):
     panels = _panels(history, rows)
     many = max(swings(history.bit_speed[rows]), swings(np.nan_to_num(history.bit_velocity[rows])))
     many = many if many > _SWINGS else 0
+    fast = max(chatter(values) for _, lines in panels for values, *_ in lines)
+    count, banded = min(_BANDS, max(many, fast) // 2), many or fast > _BANDS
     figure, axes = stacked(10, [2.3] * len(panels))
     for panel, (quantity, lines) in zip(axes, panels, strict=True):
         every = [values for values, *_ in lines]
         heading, size = scale(quantity, *every)
         for values, label, colour in lines[::-1]:
-            if many:
-                middles, least, most, mean = bands(t, values / size, min(_BANDS, many // 2))
+            if many or chatter(values) > _BANDS:
+                middles, least, most, mean = bands(t, values / size, count)
                 panel.fill_between(middles, least, most, color=colour, label=label, alpha=0.4, linewidth=0)
                 panel.plot(middles, mean, color=colour, linewidth=1.1)
             else:
@@ -198,15 +210,15 @@ def over_time_figure(history, between=None):
         panel.set_ylabel(heading)
         if quantity.label.startswith("motor") and history.stalled[rows].any():
             _shade(panel, t, history.stalled[rows], "motor stalled", "tab:red", 0.25)
-        if panel is axes[0] and turns(history) and not many:
+        if panel is axes[0] and turns(history) and not banded:
             label = f"{lower_end(history)} at rest"
             _shade_rest(panel, t, history.bit_speed[rows], history.drive_speed[rows], label)
     legend(*axes)
     axes[-1].set_xlabel("time (s)")
     caution = history.stick_slip().caution.replace(" and nothing", "\nand nothing") if len(history) > 5 else ""
     text = ""
-    if many:
-        some = f"between=({t[-1] - (t[-1] - t[0]) * _SOME_SWINGS / many:.4g}, {t[-1]:.6g})"
+    if banded:
+        some = f"between=({t[-1] - (t[-1] - t[0]) * _SOME_SWINGS / max(many, fast):.5g}, {t[-1]:.6g})"
         text = f"\nbands between the extremes of oscillations, lines: their means; single ones: {some}"
     figure.suptitle(title_of(history) + text + (f"\n{caution}" if caution else ""))
     return figure

@@ -53,8 +53,10 @@ def _draw(answer, enlarge, width, top, bottom):
         way = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(axis, axis=0), axis=1)))
         some = np.unique(np.searchsorted(way, np.append(np.arange(0.0, way[-1], 3 * view.pixel), way[-1])))
         md, axis, radius = md[some], axis[some], radius[some]
-    line = axis + enlarge * _picture(_at(md, answer, answer.offset))
-    thick = enlarge * (radius - _at(md, answer, answer.clearance))
+    # what is shorter than the hole is wide in the picture would be a lump there
+    half = enlarge * radius.max() * (3 if whole else answer.model != "rod")
+    line = axis + enlarge * _picture(_mean(md, answer, answer.offset, half))
+    thick = enlarge * (radius - _mean(md, answer, answer.clearance, half))
     _add_string(plotter, pyvista, answer, md, line, np.maximum(thick, 0.0), tubes, scale * _MARGINS[1])
     if tubes:
         _add_hole(plotter, pyvista, answer, md, axis, enlarge * radius)
@@ -85,6 +87,16 @@ def _at(md, answer, values):
     """Values (n,) or (n, 3) at the answer's depths, at other ones."""
     columns = [np.interp(md, answer.md, column) for column in np.atleast_2d(values.T)]
     return np.stack(columns, axis=-1) if values.ndim > 1 else columns[0]
+
+
+def _mean(md, answer, values, half):
+    """The same, as means over the length `half` (m) on both sides."""
+    if not half:
+        return _at(md, answer, values)
+    pieces = np.diff(answer.md)[:, None] * (values[1:] + values[:-1]).reshape(len(values) - 1, -1) / 2
+    summed = np.concatenate([np.zeros((1, pieces.shape[1])), np.cumsum(pieces, axis=0)]).reshape(values.shape)
+    low, high = np.maximum(md - half, answer.md[0]), np.minimum(md + half, answer.md[-1])
+    return ((_at(high, answer, summed) - _at(low, answer, summed)).T / (high - low)).T
 
 
 def _picture(rows):
