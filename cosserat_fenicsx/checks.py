@@ -96,6 +96,8 @@ def number(owner, field, value, expected, accept, above_zero=False, dimension=No
         dimension: of text with a unit, see `quantities.DIMENSIONS`; None for that of the SI unit.
     """
     unit, told = _unit_of(expected), value
+    if isinstance(value, str) and unit == "degrees" and not any(map(str.isdigit, value)):
+        refuse(owner, field, value, expected)
     if isinstance(value, str):
         value = _in_si(owner, field, value, unit, dimension)
         if not isinstance(value, str):
@@ -229,7 +231,7 @@ def doubt_width(owner, field):
     if diameter is not None and diameter > _WIDEST:
         warn(
             f"{name_of(owner)}.{field} = {diameter:g} m is wider than holes are: is it in inches? 8.5 in are '8.5 in', "
-            "8.5 * units.inch or 0.2159"
+            "or 0.2159"
         )
 
 

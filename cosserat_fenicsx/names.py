@@ -4,6 +4,20 @@ import importlib
 from os import path
 
 
+# Names of the trade, and those of the package.
+_USUAL = {"HWDP": "HeavyWeight", "DP": "DrillPipe", "DC": "Collar", "DrillCollar": "Collar", "Survey": "WellPath",
+          "Motor": "MudMotor", "Casing": "HoleSection", "BHA": "DrillString"}  # fmt: skip
+
+
+def _hint(name, known):
+    """'did you mean ...?' for a name that a package does not have."""
+    from cosserat_fenicsx.errors import nearest
+
+    other = _USUAL.get(name)
+    found = f"did you mean '{other}'?" if other in known else nearest(name, known)
+    return found if found.startswith("did") else "dir() of it lists what it has"
+
+
 def public(package, file):
     """Lazy public names for a package's `__init__.py`.
 
@@ -19,7 +33,8 @@ def public(package, file):
 
     def get(name):
         if name not in homes:
-            raise AttributeError(f"module '{package}' has no attribute '{name}'")
+            hint = "" if name.startswith("_") else f": {_hint(name, homes)}"
+            raise AttributeError(f"module '{package}' has no attribute '{name}'{hint}", name=name)
         if homes[name] == package:  # a public module
             return importlib.import_module(f"{package}.{name}")
         from cosserat_fenicsx.checks import in_words

@@ -13,6 +13,7 @@ from reference_strings import pipe_and_collars
 from test_whirl import collar  # noqa: F401
 
 import cosserat_fenicsx as cf
+from cosserat_fenicsx.drilling.charts import chatter
 from cosserat_fenicsx.pictures.charts import draw_chart
 
 pytest.importorskip("matplotlib")
@@ -106,3 +107,10 @@ def test_strings_in_wells():
     fit = cf.well.calibrate_friction(wells.HOLE.with_friction(0.0), wells.STRING, wells.measured(1.0), mud=wells.MUD)
     check_all(sliding.plot, lambda **look: sliding.plot(between=(2300, 2500), **look), wells.sweep().plot, fit.plot)
     assert sliding.plot(units="field").axes[1].get_xlabel() == "tension (klbf)"
+
+
+def test_chatter_is_counted_apart_from_what_it_rides_on_and_from_noise():
+    t = np.linspace(0, 100, 50_001)
+    slow, fast = np.sin(2 * np.pi * 0.2 * t), np.sin(2 * np.pi * 9 * t)
+    assert chatter(slow) == pytest.approx(20, abs=1) and chatter(slow + 0.3 * fast) == pytest.approx(900, rel=0.02)
+    assert chatter(slow + 0.01 * fast) < 100 and chatter(0 * t) == 0

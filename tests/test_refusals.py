@@ -9,6 +9,7 @@ import re
 import subprocess
 import sys
 import tomllib
+import warnings
 import zipfile
 from pathlib import Path
 
@@ -23,6 +24,7 @@ from cosserat_fenicsx.cli.explain import explain
 from cosserat_fenicsx.cli.main import main
 from cosserat_fenicsx.results.result import plain_text
 from cosserat_fenicsx.storage.mark import mark_of
+from cosserat_fenicsx.well.scenefile import WellScene
 
 pytestmark = pytest.mark.serial
 DEMOS = Path(__file__).parent.parent / "demos"
@@ -562,3 +564,27 @@ def test_depths_and_frictions_that_are_probably_in_other_units_are_told_as_typed
         cf.well.HoleSection("10000 ft", "8.5 in", 25)
     with pytest.raises(cf.SceneError, match=words):
         hole.with_friction(25)
+
+
+def test_names_of_the_trade_and_sizes_lead_to_those_known():
+    for name, other in (("Stabilizer", "Stabiliser"), ("HWDP", "HeavyWeight")):
+        with pytest.raises(AttributeError, match=f"no attribute '{name}': did you mean '{other}'"):
+            getattr(cf.well, name)
+    with pytest.raises(cf.SceneError, match="size = '6 3/4 in': known of this diameter: NC50-67;"):
+        cf.well.Collar(90, "6 3/4 in")
+    with pytest.raises(cf.SceneError, match=r"NC46-65 \(6.5 x 2.812 in\)"):
+        cf.well.Collar(90, "XX")
+    with pytest.raises(cf.SceneError, match="tool_face = 'high': expected an angle .degrees, 0 the high side"):
+        cf.well.Collar(30, "NC46-65", bend=1.5, bend_at=2, tool_face="high")
+
+
+def test_a_survey_and_lengths_that_are_doubtful():
+    with pytest.warns(cf.SceneWarning, match="turns by 34 degrees per 100 ft between md = 1000 and 1100 ft"):
+        path = cf.well.WellPath.from_survey([0, 1000, 1100, 3000], [0, 0, 34, 34], [0] * 4, length_unit="ft")
+    hole = cf.well.Borehole(path, cf.well.HoleSection("3000 ft", "8.5 in", 0.2))
+    for length, asked in ((90.0, True), ("90.5 ft", False), ("29.25 ft", False)):
+        string = cf.well.DrillString([cf.well.Collar(length, "NC46-65"), cf.well.DrillPipe(size="5 in 19.50 lb/ft")])
+        with warnings.catch_warnings(record=True) as told:
+            warnings.simplefilter("always")
+            WellScene(hole, string, (cf.well.TripOut(),), cf.well.Mud("10 ppg"))
+        assert ["write '90 ft'" in str(x.message) for x in told] == [True] * asked

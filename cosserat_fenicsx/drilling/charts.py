@@ -81,7 +81,7 @@ def swings(values):
 
 
 def chatter(values):
-    """How often values oscillate by a notable share of their range, about: half the times that they turn back so far."""
+    """How often values oscillate by a notable share of their range: half the times that they turn back so far."""
     steps = np.diff(values[np.isfinite(values)])
     turns = np.flatnonzero(steps[1:] * steps[:-1] < 0) + 1
     sizes = np.abs(np.diff(values[turns]))

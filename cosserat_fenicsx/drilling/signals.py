@@ -23,8 +23,7 @@ def doubt_speed(owner: object, field: str, speed: float) -> None:
         name = owner if isinstance(owner, str) else type(owner).__name__
         warn(
             f"{name}.{field} = {speed:g} rad/s are {speed / units.rpm:.0f} rev/min, faster than drives turn a string: "
-            f"{speed:g} rev/min are {speed:g} * units.rpm = {speed * units.rpm:.4g} rad/s, '{speed:g} rpm' in a scene "
-            "file"
+            f"{speed:g} rev/min are {speed * units.rpm:.4g} rad/s, or '{speed:g} rpm'"
         )
 
 

@@ -95,7 +95,7 @@ class DriveControl(Part, family="control of a drive", homes=("cosserat_fenicsx.d
         if self._needs_inertia and drive.inertia == 0:
             refuse(drive, "inertia", 0.0, f"the drive's own (kg m^2), about 2000 to 4000, for {self._needs_inertia}")
         if drive.speed is None and not self.sampled:
-            refuse(drive, "speed", None, "the speed asked for (rad/s), such as 60 * units.rpm")
+            refuse(drive, "speed", None, "the speed asked for (rad/s), such as '60 rpm'")
 
 
 class SampledControl(DriveControl):

@@ -80,7 +80,14 @@ def standard_size(kind, name):
 def _sizes_near(name, known):
     """The end of a message on an unknown size: the known ones of its diameter, or the nearest name."""
     alike = _of_its_diameter(name, known)
-    return f"known of this diameter: {', '.join(alike)}" if alike else nearest(name, known)
+    if alike:
+        return f"known of this diameter: {', '.join(alike)}"
+    found = nearest(name, known)
+    if found.startswith("did"):
+        return found
+    wide = (f"{size} ({row['outer_diameter'] / units.inch:.4g} x {row['inner_diameter'] / units.inch:.4g} in)"
+            for size, row in known.items())  # fmt: skip
+    return f"known, with outer and inner diameter: {', '.join(wide)}"
 
 
 def _of_its_diameter(name, known):
@@ -93,7 +100,10 @@ def _of_its_diameter(name, known):
         except (IndexError, ValueError):  # without a weight
             return 0.0
 
-    return sorted((size for size, words in sizes.items() if words[:1] == found[:1]), key=off)
+    def same(size, words):
+        return words[:1] == found[:1] or f"{known[size]['outer_diameter'] / units.inch:g}" == "".join(found[:1])
+
+    return sorted((size for size, words in sizes.items() if same(size, words)), key=off)
 
 
 def _plain(name):
@@ -165,7 +175,7 @@ class _Bendable(StringPart):
 
     bend: Annotated[float, between(0, _MOST_BENT, "a bend (degrees)")] | None = None
     bend_at: Annotated[float, Number("length", at_least(0, "a distance from the lower end (m)"))] | None = None
-    tool_face: Annotated[float, between(-360, 360, "an angle from the high side (degrees)")] | None = None
+    tool_face: Annotated[float, between(-360, 360, "an angle (degrees, 0 the high side, 90 right)")] | None = None
 
     def validate(self):
         """Refuse a bend without its place, or with a place outside, and what belongs to a bend without one."""

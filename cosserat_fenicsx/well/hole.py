@@ -29,7 +29,7 @@ _ATMOSPHERE = 101325.0
 # gas nor of a liquid; heavier than any mud.
 _DOUBTED = {
     "density": ([(0.5, 3.0), (5.0, 300.0), (2700.0, math.inf)], "is hardly that of a mud: 1.2 g/cm^3 are 1200, 10 "
-                "pounds per US gallon 10 * units.ppg = 1198"),
+                "pounds per US gallon are '10 ppg' or 1198"),
     "friction": ([(1.0, math.inf)], "is more than the wall of a well has (0.1 to 0.5; 25 percent are 0.25)"),
 }  # fmt: skip
 

@@ -28,10 +28,9 @@ def doubt_load(called, value, what, more="", of="bit"):
     least, unit = _DOUBTFUL[what]
     if 0 < abs(value) < least:
         place = "on bit" if of == "bit" else f"of a {of}"
-        warn(
-            f"{called} = {value:g} {unit} is hardly a {what} {place}: 25 kN are 25e3, 25 klbf 25 * units.kip; 5 kN m "
-            f"are 5e3, 4000 ft-lbf 4000 * units.ft_lbf{more}"
-        )
+        such = "5 kN m are 5e3 or '5 kN m', 4000 ft-lbf" if what == "torque" else "25 kN are 25e3 or '25 kN', 25 klbf"
+        text = "'4000 ft-lbf'" if what == "torque" else "'25 klbf'"
+        warn(f"{called} = {value:g} {unit} is hardly a {what} {place}: {such} {text}{more}")
 
 
 class Operation(Part, family="operation"):

@@ -321,6 +321,8 @@ def _arc(sections, i, x):
 
 
 _FULL = math.radians(360)
+# Degrees per 30 m above which no usual well turns.
+_TIGHT = 30.0
 
 
 def checked_survey(md, inc, azi, degrees, given="m"):
@@ -360,6 +362,12 @@ def checked_survey(md, inc, azi, degrees, given="m"):
             refuse(who, f"{name}[{i}]", float(columns[name][i]),
                    f"{least / one:g} to {most / one:.6g} ({unit}), at md = {told[i]} {given}")  # fmt: skip
     inc = np.minimum(inc, math.pi)
+    rates = _curvatures(inc, azi, np.diff(md))[0] / np.diff(md)
+    i = int(rates.argmax())
+    if rates[i] > _TIGHT * deg_per_30m:
+        rate, per = (deg_per_100ft, "100 ft") if given == "ft" else (deg_per_30m, "30 m")
+        warn(f"WellPath: the hole turns by {rates[i] / rate:.3g} degrees per {per} between md = {told[i]} and "
+             f"{told[i + 1]} {given}; wells have up to about 20: is there an error in the survey?")  # fmt: skip
     # rounding errors would decide the plane of such an arc
     for i in np.flatnonzero(_curvatures(inc, azi, np.diff(md))[0] > math.pi - 1e-6):
         raise SceneError(

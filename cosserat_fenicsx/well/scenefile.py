@@ -54,7 +54,8 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 
-from cosserat_fenicsx.checks import File, refuse
+from cosserat_fenicsx import units as constants
+from cosserat_fenicsx.checks import File, refuse, warn
 from cosserat_fenicsx.parts import Depth, Number, Part, Settings, Values, between, concerning, positive
 from cosserat_fenicsx.quantities import Units
 from cosserat_fenicsx.results.result import Result
@@ -187,6 +188,7 @@ class WellScene(InWords, Part):
 
     def validate(self):
         hole, settings, sweep = self.well, self.settings, self.sweep
+        self._doubt_lengths()
         here = [settings.pop("depth", hole.length)]
         friction, depths = sweep.get("friction", []), sweep.get("depths", [])
         of_sweep = {name: sweep[name] for name in ("model", "tol") if name in sweep}
@@ -205,6 +207,17 @@ class WellScene(InWords, Part):
         if self.build_rate is not None:
             with concerning("build_rate"):
                 self._check_builds(*here)
+
+    def _doubt_lengths(self):
+        """Warn of components whose lengths are whole millimetres, and not hundredths of a foot, in a hole in feet."""
+        found = []
+        for part in self.string.components if self.hole.path.unit == "ft" else ():
+            mm, feet = ((part.length or 0.0) / size for size in (1e-3, constants.foot / 1200))
+            if mm > 1000 and abs(mm - round(mm)) < 1e-6 and abs(feet - round(feet)) > 1e-3:
+                found.append(f"{part.length:.10g} m of the {part.name}")
+        if found:
+            text = f"string: lengths in m beside a survey in feet: {', '.join(found)}"
+            warn(f"{text}: if these are feet, write '{found[0].split()[0]} ft' and so on")
 
     def _check_builds(self, depth):
         """Refuse an assembly that `build_rate` cannot take."""
