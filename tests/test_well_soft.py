@@ -118,6 +118,8 @@ def test_a_survey_from_a_file(tmp_path):
         ("# My company\nWell: A-1, 2024\n\nMD;INC;AZI\nft;deg;deg", {"length_unit": "ft"}),
         ("depth_ft;tilt;Azimuth", {"md": "Depth", "inc": "tilt"}),
         ("Hole Depth (ft);Inc.;Azi True", {}),
+        ("MD;INC;AZ\n(ft);[deg];(deg)", {}),
+        ("Meas. Depth (ftKB);Incl. (deg);Azim. (deg T)", {}),
     ):
         file.write_text(heading + stations, encoding="utf-8")
         well = cf.well.WellPath.from_csv(file, **given)
@@ -126,6 +128,9 @@ def test_a_survey_from_a_file(tmp_path):
     for unit in ("usft", "US survey feet", "ftUS"):
         file.write_text(f"MD ({unit}),Inc (deg),Azi (deg True){stations}".replace(";", ","), encoding="utf-8")
         assert cf.well.WellPath.from_csv(file).md[2] == pytest.approx(2000 * 0.3048006096, rel=1e-10)
+    for numbers in ("\n0,0;0;0\n2000,00;30,5;45\n", '\n0;0;0\n"2,000.0";30.5;45\n'):
+        file.write_text(f"MD (ft);Inc (deg);Azi{numbers}", encoding="utf-8")
+        assert cf.well.WellPath.from_csv(file).inclination[1] == pytest.approx(np.radians(30.5))
     file.write_text("MD (mRKB),Inc (rad),Azi\n0,0,0\n900,0.3,0.2\n", encoding="utf-8")
     assert cf.well.WellPath.from_csv(file).inclination[1] == 0.3
     file.write_text("MD,Inc,Azi\n0,0,0\n9000,30,0\n", encoding="utf-8")
@@ -197,7 +202,7 @@ def test_a_survey_from_a_workbook(tmp_path):
 
 @pytest.mark.parametrize(("text", "given", "words"), [
     ("md,inc,azi\n0,0,0\n\n10,none,0", {}, "line 4, '10,none,0': expected numbers in md, inc, azi"),
-    ("md;inc;azi\n0;0;0\n10;10,5;20", {}, "line 3.*decimals stand behind a point"),
+    ("md;inc;azi\n0;0;0\n10;10,500;20", {}, "line 3.*decimals stand behind a point"),
     ("md,inc,azi\n0,0,0\n10,10,5,20", {}, "line 3.*no more columns than names"),
     ("MD (m),inc,azi\n0,0,0\n10,5,20", {"length_unit": "ft"}, "'MD .m.' says a unit of 1 m"),
     ("MD (m),inc,azi\n0,0,0\n10,5,20", {"length_unit": "yd"}, "length_unit = 'yd': known: cm, f"),

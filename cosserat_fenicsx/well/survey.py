@@ -21,9 +21,10 @@ from cosserat_fenicsx.results.result import import_library
 
 # Names of the same column in files.
 _NAMES = (
-    ("md", "measured depth", "meas depth", "meas. depth", "depth md", "md depth", "hole depth", "survey depth"),
-    ("inc", "incl", "inclination", "inc.", "incl."),
-    ("azi", "az", "azm", "azim", "azimuth", "azi.", "azm.", "azi true", "azi grid", "azimuth true", "azimuth grid"),
+    ("md", "measured depth", "meas depth", "depth md", "md depth", "hole depth", "survey depth"),
+    ("inc", "incl", "inclination", "drift angle"),
+    ("azi", "az", "azm", "azim", "azimuth", "azi true", "azi grid", "azimuth true", "azimuth grid",
+     "azimuth true north", "azimuth grid north"),
 )
 # Units in headings: of lengths, m; of angles, whether it is a degree.
 _LENGTHS = {
@@ -68,12 +69,14 @@ def read_columns(who, file, names, degrees, length_unit, sheet=None):
     for k, (i, line) in enumerate(lines[first + 1 :]):
         row = _cells(file, i, line, separator)
         cells = [row[column].strip() if column < len(row) else "" for column in columns]
-        if k == 0 and all(cell.lower() in _UNITS for cell in cells):
-            says = [cell.lower() for cell in cells]
+        bare = [cell.lower().strip("()[]") for cell in cells]
+        if k == 0 and all(cell in _UNITS for cell in bare):
+            says = bare
             continue
         try:
             if any(cell.strip() for cell in row[len(heading) :]):
                 raise ValueError
+            cells = [_with_point(cell, separator) for cell in cells]
             values.append([*map(_number, cells[:2]), _number(cells[2] or "nan")])  # of vertical stations: no azimuth
         except ValueError:
             point = any("," in cell for cell in row) or len(row) > len(heading)
@@ -191,12 +194,21 @@ def _columns(heading, name):
 def _split(heading):
     """Name in lower case, and unit ("" where it has none) of the heading of a column: "MD (ft)", "inc_deg", "MD"."""
     name, bracket, unit = re.match(r"([^\[(]*)([\[(]?)([^\])]*)", heading.replace("_", " ").strip().lower()).groups()
-    words = name.split()
+    words = name.replace(".", "").split()
     if bracket:
         unit = unit.strip()
         return " ".join(words), next((name for spelt, name in _SPELT if re.match(spelt, unit)), unit)
     last = words.pop() if len(words) > 1 and words[-1] in _UNITS else ""
     return " ".join(words), last
+
+
+def _with_point(cell, separator):
+    """A number as Python writes it where there is no doubt: commas between thousands before a point, or before
+    decimals that are not three, where commas do not separate cells."""
+    if re.fullmatch(r"-?\d{1,3}(,\d{3})+\.\d*", cell):
+        return cell.replace(",", "")
+    decimals = separator != "," and re.fullmatch(r"-?(\d+,(\d\d?|\d{4,})|\d{4,},\d{3})", cell)
+    return cell.replace(",", ".") if decimals else cell
 
 
 def _number(cell):
