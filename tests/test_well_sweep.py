@@ -40,9 +40,9 @@ OPERATIONS = cf.well.TripOut(), cf.well.TripIn(), cf.well.RotateOffBottom()
 DEPTHS = np.linspace(800, 2500, 5)
 
 
-def sweep(**settings):
+def sweep(depths=DEPTHS, **settings):
     given = {"mud": MUD, "model": "soft", "friction": [0.1, [0.2, 0.4]], **settings}
-    return cf.well.depth_sweep(HOLE, STRING, OPERATIONS, DEPTHS, **given)
+    return cf.well.depth_sweep(HOLE, STRING, OPERATIONS, depths, **given)
 
 
 @pytest.mark.once
@@ -54,6 +54,8 @@ def test_a_sweep_is_its_answers():
         answer = cf.well.torque_and_drag(hole, STRING, operation, mud=MUD, depth=DEPTHS[3], model="soft")
         assert found.hook_load[i, 1, 3] == answer.hook_load and found.surface_torque[i, 1, 3] == answer.surface_torque
     assert (found.hook_load[0] > found.hook_load[2]).all() and (found.hook_load[2] > found.hook_load[1]).all()
+    many = sweep(friction=[0.2], depths=np.linspace(800, 2500, 15))
+    assert "of 15; to_dataframe() has all)" in str(many) and "to_dataframe" not in str(found)
     assert found.label(1, 1) == "trip in, friction 0.2, 0.4" and f"{found.hook_load[1, 1, 2] / 1e3:.2f}" in str(found)
 
 

@@ -240,5 +240,7 @@ def over_depths(sweep, units, rows):
                 given.append((replace(known["surface_torque"], short=f"{label}, torque"), sweep.surface_torque[i, j]))
             if len(used) > 1:
                 given.append((replace(known["models"], label=f"{label}, model"), sweep.models[i, j]))
-    title = "loads over the depth of the bit"
+    count = len(sweep.depths)
+    some = f" ({len(screen.rows_of(count, rows))} of {count}; to_dataframe() has all)" if count > rows else ""
+    title = f"loads over the depth of the bit{some}"
     return screen.table([(known["depth"], sweep.depths), *given], units, rows, title)
