@@ -141,6 +141,8 @@ def _common(parser):
                         "back) [auto]")  # fmt: skip
     parser.add_argument("--branch", type=int, help="1 or -1: leave the path at its first bifurcation")
     _units(parser)
+    parser.add_argument("--details", action="store_true", help="of a string in a well with several operations: longer "
+                        "tables and all sentences of each")  # fmt: skip
     parser.add_argument("--static", action="store_true", help="the equilibrium path, whatever [simulate] says")
     motion = parser.add_argument_group("motions (--tol, --elements [8], --degree [3] and --model are theirs too)")
     motion.add_argument("--duration", type=float, help="s; makes a motion of any scene")

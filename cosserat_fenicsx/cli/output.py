@@ -79,7 +79,9 @@ def deliver(computed, options, names, files_of, tables=None, *, moving=False, ob
     out = output_of(options, [*names, *filter(None, [film])], tables)
     result, trouble, code = _ended(lambda: together(computed), patience() if obeys else nullcontext())
     if result is not None and (code == DONE or len(result)):
-        say(result.details(units_of(options), **given(options, ["station"])), file=sys.stdout)
+        brief = getattr(options, "brief", False)
+        told = result.summary if brief else partial(result.details, **given(options, ["station"]))
+        say(told(units_of(options)), file=sys.stdout)
         if out is not None:
             if code == INTERRUPTED:
                 say("cosserat: interrupted; writing the partial result, Ctrl-C again skips what is not written yet")

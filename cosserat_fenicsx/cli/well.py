@@ -36,6 +36,10 @@ def run(options, scene, tables):
     out = output_of(options, names, tables)
     if scene.title:
         say(scene.title, file=sys.stdout)
+    options.brief = len(scene.operations) > 1 and not getattr(options, "details", False)
+    if options.brief:
+        say("The answers of several operations in short; --details prints all sentences and longer tables.",
+            file=sys.stdout)  # fmt: skip
     for computed, files_of in _results(options, scene, stems, of_builds, out):
         code = deliver(computed, options, names, files_of, tables, obeys=False)
         if code != DONE:
