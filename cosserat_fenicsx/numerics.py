@@ -36,6 +36,31 @@ def lobatto_weights(nodes):
     return np.linalg.solve(np.vander(nodes, increasing=True).T, 1 / np.arange(1, len(nodes) + 1))
 
 
+# Halvings of the interval in which a jump is looked for, the share of the range of the values that is one, and the
+# share of the values below which their range is rounding.
+_HALVINGS, _JUMP, _CONSTANT = 32, 1e-3, 1e-9
+
+
+def jump_of(function, low, high, samples=129):
+    """Where a function s (n,) -> (n, m) jumps in [low, high]; None where it is continuous, as far as samples tell."""
+    s = np.linspace(low, high, samples)
+    values = np.asarray(function(s), dtype=float)
+    values = np.where(np.isfinite(values).all(axis=0), values, 0.0)
+    ranges = np.ptp(values, axis=0)
+    varies = ranges > _CONSTANT * np.abs(values).max(axis=0)
+    if not varies.any():
+        return None
+    changes = np.diff(values[:, varies], axis=0) / ranges[varies]
+    beside = np.pad(changes, ((1, 1), (0, 0)), mode="reflect")
+    k = int(np.argmax(np.abs(changes - (beside[:-2] + beside[2:]) / 2).max(axis=1)))
+    ends = s[k : k + 2]
+    for _ in range(_HALVINGS):
+        points = np.array([ends[0], ends.mean(), ends[1]])
+        rises = np.abs(np.diff(np.asarray(function(points))[:, varies] / ranges[varies], axis=0)).max(axis=1)
+        ends = points[:2] if rises[0] > rises[1] else points[1:]
+    return float(ends[1]) if rises.max() > _JUMP else None
+
+
 class ElementRule:
     """Nodes (Lobatto's of P_p), Gauss points, weights and polynomials of one element on [0, 1], ascending."""
 

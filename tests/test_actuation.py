@@ -183,7 +183,7 @@ REFUSED = {
     "no length in a piece": (lambda: bent(strain=cf.signals.AlongPieces([(0.1, (0, 0, -2.0))])),
                              "a stretch above -1"),
     "a jump": (lambda: bent(cf.signals.Along(lambda s: (0, 1.0 * (s > 0.1234567), 0))),
-               "jumps at s = 0.123457 m of rod 'rod': expected AlongPieces"),
+               "jumps at s = 0.123457 m: expected AlongPieces"),
     "both": (lambda: cf.Pretension(ROD, 3.0, 0.2), "either force"),
     "inextensible": (lambda: held(cf.Pretension("rod", 3.0), rod=rod_of(section=RIGID)),
                      "expected rest_length, since rod 'rod' cannot stretch"),

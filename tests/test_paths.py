@@ -161,7 +161,8 @@ def test_a_path_through_limit_points_meets_its_tolerance():
     np.testing.assert_allclose(loads(path, "bifurcation"), ARCH_BIFURCATIONS, rtol=2e-7)
     fine = cf.solve(scene, path.load_factors[[0, -1]].tolist(), elements=64)
     np.testing.assert_allclose(path.displacement(crown)[-1], fine.displacement(crown)[-1], atol=2e-6)
-    listed = cf.solve(scene, [30.0, 40.0], tol=1e-6)
+    with pytest.warns(cf.SceneWarning, match="the path passes a limit point"):
+        listed = cf.solve(scene, [30.0, 40.0], tol=1e-6)
     assert (listed.error <= 1e-6).all() and listed.stable.all() and len(loads(listed, "limit")) == 2
     for snapped in (path, listed):
         told = f"limit load factor is {loads(snapped, 'limit')[0]:.6g}: what follows lies beyond it."

@@ -531,7 +531,10 @@ def test_profiles_that_nobody_turned_into_the_plane_are_asked_about():
     assert "weaker axis in the x-z plane: 'post': d1 = (0, 1, 0) of the curve" in doubt
     assert doubts((0, 0, -1e3)) == doubts((1e3, 0, 0), d1=(1, 0, 0)) == doubts((1e3, 0, 0), d1=(0, 1, 0)) == ()
     assert doubts((0, 0, 1.0), top=(3, 0, 0)) == ()  # a beam stands upright
-    assert "'post' of HEA 160 is 3000 m long: are all lengths in m?" in doubts((0, 0, 1.0), top=(3000, 0, 0))[0]
+    assert "'post' of HEA 160 is 3000 m long: are all lengths in m (of" in doubts((0, 0, 1.0), top=(3000, 0, 0))[0]
+    light = cf.Rod(cf.Line((0, 0, 0), (0, 0, 3)), cf.Circle(0.1), cf.Material(E=210e9, density=7.85))
+    (doubt,) = cf.Scene([light], [cf.Clamp(light.start)]).doubts
+    assert "a density of 7.85 kg/m^3 with E of a metal: is it in g/cm^3" in doubt
 
 
 def test_sections_that_nobody_turned_are_told():

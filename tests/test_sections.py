@@ -70,6 +70,14 @@ def test_a_section_by_a_function():
     joined = cf.Rod(LINE, [(5.0, taper), (None, THIN)], STEEL)
     assert joined.section_at(5.0, side="left") == taper(5.0) and joined.section_at(5.0) is THIN
     np.testing.assert_array_equal(joined.stiffness_at(np.array([2.0, 8.0])).J[0], rod.stiffness_at(2.0).J)
+    for at in (4.2137, 9.99):  # elements do not end there, and errors would be estimated as far too small
+        with pytest.raises(cf.SceneError, match=f"its section jumps at s = {at} m: expected pieces"):
+            cf.Rod(LINE, lambda s, at=at: cf.Circle(0.1 + 1e-3 * s + 0.01 * (s > at)), STEEL)
+        jump = cf.signals.Along(lambda s, at=at: (0, 0, -s - 100.0 * (s > at)))
+        with pytest.raises(cf.SceneError, match=f"Along: its function jumps at s = {at} m: expected AlongPieces"):
+            cf.LineForce(rod, jump)
+    steep = cf.signals.Along(lambda s: (0, 0, np.tanh(1e6 * (s - math.pi))))
+    assert cf.LineForce(rod, steep).force is steep
 
 
 def test_breaks_of_curve_and_section():

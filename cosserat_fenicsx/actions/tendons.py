@@ -19,7 +19,6 @@ from typing import Annotated, Literal
 import numpy as np
 
 from cosserat_fenicsx.checks import Numbers, NumbersInTime, refuse
-from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.kinds import Number
 from cosserat_fenicsx.numerics import PLACES
 from cosserat_fenicsx.parts import ForceSize, Friction, FunctionAlong, Length, Several, at_least, positive
@@ -27,7 +26,7 @@ from cosserat_fenicsx.scene import action
 from cosserat_fenicsx.scene.action import LineAction
 from cosserat_fenicsx.scene.loads import Load
 from cosserat_fenicsx.scene.rod import RodOrName
-from cosserat_fenicsx.scene.signals import Along, AlongPieces, VectorInTime, at, values_of
+from cosserat_fenicsx.scene.signals import AlongPieces, VectorInTime, at, values_of
 
 # Step of differences along the rod, over its length.
 _STEP = 5e-4
@@ -192,9 +191,8 @@ class Tendon(Load, LineAction):
 
 
 _NONE = (0.0, 0.0, 0.0)
-# Search of jumps: samples along a rod, halvings of the interval with the largest difference, and the share of the
-# range of the values by which they jump.
-_SAMPLES, _HALVINGS, _JUMP = 257, 40, 1e-3
+# Samples along a rod.
+_SAMPLES = 257
 
 
 class InLaw(Load, LineAction):
@@ -266,32 +264,12 @@ class Actuation(InLaw):
             function = getattr(self, field)
             if isinstance(function, FunctionAlong):
                 _check_stretch(self, field, function(np.linspace(0.0, rod.length, _SAMPLES)))
-            if isinstance(function, Along) and (s := _jump_of(function, rod.length)) is not None:
-                raise SceneError(
-                    f"Actuation.{field}: its function jumps at s = {s:.6g} m of rod '{rod.name}': expected "
-                    "AlongPieces, at whose ends elements end"
-                )
 
 
 def _check_stretch(owner, field, values):
     """Refuse strains by which an element of length vanishes; functions are checked at samples."""
     if field == "strain" and not callable(values) and np.min(np.asarray(values)[..., 2]) <= -1:
         refuse(owner, field, values, "a stretch above -1, at which a rod has no length left")
-
-
-def _jump_of(function, length):
-    """Where a function of the arc length jumps in [0, length], m; None where it is continuous."""
-    s = np.linspace(0.0, length, _SAMPLES)
-    values = function(s)
-    size = np.abs(values - values[0]).max()
-    k = int(np.argmax(np.abs(np.diff(values, axis=0)).max(axis=1)))
-    a, b = s[k], s[k + 1]
-    for _ in range(_HALVINGS):
-        x = (a + b) / 2
-        at_a, at_x, at_b = function([a, x, b])
-        a, b = (a, x) if np.abs(at_x - at_a).max() > np.abs(at_b - at_x).max() else (x, b)
-    rise = np.abs(np.diff(function([a, b]), axis=0)).max()
-    return float(b) if rise > _JUMP * size > 0 else None
 
 
 @dataclass(frozen=True)

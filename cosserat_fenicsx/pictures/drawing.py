@@ -450,7 +450,13 @@ def seen(colour, values, peak):
 
 
 def peak_of(path, colour, values):
-    """The largest size of a list of arrays of values, 0 where it is rounding; NaN where there is no value."""
+    """The largest size of a list of arrays of values, 0 where it is rounding; NaN where there is no value. Raises
+    SceneError: there is none anywhere."""
+    if all(np.isnan(array).all() for array in values):
+        raise SceneError(
+            f"color: {colour.words} is not known of any rod in the picture (stresses need sections with a shape, and "
+            "rolled profiles have normal ones alone): choose another one, such as bending_moment"
+        )
     peak = max(float(np.nan_to_num(np.abs(array)).max()) for array in values)
     scale = {"N": path.scales.force, "N m": path.scales.moment, "m": path.scales.length}.get(colour.unit, 0.0)
     return peak if peak > _ROUNDING * scale else 0.0

@@ -10,6 +10,7 @@ import numpy as np
 
 from cosserat_fenicsx.checks import Numbers, instance, number, refuse, vector
 from cosserat_fenicsx.errors import SceneError
+from cosserat_fenicsx.numerics import jump_of
 from cosserat_fenicsx.parts import Kind, Object, Several, misplaced, spoken
 from cosserat_fenicsx.scene.sections import Section, Stiffness, inverse, representative
 from cosserat_fenicsx.scene.signals import vector_at
@@ -212,6 +213,7 @@ SectionsAlong = Annotated[
 _SAMPLES = 33
 _DIAGONAL = 10  # numbers (GA1, GA2, EA, EI1, EI2, GJ, mass, inertia) of a section; the 36 of its matrix follow
 _NUMBERS = _DIAGONAL + 36
+_PRINCIPAL = slice(0, 6)
 _UNKNOWN = [np.nan] * _NUMBERS  # the row of a piece given by a function
 
 
@@ -258,8 +260,22 @@ class Sections:
             if self._law[i]:
                 s = before + (end - before) * (1 - np.cos(np.linspace(0, np.pi, _SAMPLES))) / 2
                 rows.append(self._rows(s, np.full(_SAMPLES, i)))
+                self._refuse_jump(i, before, end)
             before = end
         return np.concatenate(rows)
+
+    def _refuse_jump(self, i, low, high):
+        def numbers(s):
+            rows = self._rows(s, np.full(len(s), i))
+            has_matrix = np.nan_to_num(rows[:, _DIAGONAL:]).any()
+            rows[:, _PRINCIPAL if has_matrix else slice(_DIAGONAL, None)] = 0.0  # principal axes may change places
+            return rows
+
+        if (s := jump_of(numbers, low, high)) is not None:
+            raise SceneError(
+                f"Rod '{self.owner.name}': its section jumps at s = {s:.6g} m: expected pieces (s_end, section or "
+                "function), at whose ends elements end"
+            )
 
     def _check_pieces(self, given):
         where, pieces = f"Rod '{self.owner.name}'", [(self.owner.length, given)]

@@ -41,7 +41,7 @@ _SAMPLES = 9
 # Young's moduli below this, Pa, are probably mistakes in units; of materials of these densities, kg/m^3, below this.
 _SOFTEST, _RUBBER, _SOFTEST_RUBBER = 1e6, (900.0, 1500.0), 1e4
 # Densities, kg/m^3, and moduli, Pa, of steel and cast iron; rolled profiles are of these.
-_STEEL, METAL = (7000.0, 8200.0), (5e10, 5e11)
+_STEEL, METAL, _GRAMS = (7000.0, 8200.0), (5e10, 5e11), (1.5, 25.0)
 _WAY_OUT = " (a Stiffness in its place is not doubted)"
 _ROUNDING = "beyond which rounding errors dominate"
 _UNITS = 'are the units SI (N, m, Pa; steel has 210e9, or "210 GPa")'
@@ -457,16 +457,22 @@ class Scene(Part):
         return [load for load in self.all_loads if load.follows]
 
     def _softness(self):
-        """Warnings about Young's moduli that may be in wrong units."""
+        """Warnings about Young's moduli and densities that may be in wrong units."""
         asked = {doubt: rod.material.E for rod in self.rods if (doubt := _doubted(rod)[0])}
-        return [f"{doubt}: {_UNITS}?" for doubt in sorted(asked, key=asked.get)]
+        told = [f"{doubt}: {_UNITS}?" for doubt in sorted(asked, key=asked.get)]
+        light = {rod.material.density for rod in self.rods if rod.material and METAL[0] <= rod.material.E <= METAL[1]}
+        return told + [
+            f"a density of {rho:g} kg/m^3 with E of a metal: is it in g/cm^3 or t/m^3, which are 1000 kg/m^3?"
+            for rho in sorted(filter(None, light)) if _GRAMS[0] <= rho <= _GRAMS[1]
+        ]  # fmt: skip
 
     def _thickness(self):
         """Warnings about dimensions that may be in wrong units."""
+        long = []
         for rod in self.rods:
             section = rod.section_at(0.0)
             if isinstance(section, Profile) and rod.length > _LONGEST * section.height:
-                yield f"rod '{rod.name}' of {section.name} is {rod.length:g} m long: are all lengths in m?"
+                long.append((rod.length, f"'{rod.name}' of {section.name}"))
             across = max(getattr(section, name, 0.0) for name in ("diameter", "outer_diameter", "width", "height"))
             size = "rod '{}' is {:g} m across and {:g} m long"
             if across >= rod.length:
@@ -475,6 +481,10 @@ class Scene(Part):
                 if rod.material is not None and METAL[0] <= rod.material.E <= METAL[1]:
                     size = size.format(rod.name, across, rod.length)
                     yield f'{size}, of solid metal: are all lengths in m (or texts, such as "20 mm")?'
+        if long:
+            more = f" (one of {len(long)} such rods)" if len(long) > 1 else ""
+            length, what = max(long)
+            yield f"rod {what} is {length:g} m long{more}: are all lengths in m (of a mesh in mm: scale = 0.001)?"
 
     def _turned(self):
         """A warning about rolled profiles that stand across the plane of the scene because nobody turned them."""

@@ -35,6 +35,7 @@ from cosserat_fenicsx.checks import (
 from cosserat_fenicsx.quantities import LARGEST
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.kinds import Either
+from cosserat_fenicsx.numerics import jump_of
 from cosserat_fenicsx.parts import FileName, FunctionAlong, FunctionOfTime, Limits, Number
 
 _Time = Annotated[float, Number("time", Limits(what="a time"))]
@@ -373,7 +374,6 @@ def sample_times(item, until):
 
 # Elements end at the rows of tables of up to this length. Longer ones have kinks inside elements.
 _MOST_BREAKS = 64
-_SAMPLES = 33
 
 
 def vector_at(owner, field, function, s, unit, size=3):
@@ -387,7 +387,8 @@ class Along(FunctionAlong):
     """A function of the arc length.
 
     Args:
-        function: s (m) -> three numbers, inertial; smooth.
+        function: s (m) -> three numbers, inertial; smooth: one that jumps is refused, and where it has a kink in
+            elements, errors are estimated as smaller than they are.
     """
 
     function: Callable[[float], Numbers]
@@ -404,8 +405,12 @@ class Along(FunctionAlong):
         return np.array(values).reshape(-1, 3)
 
     def check(self, length):
-        """Evaluate it at samples in [0, length], m; raises SceneError as a call does."""
-        self(np.linspace(0, length, _SAMPLES))
+        """Refuse a function that jumps in [0, length], m, as samples tell; raises SceneError as a call does, too."""
+        if (s := jump_of(self, 0.0, length)) is not None:
+            raise SceneError(
+                f"Along: its function jumps at s = {s:.6g} m: expected AlongPieces, or an AlongTable with two rows "
+                "close to it, at which elements end"
+            )
 
 
 @dataclass(frozen=True)

@@ -188,6 +188,10 @@ _UNSTABLE = (
     "where on). buckling(scene) finds critical loads and their shapes, branch=1 follows the path that leaves at the "
     "first bifurcation. Is a support missing, such as one across the plane of a frame?"
 )
+_SNAPPED = (
+    "the path passes a limit point (path.events): the structure would snap through there, and the states after it are "
+    "those that it may come to rest in. A range of load factors, such as (0, 1), or control='arc' has the path between"
+)
 _BALLS = " Ball joints let rods turn about every axis: release=axis of a Joint, or hinge_axis of a frame, makes hinges."
 # Rods of a frame from which on the BLAS decides on the time that the equations where rods meet take.
 _MANY = 1000
@@ -366,9 +370,12 @@ def solve(
         path.why.extend(told)
         for words in told if comm.rank == 0 else ():
             warn(words)
-    if comm.rank == 0 and path.negative_modes[-1] > 0 and not (scene.follows or branch or until or control == "arc"):
-        balls = any(joint.release == "all" for joint in scene.joints)
-        warn("; ".join(path.cautions) or f"{_UNSTABLE}{_BALLS if balls else ''}")
+    if comm.rank == 0 and not (scene.follows or branch or until or control == "arc"):
+        if path.negative_modes[-1] > 0:
+            balls = any(joint.release == "all" for joint in scene.joints)
+            warn("; ".join(path.cautions) or f"{_UNSTABLE}{_BALLS if balls else ''}")
+        elif not free and any(event.kind == "limit" for event in path.events):
+            warn(_SNAPPED)
     if scene.rod_contact and scene.rod_contact.friction:
         path.why.append(
             "friction of rods that touch depends on the path: slip is counted from step to step, and stability takes "
