@@ -149,8 +149,8 @@ _TENSION = (
 #: How far contacts of rods go.
 _PAIRS = (
     "one solution serves the contacts that have no rod in common; with the response to each contact apart it was 2.2. "
-    "At rest 400 contacts take 9 s, and factors of the sparse tangent of a square grid grow faster than it. Detection "
-    "is linear, but takes as long as some iterations, not 5 % of one"
+    "1e4 contacts of 100 rods across 100 take 2.1 GB, and 49 s for three steps. At rest 1024 take 41 s; factors of "
+    "the sparse tangent of a square grid grow faster. Detection takes as long as some iterations, not 5 %"
 )
 TARGETS = (
     Target(MODES, "eigenvalues, 8 P4 elements", r"complex modes .*(Beck's column under|rotating cantilever)", 1e-7),
