@@ -19,7 +19,6 @@ sum of their radii, cannot cross in it.
 """
 
 import numpy as np
-from scipy import sparse
 
 from cosserat_fenicsx.algebra.eigen import RepeatedFactors, constrained_factors
 from cosserat_fenicsx.algebra.newton import LimitedNewton, Solved
@@ -124,6 +123,8 @@ def rubbing(A, b, friction, start):
 def _bordered(K, C, factors, G, small):
     """The sparse matrix of K - sum factor c c^T, c the rows of C, with rows of G as constraints that give by `small`
     times their force; symmetric where K is."""
+    from scipy import sparse  # late: scipy is slow to import
+
     C = sparse.diags(np.sqrt(np.abs(factors))) @ C
     signs, gives = sparse.diags(np.sign(factors)), sparse.diags(np.full(G.shape[0], -small))
     return sparse.csr_array(sparse.bmat([[K, -C.T, -G.T], [-C, signs, None], [-G, None, gives]], format="csr"))
@@ -433,6 +434,8 @@ class RodContacts:
 
     def _by_unknowns(self, rows, values):
         """(m, unknowns) a sparse matrix of values (m, n) at the rows of unknowns, -1 where clamped."""
+        from scipy import sparse  # late: scipy is slow to import
+
         held = rows >= 0
         place = np.repeat(np.arange(len(rows)), held.sum(axis=1)), rows[held]
         return sparse.csr_array((values[held], place), shape=(len(rows), self._problem.numbering.size))
@@ -476,6 +479,8 @@ class RodContacts:
 
     def _tangent(self):
         """The tangent without contact as a sparse matrix."""
+        from scipy import sparse  # late: scipy is slow to import
+
         problem, model = self._problem, self._model
         links, numbering = model.signature.connections, problem.numbering
         cells = numbering.rows[model.cell_dofs]
@@ -494,6 +499,8 @@ class RodContacts:
     def negative_modes(self, variation):
         """The number of negative modes in which the contacts that press remain, by the `stability.Part` of the rods;
         -1 where one is neutral. Where `removed` is None, of many contacts without friction."""
+        from scipy import sparse  # late: scipy is slow to import
+
         variation.assemble()
         starts, columns, values = variation.K.getValuesCSR()
         K = sparse.csr_array((values, columns, starts))
