@@ -433,7 +433,6 @@ class RepeatedFactors:
         self._pc.apply(self._b, self._x)
         return self._x.array_r
 
-
     def destroy(self):
         """Free the memory, which PETSc may keep otherwise."""
         for part in (self._ksp, self._matrix, self._b, self._x):

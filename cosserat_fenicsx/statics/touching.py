@@ -126,7 +126,7 @@ def _bordered(K, C, factors, G, small):
     from scipy import sparse  # late: scipy is slow to import
 
     C = sparse.diags(np.sqrt(np.abs(factors))) @ C
-    signs, gives = sparse.diags(np.sign(factors)), sparse.diags(np.full(G.shape[0], -small))
+    signs, gives = sparse.diags(np.where(factors < 0, -1.0, 1.0)), sparse.diags(np.full(G.shape[0], -small))
     return sparse.csr_array(sparse.bmat([[K, -C.T, -G.T], [-C, signs, None], [-G, None, gives]], format="csr"))
 
 
