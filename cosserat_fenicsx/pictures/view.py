@@ -381,14 +381,13 @@ def draw_axes(plotter, pyvista, axes, view, labels, font=None, signs=()):
         lines.append(edge)
         if i == 2:  # where labels beside a drawing would have their lines cross it
             labels.part(edge)
-        longest = max(len(text) for _, text in axis.ticks)
-        room = font * (0.28 * longest * abs(out[0]) + 0.55 * abs(out[1]))
+        room = font * (max(_width(text) for _, text in axis.ticks) / 2 * abs(out[0]) + 0.55 * abs(out[1]))
         points = np.repeat(edge[:1], len(axis.ticks), axis=0)
         points[:, i] = [value for value, _ in axis.ticks]
         lines += [np.array([point, point + view.offset(*(-_TICK * out))]) for point in points]
         numbers = [(text, point) for (_, text), point in zip(axis.ticks, points, strict=True)]
         labels.evenly(numbers, size=font, away=(font / 2 + room) * out)
-        beside = font / 2 + 2 * room + font * (0.35 * len(axis.name) * abs(out[0]) + abs(out[1]))
+        beside = font / 2 + 2 * room + font * ((_width(axis.name) / 2 + 0.6) * abs(out[0]) + abs(out[1]))
         end = edge[int(np.argmax(view.pixels(edge)[:, 1] * (1 if i == 2 else -1)))]
         beyond = font * np.array([0.0, 1.3 if i == 2 else -2.4])  # over the vertical axis, under the others
         names.append((axis.name, [(edge.mean(axis=0), beside * out), (end, beyond)]))
