@@ -233,7 +233,8 @@ def compile_evolutions(model):
 def symbols_of(model):
     """The `Symbols` of a model in statics; forms that were made by a `Pattern` are made anew, by UFL."""
     if model.forms.symbols is None:
-        model.forms = replace(model.forms, symbols=_compile_static(model, model.variation_spaces).symbols)
+        with compiling():
+            model.forms = replace(model.forms, symbols=_compile_static(model, model.variation_spaces).symbols)
     return model.forms.symbols
 
 
