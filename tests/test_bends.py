@@ -236,7 +236,7 @@ def test_motions_leave_a_bend_out_or_refuse_it():
     ({"bend": 1.0, "bend_at": 8.0}, "Collar.bend_at = 8"),
     ({"bend": 1.0, "bend_at": 2.0, "length": None}, "a component with a length"),
     ({"tool_face": 10.0}, "Collar.tool_face = 10.0: expected a bend, too"),
-    ({"bend": 1.0, "bend_at": 2.0, "tool_face": 400.0}, "an angle from the high side (degrees)"),
+    ({"bend": 1.0, "bend_at": 2.0, "tool_face": 400.0}, "an angle (degrees, 0 the high side, 90 right) from -360"),
 ])  # fmt: skip
 def test_bends_that_are_refused(given, words):
     with pytest.raises(cf.SceneError) as refused:
