@@ -41,12 +41,14 @@ def lobatto_weights(nodes):
 _HALVINGS, _JUMP, _CONSTANT = 32, 1e-3, 1e-9
 
 
-def jump_of(function, low, high, samples=129):
-    """Where a function s (n,) -> (n, m) jumps in [low, high]; None where it is continuous, as far as samples tell."""
+def jump_of(function, low, high, *, alike=False, samples=129):
+    """Where a function s (n,) -> (n, m) jumps in [low, high]; None where it is continuous, as far as samples tell.
+    alike: whether its numbers have one unit, and the largest range of them is the scale of all."""
     s = np.linspace(low, high, samples)
     values = np.asarray(function(s), dtype=float)
     values = np.where(np.isfinite(values).all(axis=0), values, 0.0)
     ranges = np.ptp(values, axis=0)
+    ranges = np.full_like(ranges, ranges.max()) if alike else ranges
     varies = ranges > _CONSTANT * np.abs(values).max(axis=0)
     if not varies.any():
         return None

@@ -406,7 +406,7 @@ class Along(FunctionAlong):
 
     def check(self, length):
         """Refuse a function that jumps in [0, length], m, as samples tell; raises SceneError as a call does, too."""
-        if (s := jump_of(self, 0.0, length)) is not None:
+        if (s := jump_of(self, 0.0, length, alike=True)) is not None:
             raise SceneError(
                 f"Along: its function jumps at s = {s:.6g} m: expected AlongPieces, or an AlongTable with two rows "
                 "close to it, at which elements end"
