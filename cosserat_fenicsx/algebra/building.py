@@ -300,7 +300,8 @@ class Packed(_Kernel):
         for to, numbers in ((lanes["w"], self._w), (lanes["x"], ends)):
             for lane in range(self._lib.LANES):
                 part = numbers[lane :: self._lib.LANES]
-                to[: len(part), :, lane], to[len(part) :, :, lane] = part, numbers[-1]  # where no element is
+                to[: len(part), :, lane] = part
+                to[len(part) :, :, lane] = numbers[-1:]  # where no element is; a rank may have none at all
         lanes["c"][:] = self._c[:, None]
 
     def add_to_vector(self, array):
