@@ -55,11 +55,13 @@ def jump_of(function, low, high, *, alike=False, samples=129):
     changes = np.diff(values[:, varies], axis=0) / ranges[varies]
     beside = np.pad(changes, ((1, 1), (0, 0)), mode="reflect")
     k = int(np.argmax(np.abs(changes - (beside[:-2] + beside[2:]) / 2).max(axis=1)))
-    ends = s[k : k + 2]
+    ends, found = s[k : k + 2], values[k : k + 2]
     for _ in range(_HALVINGS):
-        points = np.array([ends[0], ends.mean(), ends[1]])
-        rises = np.abs(np.diff(np.asarray(function(points))[:, varies] / ranges[varies], axis=0)).max(axis=1)
-        ends = points[:2] if rises[0] > rises[1] else points[1:]
+        middle = ends.mean(keepdims=True)
+        points, at = np.insert(ends, 1, middle), np.insert(found, 1, np.asarray(function(middle)), axis=0)
+        rises = np.abs(np.diff(at[:, varies], axis=0) / ranges[varies]).max(axis=1)
+        half = slice(0, 2) if rises[0] > rises[1] else slice(1, 3)
+        ends, found = points[half], at[half]
     return float(ends[1]) if rises.max() > _JUMP else None
 
 

@@ -213,7 +213,7 @@ SectionsAlong = Annotated[
 _SAMPLES = 33
 _DIAGONAL = 10  # numbers (GA1, GA2, EA, EI1, EI2, GJ, mass, inertia) of a section; the 36 of its matrix follow
 _NUMBERS = _DIAGONAL + 36
-_PRINCIPAL = slice(0, 6)
+_PRINCIPAL = slice(0, 6)  # stiffnesses among them, of a matrix those about its principal axes
 _UNKNOWN = [np.nan] * _NUMBERS  # the row of a piece given by a function
 
 

@@ -40,7 +40,7 @@ _ALIKE = 1e-9
 _SAMPLES = 9
 # Young's moduli below this, Pa, are probably mistakes in units; of materials of these densities, kg/m^3, below this.
 _SOFTEST, _RUBBER, _SOFTEST_RUBBER = 1e6, (900.0, 1500.0), 1e4
-# Densities, kg/m^3, and moduli, Pa, of steel and cast iron; rolled profiles are of these.
+# Densities, kg/m^3, and moduli, Pa, of steel and cast iron; rolled profiles are of these. And of metals, in g/cm^3.
 _STEEL, METAL, _GRAMS = (7000.0, 8200.0), (5e10, 5e11), (1.5, 25.0)
 _WAY_OUT = " (a Stiffness in its place is not doubted)"
 _ROUNDING = "beyond which rounding errors dominate"
