@@ -204,6 +204,44 @@ def test_what_looks_like_a_slip_is_asked_about():
     assert any("add Joint(one.end, two.start)" in why for why in path.why)
 
 
+def test_an_end_on_a_rod_without_a_joint_is_asked_about():
+    """Between the ends of straight and of curved rods, in a frame that is held together elsewhere, nearly there; not
+    where it is joined, through another rod too, nor where both are held."""
+    steel, section = cf.Material(210e9, density=7850.0), cf.Circle(0.1)
+    points = [(0, 0, 0), (1, 0, 1), (2, 0, 1.2), (3, 0, 1), (4, 0, 0)]
+    arch = cf.Rod(cf.Spline(points), section, steel, name="arch")
+    beam = cf.Rod(cf.Line((0, 0, 0), (4, 0, 0)), section, steel, name="beam")
+
+    def post(on, s, name="post", above=(0, 0, 0)):
+        top = on.curve.position(s) + above
+        return cf.Rod(cf.Line(top - (0, 0, 2), top), section, steel, name=name)
+
+    def doubts(*rods, joints=(), held=()):
+        supports = [cf.Clamp(x) for x in (rods[0].start, *held)]
+        return cf.Scene(rods, supports, joints=[cf.Joint(*ends) for ends in joints]).doubts
+
+    on_arch, on_beam, low = post(arch, 2.1), post(beam, 1.3), post(beam, 1.3, above=(0, 0, -0.001))
+    asked = "post.end lies on rod '{0}' and is not joined to it: if it should be, add Joint(post.end, {0}@{1})"
+    assert doubts(arch, on_arch, held=[on_arch.start]) == (asked.format("arch", 2.1),)
+    assert doubts(beam, on_beam, held=[on_beam.start]) == (asked.format("beam", 1.3),)
+    assert doubts(beam, low, held=[low.start]) == (
+        "post.end is 0.001 m from beam@1.3, less than either measures across, and not joined to it: if it should be, "
+        "move it to (1.3, 0, 0) and add Joint(post.end, beam@1.3)",
+    )
+    other = cf.Rod(cf.Line(on_beam.curve.end, (1.3, 1, 0)), section, steel, name="other")
+    assert doubts(beam, on_beam, other, joints=[(on_beam.end, beam.at(1.3)), (other.start, on_beam.end)]) == ()
+    assert len(doubts(beam, on_beam, other, held=[other.end], joints=[(other.start, on_beam.end)])) == 1
+    assert doubts(beam, on_beam, held=[on_beam.end, beam.at(1.3)]) == ()
+    assert doubts(beam, post(beam, 1.3, above=(0, 0.04, 0)), held=["post.start"]) == ()
+    tie = cf.Rod(cf.Line((4, 0, 0), (0, 0, 0)), section, steel, name="tie")
+    (asked,) = doubts(arch, tie, joints=[(arch.end, tie.start)])
+    assert "arch.start and tie.end lie at one point and are not joined" in asked
+    many = [post(beam, s, f"post_{i}") for i, s in enumerate(np.linspace(0.5, 3.5, 9))]
+    assert doubts(beam, *many, held=[x.start for x in many])[-1] == (
+        "4 more ends of rods lie on other rods and are not joined to them"
+    )
+
+
 def test_a_load_per_length_is_measured_on_its_own_rod_and_drag_is_no_load():
     steel, line = cf.Material(210e9, 0.3), cf.Line((0, 0, 0), (0, 0, 5000))
     long = cf.Rod(line, cf.Circle(0.1), steel, name="long")

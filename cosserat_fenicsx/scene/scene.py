@@ -21,7 +21,7 @@ from cosserat_fenicsx.scene.planes import bent_weakly, find_plane
 from cosserat_fenicsx.scene.profiles import Stiffnesses
 from cosserat_fenicsx.scene.rod import Rod, Station, StationOrName, station_named, with_names
 from cosserat_fenicsx.scene.rolled import Profile
-from cosserat_fenicsx.scene.sections import Circle, Rectangle
+from cosserat_fenicsx.scene.sections import Circle, Rectangle, sizes_across
 from cosserat_fenicsx.scene.signals import at, sample_times, signals_of
 from cosserat_fenicsx.scene.stages import Places, Stage, legs_of, named_stages, scene_of
 from cosserat_fenicsx.scene.statical import Groups, check_held_once, touching
@@ -155,6 +155,8 @@ _ALONG_TENDON = 33
 _THICKEST = 1.5
 # Rolled profiles that are longer, over their heights, are probably given in mm.
 _LONGEST = 500
+# Warnings of one kind that are listed.
+_TOLD = 5
 _PARTS = {
     "supports": (Support, "a support such as Clamp(rod.start)"),
     "joints": (Joint, "a Joint(one.end, other.start)"),
@@ -473,7 +475,7 @@ class Scene(Part):
             section = rod.section_at(0.0)
             if isinstance(section, Profile) and rod.length > _LONGEST * section.height:
                 long.append((rod.length, f"'{rod.name}' of {section.name}"))
-            across = max(getattr(section, name, 0.0) for name in ("diameter", "outer_diameter", "width", "height"))
+            across = max(sizes_across(section), default=0.0)
             size = "rod '{}' is {:g} m across and {:g} m long"
             if across >= rod.length:
                 yield f"{size.format(rod.name, across, rod.length)}: are all lengths in m?"
@@ -498,15 +500,27 @@ class Scene(Part):
             )
 
     def _unjoined(self):
-        """Warnings about ends of different structures that lie at one point, unless both have supports."""
-        held, reported = {support.station for support in self.supports}, set()
-        for end, other in touching(self):
-            if not (end in held and other in held) and (other, end) not in reported:
-                reported.add((end, other))
-                yield (
-                    f"{end} and {other} lie at one point and are not joined: if they should be, add Joint({end}, "
-                    f"{other})"
-                )
+        """Warnings about ends of rods that lie on other rods and are not joined there; where rods touch each other,
+        about two ends alone."""
+        told = {}
+        for end, other, apart in touching(self):
+            at_ends = other.s in (0, other.rod.length)
+            if (other, end) in told or (self.rod_contact and not at_ends):
+                continue
+            if at_ends:
+                found, them = f"{end} and {other} lie at one point and are not joined", "they"
+            else:
+                found, them = f"{end} lies on rod '{other.rod.name}' and is not joined to it", "it"
+            move = ""
+            if apart > 1e-9 * max(end.rod.length, other.rod.length):
+                place = ", ".join(f"{x:.6g}" for x in other.rod.curve.position(other.s) + 0.0)
+                found = f"{end} is {apart:.3g} m from {other}, less than either measures across, and not joined to it"
+                them, move = "it", f"move it to ({place}) and "
+            told[end, other] = f"{found}: if {them} should be, {move}add Joint({end}, {other.full_name})"
+        most = _TOLD if len(told) > _TOLD + 1 else len(told)
+        yield from [*told.values()][:most]
+        if len(told) > most:
+            yield f"{len(told) - most} more ends of rods lie on other rods and are not joined to them"
 
     def _following(self):
         if not self.follows:

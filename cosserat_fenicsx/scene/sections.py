@@ -201,6 +201,12 @@ class Section(parts.Part, family="section"):
         return *k.shear, k.axial, *k.bending, k.torsion
 
 
+def sizes_across(section):
+    """The sizes across a rod that its section tells, m; none where it tells none."""
+    known = ("diameter", "outer_diameter", "width", "height")
+    return [size for name in known if (size := getattr(section, name, None))]
+
+
 @dataclass(frozen=True)
 class Stiffness(Section):
     """A section by its stiffnesses, in the order of the directors d_1, d_2, d_3; needs no material.

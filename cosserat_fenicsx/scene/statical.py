@@ -9,8 +9,9 @@ import numpy as np
 
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.numerics import svd
-from cosserat_fenicsx.scene.curves import Line
+from cosserat_fenicsx.scene.curves import Line, positions_along
 from cosserat_fenicsx.scene.action import some_of
+from cosserat_fenicsx.scene.sections import sizes_across
 from cosserat_fenicsx.scene.supports import Clamp, Hinge, Joint, Pin, PositionTie, TurnTie
 
 # Free motions that a message names; parts of a motion that are rounding.
@@ -55,7 +56,6 @@ class Groups:
     def joined(self):
         """All members that are not the leaders of their groups."""
         return self._above.keys()
-
 
 # Singular values below this, over the largest, are zero.
 _RANK_TOLERANCE = 1e-9
@@ -115,12 +115,14 @@ def null_space(row, column, value, shape):
         count *= _GROWTH
 
 
-# Ends closer than this, relative to a rod's length, lie at one point.
-_TOUCHING_DISTANCE = 1e-6
+# Points closer than this, relative to a rod's length, or than this part of what rods measure across, lie at one point.
+_TOUCHING_DISTANCE, _PART_ACROSS = 1e-6, 0.25
+# Parts that a curved rod is cut into for the search of such points; how often a part is narrowed, to a quarter each.
+_PARTS, _NARROWER = 32, 6
+# Pairs of points that are compared one by one.
+_FEW_PAIRS = 100_000
 # Largest number of supports and joints listed in a message.
 _NAMED = 8
-# A generic direction, along which different points rarely have the same coordinate.
-_OBLIQUE = np.array([0.5381, 0.6427, 0.5453])
 
 
 def rows_of(tie):
@@ -361,31 +363,112 @@ def _size(scene):
 
 
 def _or_a_joint(scene, rod):
-    """A hint at a missing joint, where an end of a free rod lies on an end of another; else empty."""
-    for end, there in sorted(touching(scene), key=lambda pair: pair[0].s):
-        if end.rod is rod:
+    """A hint at a missing joint, where an end of a free rod lies on another; else empty."""
+    for end, there, distance in sorted(touching(scene), key=lambda pair: pair[0].s):
+        if end.rod is rod and distance <= _TOUCHING_DISTANCE * rod.length:
             return f", or a Joint({end}, {there}), which lie at one point"
     return ""
 
 
 def touching(scene):
-    """Pairs of ends of different structures that lie at one point, each in both orders, in the order of the rods."""
-    if all(scene.leader(rod) is scene.rods[0] for rod in scene.rods):
-        return
-    ends = [end for rod in scene.rods for end in (rod.start, rod.end)]
-    places = np.array([end.rod.curve.position(end.s) for end in ends])
-    reach = np.array([_TOUCHING_DISTANCE * end.rod.length for end in ends])
-    along = places @ _OBLIQUE
-    order = np.argsort(along)
-    # ends at one point are neighbours in the order of their coordinates; a little more than the reach, for rounding
-    wide = 1.01 * reach + 1e-15 * np.abs(places).max()
-    first = np.searchsorted(along[order], along - wide)
-    last = np.searchsorted(along[order], along + wide, side="right")
-    for i in np.flatnonzero(last - first > 1).tolist():
-        near = np.sort(order[first[i] : last[i]])
-        for j in near[np.linalg.norm(places[near] - places[i], axis=1) <= reach[i]].tolist():
-            if scene.leader(ends[i].rod) is not scene.leader(ends[j].rod):
-                yield ends[i], ends[j]
+    """Ends of rods that lie on other rods, and neither joined to them there nor held both: [(end, station, distance in
+    m)], in the order of the rods; one end of those that are joined to each other, and two that lie at one point in both
+    orders.
+
+    An end lies on a rod where its distance is rounding, or a quarter of what the thinner one measures across.
+    """
+    rods, lengths, count = scene.rods, scene.lengths, len(scene.rods)
+    if count == 1:
+        return []
+    points = _Points(scene)
+    held, first = {points.least(support.station) for support in scene.all_supports}, np.unique(points.of_ends)
+    curves, parts = [rod.curve for rod in rods], np.minimum(np.ceil(lengths / lengths.mean()), _PARTS).astype(int)
+    parts[[not isinstance(curve, Line) for curve in curves]] = _PARTS
+    along = np.concatenate([np.arange(2 * n + 1) / (2 * n) for n in parts.tolist()])
+    places = positions_along(curves, along, 2 * parts + 1)
+    last = np.cumsum(2 * parts + 1) - 1
+    ends = places[np.stack([last - 2 * parts, last], axis=1).ravel()]
+    rod = np.repeat(np.arange(count), parts)
+    begin = 2 * np.arange(len(rod)) + rod  # of each part, among the places
+    across = {id(x.section): x for x in rods}  # many rods share a section
+    across = {name: min(sizes_across(x.section_at(0.0)), default=0.0) for name, x in across.items()}
+    thick = _PART_ACROSS * np.array([across[id(x.section)] for x in rods])
+    sizes, rounding = lengths[rod] / parts[rod], _TOUCHING_DISTANCE * lengths
+    end, part = _near(ends[first], places[begin + 1], 0.5 * sizes + max(rounding.max(), thick.max()))
+    end, own, k = first[end], first[end] // 2, rod[part]
+    most, begin = np.maximum(rounding[own], np.minimum(thick[own], thick[k])), begin[part]
+    # an arc leaves its chord by at most half of what its length has more, as legs of a triangle
+    chord = places[begin + 2] - places[begin]
+    away = 0.5 * np.sqrt(np.maximum(sizes[part] ** 2 - np.sum(chord**2, axis=1), 0.0))
+    _, distance = _on_chord(ends[end], places[begin], chord)
+    apart = np.all(end[:, None] != points.of_ends[k], axis=1) & (own != k) & (distance <= most + away)
+    found = {}
+    for i in np.flatnonzero(apart).tolist():
+        key, limit = (int(end[i]), int(k[i])), most[i]
+        if key not in points.between:
+            x, distance = _nearest(curves[k[i]], ends[end[i]], *along[begin[i] + [0, 2]])
+            if distance <= limit and distance < found.get(key, (0.0, np.inf))[1]:
+                found[key] = x, distance
+    pairs = []
+    for (end, k), (x, distance) in sorted(found.items()):
+        if min(x, 1 - x) * lengths[k] <= max(distance, rounding[k]):
+            other = rods[k].end if x > 0.5 else rods[k].start
+        else:
+            other = rods[k].at(float(f"{x * lengths[k]:.12g}"))
+        if not (end in held and points.least(other) in held):
+            pairs.append((rods[end // 2].end if end % 2 else rods[end // 2].start, other, distance))
+    return pairs
+
+
+class _Points:
+    """Numbers of stations, 2 i and 2 i + 1 at the ends of rod i; and which of them are joined: to the least of them."""
+
+    def __init__(self, scene):
+        self._scene, self._between, self._joined = scene, {}, Groups()
+        for joint in scene.joints:
+            self._joined.join(self._number(joint.first), self._number(joint.second))
+        #: (least number, rod) of what is joined between the ends of rods
+        self.between = {(self._joined.leader(number), key[0]) for key, number in self._between.items()}
+        #: (rods, 2) least numbers of the ends
+        self.of_ends = np.array([self._joined.leader(i) for i in range(2 * len(scene.rods))]).reshape(-1, 2)
+
+    def least(self, station):
+        """The least number of those that a station is joined to."""
+        return self._joined.leader(self._number(station))
+
+    def _number(self, station):
+        i, x = _key(self._scene, station)
+        if x in (0, 1):
+            return 2 * i + int(x)
+        return self._between.setdefault((i, x), 2 * len(self._scene.rods) + len(self._between))
+
+
+def _near(points, middles, reach):
+    """Numbers of the pairs of points (n, 3) and middles (m, 3) no further apart than reach (m,)."""
+    if len(points) * len(middles) <= _FEW_PAIRS:
+        apart = np.sum((points[:, None] - middles) ** 2, axis=2)
+        return np.nonzero(apart <= reach**2)
+    from scipy.spatial import cKDTree  # here, since few scenes have so many rods
+
+    near = cKDTree(points).query_ball_point(middles, reach)
+    return np.concatenate(near).astype(int), np.repeat(np.arange(len(middles)), [len(each) for each in near])
+
+
+def _on_chord(points, start, chord):
+    """Places in [0, 1] on chords (n, 3) nearest to points (n, 3), and the distances to them."""
+    place = np.clip(np.sum((points - start) * chord, axis=1) / np.maximum(np.sum(chord**2, axis=1), 1e-300), 0, 1)
+    return place, np.linalg.norm(start + place[:, None] * chord - points, axis=1)
+
+
+def _nearest(curve, point, first, last):
+    """The place in [0, 1] of a curve between two places that is nearest to a point (3,), and the distance, m."""
+    low, high = first, last
+    for _ in range(_NARROWER):
+        start, end = curve.position(np.array([low, high]) * curve.length)
+        place, distance = _on_chord(point[None], start[None], (end - start)[None])
+        x, half = low + place[0] * (high - low), (high - low) / 8
+        low, high = max(first, x - half), min(last, x + half)
+    return x, distance[0]
 
 
 def without_mechanism(scene):
