@@ -7,6 +7,7 @@ import pytest
 from conftest import refused, refuses
 from moving_scenes import SPAGHETTI, drift, flying_in_a_plane, flying_in_space, right_angle, spaghetti
 from scipy.spatial.transform import Rotation
+from scipy.special import ellipj, ellipk
 
 import cosserat_fenicsx as cf
 from cosserat_fenicsx.dynamics.pace import Adaptive, Resolution
@@ -129,6 +130,34 @@ def test_a_pendulum_books_what_its_weight_does():
     assert history.kinetic[-1] == pytest.approx(2 * 2.0 * 9.81 * 1, rel=1e-3)
     assert history.work[-1] == pytest.approx(2 * 2.0 * 9.81 * 1, rel=1e-3)
     assert np.abs(history.balance).max() < 1e-6 * history.work[-1]
+
+
+def test_the_error_of_a_motion_is_estimated_on_request(tmp_path):
+    """Of the pendulum above, by elliptic functions, with fixed and with adaptive steps: three times the error, as for
+    steps of second order; it is saved, and what is apart is NaN where another motion ends."""
+    stiff = cf.Stiffness((1e8, 1e8), 1e8, (1e7, 1e7), 1e7, mass=2.0, inertia=(1e-3, 1e-3, 2e-3))
+    rod = cf.Rod(cf.Line((0, 0, 0), (2, 0, 0)), stiff)
+    omega = np.sqrt(2 * 2 * 9.81 / (2 * 2**3 / 3 + 1e-3 * 2))  # m L g L/2 over m L^3/3 and the sections' own inertia
+    scene = cf.Scene([rod], [cf.Hinge(rod.start, (0, 1, 0))], [cf.Weight((0, 0, -9.81))])
+    for asked in ({"dt": 0.02}, {"tol": 1e-3, "save_every": 0.1}):
+        history = cf.simulate(scene, 1.0, elements=2, degree=2, estimate=True, **asked)
+        angle = 2 * np.arcsin(np.sqrt(0.5) * ellipj(ellipk(0.5) - omega * history.times, 0.5)[0])
+        exact = 2 * np.stack([np.sin(angle), 0 * angle, -np.cos(angle)], axis=1)
+        error = np.linalg.norm(history.position(rod.end) - exact, axis=1)
+        assert 2.5 < history.error.max() / error.max() < 3.5
+        assert "Positions have an estimated error of at most" in str(history)
+    history.save(tmp_path / "swing.h5")
+    np.testing.assert_array_equal(cf.read_result(tmp_path / "swing.h5").error, history.error)
+    assert history.to_dict()["error"] is history.error and len(history[3:5].error) == 2
+    short = cf.simulate(scene, 0.5, elements=1, degree=3, dt=0.02)
+    assert "error of positions was not estimated" in str(short) and "error" not in short.quantities
+    apart = history.apart(short)
+    assert np.isnan(apart[6:]).all() and 0 < apart[1:6].max() < 2e-2 and short.apart(short).max() < 1e-14
+    for wrong in ({"elements": 1}, {"folder": tmp_path / "kept"}, {"estimate": 1}):
+        with pytest.raises(cf.SceneError, match=r"simulate.estimate = "):
+            cf.simulate(scene, 0.5, **{"estimate": True, **wrong})
+    with pytest.raises(cf.SceneError, match="rods of the same names"):
+        history.apart(cf.simulate(spaghetti()[1], 0.01, dt=0.01))
 
 
 def test_a_prescribed_motion_does_work():

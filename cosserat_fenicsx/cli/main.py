@@ -149,6 +149,8 @@ def _common(parser):
     motion.add_argument("--dt", type=float, help="fixed step, s, instead of --tol [1e-3]")
     motion.add_argument("--scheme", help="momentum, energy, triple-jump or generalised-alpha [momentum]")
     motion.add_argument("--save-every", type=float, help="s between saved states [every step]")
+    motion.add_argument("--estimate", action="store_true", default=None, help="estimate the error of positions, by "
+                        "another motion with half as many elements and steps")  # fmt: skip
     motion.add_argument("--start", type=float, help="begin at the equilibrium for this load factor of the scene just "
                         "before t = 0")  # fmt: skip
     return motion

@@ -8,7 +8,7 @@ from cosserat_fenicsx.errors import SceneError, SceneWarning
 
 # Options of a motion, of an equilibrium path and of both: names of arguments of `simulate` and `solve`.
 _MOTION, _PATH = (
-    ("duration", "dt", "scheme", "save_every", "start", "folder"),
+    ("duration", "dt", "scheme", "save_every", "start", "estimate", "folder"),
     ("load_factors", "bound", "formulation", "control", "branch"),
 )
 _BOTH = ("tol", "elements", "degree", "model")

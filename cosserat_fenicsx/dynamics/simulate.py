@@ -6,6 +6,7 @@ import contextlib
 import math
 import numbers
 import os
+import warnings
 from operator import itemgetter
 from pathlib import Path as FilePath
 
@@ -14,11 +15,11 @@ from mpi4py import MPI
 
 from cosserat_fenicsx.algebra.pool import PROBLEMS
 from cosserat_fenicsx.checks import File, instance, number, refuse, whole
-from cosserat_fenicsx.dynamics.pace import Adaptive, Fixed
+from cosserat_fenicsx.dynamics.pace import Adaptive, Doubled, Fixed
 from cosserat_fenicsx.dynamics.schemes import SCHEMES
 from cosserat_fenicsx.dynamics.start import equilibrium, point_of, put_start, starts_in
 from cosserat_fenicsx.dynamics.time_loop import TimeLoop, marks_of
-from cosserat_fenicsx.errors import NotConverged, SceneError, nearest
+from cosserat_fenicsx.errors import Interrupted, NotConverged, SceneError, SceneWarning, nearest
 from cosserat_fenicsx.models.base import Scales
 from cosserat_fenicsx.models.collocated import CollocatedPlanar, CollocatedSpatial, ConservingSpatial, EccentricSpatial
 from cosserat_fenicsx.models.connections import Connections
@@ -58,6 +59,7 @@ def simulate(
     load_factor: float | None = None,
     elements: int = ELEMENTS,
     degree: int = DEGREE,
+    estimate: bool = False,
     folder: File | None = None,
     progress: bool | None = None,
     comm: MPI.Comm | None = None,
@@ -72,7 +74,7 @@ def simulate(
         duration: s.
         tol: bound on the sum of the local errors of all steps over the duration, of positions over the longest rod's
             length and of rotations (rad) over 10; steps adapt to it, and resolve loads and prescribed motions. Default
-            1e-3, unless `dt` is given. The mesh does not adapt: compare with more `elements`.
+            1e-3, unless `dt` is given. The mesh does not adapt, see `estimate`.
         dt: fixed step, s; shortened so that steps end at jumps and saved times. A step that fails is halved.
             `History.why` warns of loads that change faster than such steps resolve.
         model: "spatial"; "planar" for a scene that moves in a plane; or "auto", the cheapest one that is valid.
@@ -90,6 +92,9 @@ def simulate(
             number, otherwise 1.
         elements: elements per rod.
         degree: polynomial degree of r and q, 1 to 4.
+        estimate: also compute the motion with half as many elements and steps twice as long, for some 60 % more time;
+            how far it is apart (`History.apart`) is `History.error`: in smooth motions some three times the error. Not
+            with a `folder`.
         folder: folder for states and checkpoints of long runs: the History reads states from there when they are used,
             and keeps none in memory. Whatever ends the run, `resume(folder)` continues it with the same digits. It must
             not hold a motion yet, and all ranks must see it; None keeps the states in memory.
@@ -116,6 +121,39 @@ def simulate(
                       for name, value in (("dt", dt), ("save_every", save_every)))  # fmt: skip
     pace = pace_of(duration, tol=tol, dt=dt, scheme=scheme, save_every=save_every, elements=elements)
     rho_inf = _rho_inf(scheme, rho_inf)
+    if instance("simulate", "estimate", estimate, bool, "True or False"):
+        if folder is not None:
+            refuse("simulate", "estimate", True, "False with a folder, and `History.apart` of another motion")
+        if elements < 2:
+            refuse("simulate", "estimate", True, "False with one element a rod, which cannot be halved")
+    given = {"model": model, "scheme": scheme, "rho_inf": rho_inf, "save_every": save_every, "start": start,
+             "load_factor": load_factor, "degree": degree, "progress": progress, "comm": comm}  # fmt: skip
+    stored = None
+    if folder is not None:
+        stored = folder, {"duration": duration, "tol": tol, "dt": dt, "elements": elements}
+    history = _motion(scene, duration, pace, elements, stored, **given)
+    if estimate:
+        _estimate(history, duration, (elements + 1) // 2, given)
+    return history
+
+
+def _estimate(history, duration, elements, given):
+    """Set the errors of a motion by another one with fewer elements and steps twice as long."""
+    history.error = np.full(len(history), np.nan)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SceneWarning)  # said already
+        try:
+            history.error = history.apart(_motion(history.scene, duration, Doubled(history), elements, None, **given))
+        except NotConverged as problem:
+            history.why.append(f"the motion with half as many elements and steps twice as long fails: {problem}")
+        except Interrupted as stopped:
+            stopped.path = history
+            raise
+
+
+def _motion(scene, duration, pace, elements, stored, *, model, scheme, rho_inf, save_every, start, load_factor, degree,
+            progress, comm):  # fmt: skip
+    """The motion in steps of a pace; stored: None, or the folder and arguments of `simulate` to keep there."""
     for rod in scene.rods:
         if math.isinf(rod.profile.range[1].K.max()):
             raise SceneError(
@@ -159,12 +197,12 @@ def simulate(
         if problem.slipping:
             problem.slipping.start(_pulls(scene_over, start))
         stepper.begin()
-        history = (History if folder is None else StoredHistory).of(problem.model, scheme, [why, *cautions])
+        history = (StoredHistory if stored else History).of(problem.model, scheme, [why, *cautions])
         store = Nowhere()
-        if folder is not None:
-            asked = {"duration": duration, "tol": tol, "dt": dt, "scheme": scheme, "save_every": save_every,
-                     "load_factor": load_factor, "elements": elements, "degree": degree,
-                     "rho_inf": rho_inf}  # fmt: skip
+        if stored:
+            folder, asked = stored
+            asked |= {"scheme": scheme, "save_every": save_every, "load_factor": load_factor, "degree": degree,
+                      "rho_inf": rho_inf}  # fmt: skip
             told = {"asked": asked, "durations": [duration], "told": history.told()}
             store = Store(folder, KIND, comm).make(told, scene, duration)
             history.keep_in(store)

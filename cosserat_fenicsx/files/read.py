@@ -416,7 +416,8 @@ class Simulate(Settings):
     """Arguments of `simulate` in a scene file, see there.
 
     Args:
-        duration: s. tol, dt, model, scheme, save_every, start, load_factor, elements, degree: as for `simulate`.
+        duration: s. tol, dt, model, scheme, save_every, start, load_factor, elements, degree, estimate: as for
+            `simulate`.
     """
 
     duration: Annotated[Time, positive()]
@@ -429,6 +430,7 @@ class Simulate(Settings):
     load_factor: float | None = None
     elements: int | None = None
     degree: int | None = None
+    estimate: bool | None = None
 
     called = "simulate"
 

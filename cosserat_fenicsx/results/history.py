@@ -10,6 +10,7 @@ from cosserat_fenicsx.checks import File, refuse
 from cosserat_fenicsx.numerics import directors
 from cosserat_fenicsx.quantities import Quantity
 from cosserat_fenicsx.results import screen
+from cosserat_fenicsx.results.compared import cell_nodes
 from cosserat_fenicsx.results.contacts import ROD_FORCE, RodContacts, contacts_in_words, rod_contacts_of
 from cosserat_fenicsx.results.recovery import viscous_contact
 from cosserat_fenicsx.results.result import by_name
@@ -22,6 +23,7 @@ from cosserat_fenicsx.scene.rod import RodOrName, StationOrName
 _TIMES = 21
 _ALONG = ("point", "s")
 _ENERGIES = ("kinetic", "strain", "work", "dissipated", "balance")
+_ERROR = Quantity("error", "estimated error of positions", unit="m", digits=2)
 # Quantities of every time, and the fields that paths do not have.
 _QUANTITIES = by_name(
     Quantity("time", unit="s", getter="times"),
@@ -65,6 +67,8 @@ class History(RodResult):
         work: (n,) J, work of loads and prescribed motions, and of actuation that changes, since the start.
         dissipated: (n,) J, energy dissipated by damping since the start.
         balance: (n,) J, kinetic + strain - work + dissipated, minus its value at the start; zero for an exact solution.
+        error: (n,) m, estimated error of the positions of all points, see `simulate(estimate=True)`; None if it was not
+            asked for.
         linear_momentum: (n, 3) kg m/s; angular_momentum: (n, 3) kg m^2/s about the inertial origin, inertial.
     """
 
@@ -73,6 +77,7 @@ class History(RodResult):
     _quantities = _QUANTITIES
     _of_stations = ("displacement", "quaternion", "velocity", "angular_velocity", "force", "moment")
     more_fields = {"velocity": "velocity", "angular_velocity": "angular_velocity"}  # noqa: RUF012
+    error: np.ndarray | None = None
 
     @classmethod
     def of(cls, model, scheme, why=()):
@@ -99,9 +104,24 @@ class History(RodResult):
         largest = max(np.abs(getattr(self, name)).max() for name in _ENERGIES)
         if largest:
             worst = np.abs(self.balance).max()
-            yield f"The energy balance is off by at most {worst:.1e} J, {worst / largest:.1e} of the largest energy."
+            yield (
+                f"The energy balance is off by at most {worst:.1e} J, {worst / largest:.1e} of the largest energy, "
+                "which tells nothing of the mesh."
+            )
+        yield from self._error_in_words(units)
         yield from map(units.sentence, contacts_in_words(self))
         yield f"{self.steps[-1]} steps of the scheme {self.scheme}, {self.model} model."
+
+    def _error_in_words(self, units):
+        if self.error is None:
+            yield "The error of positions was not estimated (estimate = true does)."
+            return
+        if np.isnan(self.error).all():
+            yield "The error of positions could not be estimated: see `why`."
+            return
+        k = int(self.error.argmax())
+        words = f"{self.error[k]:.1e} m, {self.error[k] / max(self.scene.lengths):.1e} of the longest rod's length"
+        yield units.sentence(f"Positions have an estimated error of at most {words}, at t = {self.times[k]:.4g} s.")
 
     def _table(self, units, rows, station=None):
         if not len(self):
@@ -148,8 +168,52 @@ class History(RodResult):
 
     @property
     def quantities(self) -> dict[str, Quantity]:
-        """{name: `Quantity`}, with forces of rods that touch."""
-        return super().quantities | by_name(*([ROD_FORCE] if self.scene.rod_contact else []))
+        """{name: `Quantity`}, with forces of rods that touch, and the error where it was estimated."""
+        more = [ROD_FORCE] * bool(self.scene.rod_contact) + [_ERROR] * (self.error is not None)
+        return super().quantities | by_name(*more)
+
+    def at_points(self, which):
+        part = super().at_points(which)
+        part.error = None if self.error is None else self.error[which]
+        return part
+
+    def apart(self, other: "History") -> np.ndarray:
+        """Distance from another motion of the same rods, such as one with other elements, steps or another scheme.
+
+        Args:
+            other: a `History`; between its times, its positions are cubic polynomials through them and the velocities.
+
+        Returns:
+            (n,) m: at each time of this motion the largest distance, over its nodes, between the positions of a point
+            in the two; NaN at times that the other does not reach.
+
+        Raises:
+            SceneError: no motion, or one of other rods.
+        """
+        rods = [(rod.name, rod.length) for rod in self.scene.rods]
+        if not isinstance(other, History) or [(rod.name, rod.length) for rod in other.scene.rods] != rods:
+            refuse("apart", "other", other, "a History of rods of the same names and lengths")
+        if len(other) < 2:
+            return np.full(len(self), np.nan)
+        rule, layout = other.rule, other.layout
+        places = zip(layout.breaks, self.layout.node_s(self.rule.nodes), strict=True)
+        found = [rule.locate_all(breaks, x) for breaks, x in places]
+        of_cells = [nodes for nodes, _ in cell_nodes(layout, other.degree)]
+        nodes = np.concatenate([all_of[cells] for all_of, (cells, _) in zip(of_cells, found, strict=True)])
+        weights, times = np.concatenate([x for _, x in found])[:, :, None], other.times
+        apart = np.full(len(self), np.nan)
+        for i, t in enumerate(self.times):
+            if t > times[-1] * (1 + 1e-12):
+                break
+            k = int(np.clip(np.searchsorted(times, t, side="right") - 1, 0, len(times) - 2))
+            h, ends = times[k + 1] - times[k], (other._records[k], other._records[k + 1])
+            x = (t - times[k]) / h
+            a, b = (state.rq[:, :3] * other.scales.length for state in ends)
+            u, v = (state.rates[:, :3] * (h * other.scales.length / other.time_unit) for state in ends)
+            there = a + x * u + x**2 * (3 * (b - a) - 2 * u - v) + x**3 * (2 * (a - b) + u + v)
+            here = self._records[i].rq[:, :3] * self.scales.length
+            apart[i] = np.linalg.norm((weights * there[nodes]).sum(axis=1) - here, axis=1).max()
+        return apart
 
     def contacts(self, touch: Action) -> RodContacts:
         """Where rods touch each other in the last state, with the forces there; `print` shows them. `motion[k]` has

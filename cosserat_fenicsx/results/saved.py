@@ -156,7 +156,7 @@ def _solution(result):
     else:
         found |= {name: records[name] for name in (_OF_INSTANT if moving else _OF_POINT)}
     if moving:
-        found |= records["ledger"]._asdict()
+        found |= records["ledger"]._asdict() | {"error": result.error}
     else:
         found |= {} if staged else dict(zip(_DENSITIES, records["densities"], strict=True))
         if result._errors is not None:
@@ -273,6 +273,9 @@ def _restored(kind, scene, settings, numbers, assemble, comm):
     result._expanded = Records.of(listed) if listed else None
     if moving:
         result.scheme, result._time_unit = settings["scheme"], settings["time_unit"]
+        if "error" in numbers:
+            _check_shape("error", numbers["error"].shape, (states,))
+            result.error = numbers["error"]
         return result
     return _completed(result, settings, numbers)
 
