@@ -2,6 +2,7 @@
 tangled in one place are drawn beside each other."""
 
 import itertools
+import re
 import textwrap
 from dataclasses import replace
 from pathlib import Path
@@ -229,11 +230,12 @@ def _finish(plotter, pyvista, everywhere, symbols, lines, title, label, most=6):
 
 
 def _even(text):
-    """The lines of a text, none of which is much shorter than the others."""
+    """The lines of a text, none of which is much shorter than the others, and in which numbers keep their units."""
+    text = re.sub(r"(?<=\d) (?=[a-zA-Z]{1,3}\b)", "\N{NO-BREAK SPACE}", text)
     lines = textwrap.wrap(text, _TITLE_WIDTH)
     while len(lines) > 1 and len(narrower := textwrap.wrap(text, max(map(len, lines)) - 1)) == len(lines):
         lines = narrower
-    return lines
+    return [line.replace("\N{NO-BREAK SPACE}", " ") for line in lines]
 
 
 def _title(path, shown, magnify, small, apart, factors):
