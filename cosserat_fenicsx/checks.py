@@ -261,9 +261,6 @@ def store(obj, **fields):
 
 #: Attribute of functions that report their arguments in words.
 NAMED = "_names_its_arguments"
-# Names that people try, and those that the package uses.
-_USUAL = {"radius": "diameter", "r": "diameter", "d": "diameter", "young": "E", "youngs_modulus": "E", "rho": "density",
-          "poisson": "nu", "L": "length", "timestep": "dt", "time_step": "dt", "tolerance": "tol"}  # fmt: skip
 
 
 def in_words(found):
@@ -306,8 +303,6 @@ def _wrong_arguments(call, name, given, named):
     known = [x for x in signature.parameters if x != "self"]
     for unknown in named:
         if unknown not in known:
-            other = _USUAL.get(unknown)
-            hint = f"did you mean '{other}'?" if other in known else nearest(unknown, known)
-            return f"{name} has no argument '{unknown}': {hint}"
+            return f"{name} has no argument '{unknown}': {nearest(unknown, known)}"
     taken = [x if signature.parameters[x].default is inspect.Parameter.empty else f"{x}=..." for x in known]
     return f"{name}: {usual}: expected {name}({', '.join(taken)})"

@@ -2,6 +2,12 @@
 
 import difflib
 
+# Names that people try, and those that the package uses for them.
+_USUAL = {"radius": ("diameter", "a"), "r": ("diameter", "a"), "d": ("diameter",), "young": ("E",), "poisson": ("nu",),
+          "youngs_modulus": ("E",), "rho": ("density",), "energy": ("epsilon",), "specific_energy": ("epsilon",),
+          "n": ("blades",), "mu": ("friction",), "L": ("length",), "timestep": ("dt",), "time_step": ("dt",),
+          "tolerance": ("tol",)}  # fmt: skip
+
 
 class CosseratError(Exception):
     """Base of the errors that this package raises."""
@@ -77,7 +83,8 @@ class Interrupted(KeyboardInterrupt):
 def nearest(word, known):
     """', did you mean ...?' for the known word nearest to `word`, or the list of known words."""
     word = str(word)
-    match = [name for name in known if word and (word.startswith(name) or name.startswith(word))]
+    match = [name for name in _USUAL.get(word, ()) if name in known]
+    match = match or [name for name in known if word and (word.startswith(name) or name.startswith(word))]
     match = match or difflib.get_close_matches(word, list(known), n=1, cutoff=0.5)
     if match:
         return f"did you mean '{match[0]}'?"

@@ -192,6 +192,7 @@ def test_a_step_longer_than_all_parts(tmp_path, capsys):
 
 @pytest.mark.parametrize(("call", "words"), [
     (lambda: cf.Circle(radius=0.1), "Circle has no argument 'radius': did you mean 'diameter'"),
+    (lambda: cf.drilling.Cutting(radius=0.1), "Cutting has no argument 'radius': did you mean 'a'"),
     (lambda: cf.solve(None, load_factor=[1.0]), "solve has no argument 'load_factor': did you mean 'load_factors'"),
     (lambda: cf.Material(E=1.0, rho=3.0), "Material has no argument 'rho': did you mean 'density'"),
     (lambda: cf.well.DrillPipe(spacing=9.0), "DrillPipe has no argument 'spacing': did you mean 'joint_spacing'"),

@@ -162,7 +162,8 @@ def test_plain_depths_that_are_as_large_as_feet_are_doubted():
 
 def test_vertical_stations_need_no_azimuth(tmp_path):
     given = cf.well.WellPath.from_survey([0, 100, 400], [0, 0, 30], [70, 70, 70])
-    (tmp_path / "survey.csv").write_text("MD (m),Inc (deg),Azi (deg)\n0,0,\n100,0,\n400,30,70\n", encoding="utf-8")
+    text = "MD (m),Inc (deg),Azi (deg)\n0,0,\n# Tie-in\n100,0,\n400,30,70\n"
+    (tmp_path / "survey.csv").write_text(text, encoding="utf-8")
     for path in (
         cf.well.WellPath.from_survey([0, 100, 400], [0, 0, 30], [None, math.nan, 70]),
         cf.well.WellPath.from_csv(tmp_path / "survey.csv"),
@@ -202,6 +203,8 @@ def test_a_survey_from_a_workbook(tmp_path):
 
 @pytest.mark.parametrize(("text", "given", "words"), [
     ("md,inc,azi\n0,0,0\n\n10,none,0", {}, "line 4, '10,none,0': expected numbers in md, inc, azi"),
+    ("md,inc,azi\n0,0,0\nTie-in,,\n10,10,0", {}, "line 3, 'Tie-in,,'.*remove it or begin it with #"),
+    ("md,inc,azi\n0,0,0\nProjected to TD,10,10,0", {}, "line 3.*remove it or begin it with #"),
     ("md;inc;azi\n0;0;0\n10;10,500;20", {}, "line 3.*decimals stand behind a point"),
     ("md,inc,azi\n0,0,0\n10,10,5,20", {}, "line 3.*no more columns than names"),
     ("MD (m),inc,azi\n0,0,0\n10,5,20", {"length_unit": "ft"}, "'MD .m.' says a unit of 1 m"),

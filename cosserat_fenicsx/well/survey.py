@@ -66,7 +66,8 @@ def read_columns(who, file, names, degrees, length_unit, sheet=None):
     first, separator, heading, columns = _heading(file, lines, names, "\t" if workbook else ",;\t")
     says = [_split(heading[column])[1] for column in columns]
     values = []
-    for k, (i, line) in enumerate(lines[first + 1 :]):
+    stations = [(i, line) for i, line in lines[first + 1 :] if not line.lstrip(' "').startswith("#")]  # comments
+    for k, (i, line) in enumerate(stations):
         row = _cells(file, i, line, separator)
         cells = [row[column].strip() if column < len(row) else "" for column in columns]
         bare = [cell.lower().strip("()[]") for cell in cells]
@@ -81,6 +82,8 @@ def read_columns(who, file, names, degrees, length_unit, sheet=None):
         except ValueError:
             point = any("," in cell for cell in row) or len(row) > len(heading)
             hint = "; decimals stand behind a point, as in 10.5" if point else ""
+            if re.search(r"[^\W\d]", cells[0]):  # "Tie-in", "Projected to TD"
+                hint = "; where the line is no station, remove it or begin it with #, as a comment"
             raise SceneError(
                 f"{file}: line {i}, {line!r:.100}: expected numbers in {', '.join(heading[x] for x in columns)}, and "
                 f"no more columns than names{hint}"
