@@ -272,6 +272,19 @@ def test_a_rod_about_one_end():
         assert path.model == ("planar" if model == "auto" else "spatial")
 
 
+@pytest.mark.parametrize("rate, model", [((0.38, 0.08, 0.88), "spatial"), ((0, 0.7, 0), "planar")])
+def test_a_rotation_about_any_axis(rate, model):
+    """The clamp bears the inertia m w x (w x (c - a)) of a stiff straight rod, in the plane of the rotation if it has
+    one, and in space if the axis is oblique."""
+    section = cf.Stiffness((1e7, 1e7), 1e7, (1e7, 1e7), 1e7, mass=2.0, inertia=(1e-3, 1e-3, 2e-3))
+    rod, through = cf.Rod(cf.Line((0, 0, 0), (0.5, 0, 1)), section, name="blade"), np.array([0.3, 1.3 * rate[0], -0.2])
+    path = cf.solve(cf.Scene([rod], [cf.Clamp(rod.start)], [Centrifugal(rate, through=through)]), [1.0], elements=2)
+    inertia = 2.0 * rod.length * np.cross(rate, np.cross(rate, np.array([0.25, 0, 0.5]) - through))
+    assert path.force(rod.start)[-1] == pytest.approx(-inertia, rel=1e-6, abs=1e-6)
+    assert path.model == model
+    assert (model == "planar") == ("Centrifugal on blade points out of" not in " ".join(path.why))
+
+
 def test_the_least_friction_of_rolling():
     """At 100 rpm that of the reference; at 30 rpm no wall is needed, which would have to pull."""
     from whirling_collar import least_friction

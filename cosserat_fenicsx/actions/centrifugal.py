@@ -108,7 +108,7 @@ class _OfRod(LineAction):
     of: Centrifugal
     along: tuple
 
-    at_nodes, scaled, work = True, False, staticmethod(turning)
+    called, at_nodes, scaled, work = "Centrifugal", True, False, staticmethod(turning)
 
     def data(self, rod, s):
         found = rod.stiffness_at(s)
@@ -124,7 +124,7 @@ class _OfUnbalance(LineAction):
     rod: Rod
     of: Centrifugal
 
-    at_nodes, work = True, staticmethod(unbalanced)
+    called, at_nodes, work = "Centrifugal", True, staticmethod(unbalanced)
 
     def data(self, rod, s):
         return (
@@ -143,7 +143,7 @@ class _OfPoint(PointAction):
     of: Centrifugal
     body: PointAction
 
-    scaled, work = False, staticmethod(turning)
+    called, scaled, work = "Centrifugal", False, staticmethod(turning)
 
     def data(self, rod, s):
         return _turning_data(*self.body.inertia(rod), self.of, ("kg", "kg m^2"))

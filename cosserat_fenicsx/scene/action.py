@@ -276,9 +276,10 @@ def rubs(scene):
 
 def describe(item):
     """A support or a load as text: its class and its station."""
+    name = item.called or type(item).__name__
     if item.station is not None:
-        return f"{item.called or type(item).__name__} at {item.station}"
-    return f"{type(item).__name__} on {item.rod.name}" if item.rod is not None else type(item).__name__
+        return f"{name} at {item.station}"
+    return f"{name} on {item.rod.name}" if item.rod is not None else name
 
 
 def some_of(texts, most=6):

@@ -101,7 +101,7 @@ def _find(scene):
         _, drawn = _drawn(scene, scene.rods[:: len(scene.rods) // _A_FEW])
         _lie_in(_normal_of(drawn), drawn)
     tangents, drawn = _drawn(scene, scene.rods)
-    acting = [_vectors(scene, load) for load in scene.loads]
+    acting = [_vectors(scene, load) for load in scene.actions]
     normal = _normal_of(drawn)
     if normal is None:
         normal = _normal_of_a_line(
@@ -109,17 +109,18 @@ def _find(scene):
         )
     normal = normal * np.sign(normal[np.argmax(np.abs(normal))])
     _lie_in(normal, drawn)
-    for i, (load, (inside, across)) in enumerate(zip(scene.loads, acting, strict=True)):
-        bent = [np.linalg.norm(np.cross(v, normal)) for v in _units(across)]
-        if max([*np.abs(_units(inside) @ normal), *bent], default=0.0) > _SMALLEST_ANGLE:
-            what = "does not turn in" if across and not inside else "points out of"
-            raise _Leaves(f"loads[{i}] ({describe(load)}) {what} the plane of the rods")
     for rod, (s, frames) in zip(scene.rods, tangents, strict=True):
         _check_section(rod, s, frames, normal)
         if rod.mass_centre:
             offsets = np.concatenate([mass_arm(rod, s, side) for side in ("left", "right")])
             if np.abs(offsets @ normal).max() > _SMALLEST_ANGLE * rod.mass_centre.largest:
                 raise _Leaves(f"the mass centre of rod '{rod.name}' lies off the plane (Rod.eccentricity)")
+    for i, (load, (inside, across)) in enumerate(zip(scene.actions, acting, strict=True)):
+        bent = [np.linalg.norm(np.cross(v, normal)) for v in _units(across)]
+        if max([*np.abs(_units(inside) @ normal), *bent], default=0.0) > _SMALLEST_ANGLE:
+            what = "does not turn in" if across and not inside else "points out of"
+            which = f"loads[{i}] ({describe(load)})" if i < len(scene.loads) else describe(load)
+            raise _Leaves(f"{which} {what} the plane of the rods")
     e1 = np.cross(normal, np.eye(3)[np.argmin(np.abs(normal))])
     e1 /= np.linalg.norm(e1)
     plane = Plane(tuple(map(tuple, (e1, np.cross(normal, e1), normal))))
