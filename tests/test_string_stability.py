@@ -62,7 +62,9 @@ def test_limit_speeds_by_drive():
     assert all(first <= every for first, every in limits.values())
     assert f"PI (own) {limits['PI (own)'][0] / RPM:.4g} rpm" in " ".join(str(answer).split())
     cutting = replace(scene, bit=cf.drilling.BitOnRock(cf.drilling.Cutting(0.1, 60e6, 0.6, 4), 50e3))
-    assert not replace(answer, scene=cutting).limit_speeds
+    answer = replace(answer, scene=cutting)
+    assert not answer.limit_speeds and not any(drives for *_, drives in answer._growing[0])  # which take minutes
+    assert "with_drives(i, j) has the growth with other drives" in " ".join(str(answer).split())
 
 
 def test_a_string_without_losses():

@@ -192,7 +192,8 @@ class Stability(Result):
 
     @cached_property
     def _growing(self):
-        """(mode, i, j, {drive: growth}) of the fastest modes that grow, in the case of median growth; their number."""
+        """(mode, i, j, {drive: growth}) of the fastest modes that grow, in the case of median growth; their number. No
+        drives for a bit that cuts, with which they may take minutes."""
         grows = [k for k in range(self.roots.shape[2]) if (self.growth[:, :, k] > 0).any()]
         grows.sort(key=lambda k: -np.nanmax(self.growth[:, :, k]))
         rows, known = [], {}
@@ -201,9 +202,13 @@ class Stability(Result):
             middle = np.argsort(self.growth[i, j, k])[len(i) // 2]
             case = int(i[middle]), int(j[middle])
             if case not in known:
-                known[case] = self.with_drives(*case)
+                known[case] = {} if self._cuts else self.with_drives(*case)
             rows.append((k, *case, {name: growth[k] for name, growth in known[case].items()}))
         return rows, len(grows)
+
+    @property
+    def _cuts(self):
+        return self.scene.bit is not None and self.scene.bit.law.drills
 
     def _answer(self, units):
         yield f"{_range(self, units)}, all modes up to {self.up_to:.4g} Hz."
@@ -223,6 +228,8 @@ class Stability(Result):
             return
         yield f"{count} modes grow. {_SMALL}"
         yield from self._limits(units)
+        if self._cuts:
+            yield "with_drives(i, j) has the growth with other drives, at speeds[i] and weights[j]."
         yield from (
             f"{text}." for text in _advice(self, rows, [name for name in rows[0][3] if name != own_rule(self.scene)])
         )
@@ -270,9 +277,13 @@ class Stability(Result):
         yield (
             "growth: in 1/s. largest growth: of all cases. middle case: of those in which the mode grows; frequency "
             f"and growth there are those of the middle case, with the drive of the scene, {drive}. mode: counted from "
-            f"0 by frequency there. To the right the growth with {'each drive' if own else 'other drives'}: "
-            f"{_words(rows[0][3])}. gone: with that drive no mode is near."
+            "0 by frequency there."
         )
+        if rows[0][3]:
+            yield (
+                f"To the right the growth with {'each drive' if own else 'other drives'}: {_words(rows[0][3])}. gone: "
+                "with that drive no mode is near."
+            )
         for k, i, j, _ in rows:
             yield f"{self.frequency[i, j, k]:.4g} Hz moves: {self.shape(k, i, j).where}"
         if count > _LISTED:
@@ -314,7 +325,7 @@ class Stability(Result):
         walls = steady.walls(or_none(self.weights[0]))
         if walls is not None and (sliding := walls.caution(float(self.speeds.min()), steady.sliding)):
             left_out.append(sliding)
-        law = self.scene.bit.law if self.scene.bit is not None and not self.scene.bit.law.drills else None
+        law = self.scene.bit.law if self.scene.bit is not None and not self._cuts else None
         if law is not None and len(self.weights) > 1:
             at = [law.resistance(float(weight)) for weight in (self.weights.min(), self.weights.max())]
             if None not in at and all(at[0](s) == at[1](s) for s in self.speeds):
@@ -377,7 +388,7 @@ class Stability(Result):
                 found[name] = own.real.copy()
                 continue
             steady, f = self._steady(i, j, replace(scene, drive=drive))
-            roots, _ = all_roots(f, box_up_to(steady, 2 * np.pi * self.up_to)(f), f.spacing)
+            roots, _ = all_roots(f, box_up_to(steady, 2 * np.pi * self.up_to)(f), f.spacing, own[np.isfinite(own)])
             nearest = np.abs(roots.imag[:, None] - np.where(np.isfinite(own), own.imag, np.inf)).argmin(axis=1)
             growth = [roots.real[nearest == k].max(initial=-np.inf) for k in range(len(own))]
             found[name] = np.where(np.isneginf(growth), np.nan, growth)
