@@ -1,6 +1,7 @@
 """The structure of the package: allowed imports, the wheel and the plain checkout, the length of files."""
 
 import ast
+import functools
 import re
 import subprocess
 import sys
@@ -15,14 +16,16 @@ ROOT = Path(__file__).parent.parent
 PACKAGE = ROOT / "cosserat_fenicsx"
 
 
+@functools.cache
 def imports(file):
     """All modules that a file imports, inside functions too."""
+    found = set()
     for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Import):
-            yield from (alias.name for alias in node.names)
+            found |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom):
-            yield node.module
-            yield from (f"{node.module}.{alias.name}" for alias in node.names)
+            found |= {node.module, *(f"{node.module}.{alias.name}" for alias in node.names)}
+    return found
 
 
 def inside(file):
