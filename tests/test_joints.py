@@ -404,3 +404,23 @@ def test_hinges_cost_no_more_than_rods():
         cf.solve(scene, [1.0], elements=1, comm=MPI.COMM_SELF)
         times[released] = time.process_time() - begun
     assert times[True] < 6 * times[False] + 0.1
+
+
+@pytest.mark.parametrize("acts", ["rotation", "tendon"])
+def test_a_section_that_jumps_is_two_rods(acts):
+    """Nodes at the jump have the data of their side: inertia of a rotation, and what a tendon leaves to the rod."""
+    steel, thick, thin = cf.Material(1e8, 0.3, 1200.0), cf.Circle(0.03), cf.Circle(0.02)
+    whole = cf.Rod(cf.Line((0, 0, 0), (1, 0, 0)), [(0.4, thick), (None, thin)], steel, name="whole")
+    a = cf.Rod(cf.Line((0, 0, 0), (0.4, 0, 0)), thick, steel, name="a")
+    b = cf.Rod(cf.Line((0.4, 0, 0), (1, 0, 0)), thin, steel, name="b")
+
+    def solved(rods, joints=()):
+        acting = [cf.Tendon(rod, (0.02, 0), tension=20.0) for rod in rods]
+        acting = [cf.Centrifugal((0.0, 1.0, 2.0))] if acts == "rotation" else acting
+        loads = [*acting, cf.Force(rods[-1].end, (0, 0, -0.3))]
+        return cf.solve(cf.Scene(rods, [cf.Clamp(rods[0].start)], loads, joints), [1.0], elements=10)
+
+    one, two = solved([whole]), solved([a, b], [cf.Joint(a.end, b.start)])
+    for s in (0.0, 0.35, 0.38, 0.4):
+        assert one.force(whole.at(s))[-1] == pytest.approx(two.force(a.at(s))[-1], rel=1e-7, abs=1e-9)
+    assert one.displacement(whole.end)[-1] == pytest.approx(two.displacement(b.end)[-1], rel=1e-8, abs=1e-12)

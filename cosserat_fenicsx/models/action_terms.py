@@ -10,6 +10,7 @@ from cosserat_fenicsx.models.rod_data import element_function, gauss_function
 from cosserat_fenicsx.models.signature import place_actions
 from cosserat_fenicsx.models.sliding import SlidingThread
 from cosserat_fenicsx.numerics import directors
+from cosserat_fenicsx.scene.profiles import BESIDE_BREAK
 from cosserat_fenicsx.scene.signals import at, signals_of, values_at, with_values
 
 # Quadrature on an interval between kinks: exact for data that are linear there, up to p = 4.
@@ -102,8 +103,6 @@ class Densities:
 
 # Points of an element, in [0, 1], that are closer than this are the same.
 _SAME = 1e-9
-# Share of an element's length by which nodes at its ends count as inside it.
-_INSIDE = 1e-9
 
 
 class ActionTerms:
@@ -287,13 +286,14 @@ class Term:
         begin, size = np.concatenate([b[:-1] for b in layout.breaks]), layout.sizes(scene)
         lengths = np.array([rod.length for rod in scene.rods])
         along = np.where(rods.reversed[:, None], 1 - x, x)
+        starts, sizes = begin[cells] * lengths[rods.cell_rod], size[cells]
         # where data jump at an end of elements, a node there counts to each of them with the data of its side
-        inside = np.clip(along, _INSIDE, 1 - _INSIDE) if self.kind.place == "node" else along
-        s = (begin[cells] * lengths[rods.cell_rod])[:, None] + size[cells][:, None] * inside
+        inset = (BESIDE_BREAK * lengths[rods.cell_rod] * (self.kind.place == "node"))[:, None]
+        s = starts[:, None] + np.clip(sizes[:, None] * along, inset, sizes[:, None] - inset)
         weight = np.zeros(self.weight.x.array.shape)
         in_turn = np.argsort(rods.cell_rod, kind="stable")  # this rank's elements, rod by rod
         bounds = np.searchsorted(rods.cell_rod[in_turn], np.arange(len(scene.rods) + 1))
-        counts, starts, sizes = layout.counts, begin[cells] * lengths[rods.cell_rod], size[cells]
+        counts = layout.counts
         # (action, rod, rows of the values, arc lengths, their elements and points, starts and lengths of elements)
         self._where = []
         for action, rod, vertex in members:

@@ -14,6 +14,7 @@ from cosserat_fenicsx.results.records import Records
 from cosserat_fenicsx.results.compared import all_cell_nodes, cell_nodes
 from cosserat_fenicsx.results.result import Result, by_name
 from cosserat_fenicsx.scene.action import without_stress
+from cosserat_fenicsx.scene.profiles import BESIDE_BREAK
 from cosserat_fenicsx.scene.signals import at
 from cosserat_fenicsx.turning import Turning
 
@@ -134,8 +135,6 @@ def _turning(p, q):
 
 # Newton's iterations for n and m of a rod from what a cut carries, and the relative change at which they end.
 _MOST, _SAME = 30, 1e-13
-# Share of an element's length by which its ends are inside it, where data may jump.
-_INSIDE = 1e-9
 
 
 @dataclass(frozen=True, repr=False)
@@ -220,7 +219,7 @@ class Threads:
         rule, at_gauss = self._result.rule, self.at_gauss()
         at_ends = np.zeros((*at_gauss.shape[:2], 2, 6))
         for rod in {thread.rod: None for thread in self._threads}:
-            places = _Places(self._result, rod, np.array([_INSIDE, 1 - _INSIDE]))
+            places = _Places(self._result, rod, np.array([0.0, 1.0]))
             R, _ = places.turned(self._records)
             whole = _inertial(np.swapaxes(R, -1, -2), cut[:, places.cells][:, :, [0, -1]])
             at_ends[:, places.cells] = _inertial(R, self._share(places, whole))
@@ -340,17 +339,18 @@ def _along(thread, places, v, k):
 
 
 class _Places:
-    """Points x (points,) in [0, 1] of the elements of a rod of a `Path` or `History`: its Gauss points, or `_INSIDE`
-    its ends."""
+    """Points x (points,) in [0, 1] of the elements of a rod of a `Path` or `History`: its Gauss points, or its
+    ends, where data are those inside it."""
 
     def __init__(self, result, rod, x):
         i, _ = result._rows(rod)
         self.rod, self.cells, self._nodes = rod, result._cells(i), cell_nodes(result.layout, result.degree)[i][0]
-        self.ends = x[0] == _INSIDE
+        self.ends = x[0] == 0.0
         self.breaks, self.length, self._scales = result.layout.breaks[i], result.scales.length, result.scales
         h = np.diff(self.breaks)[:, None]
         self._basis, self._slopes = result.rule.basis(x), result.rule.slopes
-        self._h, s = h[..., None] * rod.length / self.length, (self.breaks[:-1, None] + h * x) * rod.length
+        inside = [BESIDE_BREAK, -BESIDE_BREAK] if self.ends else 0.0
+        self._h, s = h[..., None] * rod.length / self.length, (self.breaks[:-1, None] + h * x + inside) * rod.length
         self.shape, self.s, self._scene = s.shape, s.ravel(), result.scene
         self.frames, self._beside = rod.curve.frame(self.s), {}
 

@@ -39,9 +39,13 @@ def checked_pieces(where, field, given, length, what):
     return pieces
 
 
+# Tolerance for s at a break, and a distance from it at which s surely belongs to one side, over a rod's length.
+_AT_BREAK, BESIDE_BREAK = 1e-9, 4e-9
+
+
 def piece_at(breaks, s, side, length):
     """Indices of the pieces of a rod that end at `breaks`, at arc lengths s (...), m; `side` as for `stiffness_at`."""
-    within = 1e-9 * length * (1 if side == "left" else -1)  # tolerance for s at a break
+    within = _AT_BREAK * length * (1 if side == "left" else -1)
     return np.searchsorted(np.add(breaks, within), s, side=side)
 
 
