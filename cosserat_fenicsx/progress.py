@@ -11,6 +11,7 @@ from cosserat_fenicsx.ranks import are_apart
 
 _PATIENCE = 2.0  # s before a bar appears
 _LINE_EVERY = 10.0  # s between plain lines
+_LONG = 120.0  # s that are left of a motion from which on plain lines tell them
 _REDRAWN = 0.5  # s between texts of `_Clocked` in a terminal
 _PLANNED = 1.0  # s before a plan is printed, and so before a bar
 
@@ -66,6 +67,10 @@ class Progress:
             self._last = now
             # a path that turns back is longer than its targets suggest
             share = f"{100 * self._done / self._way:.0f} %" if self._done <= 1.001 * self._way else "it turns back"
+            left = (now - self._began) * (self._way / max(self._done, 1e-300) - 1)
+            if self._quantity != "load factor" and left > _LONG:
+                minutes, hours = round(left / 60), round(left / 3600)
+                share += f", some {minutes} minutes left" if hours < 3 else f", some {hours} hours left"
             print(f"{self._what}: {self._quantity} {self._eta:.6g}, {share}", file=sys.stderr)
 
     def _draw(self):

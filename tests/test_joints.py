@@ -284,6 +284,7 @@ def test_weight_is_a_line_force_on_every_rod():
 @pytest.mark.serial
 def test_refusals():
     rod, other = bow(), cf.Rod(cf.Line((0, 0, 0), (1, 0, 0)), SECTION, name="other")
+    link = cf.Rod(cf.Line((1, 0, 0), (2, 0, 0)), SECTION, name="link")
 
     def free(*supports):
         return cf.solve(cf.Scene([other], supports, [cf.Force(other.end, (0, 0, 1))]), [1.0])
@@ -297,6 +298,9 @@ def test_refusals():
         "and rod 'other' can move along (0, 0, 1): expected": lambda: free(cf.Roller(other.start, (1, 0, 0))),
         "supports[0] (Clamp at other.start) and supports[1] (Prescribed at other.start) hold the same motion twice":
             lambda: cf.Scene([other], [cf.Clamp(other.start), cf.Prescribed(other.start, displacement=(1, 0, 0))]),
+        "Scene.joints: link.start and other.end are joined twice": lambda: cf.Scene(
+            [other, link], [cf.Clamp(other.start)], [], [cf.Joint(other.end, link.start),
+                                                                cf.Joint("link.start", "other.end")]),
         "supports[0] (Clamp at other.start) and supports[1] (Clamp at other.start) hold the same motion twice":
             lambda: cf.Scene([other], [cf.Clamp(other.start), cf.Clamp(other.start)]),
         "hold the same motion twice": lambda: cf.Scene(

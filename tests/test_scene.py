@@ -194,6 +194,11 @@ def test_what_looks_like_a_slip_is_asked_about():
     thick = scene(across=100, joints=True)
     assert "rod 'one' is 100 m across and 4 m long: are all lengths in m?" in thick.doubts
     assert ["of solid metal" in scene(across=a, joints=True).doubts[0] for a in (2.0, 3.0)] == [True, True]
+    wall = cf.Rod(cf.Line((0, 0, 0), (0, 0, 4)), cf.Tube(0.1, 0.005), cf.Material(210e9), name="one")
+    assert cf.Scene([wall], [cf.Clamp(wall.start)]).doubts == (
+        "the tube of rod 'one' has a wall of 0.0475 m: its second number is the inner diameter; a wall of 0.005 m is "
+        "Tube(0.1, 0.09)",
+    )
     soft = scene(E=210e3, joints=True)
     assert "are the units SI" in soft.cautions[0]
     with pytest.raises(

@@ -32,6 +32,7 @@ from cosserat_fenicsx.results.history import History
 from cosserat_fenicsx.results.path import Path
 from cosserat_fenicsx.scene.action import describe, path_dependent
 from cosserat_fenicsx.scene.loads import Weight
+from cosserat_fenicsx.scene.rod import require_inertia
 from cosserat_fenicsx.scene.scene import Scene, check_magnitudes, check_tensions
 from cosserat_fenicsx.scene.stages import refuse_stages
 from cosserat_fenicsx.statics.meshes import turning_in_law
@@ -155,6 +156,7 @@ def _motion(scene, duration, pace, elements, stored, *, model, scheme, rho_inf, 
             progress, comm):  # fmt: skip
     """The motion in steps of a pace; stored: None, or the folder and arguments of `simulate` to keep there."""
     for rod in scene.rods:
+        require_inertia(rod, "a motion")
         if math.isinf(rod.profile.range[1].K.max()):
             raise SceneError(
                 f"Rod '{rod.name}': an infinite axial or shear stiffness: expected finite ones, for a motion"

@@ -135,7 +135,7 @@ def _like(values, parts):
     return values._make(parts) if hasattr(values, "_make") else tuple(parts)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Event:
     """A limit point, a bifurcation, or the onset of flutter on a path.
 
@@ -159,11 +159,15 @@ class Event:
 
     kind: str
     load_factor: float
-    mode: np.ndarray = field(repr=False)
+    mode: np.ndarray
     after: int
     residual: float = np.nan
     error: float = np.nan
     stage: int = -1
+
+    def __repr__(self):
+        words = {"limit": "limit point"}.get(self.kind, self.kind)
+        return f"<{words} at load factor {self.load_factor:.7g}, after point {self.after}>"
 
 
 def lost_at(path):

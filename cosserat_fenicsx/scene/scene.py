@@ -21,7 +21,7 @@ from cosserat_fenicsx.scene.planes import bent_weakly, find_plane
 from cosserat_fenicsx.scene.profiles import Stiffnesses
 from cosserat_fenicsx.scene.rod import Rod, Station, StationOrName, station_named, with_names
 from cosserat_fenicsx.scene.rolled import Profile
-from cosserat_fenicsx.scene.sections import Circle, Rectangle, sizes_across
+from cosserat_fenicsx.scene.sections import Circle, Rectangle, Tube, sizes_across
 from cosserat_fenicsx.scene.signals import at, sample_times, signals_of
 from cosserat_fenicsx.scene.stages import Places, Stage, legs_of, named_stages, scene_of
 from cosserat_fenicsx.scene.statical import Groups, check_held_once, touching
@@ -155,6 +155,8 @@ _ALONG_TENDON = 33
 _THICKEST = 1.5
 # Rolled profiles that are longer, over their heights, are probably given in mm.
 _LONGEST = 500
+# Share of a tube's outer diameter below which its inner one is doubted.
+_THICK_WALL = 0.2
 # Warnings of one kind that are listed.
 _TOLD = 5
 _PARTS = {
@@ -477,6 +479,12 @@ class Scene(Part):
                 long.append((rod.length, f"'{rod.name}' of {section.name}"))
             across = max(sizes_across(section), default=0.0)
             size = "rod '{}' is {:g} m across and {:g} m long"
+            if isinstance(section, Tube) and section.inner_diameter < _THICK_WALL * section.outer_diameter:
+                inner, outer = section.inner_diameter, section.outer_diameter
+                yield (
+                    f"the tube of rod '{rod.name}' has a wall of {(outer - inner) / 2:g} m: its second number is the "
+                    f"inner diameter; a wall of {inner:g} m is Tube({outer:g}, {outer - 2 * inner:g})"
+                )
             if across >= rod.length:
                 yield f"{size.format(rod.name, across, rod.length)}: are all lengths in m?"
             elif across > _THICKEST and isinstance(section, Circle | Rectangle):

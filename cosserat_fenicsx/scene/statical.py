@@ -163,8 +163,15 @@ def check_held_once(scene):
     """Refuse (SceneError) redundant constraints: several that hold the same motion of one station. Constraints at
     different stations of a rod are never redundant, since the rod between them is elastic. So only those may be that
     connect stations, and the ground, in a closed loop."""
-    joined, grounded, closed, stations = Groups(), set(), [], []
-    for holder in _holders(scene):
+    joined, grounded, closed, stations, holders = Groups(), set(), [], [], [*_holders(scene)]
+    if len(holders) < len(scene.supports) + len(scene.joints):
+        pairs = set()
+        for joint in scene.joints:
+            pair = frozenset(_key(scene, x) for x in (joint.first, joint.second))
+            if pair in pairs:
+                raise SceneError(f"Scene.joints: {joint.first} and {joint.second} are joined twice: expected one Joint")
+            pairs.add(pair)
+    for holder in holders:
         if isinstance(holder, Joint):
             one, other = (joined.leader(_key(scene, x)) for x in (holder.first, holder.second))
             if not joined.join(one, other) or (one in grounded and other in grounded):
