@@ -668,7 +668,7 @@ def test_resultants_of_any_pressure_add_up():
     """Of rough pressures with gaps and jumps, on elements of any length, in layers of any length."""
     rng, nodes = np.random.default_rng(0), np.array([0.0, 0.5 - math.sqrt(0.05), 0.5 + math.sqrt(0.05), 1.0])
     found = 0
-    for _ in range(300):
+    for _ in range(100):
         count = int(rng.integers(1, 200))
         h = np.full(count, 10 ** rng.uniform(-2, 1)) * rng.uniform(0.5, 1.5, count)
         s = np.cumsum(h)[:, None] + h[:, None] * (nodes - 1)
@@ -683,7 +683,7 @@ def test_resultants_of_any_pressure_add_up():
         assert sum(points) + (regular * sizes).sum() == pytest.approx(total, rel=1e-12) and regular.min() >= 0
         assert all(x.force > -1e-12 * total and x.start <= x.end for x in contacts)
         found += len(points)
-    assert found > 300
+    assert found > 100
 
 
 def test_torque_does_not_alternate_at_the_edge_of_a_collar():
