@@ -175,7 +175,7 @@ class Strands:
 
     def _moved(self, element, place, change):
         """Elements and places after a limited change; and whether an end of a rod, or between elements, stops it."""
-        place = place + np.clip(change, -_LONGEST, _LONGEST)
+        place = place + np.minimum(np.maximum(change, -_LONGEST), _LONGEST)
         element, stopped = element.copy(), np.zeros(len(element), dtype=bool)
         for beyond, neighbour, shift, end in ((place > 1, self._next, -1.0, 1.0), (place < 0, self._before, 1.0, 0.0)):
             ended = beyond & (neighbour[element] < 0)
@@ -214,10 +214,10 @@ class Strands:
                     back = (now != was) & ((place_now < 0.1) | (place_now > 0.9)) & (step > 20)
                     place_now[back] = np.round(place_now[back])
                     slides[back, column] = False
-            moved = np.abs(np.where(slides, np.c_[first, second], 0.0)).max(initial=0.0)
+            moved = np.abs(np.where(slides, np.stack([first, second], axis=1), 0.0)).max(initial=0.0)
             if moved < (_ENOUGH if step < _ROUNDED else _ROUGH):
                 break
-        return np.c_[e, f], np.c_[a, b], slides
+        return np.stack([e, f], axis=1), np.stack([a, b], axis=1), slides
 
     def near(self, x, reach):
         """All pairs of points of strands that are nearest to each other, with gaps below `reach`: where strands cross,
@@ -290,8 +290,8 @@ class Strands:
 
     def apart(self, x, element, place):
         """(m, 3) vectors from the first to the second points of pairs of places (m, 2), linear in the positions x."""
-        first, second = np.split(self.at(x, element.T.ravel(), place.T.ravel()), 2)
-        return second - first
+        found = self.at(x, element.T.ravel(), place.T.ravel())
+        return found[len(element) :] - found[: len(element)]
 
     def between(self, first, second, share):
         """Elements, places (m, 2) at a share (m,) of the arc lengths from some `Touches` to others of the same rods."""
@@ -358,8 +358,8 @@ class Strands:
 
     def moves(self, element, place):
         """(m, n) shares of `movers` in how far the second of a pair of places moves from the first."""
-        first, second = np.split(self.basis(element.T.ravel(), place.T.ravel()), 2)
-        return np.concatenate([-first, second], axis=1)
+        found = self.basis(element.T.ravel(), place.T.ravel())
+        return np.concatenate([-found[: len(element)], found[len(element) :]], axis=1)
 
     def gradients(self, touches):
         """(m, n, 3) derivatives of the gaps by the positions of `nodes_of`."""

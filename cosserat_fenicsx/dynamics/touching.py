@@ -100,7 +100,8 @@ class _Pairs:
 
         def off(share):
             element, place = strands.between(before, now, share)
-            start, change = np.split(strands.apart(both, element, place), 2, axis=1)
+            found = strands.apart(both, element, place)
+            start, change = found[:, :3], found[:, 3:]
             return np.sum(change * (2 * start + change), axis=1) - target, (element, place, 2 * start + change)
 
         low, high = np.zeros(len(now)), np.ones(len(now))
@@ -110,7 +111,7 @@ class _Pairs:
             difference = at_low - at_high
             slides = difference > small
             share = np.where(slides, low + (high - low) * at_low / np.where(slides, difference, 1.0), (low + high) / 2)
-            share = np.clip(share, 0.0, 1.0)
+            share = np.minimum(np.maximum(share, 0.0), 1.0)
             left, found = off(share)
             if np.abs(left[slides]).max(initial=0.0) <= 1e-15 * (now.distance**2).max():
                 break
