@@ -219,7 +219,7 @@ def test_public_functions_are_those_of_their_modules():
 
 
 @pytest.mark.parametrize("call", [
-    lambda: cf.well.HoleSection(10.0, 20.0, 0.1), lambda: cf.well.Mud(1.2), lambda: cf.well.TripOut(weight=3.0),
+    lambda: cf.well.HoleSection(10.0, 20.0, 0.1), lambda: cf.well.Mud(1.2), lambda: cf.well.TripIn(weight=3.0),
     lambda: cf.well.Ream(0.1, 5.0),
 ])  # fmt: skip
 def test_warnings_are_of_the_line_that_calls(call):
@@ -577,6 +577,45 @@ def test_names_of_the_trade_and_sizes_lead_to_those_known():
         cf.well.Collar(90, "XX")
     with pytest.raises(cf.SceneError, match="tool_face = 'high': expected an angle .degrees, 0 the high side"):
         cf.well.Collar(30, "NC46-65", bend=1.5, bend_at=2, tool_face="high")
+
+
+PIPE = cf.well.DrillPipe(size="5 in 19.50 lb/ft")
+
+
+@pytest.mark.parametrize(("make", "words"), [
+    (lambda: cf.well.DrillPipe(size="5 in 19.50 lb/ft", mass=19.5), "less than its body weighs.*19.5 lb/ft are '19.5"),
+    (lambda: cf.well.Ream(60, 60), "Ream.speed = 60 m/s is faster than blocks move"),
+    (lambda: cf.well.DrillString([PIPE, cf.well.Bit(0.2)], order="top down"), ""),
+    (lambda: cf.well.DrillString([cf.well.Collar(9.0, "NC46-65"), cf.well.Bit(0.2), PIPE]), "component 2 from below"),
+    (lambda: cf.well.DrillString([cf.well.Bit(0.2), cf.well.Bit(0.2), PIPE]), "2 bits, of 3 components"),
+    (lambda: cf.well.RotaryDrilling("25 klbf", "4000 kft-lbf"), "more than any drill pipe carries"),
+    (lambda: cf.well.RotaryDrilling("25 klbf", "-4 kft-lbf"), "torque = -5423.27 N m drives the string"),
+    (lambda: cf.well.RotaryDrilling("-25 klbf", 5e3), "expected it positive"),
+    (lambda: cf.well.TripOut(weight="25 klbf"), "expected it negative, a pull"),
+    (lambda: cf.well.Sliding("25 klbf", "4 kft-lbf"), ""), (lambda: cf.well.TripIn(weight="25 klbf"), ""),
+    (lambda: cf.well.HoleSection(900.0, "9 5/8 in", 0.2, "casing"), "the outer diameter of casing.*casing='9 5/8 in"),
+    (lambda: cf.well.HoleSection(900.0, "9 5/8 in", 0.2, "open hole"), ""),
+    (lambda: cf.well.Mud(1200.0, flow_inside=3500), "3500 psi are '3500 psi'"),
+    (lambda: cf.well.Centraliser(400, 0.2), "400 in are '400 in'"),
+    (lambda: cf.drilling.Stribeck(0.8, 0.5, 3.0, radius=4.25), "Stribeck.radius = 4.25 m is wider than holes are"),
+    (lambda: cf.well.WellPath.from_survey([0, 900, 2000], [130, 130, 150], [0, 0, 60]), "climbs .*swapped"),
+    (lambda: cf.well.WellPath.from_survey([0, 900], [70, 112], [0, 0]), ""),  # a crossing under a river
+])  # fmt: skip
+def test_what_is_probably_a_mistake_is_asked_about(make, words):
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        make()
+    assert len(told) == bool(words) and all(re.search(words, str(x.message)) for x in told)
+
+
+@pytest.mark.parametrize(("tvd", "asked"), [("2653.99", False), ("", False), ("2900", True)])
+def test_vertical_depths_of_a_survey_are_compared(tvd, asked, tmp_path):
+    file = tmp_path / "survey.csv"
+    file.write_text(f"MD (ft),Inc (deg),Azi (deg),TVD (ft)\n0,0,0,0\n1000,0,0,1000\n3000,60,0,{tvd}\n")
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        cf.well.WellPath.from_csv(file)
+    assert ["differs by 246.01 ft" in str(x.message) for x in told] == [True] * asked
 
 
 def test_a_survey_and_lengths_that_are_doubtful():

@@ -32,7 +32,7 @@ from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
-from cosserat_fenicsx.checks import refuse, warn
+from cosserat_fenicsx.checks import doubt_width, refuse, warn
 from cosserat_fenicsx.drilling.laws import Resistance, by_method, checked, hashable, surface_of, tabulated
 from cosserat_fenicsx.drilling.signals import ScalarSignal, doubt_decay
 from cosserat_fenicsx.parts import (
@@ -141,6 +141,8 @@ class Stribeck(BitLaw):
     def validate(self):
         if self.static < self.dynamic:
             refuse(self, "static", self.static, f"at least the dynamic one, {self.dynamic:g}")
+        if self.radius is not None:
+            doubt_width(self, "radius")
         doubt_decay(self, self.speed)
 
     @property

@@ -115,6 +115,12 @@ def _buckled(scene, name):
     ]
 
 
+class _Up(TripOut):
+    """Of a block that moves up while the bit still presses."""
+
+    pressed = 0
+
+
 def _operations(scene):
     """Steady operations, of which the one that compresses the string most is not known in advance."""
     bit, weight = scene.bit, _heaviest(scene)
@@ -126,7 +132,7 @@ def _operations(scene):
     if scene.hook is not None:
         signal = scene.hook.signal()
         speeds = [signal(t) for t in (0.0, *signal.jumps)]
-        yield from (kind(weight) for kind, there in ((TripIn, min(speeds) < 0), (TripOut, max(speeds) > 0)) if there)
+        yield from (kind(weight) for kind, there in ((TripIn, min(speeds) < 0), (_Up, max(speeds) > 0)) if there)
 
 
 def _with_friction(scene):

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 import numpy as np
 
-from cosserat_fenicsx.checks import refuse, store
+from cosserat_fenicsx.checks import refuse, store, warn
 from cosserat_fenicsx.drilling import bit_curves  # noqa: F401 its laws join their family
 from cosserat_fenicsx.drilling.bit_laws import BitOnRock, Stribeck
 from cosserat_fenicsx.drilling.joints import Joint, joints_of
@@ -190,7 +190,15 @@ class Drilling(InWords, Part):
 
     def _doubt_torques(self):
         """Warn of weights and torques at bit and drive that are probably in other units."""
-        control, bit = self.drive.control, self.bit
+        control, bit, drag = self.drive.control, self.bit, self.drag
+        stiffness, inertia = self.hook.stiffness if self.hook else math.inf, self.drive.inertia
+        for called, value, odd, usual in (
+            ("Hook.stiffness", f"{stiffness:g} N/m", stiffness < 1e5, "about 5e6: 5 MN/m are 5e6 or '5 MN/m'"),
+            ("TopDrive.inertia", f"{inertia:g} kg m^2", 0 < inertia < 20, "about 1000 to 4000: 2.9 t m^2 are 2900"),
+            ("ViscousDrag", f"{drag} 1/s", drag and max(drag.torsion, drag.axial) > 50, "0.05 to 5 1/s: it is a rate"),
+        ):
+            if odd:
+                warn(f"{called} = {value} is hardly that of a rig with a string, {usual}")
         if isinstance(control, Motor):
             doubt_load("Motor.torque", control.torque, "torque", of="drive")
         if bit is None:

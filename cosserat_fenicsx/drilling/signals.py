@@ -13,8 +13,6 @@ from cosserat_fenicsx.checks import call, number, refuse, warn
 _FAST = 32.0
 # Time (s) up to which a signal that is smooth is looked at for its largest value.
 _LONG = 600.0
-# Speeds of the block (m/s) above this are probably in other units: strings are run at up to 2 m/s.
-_FASTEST_BLOCK = 5.0
 
 
 def doubt_speed(owner: object, field: str, speed: float) -> None:
@@ -24,16 +22,6 @@ def doubt_speed(owner: object, field: str, speed: float) -> None:
         warn(
             f"{name}.{field} = {speed:g} rad/s are {speed / units.rpm:.0f} rev/min, faster than drives turn a string: "
             f"{speed:g} rev/min are {speed * units.rpm:.4g} rad/s, or '{speed:g} rpm'"
-        )
-
-
-def doubt_block_speed(owner: object, field: str, speed: float) -> None:
-    """Warn of a speed of the block (m/s) that looks like metres an hour, or feet a minute."""
-    if abs(speed) > _FASTEST_BLOCK:
-        warn(
-            f"{type(owner).__name__}.{field} = {speed:g} m/s is faster than blocks move: {speed:g} m/h are "
-            f"{speed:g} / 3600 = {speed / 3600:.3g} m/s, '{speed:g} m/h' in a scene file; {speed:g} ft/min are "
-            f"{speed * units.foot / 60:.3g} m/s"
         )
 
 

@@ -19,7 +19,7 @@ import numpy as np
 
 from cosserat_fenicsx.checks import call, finite_array, number, refuse
 from cosserat_fenicsx.checks import positive as positive_number
-from cosserat_fenicsx.drilling.signals import ScalarSignal, doubt_block_speed, doubt_speed
+from cosserat_fenicsx.drilling.signals import ScalarSignal, doubt_speed
 from cosserat_fenicsx.parts import (
     AngularVelocity,
     ForceSize,
@@ -36,6 +36,7 @@ from cosserat_fenicsx.parts import (
     positive,
 )
 from cosserat_fenicsx.quantities import LARGEST
+from cosserat_fenicsx.well.operations import doubt_block_speed
 
 #: Kp over the impedance of the string by the rules for `PI` controls in `linear.frequencies`.
 RULES = {"SoftTorque": 1.0, "SoftSpeed": 4.0}

@@ -155,6 +155,8 @@ class StringPart(Part, family="component of a string", homes=("cosserat_fenicsx.
 
 # Distances of tool joints (m) between which pipe of the ranges 1 to 3 has them, 18 to 45 ft, with some room.
 _JOINTS = 4.0, 16.0
+# Share of its body's weight below which the mass of a tube is doubted, and distance (m) of centralisers above which.
+_LIGHT, _APART = 0.9, 100.0
 # The largest bend of a housing, degrees.
 _MOST_BENT = 5.0
 
@@ -246,8 +248,13 @@ class Centraliser(Part):
     diameter: Diameter
 
     def validate(self):
-        """Warn of a diameter that is probably in inches."""
+        """Warn of a diameter that is probably in inches, and of a distance that no casing has."""
         doubt_width(self, "diameter")
+        if self.spacing > _APART:
+            warn(
+                f"Centraliser.spacing = {self.spacing:g} m is more than centralisers are apart, a few joints of 12 m "
+                f"at most: {self.spacing:g} in are '{self.spacing:g} in'"
+            )
 
 
 @dataclass(frozen=True)
@@ -326,8 +333,14 @@ class _Tubular(_Bendable):
         doubt_width(self, "outer_diameter")
         doubt_width(self, "tool_joint")
         Tube(self.outer_diameter, self.inner_diameter)  # refuses diameters of no tube
+        body = self.material.density * math.pi / 4 * (self.outer_diameter**2 - self.inner_diameter**2)
         if self.mass is None:
-            store(self, mass=self.material.density * math.pi / 4 * (self.outer_diameter**2 - self.inner_diameter**2))
+            store(self, mass=body)
+        if self.mass < _LIGHT * body:
+            warn(
+                f"{type(self).__name__}.mass = {self.mass:g} kg/m is less than its body weighs, {body:.4g} kg/m: are "
+                f"these pounds per foot? {self.mass:g} lb/ft are '{self.mass:g} lb/ft'"
+            )
         if self.tool_joint is not None and self.tool_joint < self.outer_diameter:
             refuse(self, "tool_joint", self.tool_joint, f"at least the body's diameter, {self.outer_diameter:g} m")
         if self.joint_spacing is not None and not (self.tool_joint or 0) > self.outer_diameter:
@@ -579,6 +592,11 @@ class DrillString(InWords, Part):
                 if part is given[0]:
                     expected += f"; where the list runs the other way, say order='{other}'"
                 refuse(part, "length", None, expected)
+        bits = [k for k, part in enumerate(given) if isinstance(part, Bit)]
+        if bits and bits[-1]:
+            told = f"{len(bits)} bits" if len(bits) > 1 else f"the bit is component {bits[0] + 1} from below"
+            warn(f"DrillString: {told}, of {len(given)} components: expected one bit, the lowest component; where the "
+                 f"list runs the other way, say order='{other}'")  # fmt: skip
 
     @property
     def bent(self) -> str:

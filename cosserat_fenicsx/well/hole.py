@@ -19,12 +19,14 @@ from cosserat_fenicsx.parts import Depth, Diameter, FileName, Friction, Number, 
 from cosserat_fenicsx.results.screen import InWords
 from cosserat_fenicsx.scene.rod import Rod
 from cosserat_fenicsx.scene.sections import Circle, Tube
-from cosserat_fenicsx.well.components import standard_size
+from cosserat_fenicsx.well.components import standard_size, standard_sizes
 from cosserat_fenicsx.well.path import Tortuosity, WellPath, tortuosity as made_crooked
 from cosserat_fenicsx.well.survey import doubt_depth
 
 # Pa, standard.
 _ATMOSPHERE = 101325.0
+# Pressures (Pa) of flow below this are probably in psi or bar.
+_FAINT = 1e4
 # {what: ([ranges of values that are doubted], what is said of them)}. Densities, kg/m^3: relative ones; neither of a
 # gas nor of a liquid; heavier than any mud.
 _DOUBTED = {
@@ -85,6 +87,11 @@ class HoleSection(Part):
         if self.diameter is None:
             refuse(self, "diameter", None, "a diameter (m), or the size of a casing, casing='9 5/8 in 47 lb/ft'")
         doubt_width(self, "diameter")
+        outside = {size: row["outer_diameter"] for size, row in standard_sizes()["Casing"].items()}
+        alike = [size for size, width in outside.items() if abs(width - self.diameter) < 1e-5]
+        if alike and not self.casing and "casing" in self.name.lower():
+            warn(f"HoleSection.diameter = {self.diameter:g} m is the outer diameter of casing; inside it is less: give "
+                 f"casing='{alike[0]}' in the place of the diameter, or the inner diameter")  # fmt: skip
         doubt_value("friction", f"HoleSection.friction = {self.friction:g}", np.array([self.friction]))
 
 
@@ -339,6 +346,10 @@ class Mud(InWords, Part):
         for field in ("flow_inside", "flow_outside"):
             flow = getattr(self, field)
             at_surface = flow[0][1] if isinstance(flow, tuple) else flow
+            most = max(abs(x) for _, x in flow) if isinstance(flow, tuple) else abs(flow)
+            if 0 < most < _FAINT:
+                warn(f"Mud.{field}: {most:g} Pa is hardly a pressure of flow: {most:g} psi are '{most:g} psi', "
+                     f"{most:g} bar are '{most:g} bar'")  # fmt: skip
             if at_surface < -_ATMOSPHERE:
                 refuse(self, field, flow, f"at least -{_ATMOSPHERE:g} Pa at the surface, a vacuum; what flow loses on "
                        "its way down the string is a positive number that falls with depth")  # fmt: skip

@@ -20,6 +20,10 @@ from cosserat_fenicsx.parts import ForceSize, Part, Rotation, Speed, Torque, pos
 _DOUBTFUL = {"weight": (500.0, "N"), "torque": (50.0, "N m"), "hook load": (5000.0, "N")}
 # Revolutions per minute below this are probably rad/s: 80 rev/min are 8.4 rad/s.
 _SLOW = 20.0
+# Torques (N m) above this break any drill pipe: the largest ones yield at 200 kN m.
+_STRONGEST = 5e5
+# Speeds of the block (m/s) above this are probably in other units: strings are run at up to 2 m/s.
+_FASTEST_BLOCK = 5.0
 
 
 def doubt_load(called, value, what, more="", of="bit"):
@@ -33,18 +37,30 @@ def doubt_load(called, value, what, more="", of="bit"):
         warn(f"{called} = {value:g} {unit} is hardly a {what} {place}: {such} {text}{more}")
 
 
+def doubt_block_speed(owner: object, field: str, speed: float) -> None:
+    """Warn of a speed of the block (m/s) that looks like metres an hour, or feet a minute."""
+    if abs(speed) > _FASTEST_BLOCK:
+        warn(
+            f"{type(owner).__name__}.{field} = {speed:g} m/s is faster than blocks move: {speed:g} m/h are "
+            f"{speed:g} / 3600 = {speed / 3600:.3g} m/s, '{speed:g} m/h' in a scene file; {speed:g} ft/min are "
+            f"{speed * units.foot / 60:.3g} m/s"
+        )
+
+
 class Operation(Part, family="operation"):
     """Base of operations with a string.
 
     Attributes:
         name: in tables and charts: the class name as words, such as "trip out".
         slip: the signs of (c, e).
+        pressed: the sign of its weight on bit, of which another one is asked about; 0 for any.
         weight: on bit, N: the thrust in the string at its lower end; below 0 a pull (overpull, a stuck tool).
         torque: on bit, N m, against the rotation.
     """
 
     name: ClassVar[str] = ""
     slip: ClassVar[tuple[float, float]] = (0.0, 0.0)
+    pressed: ClassVar[int] = 0
 
     weight = torque = 0.0
 
@@ -53,9 +69,20 @@ class Operation(Part, family="operation"):
         cls.name = re.sub(r"(?<=.)([A-Z])", r" \1", cls.__name__).lower()
 
     def validate(self):
-        """Warn of a weight or a torque on bit that is probably in another unit."""
+        """Warn of a weight or a torque on bit that probably has another unit or the other sign."""
+        called = type(self).__name__
         for name in ("weight", "torque"):
-            doubt_load(f"{type(self).__name__}.{name}", getattr(self, name), name)
+            doubt_load(f"{called}.{name}", getattr(self, name), name)
+        if self.pressed * self.weight < 0:
+            does, way = (("drills", "positive") if self.pressed > 0 else ("moves up", "negative, a pull"))
+            warn(f"{called}.weight = {self.weight:g} N has the other sign than that of a string that {does}: weight "
+                 f"on bit is positive where the string presses on the bottom; expected it {way}, or 0")  # fmt: skip
+        if self.torque < 0:
+            warn(f"{called}.torque = {self.torque:g} N m drives the string: what is against the rotation, and the "
+                 "reaction of a motor, are positive")  # fmt: skip
+        if abs(self.torque) > _STRONGEST:
+            warn(f"{called}.torque = {self.torque:g} N m is more than any drill pipe carries, {_STRONGEST:g} N m: 4000 "
+                 "ft-lbf are '4000 ft-lbf', 4 kN m are '4 kN m'")  # fmt: skip
 
     def direction(self, radius: float) -> tuple[float, float]:
         """(c, e) for a contact radius (m)."""
@@ -82,7 +109,7 @@ class _Plain(Operation):
 class TripOut(_Plain):
     """Pulled out without rotation."""
 
-    slip = (1.0, 0.0)
+    slip, pressed = (1.0, 0.0), -1
 
 
 @dataclass(frozen=True)
@@ -113,7 +140,7 @@ class RotaryDrilling(Operation):
     weight: ForceSize = field()
     torque: Torque = field()
 
-    slip = (0.0, 1.0)
+    slip, pressed = (0.0, 1.0), 1
 
 
 @dataclass(frozen=True)
@@ -131,7 +158,7 @@ class Sliding(Operation):
     weight: ForceSize = field()
     torque: Torque = 0.0
 
-    slip = (-1.0, 0.0)
+    slip, pressed = (-1.0, 0.0), 1
 
 
 @dataclass(frozen=True)
@@ -151,6 +178,7 @@ class _Reaming(Operation):
 
     def validate(self):
         super().validate()
+        doubt_block_speed(self, "speed", self.speed)
         if self.rpm < _SLOW:
             warn(
                 f"{type(self).__name__}.rpm = {self.rpm:g} 1/min is hardly a rotation: it is in revolutions a minute, "

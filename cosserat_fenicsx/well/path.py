@@ -111,11 +111,27 @@ class WellPath(TubeAxis):
         return path
 
     @classmethod
-    def of_unit(cls, md, inc, azi, degrees, unit):
-        """From measured depths (m) that were given in this unit."""
+    def of_unit(cls, md, inc, azi, degrees, unit, tvd=()):
+        """From measured depths (m) that were given in this unit; tvd: (n,) vertical depths (m, or NaN) of a survey,
+        which are compared with the path's: those of all stations from the first one on."""
         *columns, filled = checked_survey(md, inc, azi, degrees, unit)
         path = cls(*columns)
         store(path, unit=unit, filled=filled)
+        down = float(path.position(path.length)[2])
+        if path.inclination[0] > math.pi / 2 + 1e-9 or down < -_ABOVE * path.length:
+            says = "climbs from the surface" if path.inclination[0] > math.pi / 2 else "ends above the surface"
+            first = math.degrees(path.inclination[0])
+            warn(f"WellPath: the hole {says}: inclinations are from the vertical down, {first:g} "
+                 "degrees at the surface; are inclinations and azimuths swapped?")  # fmt: skip
+        if len(tvd) and np.isfinite(tvd).any():
+            off = np.asarray(tvd) - path.position(path.md)[:, 2]
+            off = np.nan_to_num(np.abs(off - off[np.isfinite(off)][0]))
+            if off.max() > max(1.0, _APART * path.length):
+                md = path.md[off.argmax()]
+                warn(path.told(
+                    f"WellPath: TVD of the survey differs by {off.max():.5g} m from that of its measured depths and "
+                    f"inclinations at md = {md:.10g} m, and is not used: are columns or units wrong?"
+                ))  # fmt: skip
         return path
 
     def told(self, text):
@@ -323,6 +339,12 @@ def _arc(sections, i, x):
 _FULL = math.radians(360)
 # Degrees per 30 m above which no usual well turns.
 _TIGHT = 30.0
+
+
+# Height of the bottom above the surface, over the length, from which on a survey is doubted: crossings end near 0.
+_ABOVE = 0.05
+# Difference of vertical depths, over the length, from which on a survey is doubted: methods differ by less.
+_APART = 3e-3
 
 
 def checked_survey(md, inc, azi, degrees, given="m"):

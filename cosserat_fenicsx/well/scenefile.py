@@ -64,7 +64,7 @@ from cosserat_fenicsx.well.answer import TorqueAndDrag
 from cosserat_fenicsx.well.assembly import LENGTH, BuildRate, assembly_of, build_rate
 from cosserat_fenicsx.well.components import DrillString, in_columns
 from cosserat_fenicsx.well.hole import Borehole, Mud
-from cosserat_fenicsx.well.operations import Operation
+from cosserat_fenicsx.well.operations import BackReam, Operation, Ream
 from cosserat_fenicsx.well.pieces import pieces_of, within
 from cosserat_fenicsx.well.rod.rod_answer import check_rod
 from cosserat_fenicsx.well.solve import CONVENTIONS, ROD, check_settings, torque_and_drag
@@ -254,7 +254,10 @@ class WellScene(InWords, Part):
         for operation in self.operations:
             on_bit = f"{units.told(operation.weight, 'N')} and {units.told(operation.torque, 'N m')}"
             loads = f"on bit {on_bit}" if operation.weight or operation.torque else "no load on the bit"
-            yield f"Operation: {operation.name}, {loads}."
+            moves = ""
+            if isinstance(operation, Ream | BackReam):
+                moves = f", {units.told(operation.speed, 'm/s')} along the hole at {operation.rpm:g} rev/min"
+            yield f"Operation: {operation.name}{moves}, {loads}."
         if sweep:
             low, high = (units.told(x, "m") for x in (sweep["depths"].min(), sweep["depths"].max()))
             yield f"Sweep over {len(sweep['depths'])} depths of the bit, {low} to {high}."

@@ -26,6 +26,7 @@ _NAMES = (
     ("azi", "az", "azm", "azim", "azimuth", "azi true", "azi grid", "azimuth true", "azimuth grid",
      "azimuth true north", "azimuth grid north"),
 )
+_TVD = ("tvd", "true vertical depth", "vertical depth")
 # Units in headings: of lengths, m; of angles, whether it is a degree.
 _LENGTHS = {
     **dict.fromkeys(("m", "meter", "meters", "metre", "metres"), 1.0),
@@ -65,6 +66,8 @@ def read_columns(who, file, names, degrees, length_unit, sheet=None):
     lines = [(i, line) for i, line in enumerate(whole.splitlines(), start=1) if line.strip()]
     first, separator, heading, columns = _heading(file, lines, names, "\t" if workbook else ",;\t")
     says = [_split(heading[column])[1] for column in columns]
+    deep = next((i for i, name in enumerate(heading) if _split(name)[0] in _TVD), None)
+    vertical, tvd = "" if deep is None else _split(heading[deep])[1], []
     values = []
     stations = [(i, line) for i, line in lines[first + 1 :] if not line.lstrip(' "').startswith("#")]  # comments
     for k, (i, line) in enumerate(stations):
@@ -73,11 +76,15 @@ def read_columns(who, file, names, degrees, length_unit, sheet=None):
         bare = [cell.lower().strip("()[]") for cell in cells]
         if k == 0 and all(cell in _UNITS for cell in bare):
             says = bare
+            if deep is not None:
+                vertical = row[deep].strip().lower().strip("()[]") if deep < len(row) else ""
             continue
         try:
             if any(cell.strip() for cell in row[len(heading) :]):
                 raise ValueError
             cells = [_with_point(cell, separator) for cell in cells]
+            told = _with_point(row[deep].strip(), separator) if deep is not None and deep < len(row) else ""
+            tvd.append(float(told) if _is_number(told) else math.nan)
             values.append([*map(_number, cells[:2]), _number(cells[2] or "nan")])  # of vertical stations: no azimuth
         except ValueError:
             point = any("," in cell for cell in row) or len(row) > len(heading)
@@ -101,7 +108,8 @@ def read_columns(who, file, names, degrees, length_unit, sheet=None):
             )
     unit = _length_unit(who, file, heading[columns[0]], says[0], length_unit, depth.max())
     degrees = _degrees(file, [heading[x] for x in columns[1:]], says[1:], degrees)
-    return depth * unit, inclination, azimuth, degrees, length_unit_of(unit)
+    tvd = np.array(tvd) * _LENGTHS.get(vertical, unit)
+    return depth * unit, inclination, azimuth, degrees, length_unit_of(unit), tvd
 
 
 def _sheet_of(who, file, sheet):
