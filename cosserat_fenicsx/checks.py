@@ -176,10 +176,19 @@ def vector(owner, field, value, unit, size=3):
     if type(value) is tuple and len(value) == size and all(type(x) is float and abs(x) <= LARGEST for x in value):
         return value  # at once: frames have tens of thousands of points
     expected = f"{size} finite numbers ({unit})"
+    if size == 3 and isinstance(value, numbers.Real | str):
+        expected += f", such as (0, 0, {1 if unit == 'direction' else _downwards(value, unit)})"
     array = finite_array(owner, field, value, expected)
     if array.shape != (size,):
         refuse(owner, field, value, expected)
     return tuple(array.tolist())
+
+
+def _downwards(value, unit):
+    """A number or a text with a unit as it is written in a vector, downwards where it is a load or gravity."""
+    if unit not in ("N", "N/m", "m/s^2") or str(value).startswith(("-", "+")):
+        return repr(value)
+    return f"-{value}" if not isinstance(value, str) else f'"-{value}"'
 
 
 def text_of(file, expected, *, pipes=False):

@@ -198,6 +198,8 @@ def test_not_converged_is_exit_code_1_with_the_partial_path(tmp_path, here):
     (("run", DEMO, "--load-factors", "0.01", "-o", "{tmp}", "--magnify", "-2"), "plot.magnify = -2.0"),
     (("explain", DEMO, "--degree", "9"), "degree = 9"),
     (("explode",), "invalid choice"),
+    (("expl",), "did you mean 'explain'?"),
+    (("plot",), "`cosserat run SCENE -o DIR` draws pictures"),
     ((), "usage"),
     (("run", FLIGHT, "--load-factors", "0:1"), "--load-factors is for an equilibrium path"),
     (("run", DEMO, "--dt", "0.1"), "--dt is for a motion, and this scene is an equilibrium path"),

@@ -510,6 +510,21 @@ class TestWhatAResultLeavesOpen:
         assert abs(path.displacement(self.rod.end)[-1, 0]) < 1e-10 and path.stable.all()
 
 
+@pytest.mark.parametrize("stiffness, told", [(1e8, "about 3 %"), (1e10, "about 0.1 %")])
+def test_what_a_finite_stiffness_changes(stiffness, told):
+    """A cantilever over a bollard at its middle, beside one on a rigid prop: 3.0 % and 0.12 % off."""
+    EI, F = 210e9 * np.pi * 0.02**4 / 64, 20.0
+    rod = cf.Rod(cf.Line((0, 0, 0), (2, 0, 0)), cf.Circle(0.02), cf.Material(E=210e9, nu=0.3))
+    bollard = cf.Cylinder((1, 0, -0.11), (0, 1, 0), 0.1, stiffness=stiffness)
+    with warnings.catch_warnings(record=True) as warned:
+        path = cf.solve(cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Force(rod.end, (0, 0, -F)), bollard]), [1.0])
+    off = path.displacement(rod.end)[-1, 2] / -(F / (3 * EI) + F / (4 * EI)) - 1
+    words = f"the finite stiffness of Cylinder changes positions by {told} of the largest displacement"
+    assert float(told.split()[1]) / 100 == pytest.approx(off, rel=0.2) and path.error < 1e-6
+    assert words in " ".join(str(path).split()) and any(words in sentence for sentence in path.why)
+    assert [words in str(x.message) for x in warned] == [True] * (stiffness == bollard.__class__.stiffness)
+
+
 def test_a_motion_does_not_start_inside_an_obstacle():
     rod = TestWhatAResultLeavesOpen.rod
     bent = cf.solve(cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Force(rod.end, (0, 0, -0.1))]), 1.0, elements=2)

@@ -133,12 +133,16 @@ def test_files_that_no_reader_takes(tmp_path, monkeypatch):
     for read, file, words in (
         (cf.read, "/dev/zero", "/dev/zero"), (cf.Spline, "/dev/zero", "/dev/zero"),
         (cf.signals.AlongTable, "/dev/zero", "/dev/zero"),
-        (cf.Spline, tmp_path / "points.csv", "points.csv: no plain file"),
+        (cf.Spline, tmp_path / "points.csv", "points.csv': no plain file"),
         (cf.well.WellPath.from_csv, tmp_path / "long.csv", "long.csv: larger than .* MiB: expected a survey"),
     ):  # fmt: skip
         with pytest.raises(cf.SceneError, match=words):
             read(file)
     monkeypatch.undo()
+    for name, words in (("a.py", "a Python program"), ("b.csv", 'points = "b.csv" of a Spline')):
+        (tmp_path / name).write_text("from a\n")
+        with pytest.raises(cf.SceneError, match=words):
+            cf.read(tmp_path / name)
     with pytest.raises(cf.SceneError, match="s.toml: not valid TOML: .*digits"):
         cf.read(tmp_path / "s.toml")
     with pytest.raises(TypeError, match="os.PathLike object"):
@@ -275,7 +279,7 @@ def test_refused_lines(case, tmp_path):
 
 
 FILES = {
-    "missing.csv": (None, "expected a text file that can be read"),
+    "missing.csv": (None, "missing.csv': cannot be read (No such file or directory): expected points as .csv"),
     "missing.vtk": (None, "expected a file that exists"),
     "two.csv": ("0,0,0\n1,2\n", "three numbers in line 2, which is '1,2'"),
     "words.csv": ("x,y,z\n0,0,0\na,b,c\n", "three numbers in line 3"),

@@ -48,9 +48,12 @@ REFUSED = {
     "rod with a length": (lambda: cf.Rod(20.0, cf.Circle(0.1), STEEL), "Rod.curve = 20.0"),
     "rod with a diameter": (lambda: cf.Rod(LINE, 0.1, STEEL), "Rod.section = 0.1"),
     "station beyond the end": (lambda: ROD.at(1.5), "Rod.at(s) = 1.5: expected an arc length in [0, 1] m"),
+    "text for a vector": (lambda: cf.Force(ROD.end, "10 kN"), 'finite numbers (N), such as (0, 0, "-10 kN")'),
+    "number for a vector": (lambda: cf.Weight(9.81), "expected 3 finite numbers (m/s^2), such as (0, 0, -9.81)"),
+    "letter for a direction": (lambda: cf.Roller(ROD.end, "z"), "numbers (direction), such as (0, 0, 1)"),
     "NaN load": (lambda: cf.Force(ROD.end, (0, 0, nan)), "Force.force = (0, 0, nan): expected 3 finite numbers (N)"),
     "load of two numbers": (lambda: cf.Moment(ROD.end, (0, 1)), "Moment.moment = (0, 1)"),
-    "load on a rod": (lambda: cf.Force(ROD, (0, 0, 1)), "a station such as rod.end"),
+    "load on a rod": (lambda: cf.Force(ROD, (0, 0, 1)), "expected a station of it"),
     "offset": (lambda: cf.EccentricForce(ROD.end, (0, 0, 1), (0, 0, 0)), "EccentricForce.offset"),
     "gravity": (lambda: cf.Weight("down"), "Weight.gravity = 'down'"),
     "no rods": (lambda: cf.Scene([], [CLAMP]), "Scene.rods is empty"),
@@ -490,7 +493,8 @@ class Own(cf.PointAction):
 REFUSED_NAMES = {
     "an unknown station": (lambda r: cf.Scene(r, [cf.Clamp("pots.start")]), "Scene.supports[0].station = 'pots.start'"),
     "its nearest": (lambda r: cf.Scene(r, [cf.Clamp("pots.start")]), "did you mean 'post'?"),
-    "no station": (lambda r: cf.Scene(r, [cf.Clamp("post")]), "expected 'rod.start', 'rod.end' or 'rod@s'"),
+    "no station": (lambda r: cf.Scene(r, [cf.Clamp("post")]), "it is a rod, expected 'post.start', 'post.end' or"),
+    "a load as a support": (lambda r: cf.Scene(r, [cf.Force("post.end", (0, 0, -1))]), "Force at post.end belongs in"),
     "an unknown rod": (lambda r: cf.Scene(r, (), [cf.Foundation("pier", 1.0)]), "Scene.loads[0].rod = 'pier'"),
     "a place inside a wall": (
         lambda r: cf.Scene(r, (), [cf.Wall("beam", (0, 0, 0), (0, 0, 1), 0.1)]), "rod 'beam' lies beyond its surface"),
@@ -499,7 +503,8 @@ REFUSED_NAMES = {
     "of one's own": (lambda r: cf.Scene(r, (), [Own(3)]), "Scene.loads[0].station = 3: expected a station"),
     "another of its name": (lambda r: cf.Scene(r, [cf.Clamp(rods()[0].end)]),
                             "acts at post.end, of another rod that is named 'post' too"),
-    "a rod for a station": (lambda r: cf.Clamp(r[0]), "Clamp.station = <Rod 'post': Line, length 2 m>: expected"),
+    "a rod for a station": (lambda r: cf.Clamp(r[0]),
+                            "Line, length 2 m>: expected a station of it, such as 'post.start'"),
 }  # fmt: skip
 
 

@@ -323,6 +323,9 @@ def test_rounding_of_the_forces_of_slender_rods_is_told_and_not_refined_for():
     scene = cf.Scene([rod], held, [cf.Force(rod.at(0.5), (0, 0, -5 * unit))])
     path = cf.solve(scene, [1.0], tol=1e-7)
     assert path.errors.force[0] > 1e-7 and "force" not in path.bounded and path.error[0] <= 1e-7
+    with pytest.warns(cf.SceneWarning, match="Force at hair.start acts on a clamp and moves nothing"):
+        idle = cf.solve(cf.Scene([rod], held[:1], [cf.Force(rod.start, (0, 0, -1))]), [1.0])
+    assert not any("rounding leaves an error" in sentence for sentence in idle.why)
     assert any("rounding leaves an error" in sentence for sentence in path.why) and max(path.elements) <= 32
     fine = cf.solve(scene, [1.0], elements=3 * max(path.elements))
     assert (true_errors(path, fine)[:, 0] <= 3 * np.array(path.errors)[:, 0]).all()  # the finer one rounds more

@@ -11,11 +11,23 @@ from pathlib import Path
 
 from cosserat_fenicsx import __version__, interrupts
 from cosserat_fenicsx.cli.output import BAD_INPUT, DONE, INTERRUPTED, in_words, say, together, warnings_in_words
-from cosserat_fenicsx.errors import CosseratError, SceneError
+from cosserat_fenicsx.errors import CosseratError, SceneError, nearest
+
+
+# What does the work of commands that do not exist.
+_RELATED = dict.fromkeys(("plot", "draw", "view", "show", "picture"), "`cosserat run SCENE -o DIR` draws pictures")
+_RELATED |= dict.fromkeys(("solve", "simulate"), "`cosserat run SCENE` does that")
 
 
 class _Parser(argparse.ArgumentParser):
     """Prints by one rank, and says nothing where its reader, such as `head`, has gone."""
+
+    def _check_value(self, action, value):
+        try:
+            super()._check_value(action, value)
+        except argparse.ArgumentError:
+            hint = _RELATED.get(value) or nearest(value, action.choices)
+            raise argparse.ArgumentError(action, f"invalid choice: {value!r}: {hint}") from None
 
     def _print_message(self, message, file=None):
         say(message.rstrip("\n"), file)

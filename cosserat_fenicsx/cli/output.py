@@ -98,9 +98,11 @@ def deliver(computed, options, names, files_of, tables=None, *, moving=False, ob
                 code = code or BAD_INPUT
     if trouble is not None:
         reached = f" (t = {result.times[-1]:.6g} s)" if isinstance(trouble, Interrupted) and moving and result else ""
-        say(f"cosserat: {getattr(trouble, 'words', trouble)}{reached}")
+        words = str(getattr(trouble, "words", trouble))
+        say(f"cosserat: {words}{reached}")
         if getattr(options, "folder", None) and not isinstance(trouble, NotConverged | SceneError):
-            say(f"cosserat: `cosserat resume {shlex.quote(options.folder)}` continues from there")
+            if "cosserat resume" not in words:
+                say(f"cosserat: `cosserat resume {shlex.quote(options.folder)}` continues from there")
         elif moving and code == INTERRUPTED:
             say("cosserat: a motion that is run with --folder DIR can be continued by `cosserat resume DIR`")
     return code

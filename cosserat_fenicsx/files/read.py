@@ -110,6 +110,14 @@ _QUOTED = "; text, and a number with its unit, stand in quotes"
 _AT = re.compile(r" \(at line (\d+), column (\d+)\)$")
 
 
+# What other files are that users take for scene files, by the ends of their names.
+_OTHER_FILES = {
+    ".py": "a Python program, not a scene file (.toml): expected `python3 {file}`",
+    ".csv": "a table, not a scene file (.toml): expected a scene file that names it, such as "
+    'points = "{file.name}" of a Spline, or survey = "{file.name}" under [well]',
+}
+
+
 class _GivenTwice(Exception):
     """A table or a key is defined twice; `args`: its name, and the offsets of both definitions."""
 
@@ -121,6 +129,8 @@ def text_and_tables(file):
     try:
         return text, tomllib.loads(text)
     except tomllib.TOMLDecodeError as problem:
+        if words := _OTHER_FILES.get(file.suffix.lower()):
+            raise SceneError(f"{file}: {words.format(file=file)}") from None
         raise SceneError(f"{file}{_refused(text, str(problem))}") from None
     except ValueError as problem:  # of a whole number of thousands of digits
         raise SceneError(f"{file}: not valid TOML: {str(problem).partition(';')[0]}") from None

@@ -132,11 +132,11 @@ class _Known(ContactForce):
 
 
 #: n by the law: on slender rods the rounding error of the residual then affects the solution.
-OF_MOTION = _OfMotion("the contact force follows from the motion", of_motion=True, stiff=1e6, rounding=0.1)
-CARRIED = _Carried("the contact force is carried at the Gauss points", carried=True, stiff=1e6)
-UNKNOWN = _Unknown("a stiffness is infinite or next to it, so the contact force is an unknown", unknown=True, stiff=1e5)
+OF_MOTION = _OfMotion("the internal force follows from the motion", of_motion=True, stiff=1e6, rounding=0.1)
+CARRIED = _Carried("the internal force is carried at the Gauss points", carried=True, stiff=1e6)
+UNKNOWN = _Unknown("a stiffness is (nearly) infinite, so the internal force is an unknown", unknown=True, stiff=1e5)
 #: for the determinate models
-KNOWN = _Known("the contact force follows from statics alone")
+KNOWN = _Known("the internal force follows from statics alone")
 
 
 # From a moment to the residual rows of q, the rows of its vector part.

@@ -235,7 +235,7 @@ def choose(scene, *, model="auto", formulation=None, degree=4, points=None, foll
         if not obstacle:
             why = _reasons(name, scene)
             if name == "planar":
-                why.append(f"determinate is not possible: {obstacles['determinate']}")
+                why.append(f"the determinate model is not possible: {obstacles['determinate']}")
             return Choice(name, why, promoted=True)
     if obstacles["determinate"] == obstacles["planar"]:
         return Choice(
@@ -263,14 +263,14 @@ def _obstacle(name, scene, formulation, degree, points):
 
 
 def _not_a_tree(scene):
-    """Why statics alone does not give the contact force of a scene."""
+    """Why statics alone does not give the internal force of a scene."""
     for what, holders in (
         ("support", [x for x in scene.supports if not x.clamps]),
         ("joint", [x for x in scene.joints if not x.rigid]),
     ):
         for holder in holders:
             where = holder.station if what == "support" else f"{holder.first} with {holder.second}"
-            return f"statics alone does not give the contact force, because of the {type(holder).__name__} at {where}"
+            return f"statics alone does not give the internal force, because of the {type(holder).__name__} at {where}"
     clamps = Counter(scene.leader(x.station.rod) for x in scene.supports)
     joints = Counter(scene.leader(x.first.rod) for x in scene.joints)
     structures = {}
@@ -279,9 +279,9 @@ def _not_a_tree(scene):
     for rods in structures.values():
         held = clamps[rods[0]]
         if held > 1:
-            return f"statics alone does not give the contact force of rod '{rods[0].name}', which is held {held} times"
+            return f"statics alone does not give the internal force of rod '{rods[0].name}', which is held {held} times"
         if joints[rods[0]] >= len(rods):
-            return f"statics alone does not give the contact force of rod '{rods[0].name}', which closes a ring"
+            return f"statics alone does not give the internal force of rod '{rods[0].name}', which closes a ring"
     return ""
 
 
@@ -298,7 +298,7 @@ def _live(scene):
             how = "turns with the rod" if load.follows else "depends on the motion"
             added = i >= len(scene.loads)  # `Action.companions`
             load_and_why = f"{describe(load) if added else f'loads[{i}], a {type(load).__name__},'} {how}"
-            return f"{load_and_why}, so that statics alone does not give the contact force"
+            return f"{load_and_why}, so that statics alone does not give the internal force"
     return ""
 
 
@@ -332,5 +332,5 @@ def _reasons(name, scene):
     if name == "planar":
         return [where]
     clamp = "one clamp" if len(scene.supports) == 1 else f"one clamp on each of {len(scene.supports)} structures"
-    known = f"{clamp} and dead loads: statics gives the contact force"
+    known = f"{clamp} and dead loads: statics gives the internal force"
     return [known, where] if plane is None else [where, known]

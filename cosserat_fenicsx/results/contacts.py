@@ -3,7 +3,7 @@ Contacts of rods with each other: places and forces; and that none has passed th
 """
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from cosserat_fenicsx.checks import refuse, warn
 from cosserat_fenicsx.errors import NotConverged, SceneError
 from cosserat_fenicsx.quantities import Quantity, Units
 from cosserat_fenicsx.results import screen
+from cosserat_fenicsx.results.compared import MOMENT, POSITION, differences
 from cosserat_fenicsx.scene.action import describe
 from cosserat_fenicsx.strands import AT_BOUND, CROSSING, Strands, across, closest_segments, overlap
 
@@ -24,6 +25,9 @@ _SHALLOW = 0.1
 _ROUNDING = 1e-10
 # Gap over the rod's length up to which a rod that does not press touches: rounding.
 _GRAZES = 1e-13
+# Stiffness, over that of obstacles, of the state that shows what theirs changes; least change, over the largest
+# displacement, that a sentence mentions, and that a warning does where the stiffness is the default one.
+_STIFFER, _SOFT, SOFT = 10, 1e-3, 1e-2
 # Smallest share of an obstacle's pressure along rods that a sentence mentions.
 _SLANTED = 0.02
 # A friction force below this times the limit of friction is one at which the surface sticks.
@@ -165,10 +169,39 @@ def contacts_in_words(path):
         if depth > 0 and obstacle.law is None and largest:
             yield (
                 f"{describe(obstacle)} lets rods in by up to {depth:.2g} m, {depth / largest:.1g} of the largest "
-                "displacement: its stiffness makes that, and estimated errors do not contain it."
+                "displacement: its stiffness makes that, and estimated errors do not contain it; a larger one lets "
+                "them in less."
             )
         yield from slanted(path, obstacle)
     yield from lifting(path)
+
+
+def stiffer(path):
+    """The scene of a path with the smooth elastic obstacles that rods press on at last `_STIFFER` times as stiff; their
+    words, "" where there are none, or where rods hardly move but into them; whether a stiffness is the default one."""
+    largest, soft = path.largest_displacement()[-1], []
+    for one in _obstacles(path.scene):
+        depth = max((-_gaps(path, one, rod, x)[0][-1].min() for _, rod, x in _nodes_at(path, one)), default=0.0)
+        if 0 < depth < largest / 2 and one.law is None and not one.friction:
+            soft.append(one)
+    loads = [replace(x, stiffness=_STIFFER * x.stiffness) if x in soft else x for x in path.scene.loads]
+    by_default = any(one.stiffness == getattr(type(one), "stiffness", None) for one in soft)
+    return replace(path.scene, loads=loads), ", ".join(dict.fromkeys(map(describe, soft))), by_default
+
+
+def softness_in_words(last, stiff, obstacles):
+    """(sentence, change) on what the finite stiffness k of obstacles changes, by a path's last state and that with
+    `_STIFFER` times the stiffness; the change is that of positions over the largest displacement. None where it is
+    little. Where rods touch along a line it is as 1/k; at a point as k^(-3/4), since an elastic support spreads a
+    force over lengths as (4 EI/k)^(1/4)."""
+    left = _STIFFER**-0.75
+    moved, bent = (differences(stiff, last)[0] / last._reference.sizes)[[POSITION, MOMENT], 0] / (1 - left)
+    if moved > _SOFT:
+        yield (
+            f"the finite stiffness of {obstacles} changes positions by about {100 * moved:.1g} % of the largest "
+            f"displacement and moments by {100 * bent:.1g} % of the largest, which estimated errors do not contain: a "
+            f"larger stiffness changes less, {_STIFFER} times as much about {100 * moved * left:.1g} %"
+        ), moved
 
 
 def slanted(path, obstacle):

@@ -365,6 +365,8 @@ class Modes(Shapes):
             verdict = {0: f"no negative mode{' (stable)' if self.conservative else ''}", -1: "a singular stiffness"}
             counted = verdict.get(self.negative_modes, f"{self.negative_modes} negative mode(s) (unstable)")
             yield f"{state} has {counted}."
+        if len(self) == 1:
+            yield "More modes: modes(scene, 5), or --count 5."
         if self.caution:
             yield self.caution
 

@@ -177,12 +177,14 @@ class Shapes(Result, OnNodes):
         return np.abs(self.shapes[self.number(k), :, :3]).max() < _TWIST
 
     def farthest(self, k):
-        """The station that mode k displaces most, and its direction there (3,), inertial; None, None for a twist."""
+        """The station that mode k displaces most, an end of its rod where that moves by 99 % as much, and its direction
+        there (3,), inertial; None, None for a twist."""
         if self.twists(k):
             return None, None
         sizes = [(np.linalg.norm(self.mode(k, rod), axis=1), rod) for rod in self.scene.rods]
         size, rod = max(sizes, key=lambda item: round(item[0].max(), 9))
-        place = int(np.argmax(size))
+        end, place = (0 if size[0] > size[-1] else len(size) - 1), int(np.argmax(size))
+        place = end if size[end] > 0.99 * size[place] else place
         return rod.at(self.equilibrium.s(rod)[place]), self.mode(k, rod)[place] / size[place]
 
     # -- tables ------------------------------------------------------------------------------------------------------

@@ -16,7 +16,7 @@ from typing import Annotated
 import numpy as np
 from numpy.polynomial import legendre
 
-from cosserat_fenicsx.checks import File, Numbers, Rows, positive, refuse, store, text_of, vector, warn
+from cosserat_fenicsx.checks import File, Numbers, Rows, name_of, positive, refuse, store, text_of, vector, warn
 from cosserat_fenicsx.quantities import LARGEST
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.numerics import directors, gauss
@@ -70,7 +70,10 @@ def _from_csv(owner, field, file):
     rows = []
     try:
         table = list(csv.reader(io.StringIO(text_of(file, "points as .csv"), newline="")))
-    except (SceneError, csv.Error) as problem:
+    except SceneError as problem:
+        why = str(problem).removeprefix(f"{file}: ")
+        raise SceneError(f"{name_of(owner)}.{field} = '{file}': {why}") from None
+    except csv.Error as problem:
         refuse(owner, field, str(file), f"a text file that can be read ({problem})")
     for line, row in enumerate(table, start=1):
         if not any(cell.strip() for cell in row):

@@ -231,6 +231,8 @@ def station_named(where, text, rods):
     """The station 'rod.start', 'rod.end' or 'rod@s' (m) of {name: rod}; a SceneError of `where` for others."""
     known = ", ".join([*rods][:_NAMED]) + (", ..." if len(rods) > _NAMED else "")
     expected = f"expected 'rod.start', 'rod.end' or 'rod@s' with s in m and the rod one of {known}"
+    if text in rods:
+        expected = f"it is a rod, expected '{text}.start', '{text}.end' or '{text}@s' with s in m"
     if not isinstance(text, str):
         raise SceneError(f"{where} = {text!r}: {expected}")
     if "@" in text:
@@ -264,6 +266,8 @@ class ByName(Text):
         return f"{'a station such as rod.end' if self.kind is Station else 'a Rod'}, or its name"
 
     def check(self, owner, field, value):
+        if self.kind is Station and isinstance(value, Rod):
+            refuse(owner, field, value, f"a station of it, such as '{value.name}.start' or '{value.name}.end'")
         return instance(owner, field, value, self.kind | str, self.words)
 
     def write(self, value, writing):

@@ -12,7 +12,7 @@ from typing import Annotated
 
 import numpy as np
 
-from cosserat_fenicsx.checks import instance, store, warn
+from cosserat_fenicsx.checks import instance, refuse, store, warn
 from cosserat_fenicsx.errors import SceneError, nearest
 from cosserat_fenicsx.parts import Items, Object, Part, concerning
 from cosserat_fenicsx.scene.action import Action, describe, powers, some_of
@@ -25,7 +25,7 @@ from cosserat_fenicsx.scene.sections import Circle, Rectangle, Tube, sizes_acros
 from cosserat_fenicsx.scene.signals import at, sample_times, signals_of
 from cosserat_fenicsx.scene.stages import Places, Stage, legs_of, named_stages, scene_of
 from cosserat_fenicsx.scene.statical import Groups, check_held_once, touching
-from cosserat_fenicsx.scene.supports import InitialVelocity, Joint, Support
+from cosserat_fenicsx.scene.supports import Clamp, InitialVelocity, Joint, Support
 
 # Largest load over the largest EA, and over EI/L^2 where a rod's EA is infinite: beyond, rounding errors dominate.
 _MOST_STRAIN, _MOST_BENDING = 1e6, 1e15
@@ -167,6 +167,12 @@ _PARTS = {
 }
 
 
+def _where_it_belongs(item):
+    """The list of a scene that takes an item, in words; "" where none does."""
+    field = next((name for name, (kind, _) in _PARTS.items() if isinstance(item, kind)), None)
+    return f"; {describe(item)} belongs in {field}=, Scene(rods, supports, loads, joints)" if field else ""
+
+
 @dataclass(frozen=True, eq=False)
 class Scene(Part):
     """The complete input of a solver.
@@ -227,7 +233,8 @@ class Scene(Part):
             store(self, **{field: tuple(items)})
         for field, (kind, expected) in _PARTS.items():
             for i, item in enumerate(getattr(self, field)):
-                instance("Scene", f"{field}[{i}]", item, kind, expected)
+                if not isinstance(item, kind):
+                    refuse("Scene", f"{field}[{i}]", item, f"{expected}{_where_it_belongs(item)}")
                 self._check_places(f"{field}[{i}]", item)
         first = {}
         for i, velocity in enumerate(self.velocities):
@@ -419,7 +426,17 @@ class Scene(Part):
     @cached_property
     def doubts(self):
         """Warnings about probable mistakes in the scene, sentences."""
-        return (*self._softness(), *self._thickness(), *self._turned(), *self._unjoined())
+        return (*self._softness(), *self._thickness(), *self._turned(), *self._unjoined(), *self.idle)
+
+    @cached_property
+    def idle(self):
+        """A warning about loads that move nothing, in a list, where all of them act on clamps."""
+        held = {str(x.station) for x in self.all_supports if isinstance(x, Clamp)}
+        if not self.all_loads or len(held) < len(self.all_supports) or self.velocities:
+            return []
+        if not all(load.station is not None and str(load.station) in held for load in self.all_loads):
+            return []
+        return [f"{describe(load)} acts on a clamp and moves nothing" for load in self.all_loads[:_TOLD]]
 
     def warn(self):
         """Raise a `SceneWarning` for each of `doubts`, on behalf of the caller of the function that calls this."""

@@ -186,7 +186,8 @@ class _Search:
         hidden = [name for name in path.bounded if by_rounding[path.judged.index(name)] > self._tol]
         if hidden:
             path.bounded = tuple(name for name in path.bounded if name not in hidden)
-            path.why.extend(_rounding_leaves(self._tol, name, path) for name in hidden)
+            if not self._scene.idle:  # else all that is found is rounding
+                path.why.extend(_rounding_leaves(self._tol, name, path) for name in hidden)
         keep_confirmed(path, max(self._tol, _REFINEMENT.located), self._lost_events if path is self.whole else [])
         return path
 

@@ -28,7 +28,7 @@ from cosserat_fenicsx.progress import Progress
 from cosserat_fenicsx.ranks import communicator
 from cosserat_fenicsx.results.accuracy import FEW
 from cosserat_fenicsx.results.compared import NAMES, Criterion, criteria_of
-from cosserat_fenicsx.results.contacts import check_passes, lifting, slanted
+from cosserat_fenicsx.results.contacts import SOFT, check_passes, lifting, slanted, softness_in_words, stiffer
 from cosserat_fenicsx.results.path import Path
 from cosserat_fenicsx.results.staged import StagedPath
 from cosserat_fenicsx.scene.action import describe, path_dependent, rubs
@@ -186,8 +186,9 @@ class Legs:
 _UNSTABLE = (
     "the last state of the path is unstable: the structure would have left it (path.stable and path.events say from "
     "where on). buckling(scene) finds critical loads and their shapes, branch=1 follows the path that leaves at the "
-    "first bifurcation. Is a support missing, such as one across the plane of a frame?"
+    "first bifurcation."
 )
+_MISSING = " Is a support missing, such as one across the plane of a frame?"
 _SNAPPED = (
     "the path passes a limit point (path.events): the structure would snap through there, and the states after it are "
     "those that it may come to rest in. A range of load factors, such as (0, 1), or control='arc' has the path between"
@@ -356,6 +357,9 @@ def solve(
                 for k, leg in enumerate(legs):
                     if k >= found.leg and leg.choice.model != "spatial":
                         leg.choice = leg.choice.in_space(found.reason)
+        of_softness = []
+        if scene.has_obstacles and not (scene.stages or in_order):
+            of_softness = list(_softness(path, legs[0], {**discretised, "comm": comm}, bar))
     for part in path.parts.values() if scene.stages else [path]:
         path.why.extend(_not_located(part))
     if len(scene.rods) >= _MANY and reference_blas():
@@ -373,9 +377,15 @@ def solve(
     if comm.rank == 0 and not (scene.follows or branch or until or control == "arc"):
         if path.negative_modes[-1] > 0:
             balls = any(joint.release == "all" for joint in scene.joints)
-            warn("; ".join(path.cautions) or f"{_UNSTABLE}{_BALLS if balls else ''}")
+            missing = _MISSING if len(scene.rods) > 1 else ""
+            warn("; ".join(path.cautions) or f"{_UNSTABLE}{missing}{_BALLS if balls else ''}")
         elif not free and any(event.kind == "limit" for event in path.events):
             warn(_SNAPPED)
+    for words, warns in of_softness:
+        path.why.append(words)
+        path.cautions.append(words)
+        if warns and comm.rank == 0:
+            warn(words)
     if scene.rod_contact and scene.rod_contact.friction:
         path.why.append(
             "friction of rods that touch depends on the path: slip is counted from step to step, and stability takes "
@@ -387,6 +397,26 @@ def solve(
             f"{' and '.join(f'{name}s' for name in bound)} alone"
         )
     return path
+
+
+def _softness(path, leg, discretised, bar):
+    """(sentence, whether it warns) on what the stiffness of obstacles changes in the last state of a path, by the same
+    state with stiffer ones on its mesh; none where that is little or not found."""
+    last = path.at_points([len(path) - 1])
+    try:
+        scene, obstacles, by_default = stiffer(last)
+        if not obstacles:
+            return
+        alone = Legs(scene, [replace(leg, scene=scene)], discretised, bar, lambda path: None, until=None,
+                     in_order=False, simple=True, known=None)  # fmt: skip
+        stiff = alone.correct(path.layout, last)
+    except (NotConverged, SceneError):  # such as a stiffness beyond the largest one
+        return
+    except Interrupted:
+        raise Interrupted(path) from None
+    if stiff is not None:
+        for words, moved in softness_in_words(last, stiff, obstacles):
+            yield words, by_default and moved > SOFT
 
 
 def _keep_in_space(legs):
