@@ -65,7 +65,7 @@ def test_strings_in_motion(monkeypatch):
     use(monkeypatch)
     history, long = (
         cf.drilling.simulate(scene(), 30.0),
-        cf.drilling.simulate(scene(), 1000.0, profile_every=10.0),
+        cf.drilling.simulate(scene(), 300.0, profile_every=3.0),
     )
     check_all(history.plot, history.plot_map, history.plot_phase, history.plot_energy, long.plot, long.plot_map)
     assert history.plot(units="field").axes[1].get_ylabel() == "torque (ft-lbf)"

@@ -51,7 +51,7 @@ FULL = Settings(
     clamped_etas=(0.9, 1.0),
 )
 QUICK = Settings(
-    etas=tuple(np.union1d(_WHOLE[1::2], 0.9).tolist()),
+    etas=tuple(np.union1d(_WHOLE[1::4], 0.9).tolist()),
     coarse_etas=(0.5, 0.7, 0.9),
     rungs=(16, 32, 64),
     mcre=(1, 2, 32),
