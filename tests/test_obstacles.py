@@ -519,7 +519,7 @@ def test_what_a_finite_stiffness_changes(stiffness, told):
     with warnings.catch_warnings(record=True) as warned:
         path = cf.solve(cf.Scene([rod], [cf.Clamp(rod.start)], [cf.Force(rod.end, (0, 0, -F)), bollard]), [1.0])
     off = path.displacement(rod.end)[-1, 2] / -(F / (3 * EI) + F / (4 * EI)) - 1
-    words = f"the finite stiffness of Cylinder changes positions by {told} of the largest displacement"
+    words = f"finite stiffness of Cylinder changes positions by {told} of the largest displacement"
     assert float(told.split()[1]) / 100 == pytest.approx(off, rel=0.2) and path.error < 1e-6
     assert words in " ".join(str(path).split()) and any(words in sentence for sentence in path.why)
     assert [words in str(x.message) for x in warned] == [True] * (stiffness == bollard.__class__.stiffness)

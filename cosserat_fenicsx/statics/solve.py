@@ -383,7 +383,7 @@ def solve(
             warn(_SNAPPED)
     for words, warns in of_softness:
         path.why.append(words)
-        path.cautions.append(words)
+        path.cautions.append(f"{words[0].upper()}{words[1:]}.")
         if warns and comm.rank == 0:
             warn(words)
     if scene.rod_contact and scene.rod_contact.friction:
