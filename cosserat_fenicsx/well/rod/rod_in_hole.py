@@ -38,7 +38,10 @@ class _Meshes:
     beside: float = 5.0
     within: float = 3.5
     places: int = 4096  # elements of equal length whose density is said so
-    parts: float = 1.5  # least number of elements on a finer mesh for one on the mesh before: all errors change
+    # least number of elements on a finer mesh for one on the mesh before: all errors change; and for twice as many on a
+    # mesh that is asked for, whose fields along the string count too
+    parts: float = 1.25
+    asked: float = 1.5
     # root of the change of pressure over the usual one, below which an element gets no others; cap on what is above
     equal: float = 0.3
     densest: float = 2.1
@@ -207,7 +210,8 @@ class _Job(NamedTuple):
 def _finer(string, count, before, job):
     """The `InHole` on a mesh of `count` elements, from the `InHole` on the mesh before, or from the start in stages."""
     if before is not None:
-        layout = _divided(string, before.path.layout, _wanted(before), count)
+        parts = _MESHES.parts if count <= _MESHES.finer * before.path.elements[0] else _MESHES.asked
+        layout = _divided(string, before.path.layout, _wanted(before, parts), count)
         near = LAST_TWO if before.estimates.ratio <= _WALLS.regular else DECADES
         near = LAST if max(before.of_stiffness, UNSEEN) <= _WALLS.too_soft * job.tol else near
         # the contact on the coarse mesh may be too far off, or the wall too stiff for this one
@@ -217,7 +221,7 @@ def _finer(string, count, before, job):
             with contextlib.suppress(NotConverged):
                 return _on_mesh(string, layout, stages, factor, before, before, job)
     if job.start is not None:
-        layout = _divided(string, job.start.path.layout, _wanted(job.start), count)
+        layout = _divided(string, job.start.path.layout, _wanted(job.start, _MESHES.asked), count)
         with contextlib.suppress(NotConverged):
             answer = _on_mesh(string, layout, DECADES, job.start.factor, job.start, None, job)
             if answer.negative_modes == 0:
@@ -256,14 +260,15 @@ def _at_first(string):
     return layout, np.diff(ends) * (1.0 + (_MESHES.beside - 1.0) * np.exp(-away / within))
 
 
-def _wanted(answer):
-    """(elements,) numbers of elements for each, of a mesh with twice as many: more where the pressure changes."""
+def _wanted(answer, parts):
+    """(elements,) numbers of elements for each, `parts` at least, of a mesh with twice as many: more where the pressure
+    changes."""
     h, p = np.diff(answer.path.layout.breaks[0]), answer.element_pressures
     change = p.max(axis=1) - p.min(axis=1)
     change = np.maximum(change, np.maximum(np.append(change[1:], 0.0), np.append(0.0, change[:-1])))
     usual = np.median(p[p > 0]) if (p > 0).any() else 1.0
     more = h * np.clip(np.sqrt(change / usual) - _MESHES.equal, 0.0, _MESHES.densest)
-    return _MESHES.parts + (_MESHES.finer - _MESHES.parts) * more / max(more.mean(), np.finfo(float).tiny)
+    return parts + (_MESHES.finer - parts) * more / max(more.mean(), np.finfo(float).tiny)
 
 
 def _divided(string, layout, wanted, count):
