@@ -6,7 +6,8 @@ import difflib
 _USUAL = {"radius": ("diameter", "a"), "r": ("diameter", "a"), "d": ("diameter",), "young": ("E",), "poisson": ("nu",),
           "youngs_modulus": ("E",), "rho": ("density",), "energy": ("epsilon",), "specific_energy": ("epsilon",),
           "n": ("blades",), "mu": ("friction",), "L": ("length",), "timestep": ("dt",), "time_step": ("dt",),
-          "tolerance": ("tol",)}  # fmt: skip
+          "tolerance": ("tol",), "Jar": ("Collar",), "HWDP": ("HeavyWeight",), "DP": ("DrillPipe",),
+          "SlackOff": ("TripIn",), "PickUp": ("TripOut",)}  # fmt: skip
 
 
 class CosseratError(Exception):

@@ -125,7 +125,7 @@ class Units:
     Args:
         units: "SI"; "field" (ft, in, klbf, ft-lbf, ppg, rpm, psi); {dimension or unit: unit}, such as
             {"force": "klbf", "[length]": "ft", "N m": "kN m"}, or units with commas between, "kN,mm", with SI for all
-            others: but moments and forces per length follow a force in N or kN, as kN m and kN/m.
+            others: but moments and forces per length follow a force in N, kN, lbf or klbf, as kN m and kN/m.
 
     Raises:
         SceneError: unknown units; a unit of another dimension; several of one.
@@ -159,6 +159,8 @@ class Units:
                 )
         force = self._chosen.get("force")
         for name, unit in (("moment", f"{force} m"), ("force per length", f"{force}/m")):
+            if force and re.search("lb|kip", force):
+                unit = DIMENSIONS[name].field
             if unit in DIMENSIONS[name].units:
                 self._chosen.setdefault(name, unit)
 

@@ -24,6 +24,8 @@ from cosserat_fenicsx.cli.explain import explain
 from cosserat_fenicsx.cli.main import main
 from cosserat_fenicsx.results.result import plain_text
 from cosserat_fenicsx.storage.mark import mark_of
+from cosserat_fenicsx.drilling.scenefile import DrillingScene
+from cosserat_fenicsx.parts import from_data
 from cosserat_fenicsx.well.scenefile import WellScene
 
 pytestmark = pytest.mark.serial
@@ -610,6 +612,19 @@ def test_what_is_probably_a_mistake_is_asked_about(make, words):
         warnings.simplefilter("always")
         make()
     assert len(told) == bool(words) and all(re.search(words, str(x.message)) for x in told)
+
+
+@pytest.mark.parametrize(("make", "words"), [
+    (lambda: cf.well.DrillPipe(size="5 7/8 in 23.40 lb/ft"), "nearest ones .*5 1/2 in .*6 5/8 in .*inner_diameter may"),
+    (lambda: cf.drilling.Stribeck("6 kft-lbf", 0.5, 3.0, radius=0.1), "static = '6 kft-lbf': expected a coefficient"),
+    (lambda: from_data(cf.well.Borehole, {"sections": [{"to": 9.0, "diameter": 0.2, "friction": 0.2}]}),
+     "expected either survey, .* or stations"),
+    (lambda: from_data(cf.well.DrillString, {"components": [{"type": "Jar"}]}), "did you mean 'Collar'"),
+    (lambda: DrillingScene(cf.drilling.TopDrive(6.0), discs=cf.drilling.Discs((9.0, 2.0), (7.0,))).run(), "is asked"),
+])  # fmt: skip
+def test_refusals_say_what_to_do(make, words):
+    with pytest.raises(cf.SceneError, match=words):
+        make()
 
 
 @pytest.mark.parametrize(("tvd", "asked"), [("2653.99", False), ("", False), ("2900", True)])

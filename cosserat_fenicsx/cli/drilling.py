@@ -10,7 +10,7 @@ from functools import partial
 from cosserat_fenicsx.cli.output import DONE, charted, deliver, given, refuse_of_rods, say, units_of
 from cosserat_fenicsx.drilling.choose import chosen, model_of
 from cosserat_fenicsx.drilling.motion import KIND, check_arguments
-from cosserat_fenicsx.drilling.scenefile import SimulateDrilling
+from cosserat_fenicsx.drilling.scenefile import NOTHING_ASKED, SimulateDrilling
 from cosserat_fenicsx.drilling.stick_slip import turns
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.quantities import Units
@@ -86,6 +86,8 @@ def explain(options, found):
     if found.mixed is not None:
         return "\n".join(lines)
     name, why = chosen(scene, settings.get("model", "auto"))
+    if not any(("duration" in settings, found.speeds, found.response, found.fit)):
+        lines.append(f"{NOTHING_ASKED[0].upper()}{NOTHING_ASKED[1:]}.")
     lines += [f"Model: {shown.sentence(line)}." for line in why]
     if "duration" in settings:
         check_arguments(scene, **{key: value for key, value in settings.items() if key != "model"})

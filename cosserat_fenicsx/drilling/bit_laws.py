@@ -145,6 +145,13 @@ class Stribeck(BitLaw):
             doubt_width(self, "radius")
         doubt_decay(self, self.speed)
 
+    def __post_init__(self):
+        for name in ("static", "dynamic") if self.radius is not None else ():
+            if isinstance(given := getattr(self, name), str):
+                refuse(self, name, given, "a coefficient of friction, a number without a unit, beside a radius; a "
+                       "torque (N m) has no radius beside it")  # fmt: skip
+        super().__post_init__()
+
     @property
     def needs_weight(self) -> bool:
         return self.radius is not None

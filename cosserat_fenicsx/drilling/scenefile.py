@@ -78,6 +78,10 @@ from cosserat_fenicsx.well.components import DrillString
 from cosserat_fenicsx.well.hole import Borehole, Mud
 
 
+#: What a file may ask for, in messages on one that asks for nothing.
+NOTHING_ASKED = "nothing is asked for: expected [simulate] with duration, [stability] with speeds, [response] or [fit]"
+
+
 class _Tuned(DriveControl):
     """Base of controls with gains that a function of the same name chooses for the string."""
 
@@ -343,7 +347,7 @@ class DrillingScene(InWords, Part):
         """
         given = {**self.settings, **changed}
         if given.get("duration") is None:
-            raise SceneError("simulate.duration = None: expected a positive number (s), in [simulate]")
+            raise SceneError(f"simulate.duration = None: {NOTHING_ASKED}")
         if self.mixed is None:
             return simulate(self.scene, **given)
         if given.pop("folder", None) is not None:

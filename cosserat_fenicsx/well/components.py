@@ -43,6 +43,8 @@ from cosserat_fenicsx.scene.sections import Circle, Material, Stiffness, Tube
 
 # A number with a unit of lengths, and nothing after it.
 _LENGTH = re.compile(r"""\s*[-+]?[\d.]+(?:[eE][-+]?\d+)?(?:[ -]+\d+/\d+|/\d+)?\s*[a-zA-Z"]*\s*$""")
+# Diameters, in: larger numbers are no inches.
+_WIDEST = 40.0
 _TABLE = Path(__file__).with_name("standard_sizes.csv")
 
 
@@ -82,6 +84,12 @@ def _sizes_near(name, known):
     alike = _of_its_diameter(name, known)
     if alike:
         return f"known of this diameter: {', '.join(alike)}"
+    first = _plain(str(name)).partition(" ")[0]
+    if first.replace(".", "", 1).isdigit() and float(first) < _WIDEST:
+        asked, widths = float(first) * units.inch, {row["outer_diameter"] for row in known.values()}
+        widths = sorted(widths, key=lambda x: abs(x - asked))
+        near = [size for size, row in known.items() if row["outer_diameter"] in widths[:2]]
+        return f"none of this diameter is known, of the nearest ones {', '.join(near)}"
     found = nearest(name, known)
     if found.startswith("did"):
         return found

@@ -126,6 +126,10 @@ class Borehole(InWords, Part):
         return cls, cls.from_survey
 
     @classmethod
+    def constructor(cls, names):
+        return cls if "path" in names else cls.from_survey  # which says what a file may give
+
+    @classmethod
     def from_survey(
         cls,
         sections: tuple[HoleSection, ...],

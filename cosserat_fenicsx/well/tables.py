@@ -13,6 +13,8 @@ from cosserat_fenicsx.well.components import Bit, DrillPipe
 from cosserat_fenicsx.well.contacts import ROUGH, stretches
 
 # A sentence with a word in capitals is a warning.
+# What the sentence on the accuracy says too.
+_SAID = re.compile(r"NOT ENOUGH for tol = \S+ in the ")
 _WARNS = re.compile(r"\b[A-Z]{4,}\b")
 
 
@@ -78,9 +80,11 @@ def answer_in_words(answer, units):
         f"{answer._told('hook_load', units)} ({friction}), surface torque {answer._told('surface_torque', units)} "
         f"(convention: {answer.torque_convention})."
     )
+    asked = not answer.enough and answer.why[0].endswith("as asked") and answer.model != "rod"
     yield (
         f"{'Enough' if answer.enough else 'NOT ENOUGH'} for tol = {answer.tol:g}: estimated relative errors of these "
-        f"are {answer.error:.0e} of the solution; of the model: {_estimate(answer)}."
+        f"are {answer.error:.0e} of the solution; of the model: {_estimate(answer)}"
+        f"{asked * '; model=auto looks for a better one'}."
     )
     yield from _without_bit(answer)
     if answer.hook_load < 0:
@@ -94,6 +98,8 @@ def answer_in_words(answer, units):
     yield units.sentence(f"{answer.model}: {answer.why[0]}.")
     last = len(answer.why) - 1  # why a model that is not enough was not followed by a better one
     for i, line in enumerate(answer.why[1:], start=1):
+        if _SAID.match(line):
+            continue
         if _WARNS.search(line) or "lock up" in line or (i == last and not answer.enough):
             yield units.sentence(f"{line}.")
 
