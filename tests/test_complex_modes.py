@@ -19,6 +19,17 @@ def off(found, exact):
     return np.abs(found.eigenvalues / np.array(exact) - 1)
 
 
+@pytest.mark.parametrize("angle", [0.0, 0.7, 1.9, 2.8])
+def test_of_a_pair_that_flutters_the_one_that_grows_is_first(angle):
+    """Both have one size: rounding, and so the orientation, does not decide on their order."""
+    section = cf.Stiffness((1e5, 1e5), 1e5, (1.0, 2.0), 1.0, mass=1.0, inertia=(1e-6, 1e-6, 2e-6))
+    rod = cf.Rod(cf.Line((0, 0, 0), (np.cos(angle), 0.3, np.sin(angle))), section)
+    thrust = cf.FollowerForce(rod.end, (0, 0, -22.0 / rod.length**2))
+    found = cf.modes(cf.Scene([rod], [cf.Clamp(rod.start)], [thrust]), 3, load_factor=1.0, elements=4)
+    flutters = found.eigenvalues[np.abs(found.growth_rates) > 1e-3]
+    assert flutters[0].real > 0 > flutters[1].real and np.ptp(np.abs(flutters)) < 1e-6
+
+
 @pytest.mark.serial
 def test_a_dashpot_at_the_end_may_overdamp(truth):
     """Roots of Euler's beam with a dashpot c = 2 and Kelvin-Voigt's damping; shear changes the third by about 4e-6."""

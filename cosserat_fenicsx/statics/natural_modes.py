@@ -59,6 +59,8 @@ _CORRECTIONS = 10  # Newton iterations after the added constraints of a mechanis
 _OF_SQUARES, _OF_EIGENVALUES = 2, 4
 # Sizes below this share of the largest eigenvalue, such as of free motions, count as that where others follow them.
 _LEAST = 1e-9
+# Relative difference of distances from a point, of complex eigenvalues, that rounding may leave.
+_AS_FAR = 1e-8
 # Sine of the angle between a vector and the axis of a rotation below which it has the axis's direction; arc lengths, as
 # shares of a rod, where that is tried.
 _ALONG, _TRIED = 1e-9, np.array([0.0, 0.31, 0.73, 1.0])
@@ -209,7 +211,11 @@ def _result(scene, found, error, comm, point=0.0):
     """The `Modes` of an `_OnMesh`, complex ones by the distance from a point."""
     values, shapes, rounding, rotation = found.numbers, found.shapes, found.rounding, _rotation(scene)
     if found.complex:
-        order = np.argsort(np.abs(values - point), kind="stable")
+        away = np.abs(values - point)
+        order = np.argsort(away, kind="stable")
+        # of those as far from the point, as pairs that grow and decay at one frequency, the one that grows is first
+        apart = np.cumsum(np.diff(away[order], prepend=0.0) > _AS_FAR * away[order])
+        order = order[np.lexsort((-np.round(values.real / np.abs(values).clip(1e-300), 6)[order], apart))]
         values, shapes, error, rounding = values[order], shapes[order], error[order], rounding[order]
     else:
         values = np.sqrt(np.maximum(-values, 0.0)) + 1j * np.sqrt(np.maximum(values, 0.0))
