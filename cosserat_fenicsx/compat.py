@@ -128,9 +128,27 @@ if _VERSION < (0, 8):
         return ufl.Mesh(ufl.VectorElement("Lagrange", cell, 1, variant="equispaced"))
 
     def create_interval_mesh(comm, cells, x):
-        """A mesh of intervals on a line from `cells (n, 2)` and `x (m, 1)`, given on rank 0 alone."""
+        """A mesh of chains of intervals on a line from `cells (n, 2)`, chain after chain, and `x (m, 1)`, given on rank
+        0 alone; and the number in `cells` of every local cell."""
         one = {"partitioner": _of_one_rank} if comm.size == 1 else {}
-        return dolfinx_mesh.create_mesh(comm, cells, x, interval_domain(), **one)
+        if comm.size > 1 or len(x) - len(cells) < _MANY_CHAINS:
+            made = dolfinx_mesh.create_mesh(comm, cells, x, interval_domain(), **one)
+            return made, made.topology.original_cell_index
+        # dolfinx looks for an order of cells and vertices for a time that grows by the square of the number of chains,
+        # and finds the given one: take the geometry of a single chain through all vertices, with the cells of this mesh
+        ends, vertices = np.arange(len(x)), cpp.graph.AdjacencyList_int32
+        whole = dolfinx_mesh.create_mesh(comm, np.column_stack([ends[:-1], ends[1:]]), x, interval_domain(), **one)
+        if not np.array_equal(whole.geometry.input_global_indices, ends):
+            raise RuntimeError("this release of dolfinx reorders a chain of intervals: a defect of cosserat_fenicsx")
+        whole.geometry.dofmap.array[: cells.size] = cells.ravel()
+        topology = cpp.mesh.Topology(comm, cpp.mesh.CellType.interval)
+        for dimension, entities in enumerate((ends[:, None], cells)):
+            topology.set_index_map(dimension, cpp.common.IndexMap(comm, len(entities)))
+            topology.set_connectivity(vertices(entities.astype(np.int32)), dimension, 0)
+        made = cpp.mesh.Mesh(comm, topology, whole.geometry)
+        return dolfinx_mesh.Mesh(made, interval_domain()), np.arange(len(cells))
+
+    _MANY_CHAINS = 100
 
     def _of_one_rank(comm, ranks, dimension, cells, ghosts):
         """Where cells belong, without the search that dolfinx makes on one rank too."""
@@ -197,7 +215,8 @@ else:  # the same functions, see above
         return ufl.Mesh(basix.ufl.element("Lagrange", "interval", 1, shape=(1,)))
 
     def create_interval_mesh(comm, cells, x):
-        return _mesh(comm, cells, x, basix.ufl.element("Lagrange", "interval", 1, shape=(1,)))
+        made = _mesh(comm, cells, x, basix.ufl.element("Lagrange", "interval", 1, shape=(1,)))
+        return made, made.topology.original_cell_index
 
     def create_solid_mesh(comm, cells, x):
         return _mesh(comm, cells, x, basix.ufl.element("Lagrange", "hexahedron", 2, shape=(3,)))

@@ -5,8 +5,13 @@ from pathlib import Path
 import meshio
 import numpy as np
 import pytest
+import ufl
+from dolfinx import fem
+from mpi4py import MPI
 
 import cosserat_fenicsx as cf
+from cosserat_fenicsx import compat
+from cosserat_fenicsx.models.rodmesh import RodMesh
 from cosserat_fenicsx.numerics import conjugate_product
 from cosserat_fenicsx.parts import to_data
 
@@ -328,3 +333,18 @@ def test_what_is_printed_of_many_rods_fits_a_screen():
     assert "rod5 and 64 more" in printed["scene"]
     told = explain(scene, (0.0, 1.0), {})
     assert "70 rods 'rod0'" in told and "length 3 to 4 m" in told and len(told) < 3000
+
+
+def test_the_mesh_of_many_chains_has_each_element_in_its_place():
+    counts = 1 + np.arange(120) % 3
+    ends = [np.linspace(0.0, 1.0 + k, n + 1) for k, n in enumerate(counts)]
+    many = RodMesh(MPI.COMM_SELF, counts)
+    many.place(ends)
+    space = compat.function_space(many.mesh, compat.lagrange(many.mesh, 2, 1))
+    assert sorted(many.cells) == [*range(counts.sum())]
+    assert sorted(many.slots(space, 2)) == [*range(2 * counts.sum() + 120)]
+    x = many.mesh.geometry.x[compat.geometry_dofs(many.mesh)[: len(many.cells)], 0]
+    starts, stops = (np.concatenate([e[part] for e in ends]) for part in (slice(-1), slice(1, None)))
+    np.testing.assert_array_equal(np.sort(x, axis=1), np.column_stack([starts, stops])[many.cells])
+    one = fem.assemble_scalar(fem.form(1.0 * ufl.dx(domain=many.mesh)))
+    assert one == pytest.approx(sum(e[-1] for e in ends), rel=1e-12)

@@ -225,9 +225,9 @@ class RodMesh:
             x = np.arange(first_vertex[-1], dtype=float)[:, None]  # placed later, by `place`
         else:
             cells, x = np.empty((0, 2), dtype=np.int64), np.empty((0, 1))
-        self.mesh = compat.create_interval_mesh(comm, cells, x)
+        self.mesh, numbers = compat.create_interval_mesh(comm, cells, x)
         #: the scene's number of every local element, ghosts included; int64 also where a rank has none
-        self.cells = np.asarray(self.mesh.topology.original_cell_index, dtype=np.int64)
+        self.cells = np.asarray(numbers, dtype=np.int64)
         self.cell_rod, self.cell_inner = rods[self.cells], inner[self.cells]
         ends = compat.geometry_dofs(self.mesh)[: len(self.cells)]
         vertices = np.asarray(self.mesh.geometry.input_global_indices, dtype=np.int64)
