@@ -41,6 +41,8 @@ _SMALLEST = min(MOST.values())
 _OF_STRINGS = ("cosserat_fenicsx.well.", "cosserat_fenicsx.drilling.")
 # Diameters (m) above this are wider than those of wells.
 _WIDEST = 1.5
+# Diameters above this are probably in mm, not in inches.
+_INCHES = 50.0
 # Longer texts of values, such as a rod's, are abbreviated in messages.
 _LONGEST = 100
 
@@ -238,10 +240,9 @@ def doubt_width(owner, field):
     """Warn of a diameter (m) of a hole, or of what is in it, that is probably in inches."""
     diameter = getattr(owner, field)
     if diameter is not None and diameter > _WIDEST:
-        warn(
-            f"{name_of(owner)}.{field} = {diameter:g} m is wider than holes are: is it in inches? 8.5 in are '8.5 in', "
-            "or 0.2159"
-        )
+        asks = "inches? 8.5 in are '8.5 in', or 0.2159"
+        asks = f"mm? {diameter:g} mm are '{diameter:g} mm', or {diameter / 1e3:g}" if diameter > _INCHES else asks
+        warn(f"{name_of(owner)}.{field} = {diameter:g} m is wider than holes are: is it in {asks}")
 
 
 def direction(owner, field, value):

@@ -601,6 +601,7 @@ PIPE = cf.well.DrillPipe(size="5 in 19.50 lb/ft")
     (lambda: cf.well.Sliding("25 klbf", "4 kft-lbf"), ""), (lambda: cf.well.TripIn(weight="25 klbf"), ""),
     (lambda: cf.well.HoleSection(900.0, "9 5/8 in", 0.2, "casing"), "the outer diameter of casing.*casing='9 5/8 in"),
     (lambda: cf.well.HoleSection(900.0, "9 5/8 in", 0.2, "open hole"), ""),
+    (lambda: cf.well.HoleSection(900.0, 216, 0.2), "is it in mm. 216 mm are '216 mm', or 0.216"),
     (lambda: cf.well.Mud(1200.0, flow_inside=3500), "3500 psi are '3500 psi'"),
     (lambda: cf.well.Centraliser(400, 0.2), "400 in are '400 in'"),
     (lambda: cf.drilling.Stribeck(0.8, 0.5, 3.0, radius=4.25), "Stribeck.radius = 4.25 m is wider than holes are"),
