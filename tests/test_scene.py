@@ -240,6 +240,8 @@ def test_an_end_on_a_rod_without_a_joint_is_asked_about():
     assert doubts(beam, on_beam, other, joints=[(on_beam.end, beam.at(1.3)), (other.start, on_beam.end)]) == ()
     assert len(doubts(beam, on_beam, other, held=[other.end], joints=[(other.start, on_beam.end)])) == 1
     assert doubts(beam, on_beam, held=[on_beam.end, beam.at(1.3)]) == ()
+    more = cf.Rod(cf.Line(on_beam.curve.end, (1.3, -1, 0)), section, steel, name="more")
+    assert len(doubts(on_beam, other, more, joints=[(other.start, on_beam.end)])) == 1
     assert doubts(beam, post(beam, 1.3, above=(0, 0.04, 0)), held=["post.start"]) == ()
     tie = cf.Rod(cf.Line((4, 0, 0), (0, 0, 0)), section, steel, name="tie")
     (asked,) = doubts(arch, tie, joints=[(arch.end, tie.start)])

@@ -44,6 +44,8 @@ from cosserat_fenicsx.storage.stored_history import KIND, StoredHistory
 ELEMENTS, DEGREE, TOL = 8, 3, 1e-3
 #: More steps or saved states than these are refused as a mistake.
 MOST_STEPS, MOST_SAVED = 1e9, 1e6
+# Steps between saved times from which on half as many are nearly twice as long.
+_DOUBLED = 8
 
 
 def simulate(
@@ -94,8 +96,8 @@ def simulate(
         elements: elements per rod.
         degree: polynomial degree of r and q, 1 to 4.
         estimate: also compute the motion with half as many elements and steps twice as long, for some 60 % more time;
-            how far it is apart (`History.apart`) is `History.error`: in smooth motions some three times the error. Not
-            with a `folder`.
+            how far the two have been apart up to each time (`History.apart`) is `History.error`: in smooth motions some
+            three times the largest error; in the first steps it may be less. Not with a `folder`.
         folder: folder for states and checkpoints of long runs: the History reads states from there when they are used,
             and keeps none in memory. Whatever ends the run, `resume(folder)` continues it with the same digits. It must
             not hold a motion yet, and all ranks must see it; None keeps the states in memory.
@@ -134,20 +136,24 @@ def simulate(
         stored = folder, {"duration": duration, "tol": tol, "dt": dt, "elements": elements}
     history = _motion(scene, duration, pace, elements, stored, **given)
     if estimate:
-        _estimate(history, duration, (elements + 1) // 2, given)
+        _estimate(history, duration, elements // 2, given)
     return history
 
 
 def _estimate(history, duration, elements, given):
     """Set the errors of a motion by another one with fewer elements and steps twice as long."""
     history.error = np.full(len(history), np.nan)
+    if (np.diff(history.steps) < _DOUBLED).any():  # steps that end at saved times could not be twice as long
+        given = given | {"save_every": None}
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", SceneWarning)  # said already
         try:
-            history.error = history.apart(_motion(history.scene, duration, Doubled(history), elements, None, **given))
-        except NotConverged as problem:
+            apart = history.apart(_motion(history.scene, duration, Doubled(history), elements, None, **given))
+            history.error = np.maximum.accumulate(apart)
+        except (NotConverged, SceneError) as problem:
             history.why.append(f"the motion with half as many elements and steps twice as long fails: {problem}")
         except Interrupted as stopped:
+            history.why.append("the motion that its error is estimated by was interrupted")
             stopped.path = history
             raise
 

@@ -67,8 +67,8 @@ class History(RodResult):
         work: (n,) J, work of loads and prescribed motions, and of actuation that changes, since the start.
         dissipated: (n,) J, energy dissipated by damping since the start.
         balance: (n,) J, kinetic + strain - work + dissipated, minus its value at the start; zero for an exact solution.
-        error: (n,) m, estimated error of the positions of all points, see `simulate(estimate=True)`; None if it was not
-            asked for.
+        error: (n,) m, estimated error of the positions of all points up to each time, see `simulate(estimate=True)`;
+            None if it was not asked for.
         linear_momentum: (n, 3) kg m/s; angular_momentum: (n, 3) kg m^2/s about the inertial origin, inertial.
     """
 
@@ -117,9 +117,9 @@ class History(RodResult):
             yield "The error of positions was not estimated (estimate = true does)."
             return
         if np.isnan(self.error).all():
-            yield "The error of positions could not be estimated: see `why`."
+            yield "The error of positions is not known: `why` says why."
             return
-        k = int(self.error.argmax())
+        k = int(np.nanargmax(self.error))
         words = f"{self.error[k]:.1e} m, {self.error[k] / max(self.scene.lengths):.1e} of the longest rod's length"
         yield units.sentence(f"Positions have an estimated error of at most {words}, at t = {self.times[k]:.4g} s.")
 

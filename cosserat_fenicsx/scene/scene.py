@@ -156,7 +156,7 @@ _THICKEST = 1.5
 # Rolled profiles that are longer, over their heights, are probably given in mm.
 _LONGEST = 500
 # Share of a tube's outer diameter below which its inner one is doubted.
-_THICK_WALL = 0.2
+_SMALL_BORE = 0.2
 # Warnings of one kind that are listed.
 _TOLD = 5
 _PARTS = {
@@ -496,7 +496,7 @@ class Scene(Part):
                 long.append((rod.length, f"'{rod.name}' of {section.name}"))
             across = max(sizes_across(section), default=0.0)
             size = "rod '{}' is {:g} m across and {:g} m long"
-            if isinstance(section, Tube) and section.inner_diameter < _THICK_WALL * section.outer_diameter:
+            if isinstance(section, Tube) and section.inner_diameter < _SMALL_BORE * section.outer_diameter:
                 inner, outer = section.inner_diameter, section.outer_diameter
                 yield (
                     f"the tube of rod '{rod.name}' has a wall of {(outer - inner) / 2:g} m: its second number is the "

@@ -9,8 +9,8 @@ import numpy as np
 
 from cosserat_fenicsx.errors import SceneError
 from cosserat_fenicsx.numerics import svd
-from cosserat_fenicsx.scene.curves import Line, positions_along
 from cosserat_fenicsx.scene.action import some_of
+from cosserat_fenicsx.scene.curves import Line, positions_along
 from cosserat_fenicsx.scene.sections import sizes_across
 from cosserat_fenicsx.scene.supports import Clamp, Hinge, Joint, Pin, PositionTie, TurnTie
 
@@ -56,6 +56,7 @@ class Groups:
     def joined(self):
         """All members that are not the leaders of their groups."""
         return self._above.keys()
+
 
 # Singular values below this, over the largest, are zero.
 _RANK_TOLERANCE = 1e-9
@@ -416,13 +417,15 @@ def touching(scene):
             x, distance = _nearest(curves[k[i]], ends[end[i]], *along[begin[i] + [0, 2]])
             if distance <= limit and distance < found.get(key, (0.0, np.inf))[1]:
                 found[key] = x, distance
-    pairs = []
+    pairs, known = [], set()
     for (end, k), (x, distance) in sorted(found.items()):
         if min(x, 1 - x) * lengths[k] <= max(distance, rounding[k]):
             other = rods[k].end if x > 0.5 else rods[k].start
         else:
             other = rods[k].at(float(f"{x * lengths[k]:.12g}"))
-        if not (end in held and points.least(other) in held):
+        pair = end, points.least(other)  # one of those that are joined to each other
+        if pair not in known and not (end in held and pair[1] in held):
+            known.add(pair)
             pairs.append((rods[end // 2].end if end % 2 else rods[end // 2].start, other, distance))
     return pairs
 
