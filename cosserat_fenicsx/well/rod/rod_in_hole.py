@@ -210,7 +210,7 @@ class _Job(NamedTuple):
 def _finer(string, count, before, job):
     """The `InHole` on a mesh of `count` elements, from the `InHole` on the mesh before, or from the start in stages."""
     if before is not None:
-        parts = _MESHES.parts if count <= _MESHES.finer * before.path.elements[0] else _MESHES.asked
+        parts = _MESHES.parts if count <= _MESHES.finer * before.path.layout.counts[0] else _MESHES.asked
         layout = _divided(string, before.path.layout, _wanted(before, parts), count)
         near = LAST_TWO if before.estimates.ratio <= _WALLS.regular else DECADES
         near = LAST if max(before.of_stiffness, UNSEEN) <= _WALLS.too_soft * job.tol else near

@@ -34,7 +34,7 @@ def assembled_vector(form):
 def unit_mesh(elements):
     """The interval [0, 1] in equal elements."""
     ends = np.column_stack([np.arange(elements), np.arange(1, elements + 1)]).astype(np.int64)
-    return compat.create_interval_mesh(MPI.COMM_SELF, ends, np.linspace(0, 1, elements + 1)[:, None])
+    return compat.create_interval_mesh(MPI.COMM_SELF, ends, np.linspace(0, 1, elements + 1)[:, None])[0]
 
 
 class TruncatedColumn:
