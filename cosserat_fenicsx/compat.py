@@ -127,6 +127,9 @@ if _VERSION < (0, 8):
         # FFCx 0.5 gives the element this variant when it compiles: signatures before and after must be equal
         return ufl.Mesh(ufl.VectorElement("Lagrange", cell, 1, variant="equispaced"))
 
+    # Chains from which on their mesh is made without the search of dolfinx.
+    _MANY_CHAINS = 100
+
     def create_interval_mesh(comm, cells, x):
         """A mesh of chains of intervals on a line from `cells (n, 2)`, chain after chain, and `x (m, 1)`, given on rank
         0 alone; and the number in `cells` of every local cell."""
@@ -147,8 +150,6 @@ if _VERSION < (0, 8):
             topology.set_connectivity(vertices(entities.astype(np.int32)), dimension, 0)
         made = cpp.mesh.Mesh(comm, topology, whole.geometry)
         return dolfinx_mesh.Mesh(made, interval_domain()), np.arange(len(cells))
-
-    _MANY_CHAINS = 100
 
     def _of_one_rank(comm, ranks, dimension, cells, ghosts):
         """Where cells belong, without the search that dolfinx makes on one rank too."""

@@ -497,6 +497,8 @@ REFUSED_NAMES = {
     "its nearest": (lambda r: cf.Scene(r, [cf.Clamp("pots.start")]), "did you mean 'post'?"),
     "no station": (lambda r: cf.Scene(r, [cf.Clamp("post")]), "it is a rod, expected 'post.start', 'post.end' or"),
     "a load as a support": (lambda r: cf.Scene(r, [cf.Force("post.end", (0, 0, -1))]), "Force at post.end belongs in"),
+    "a joint as a support": (lambda r: cf.Scene(r, [cf.Joint("post.end", "beam.start")]), "Joint belongs in joints="),
+    "a list as a station": (lambda r: cf.Scene(r).station(["post.end"]), "station = ['post.end']: expected 'rod"),
     "an unknown rod": (lambda r: cf.Scene(r, (), [cf.Foundation("pier", 1.0)]), "Scene.loads[0].rod = 'pier'"),
     "a place inside a wall": (
         lambda r: cf.Scene(r, (), [cf.Wall("beam", (0, 0, 0), (0, 0, 1), 0.1)]), "rod 'beam' lies beyond its surface"),

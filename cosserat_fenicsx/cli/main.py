@@ -13,7 +13,6 @@ from cosserat_fenicsx import __version__, interrupts
 from cosserat_fenicsx.cli.output import BAD_INPUT, DONE, INTERRUPTED, in_words, say, together, warnings_in_words
 from cosserat_fenicsx.errors import CosseratError, SceneError, nearest
 
-
 # What to use in place of commands that do not exist.
 _RELATED = dict.fromkeys(("plot", "draw", "view", "show", "picture"), "`cosserat run SCENE -o DIR` draws pictures")
 _RELATED |= dict.fromkeys(("solve", "simulate"), "`cosserat run SCENE` does that")

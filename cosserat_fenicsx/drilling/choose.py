@@ -1,5 +1,6 @@
 """The choice of the model of a drill-string in motion, its reasons, and what the model leaves out."""
 
+import warnings
 from functools import partial
 
 import numpy as np
@@ -8,7 +9,7 @@ from cosserat_fenicsx.checks import refuse
 from cosserat_fenicsx.drilling.elements import AxialTorsional
 from cosserat_fenicsx.drilling.torsion import TorsionWaves
 from cosserat_fenicsx.drilling.wall_friction import law_of, rotating
-from cosserat_fenicsx.errors import NotConverged, SceneError, nearest
+from cosserat_fenicsx.errors import NotConverged, SceneError, SceneWarning, nearest
 from cosserat_fenicsx.well import criteria
 from cosserat_fenicsx.well.operations import TripIn, TripOut
 from cosserat_fenicsx.well.solve import torque_and_drag
@@ -115,12 +116,6 @@ def _buckled(scene, name):
     ]
 
 
-class _Up(TripOut):
-    """Of a block that moves up while the bit still presses."""
-
-    pressed = 0
-
-
 def _operations(scene):
     """Steady operations, of which the one that compresses the string most is not known in advance."""
     bit, weight = scene.bit, _heaviest(scene)
@@ -132,7 +127,11 @@ def _operations(scene):
     if scene.hook is not None:
         signal = scene.hook.signal()
         speeds = [signal(t) for t in (0.0, *signal.jumps)]
-        yield from (kind(weight) for kind, there in ((TripIn, min(speeds) < 0), (_Up, max(speeds) > 0)) if there)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", SceneWarning)  # the block moves up while the bit still presses
+            moves = (TripIn, min(speeds) < 0), (TripOut, max(speeds) > 0)
+            moves = [kind(weight) for kind, there in moves if there]
+        yield from moves
 
 
 def _with_friction(scene):

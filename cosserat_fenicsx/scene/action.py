@@ -289,7 +289,7 @@ def some_of(texts, most=6):
     return ", ".join(texts[:most] if more else texts) + more
 
 
-def _name_of(item):
+def part_in_words(item):
     """A part of a scene in messages: as `describe`, or by its name or class."""
     return describe(item) if hasattr(item, "station") else getattr(item, "name", type(item).__name__)
 
@@ -320,7 +320,7 @@ def unpicklable(scene):
         return ""
     for group in ("rods", "loads", "supports", "velocities"):  # all other parts only refer to rods
         items = list(enumerate(getattr(scene, group)))
-        names = [f"{group}[{i}] ({_name_of(item)})" for i, item in items if not _pickles(item)]
+        names = [f"{group}[{i}] ({part_in_words(item)})" for i, item in items if not _pickles(item)]
         if names:
             return ", ".join(names)
     return "the scene"

@@ -231,10 +231,10 @@ def station_named(where, text, rods):
     """The station 'rod.start', 'rod.end' or 'rod@s' (m) of {name: rod}; a SceneError of `where` for others."""
     known = ", ".join([*rods][:_NAMED]) + (", ..." if len(rods) > _NAMED else "")
     expected = f"expected 'rod.start', 'rod.end' or 'rod@s' with s in m and the rod one of {known}"
-    if text in rods:
-        expected = f"it is a rod, expected '{text}.start', '{text}.end' or '{text}@s' with s in m"
     if not isinstance(text, str):
         raise SceneError(f"{where} = {text!r}: {expected}")
+    if text in rods:
+        expected = f"it is a rod, expected '{text}.start', '{text}.end' or '{text}@s' with s in m"
     if "@" in text:
         name, _, s = text.partition("@")
         try:

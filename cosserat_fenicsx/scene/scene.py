@@ -15,7 +15,7 @@ import numpy as np
 from cosserat_fenicsx.checks import instance, refuse, store, warn
 from cosserat_fenicsx.errors import SceneError, nearest
 from cosserat_fenicsx.parts import Items, Object, Part, concerning
-from cosserat_fenicsx.scene.action import Action, describe, powers, some_of
+from cosserat_fenicsx.scene.action import Action, describe, part_in_words, powers, some_of
 from cosserat_fenicsx.scene.curves import Line, Spline
 from cosserat_fenicsx.scene.planes import bent_weakly, find_plane
 from cosserat_fenicsx.scene.profiles import Stiffnesses
@@ -170,7 +170,7 @@ _PARTS = {
 def _where_it_belongs(item):
     """The list of a scene that takes an item, in words; "" where none does."""
     field = next((name for name, (kind, _) in _PARTS.items() if isinstance(item, kind)), None)
-    return f"; {describe(item)} belongs in {field}=, Scene(rods, supports, loads, joints)" if field else ""
+    return f"; {part_in_words(item)} belongs in {field}=, Scene(rods, supports, loads, joints)" if field else ""
 
 
 @dataclass(frozen=True, eq=False)

@@ -87,9 +87,10 @@ class HoleSection(Part):
         if self.diameter is None:
             refuse(self, "diameter", None, "a diameter (m), or the size of a casing, casing='9 5/8 in 47 lb/ft'")
         doubt_width(self, "diameter")
-        outside = {size: row["outer_diameter"] for size, row in standard_sizes()["Casing"].items()}
-        alike = [size for size, width in outside.items() if abs(width - self.diameter) < 1e-5]
-        if alike and not self.casing and "casing" in self.name.lower():
+        called_casing = not self.casing and "casing" in self.name.lower()
+        sizes = standard_sizes()["Casing"] if called_casing else {}
+        alike = [size for size, row in sizes.items() if abs(row["outer_diameter"] - self.diameter) < 1e-5]
+        if alike:
             warn(f"HoleSection.diameter = {self.diameter:g} m is the outer diameter of casing; inside it is less: give "
                  f"casing='{alike[0]}' in the place of the diameter, or the inner diameter")  # fmt: skip
         doubt_value("friction", f"HoleSection.friction = {self.friction:g}", np.array([self.friction]))

@@ -12,9 +12,9 @@ from cosserat_fenicsx.well import criteria
 from cosserat_fenicsx.well.components import Bit, DrillPipe
 from cosserat_fenicsx.well.contacts import ROUGH, stretches
 
-# A sentence with a word in capitals is a warning.
 # What the sentence on the accuracy says too.
 _SAID = re.compile(r"NOT ENOUGH for tol = \S+ in the ")
+# A sentence with a word in capitals is a warning.
 _WARNS = re.compile(r"\b[A-Z]{4,}\b")
 
 
